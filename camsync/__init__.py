@@ -1,0 +1,31 @@
+"""Frame pulses over TCP: every camera takes frame n when pulse n comes."""
+
+from camsync.client import PulseClient
+from camsync.limits import ServerLimits
+from camsync.peer import ClientInfo
+from camsync.protocol import VERSION
+from camsync.pulse import (
+    AxisLostError,
+    ClientSettings,
+    Pulse,
+    ReplacedError,
+    SyncError,
+    SyncStatus,
+    VersionError,
+)
+from camsync.server import PulseServer
+
+__all__ = [
+    "VERSION",
+    "AxisLostError",
+    "ClientInfo",
+    "ClientSettings",
+    "Pulse",
+    "PulseClient",
+    "PulseServer",
+    "ReplacedError",
+    "ServerLimits",
+    "SyncError",
+    "SyncStatus",
+    "VersionError",
+]

@@ -1,0 +1,26 @@
+"""How much a pulse server bears from its clients, and when it gives a pulse up."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class ServerLimits:
+    """Settings of a PulseServer that are right for nearly everyone."""
+
+    catch_up: float = 0.5
+    """Seconds that the server may be late and still send every pulse; later, it skips to the current one."""
+    adopt_for: float = 30.0
+    """Seconds after the first pulse in which clients that have counted further may move the axis forward:
+    the expected ones, or all where nobody is expected. A server long running follows nobody."""
+    backlog: int = 4096
+    """Bytes waiting for one client before pulses are dropped for it (a pulse has about 30)."""
+    cut_off: float = 10.0
+    """Seconds a client may stay behind, or not acknowledge what was sent, before it is cut off."""
+    clients: int = 256
+    """Connections at once; more are refused."""
+    line_burst: float = 100.0
+    """Lines that a client may send at once."""
+    line_rate: float = 20.0
+    """Lines per second that a client may send in the long run; beyond, it is cut off."""

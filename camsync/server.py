@@ -1,0 +1,234 @@
+"""The pulse server: frame pulses over TCP (paper section IV.B, the synchronization server)."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Collection
+from types import TracebackType
+from typing import Self
+
+from camsync.axis import PulseAxis
+from camsync.clock import Clock, steady_unix_clock
+from camsync.hub import Hub
+from camsync.limits import ServerLimits
+from camsync.messages import Beat, Greeting, Hello, Wait
+from camsync.peer import ClientInfo
+from camsync.protocol import VERSION, encode, is_name
+
+_log = logging.getLogger(__name__)
+MAX_FPS = 10_000.0  # pulses per second that a server takes as a rate
+
+
+class PulseServer:
+    """Sends pulse n to every client when it is due, at ``epoch + n / fps``, and waits for none of them.
+
+    Pulse 0 is sent once all clients named in ``expect`` have said HELLO, or ``start_timeout`` seconds after
+    ``start()`` (0, or nobody expected: at once). Who joins later gets the current pulse next.
+
+    The numbers only rise. They skip when the machine slept or stalled for more than ``limits.catch_up``
+    (no burst of old pulses), and when a client that has counted further returns to a restarted server:
+    the first such client ends the wait, and the axis goes on where the clients' own count has got to.
+
+    ``host`` None listens on all interfaces; ``port`` 0 takes a free one (see ``port``). With ``max_pulses``
+    the server falls silent before that pulse number. Not thread-safe: one event loop.
+
+    Raises:
+        ValueError: a rate out of range or an expected name that no client could say.
+    """
+
+    def __init__(
+        self,
+        fps: float,
+        *,
+        expect: Collection[str] = (),
+        start_timeout: float = 10.0,
+        host: str | None = "127.0.0.1",
+        port: int = 0,
+        max_pulses: int | None = None,
+        limits: ServerLimits | None = None,
+        clock: Clock | None = None,
+    ) -> None:
+        if not 0.0 < fps <= MAX_FPS:
+            raise ValueError(f"fps must be above 0 and at most {MAX_FPS:.0f}, not {fps}")
+        wrong = sorted(name for name in expect if not is_name(name))
+        if wrong:
+            raise ValueError(f"{wrong[0]!r} cannot be a client's name: letters, digits, '.', '_', '-'")
+        self._fps = fps
+        self._expect = frozenset(expect)
+        self._start_timeout = start_timeout
+        self._host = host
+        self._port = port
+        self._max_pulses = max_pulses
+        self._limits = limits or ServerLimits()
+        self._clock = clock or steady_unix_clock()
+        self._hub = Hub(self._clock, self._limits, self._greet, self._heard, self._changed)
+        self._server: asyncio.Server | None = None
+        self._timer: asyncio.TimerHandle | None = None
+        self._axis: PulseAxis | None = None
+        self._begun_at = 0.0
+        self._next = 0
+        self._pulse: int | None = None
+        self._skipped = 0
+        self._begun = asyncio.Event()
+        self._ended = asyncio.Event()
+
+    @property
+    def fps(self) -> float:
+        """Pulses per second."""
+        return self._fps
+
+    @property
+    def port(self) -> int:
+        """The TCP port listened on (0 before ``start()`` if the system is to choose)."""
+        sockets = self._server.sockets if self._server else ()
+        return int(sockets[0].getsockname()[1]) if sockets else self._port
+
+    @property
+    def pulse(self) -> int | None:
+        """The last pulse sent; None before the first."""
+        return self._pulse
+
+    @property
+    def epoch(self) -> float | None:
+        """When pulse 0 was due (unix seconds, server clock); None before the first pulse."""
+        return self._axis.epoch if self._axis else None
+
+    @property
+    def skipped(self) -> int:
+        """Pulse numbers never sent because the server was stalled or moved its axis forward."""
+        return self._skipped
+
+    def clients(self) -> tuple[ClientInfo, ...]:
+        """Give everybody connected, in the order of joining."""
+        return self._hub.clients()
+
+    def missing(self) -> tuple[str, ...]:
+        """Give the expected names that are not connected, sorted."""
+        return tuple(sorted(self._expect - self._hub.names()))
+
+    async def start(self) -> None:
+        """Listen.
+
+        Raises:
+            OSError: the address cannot be listened on (port in use, no such interface); the text says which.
+        """
+        loop = asyncio.get_running_loop()
+        try:
+            self._server = await loop.create_server(self._hub.new_peer, self._host, self._port)
+        except OSError as error:
+            where = f"{self._host or '*'}:{self._port}"
+            raise OSError(
+                error.errno, f"the pulse server cannot listen on {where}: {error.strerror}"
+            ) from error
+        if self._expect and self._start_timeout > 0.0:
+            self._timer = loop.call_later(self._start_timeout, self._begin_without)
+        else:
+            self._begin(PulseAxis(self._clock(), self._fps), 0)
+
+    async def stop(self) -> None:
+        """Stop sending, end all connections, free the port."""
+        self._cancel_timer()
+        self._ended.set()
+        if self._server is None:
+            return
+        self._server.close()
+        self._hub.close()
+        await self._server.wait_closed()
+        self._server = None
+
+    async def wait_begun(self) -> None:
+        """Return once the first pulse is scheduled."""
+        await self._begun.wait()
+
+    async def wait_ended(self) -> None:
+        """Return once ``max_pulses`` is reached or the server was stopped."""
+        await self._ended.wait()
+
+    async def __aenter__(self) -> Self:
+        await self.start()
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        await self.stop()
+
+    def _greet(self) -> bytes:
+        greeting = encode(Greeting(VERSION, self._fps, self._clock(), self._pulse))
+        return greeting if self._axis else greeting + self._wait_line()
+
+    def _wait_line(self) -> bytes:
+        missing = self.missing()
+        return encode(Wait(missing)) if missing else b""
+
+    def _heard(self, hello: Hello) -> None:
+        """Go on with the axis that a client brings from before this server was started."""
+        if hello.known is None or (self._expect and hello.name not in self._expect):
+            return
+        now = self._clock()
+        axis = PulseAxis.through(hello.known.number, now - hello.known.ago, self._fps)
+        first = axis.number_at(now) + 1
+        if self._axis is None:
+            _log.info("%s has counted to %d: going on from there", hello.name, hello.known.number)
+            self._begin(axis, first)
+        # One pulse ahead is the error of measurement, not another axis.
+        elif now - self._begun_at <= self._limits.adopt_for and first > self._axis.number_at(now) + 2:
+            _log.warning("%s has counted to %d: moving forward to it", hello.name, hello.known.number)
+            self._skipped += max(0, first - self._next)
+            self._axis, self._next = axis, first
+            self._schedule()
+
+    def _changed(self) -> None:
+        """Begin if nobody is missing any more, or say who is."""
+        if self._axis is not None or self._ended.is_set():
+            return
+        line = self._wait_line()
+        if line:
+            self._hub.tell(line)
+        else:
+            self._begin(PulseAxis(self._clock(), self._fps), 0)
+
+    def _begin_without(self) -> None:
+        _log.warning("beginning without %s", ", ".join(self.missing()))
+        self._begin(PulseAxis(self._clock(), self._fps), 0)
+
+    def _begin(self, axis: PulseAxis, first: int) -> None:
+        self._axis = axis
+        self._next = first
+        self._begun_at = self._clock()
+        self._begun.set()
+        self._schedule()
+
+    def _cancel_timer(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+
+    def _schedule(self) -> None:
+        self._cancel_timer()
+        if self._axis is None or self._ended.is_set():
+            return
+        wait = self._axis.due(self._next) - self._clock()
+        self._timer = asyncio.get_running_loop().call_later(max(0.0, wait), self._tick)
+
+    def _tick(self) -> None:
+        """Send what is due; skip what has been due for too long."""
+        if self._axis is None:
+            return
+        now = self._clock()
+        current = self._axis.number_at(now)
+        if now - self._axis.due(self._next) > self._limits.catch_up:
+            _log.warning("late by %d pulses: skipping to %d", current - self._next, current)
+            self._skipped += current - self._next
+            self._next = current
+        while self._next <= current and not self._full():
+            self._hub.pulse(encode(Beat(self._next, self._axis.due(self._next))))
+            self._pulse = self._next
+            self._next += 1
+        self._schedule()
+
+    def _full(self) -> bool:
+        if self._max_pulses is not None and self._next >= self._max_pulses:
+            self._ended.set()
+        return self._ended.is_set()

@@ -1,0 +1,68 @@
+"""What the tests of the pulses share: a client that speaks by hand, as with `nc`; a clock that jumps."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+
+from camsync.clock import Clock, steady_unix_clock
+from camsync.messages import Beat, ServerLine
+from camsync.protocol import parse_server_line
+
+PATIENCE = 20.0  # seconds until a test that awaits something has failed
+
+
+@dataclass
+class ByHand:
+    """A bare TCP connection to a pulse server."""
+
+    reader: asyncio.StreamReader
+    writer: asyncio.StreamWriter
+
+    async def line(self) -> bytes:
+        async with asyncio.timeout(PATIENCE):
+            return await self.reader.readline()
+
+    async def message(self) -> ServerLine | None:
+        line = await self.line()
+        assert line.endswith(b"\n"), f"the server hung up after {line!r}"
+        return parse_server_line(line.removesuffix(b"\n"))
+
+    async def beat(self) -> Beat:
+        while True:
+            message = await self.message()
+            if isinstance(message, Beat):
+                return message
+
+    async def other(self) -> ServerLine | None:
+        """Give the next message that is no pulse."""
+        while True:
+            message = await self.message()
+            if not isinstance(message, Beat):
+                return message
+
+    async def ended(self) -> bytes:
+        """Read until the server hangs up; give all it said."""
+        async with asyncio.timeout(PATIENCE):
+            try:
+                return await self.reader.read(-1)
+            except ConnectionError:
+                return b""
+
+    def say(self, data: bytes) -> None:
+        self.writer.write(data)
+
+
+class JumpingClock:
+    """The steady clock, plus the jumps it was told to make."""
+
+    def __init__(self) -> None:
+        self._clock: Clock = steady_unix_clock()
+        self.jumped = 0.0
+
+    def __call__(self) -> float:
+        return self._clock() + self.jumped
+
+
+Connect = Callable[..., Awaitable[ByHand]]

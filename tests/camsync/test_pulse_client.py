@@ -1,0 +1,280 @@
+"""The client with a real server: iterating, counting what is missed, measuring the clock."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+import sys
+import time
+from collections.abc import AsyncIterator, Callable
+from contextlib import ExitStack, asynccontextmanager
+from pathlib import Path
+
+import pytest
+from pulses_by_hand import PATIENCE, JumpingClock
+
+import camsync
+from camsync import ClientSettings, Pulse, PulseClient, PulseServer, ReplacedError, SyncError, VersionError
+from camsync.axis import PulseAxis
+from camsync.clock import steady_unix_clock
+from camsync.messages import Beat, Greeting
+from camsync.protocol import encode
+
+FPS = 400.0
+QUICK = ClientSettings(backoff_first=0.01, backoff_most=0.05, ping_interval=0.05, silence=0.3)
+
+
+async def take(client: PulseClient, count: int) -> list[Pulse]:
+    async with asyncio.timeout(PATIENCE):
+        return [await anext(client) for _ in range(count)]
+
+
+@asynccontextmanager
+async def pretended_server(answer: Callable[[], bytes]) -> AsyncIterator[tuple[int, asyncio.Semaphore]]:
+    """Say ``answer()`` to every connection and no more; give the port, and a semaphore that counts them."""
+    loop = asyncio.get_running_loop()
+    calls = asyncio.Semaphore(0)
+    with ExitStack() as stack:
+        listener = stack.enter_context(socket.create_server(("127.0.0.1", 0)))
+        listener.settimeout(0.0)
+
+        async def serve() -> None:
+            while True:
+                connection, _ = await loop.sock_accept(listener)
+                stack.enter_context(connection)
+                connection.sendall(answer())
+                calls.release()
+
+        serving = asyncio.create_task(serve())
+        yield listener.getsockname()[1], calls
+        serving.cancel()
+        await asyncio.gather(serving, return_exceptions=True)
+
+
+async def counted(client: PulseClient, number: int) -> None:
+    """Return when the client has counted to ``number``, taking nothing from it."""
+    async with asyncio.timeout(PATIENCE):
+        while (client.status().pulse or 0) < number:  # noqa: ASYNC110 — only taking pulses would be an event
+            await asyncio.sleep(0)
+
+
+async def test_clients_that_are_expected_all_get_every_pulse_from_the_first_on() -> None:
+    names = ["c0", "c1", "bestview"]
+    async with PulseServer(FPS, expect=names) as server:
+        clients = [PulseClient("127.0.0.1", server.port, name) for name in names]
+        heard = await asyncio.gather(*(take(client, 100) for client in clients))
+        for pulses in heard:
+            assert [pulse.number for pulse in pulses] == list(range(100))
+            assert not any(pulse.missed or pulse.own for pulse in pulses)
+        for same in zip(*heard, strict=True):
+            dues = [pulse.due for pulse in same]
+            assert max(dues) - min(dues) < 0.05
+        assert {info.name for info in server.clients()} == set(names)
+        for client in clients:
+            assert client.status().fps == FPS
+            await client.close()
+
+
+async def test_dues_are_a_frame_apart_and_pulses_come_after_them() -> None:
+    async with PulseServer(FPS) as server, PulseClient("127.0.0.1", server.port, "c0") as client:
+        pulses = await take(client, 200)
+        first = pulses[0]
+        for pulse in pulses:
+            # The offset to a server on the same machine is measured well within a few milliseconds.
+            assert pulse.due == pytest.approx(first.due + (pulse.number - first.number) / FPS, abs=0.02)
+            assert pulse.received > pulse.due - 0.02
+
+
+async def test_the_offset_of_the_servers_clock_is_measured(jumping_clock: JumpingClock) -> None:
+    jumping_clock.jumped = 1234.5
+    async with (
+        PulseServer(FPS, clock=jumping_clock) as server,
+        PulseClient("127.0.0.1", server.port, "c0", settings=QUICK) as client,
+    ):
+        async with asyncio.timeout(PATIENCE):
+            while (await anext(client)).number >= 0 and client.status().round_trip is None:
+                pass
+        status = client.status()
+        assert status.offset == pytest.approx(1234.5, abs=0.05)
+        assert status.round_trip is not None
+        assert 0.0 <= status.round_trip < 0.5
+        (pulse,) = await take(client, 1)
+        assert pulse.due == pytest.approx(client.now(), abs=1.0)
+
+
+async def test_a_slow_consumer_is_told_what_it_missed() -> None:
+    settings = ClientSettings(queue=1)
+    async with (
+        PulseServer(FPS) as server,
+        PulseClient("127.0.0.1", server.port, "c0", settings=settings) as client,
+    ):
+        (first,) = await take(client, 1)
+        await counted(client, first.number + 30)
+        newest = client.status().pulse
+        (late,) = await take(client, 1)
+        assert late.number == newest
+        assert late.missed == late.number - first.number - 1
+        assert client.missed == late.missed
+
+
+async def test_a_short_stall_of_the_consumer_costs_nothing() -> None:
+    async with PulseServer(FPS) as server, PulseClient("127.0.0.1", server.port, "c0") as client:
+        (first,) = await take(client, 1)
+        await counted(client, first.number + 40)
+        numbers = [pulse.number for pulse in await take(client, 60)]
+        assert numbers == list(range(first.number + 1, first.number + 61))
+        assert client.missed == 0
+
+
+async def test_a_process_that_was_held_up_takes_the_pulses_that_lie_unread() -> None:
+    server = await asyncio.create_subprocess_exec(
+        sys.executable, "-c", _SERVER, stdout=asyncio.subprocess.PIPE, cwd=Path(camsync.__file__).parents[1]
+    )
+    assert server.stdout is not None
+    port = int(await server.stdout.readline())
+    settings = ClientSettings(catch_up=0.1)  # what is not read is lost
+    try:
+        async with PulseClient("127.0.0.1", port, "c0", settings=settings) as client:
+            (first,) = await take(client, 1)
+            time.sleep(0.7)  # noqa: ASYNC251 — this stall is what is tested
+            numbers = [pulse.number for pulse in await take(client, 40)]
+            assert numbers == list(range(first.number + 1, first.number + 41))
+    finally:
+        server.kill()
+        await server.wait()
+
+
+_SERVER = """
+import asyncio, camsync
+async def main():
+    async with camsync.PulseServer(50.0, expect={"c0"}) as server:
+        print(server.port, flush=True)
+        await server.wait_ended()
+asyncio.run(main())
+"""
+
+
+async def test_skipped_numbers_are_counted_as_missed(jumping_clock: JumpingClock) -> None:
+    async with (
+        PulseServer(FPS, clock=jumping_clock) as server,
+        PulseClient("127.0.0.1", server.port, "c0") as client,
+    ):
+        await take(client, 5)
+        jumping_clock.jumped += 10.0
+        async with asyncio.timeout(PATIENCE):
+            async for pulse in client:
+                if pulse.missed:
+                    break
+        assert pulse.missed > 9.5 * FPS
+        assert client.missed == pulse.missed
+
+
+async def test_the_newer_client_of_a_name_stays_and_the_older_gives_up() -> None:
+    async with PulseServer(FPS) as server, PulseClient("127.0.0.1", server.port, "c0") as older:
+        await take(older, 1)
+        async with PulseClient("127.0.0.1", server.port, "c0") as newer:
+            await take(newer, 5)
+            with pytest.raises(ReplacedError, match="c0"):
+                await take(older, 10_000)
+            await take(newer, 5)
+
+
+async def test_without_a_server_it_waits() -> None:
+    with socket.socket() as held:  # bound and not listening: nobody can be there
+        held.bind(("127.0.0.1", 0))
+        port = held.getsockname()[1]
+        async with PulseClient("127.0.0.1", port, "c0", fps_hint=FPS, settings=QUICK) as client:
+            with pytest.raises(TimeoutError):
+                async with asyncio.timeout(0.2):
+                    await anext(client)
+            assert not client.status().connected
+
+
+async def test_without_a_server_it_counts_alone_if_told_to_and_a_server_takes_the_count_up() -> None:
+    settings = ClientSettings(backoff_first=0.01, backoff_most=0.05, free_run_after=0.05)
+    with socket.socket() as held:
+        held.bind(("127.0.0.1", 0))
+        port = held.getsockname()[1]
+        client = PulseClient("127.0.0.1", port, "c0", fps_hint=FPS, settings=settings)
+        pulses = await take(client, 50)
+    assert [pulse.number for pulse in pulses] == list(range(50))
+    assert all(pulse.own for pulse in pulses)
+    async with PulseServer(FPS, expect={"c0"}, port=port), asyncio.timeout(PATIENCE):
+        number = pulses[-1].number
+        async for pulse in client:
+            assert pulse.number > number
+            number = pulse.number
+            if not pulse.own:
+                break
+    await client.close()
+
+
+async def test_closing_ends_the_iteration() -> None:
+    async with PulseServer(FPS, expect={"c0", "c1"}, start_timeout=1000.0) as server:
+        client = PulseClient("127.0.0.1", server.port, "c0")
+        waiting = asyncio.create_task(take_all(client))
+        async with asyncio.timeout(PATIENCE):
+            while not client.status().waiting_for:  # noqa: ASYNC110 — the client tells no event of this
+                await asyncio.sleep(0)
+        assert "c1" in client.status().waiting_for
+        await client.close()
+        assert await waiting == []
+        await client.close()  # a second time is harmless
+
+
+async def take_all(client: PulseClient) -> list[Pulse]:
+    return [pulse async for pulse in client]
+
+
+async def test_a_server_that_falls_silent_is_left_and_sought_again() -> None:
+    clock = steady_unix_clock()
+    axis = PulseAxis.through(7, clock(), FPS)
+
+    def one_pulse() -> bytes:
+        number = axis.number_at(clock())
+        beat = Beat(number, axis.due(number))
+        return encode(Greeting(1, FPS, clock(), None)) + encode(beat)
+
+    async with (
+        pretended_server(one_pulse) as (port, _),
+        PulseClient("127.0.0.1", port, "c0", settings=QUICK) as client,
+    ):
+        numbers = []
+        while client.status().connections < 3:
+            numbers += [pulse.number for pulse in await take(client, 1)]
+        assert numbers == sorted(set(numbers))
+        assert client.status().own > 0
+
+
+@pytest.mark.parametrize("noise", [b"HTTP/1.1 400 Bad Request\r\n\r\n", b"\x00\xff" * 10, b"x" * 50_000])
+async def test_something_else_on_that_port_is_not_a_server(noise: bytes) -> None:
+    async with (
+        pretended_server(lambda: noise) as (port, calls),
+        PulseClient("127.0.0.1", port, "c0", settings=QUICK) as client,
+    ):
+        async with asyncio.timeout(PATIENCE):
+            await calls.acquire()
+            await calls.acquire()  # it has hung up and tried again
+        assert client.status().connections == 0
+
+
+async def test_a_server_of_another_version_is_an_error() -> None:
+    async with (
+        pretended_server(lambda: b"MYVIEW-SYNC 2 rate:25\n") as (port, _),
+        PulseClient("127.0.0.1", port, "c0") as client,
+    ):
+        with pytest.raises(VersionError, match="version 2"):
+            await take(client, 1)
+
+
+async def test_a_host_name_that_can_be_nobodys_is_an_error() -> None:
+    async with PulseClient("two..dots", 1, "c0", settings=QUICK) as client:
+        with pytest.raises(SyncError, match=r"two\.\.dots"):
+            await take(client, 1)
+
+
+def test_an_impossible_name_or_rate_is_refused() -> None:
+    with pytest.raises(ValueError, match="a b"):
+        PulseClient("127.0.0.1", 1, "a b")
+    with pytest.raises(ValueError, match="fps_hint"):
+        PulseClient("127.0.0.1", 1, "c0", fps_hint=0.0)

@@ -1,0 +1,131 @@
+"""The arithmetic of pulses: no drift, no number twice, no number backwards."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from camsync.axis import PulseAxis
+from camsync.follower import Follower
+from camsync.offset import ClockOffset
+
+rates = st.sampled_from([1.0, 12.5, 25.0, 30000 / 1001, 60.0, 500.0])
+epochs = st.floats(1.7e9, 1.9e9)
+
+
+@settings(deadline=None, max_examples=60)
+@given(epochs, rates, st.integers(0, 10**9))
+def test_a_pulse_is_the_one_due_at_its_due_time(epoch: float, fps: float, number: int) -> None:
+    axis = PulseAxis(epoch, fps)
+    assert axis.due(number) == epoch + number / fps
+    assert axis.number_at(axis.due(number)) == number
+
+
+@settings(deadline=None, max_examples=60)
+@given(epochs, rates, st.floats(-1e3, 1e7))
+def test_the_number_now_is_due_and_the_next_is_not(epoch: float, fps: float, passed: float) -> None:
+    axis = PulseAxis(epoch, fps)
+    number = axis.number_at(epoch + passed)
+    assert axis.due(number) <= epoch + passed < axis.due(number + 1)
+
+
+# What may happen to a client: a pulse of the server, or time passing without one.
+happenings = st.lists(st.integers(0, 400) | st.floats(0.0, 3.0), max_size=40)
+
+
+@settings(deadline=None, max_examples=60)
+@given(rates, happenings)
+def test_numbers_only_rise_whatever_happens(fps: float, what: list[int | float]) -> None:
+    follower = Follower(fps, catch_up=0.5)
+    now = 1.7e9
+    numbers: list[int] = []
+    for event in what:
+        if isinstance(event, int):
+            numbers += [number for number, _ in follower.gap(event, now)]
+            if follower.heard(event, now):
+                numbers.append(event)
+        else:
+            now += event
+            numbers += [number for number, _ in follower.own(now)]
+    assert all(before < after for before, after in pairwise(numbers))
+
+
+@settings(deadline=None, max_examples=60)
+@given(rates, st.integers(0, 10**6), st.integers(1, 200))
+def test_counting_alone_goes_on_at_the_rate_of_the_server(fps: float, number: int, more: int) -> None:
+    follower = Follower(fps, catch_up=1000.0)
+    assert follower.heard(number, 1.8e9)
+    own = list(follower.own(1.8e9 + (more + 0.5) / fps))
+    assert [number for number, _ in own] == list(range(number + 1, number + more + 1))
+    for i, (_, due) in enumerate(own, start=1):
+        assert due == pytest.approx(1.8e9 + i / fps, abs=1e-6)
+
+
+def test_a_stalled_client_skips_to_the_present_instead_of_making_up_for_hours() -> None:
+    follower = Follower(25.0, catch_up=0.5)
+    follower.heard(10, 1000.0)
+    assert [number for number, _ in follower.own(1000.0 + 3600.0)] == [10 + 3600 * 25]
+
+
+@settings(deadline=None, max_examples=60)
+@given(rates, st.integers(0, 10**6), st.integers(1, 300))
+def test_a_short_gap_is_made_good_and_a_long_one_is_not(fps: float, last: int, ahead: int) -> None:
+    follower = Follower(fps, catch_up=0.5)
+    follower.heard(last, 1.8e9)
+    number = last + ahead
+    made = list(follower.gap(number, 1.8e9 + ahead / fps))
+    assert follower.heard(number, 1.8e9 + ahead / fps)
+    short = (ahead - 1) / fps <= 0.5
+    assert [one for one, _ in made] == (list(range(last + 1, number)) if short else [])
+    assert all(due == pytest.approx(1.8e9 + (one - last) / fps, abs=1e-6) for one, due in made)
+
+
+def test_who_never_heard_a_pulse_counts_nothing() -> None:
+    follower = Follower(25.0, catch_up=0.5)
+    assert list(follower.own(1e9)) == []
+    assert follower.known(1e9) is None
+    assert follower.next_due() is None
+
+
+def test_a_new_rate_holds_from_the_last_pulse_on() -> None:
+    follower = Follower(25.0, catch_up=10.0)
+    follower.heard(100, 1000.0)
+    follower.set_rate(50.0)
+    assert follower.next_due() == pytest.approx(1000.02)
+
+
+def test_the_sample_with_the_shortest_round_trip_gives_the_offset() -> None:
+    clock = ClockOffset()
+    assert clock.offset is None
+    clock.greeted(server=105.2, received=100.0)
+    assert clock.offset == pytest.approx(5.2)
+    assert clock.round_trip is None
+    clock.ponged(sent=100.0, server=105.4, received=100.4)  # 5.2, in 0.4
+    clock.ponged(sent=101.0, server=106.01, received=101.02)  # 5.0, in 0.02
+    clock.ponged(sent=102.0, server=107.6, received=102.6)
+    assert clock.offset == pytest.approx(5.0)
+    assert clock.round_trip == pytest.approx(0.02)
+    clock.restart()
+    assert clock.offset is None
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.floats(-1e6, 1e6), st.lists(st.tuples(st.floats(0, 1), st.floats(0, 1)), min_size=1, max_size=40))
+def test_the_offset_is_wrong_by_half_the_shortest_round_trip_at_most(
+    offset: float, ways: list[tuple[float, float]]
+) -> None:
+    clock = ClockOffset()
+    for i, (there, back) in enumerate(ways):
+        clock.ponged(sent=float(i), server=i + there + offset, received=i + there + back)
+    remembered = min(there + back for there, back in ways[-16:])
+    assert clock.offset is not None
+    assert abs(clock.offset - offset) <= remembered / 2 + 1e-6
+
+
+def test_an_answer_before_the_question_is_ignored() -> None:
+    clock = ClockOffset()
+    clock.ponged(sent=10.0, server=20.0, received=9.0)
+    assert clock.offset is None
