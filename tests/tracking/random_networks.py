@@ -1,0 +1,101 @@
+"""Random windows for the tests of the solvers, and the answer by trying everything."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+from hypothesis import strategies as st
+
+from tracking.detections import Detections
+from tracking.network import CostSettings, Network, Template, build_network, build_network_per_object
+from tracking.presets import PAPER_COSTS
+from tracking.solvers.objective import conflict_count, objective
+
+BINS = 4
+SETTINGS = PAPER_COSTS
+SPARSE = 0.3
+"""Share of windows and frames that are less than full, down to empty."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """What a random window looks like."""
+
+    objects: int
+    frames: int
+    places: int
+    shared: bool
+    settings: CostSettings
+    seed: int
+
+
+@st.composite
+def cases(
+    draw: st.DrawFn,
+    *,
+    objects: int = 3,
+    frames: int = 3,
+    places: int = 3,
+    layouts: tuple[float, ...] = (0.0,),
+    stars: bool = True,
+) -> Case:
+    """Draw a window: ties, empty frames, gates and own observations included."""
+    seed = draw(st.integers(0, 2**32 - 1))
+    # Sizes come from the seed, not from hypothesis, which would draw mostly the smallest windows.
+    rng = np.random.default_rng(seed)
+    settings = replace(
+        SETTINGS,
+        layout=float(rng.choice(layouts)),
+        gate=None if rng.integers(2) else 40.0,
+        conflict_rows="star" if stars and rng.integers(2) else "clique",
+        conflict_distance=float(rng.choice([40.0, 120.0])),
+    )
+    return Case(
+        objects=int(rng.integers(1, objects + 1)),
+        frames=int(rng.integers(1, frames + 1)),
+        places=int(rng.integers(0 if rng.uniform() < SPARSE else places, places + 1)),
+        shared=bool(rng.integers(2)),
+        settings=settings,
+        seed=seed,
+    )
+
+
+def network_of(case: Case) -> Network:
+    """Build the window; odd seeds have whole coordinates and few appearances, hence ties."""
+    rng = np.random.default_rng(case.seed)
+    coarse = bool(case.seed % 2)
+
+    def looks(count: int) -> np.ndarray:
+        if coarse:
+            return np.eye(BINS)[rng.integers(0, 2, count)]
+        return rng.dirichlet(np.ones(BINS), count)
+
+    def seen() -> Detections:
+        count = int(rng.integers(0, case.places + 1)) if rng.uniform() < SPARSE else case.places
+        corner = rng.integers(0, 5, (count, 2)) * 20.0 if coarse else rng.uniform(0.0, 100.0, (count, 2))
+        return Detections(
+            np.hstack([corner, corner + np.array([20.0, 50.0])]), rng.uniform(size=count), looks(count)
+        )
+
+    templates = []
+    for n in range(case.objects):
+        box = seen().boxes[:1].reshape(-1) if rng.uniform() < 0.8 else np.empty(0)
+        templates.append(Template(n + 1, looks(1)[0], box if box.size else None))
+    if case.shared:
+        return build_network(templates, [seen() for _ in range(case.frames)], case.settings)
+    own = [[seen() for _ in range(case.frames)] for _ in range(case.objects)]
+    return build_network_per_object(templates, own, case.settings)
+
+
+def best_by_trying(network: Network) -> float:
+    """Give the cost of the optimum by trying all states of all objects."""
+    states = range(network.places + 1)
+    best = np.inf
+    for flat in product(states, repeat=network.objects * network.frames):
+        nodes = np.array(flat).reshape(network.objects, network.frames)
+        cost = objective(network, nodes)
+        if cost < best and conflict_count(network, nodes) == 0:
+            best = cost
+    return best

@@ -1,0 +1,72 @@
+"""People as boxes that walk along lines, for the tests of the online tracker."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tracking.costs import CostSettings
+from tracking.detections import Detections
+from tracking.solvers.base import solver_named
+from tracking.tracker import OnlineTracker
+from tracking.window import WindowResult, WindowSettings
+
+BINS = 8
+TEST_COSTS = CostSettings(displacement=2.0, displacement_unit="heights", conflict_rule="overlap")
+WIDTH, HEIGHT = 30.0, 90.0
+
+
+@dataclass(frozen=True)
+class Stroll:
+    """One person: walks `speed` pixels a frame from `x` at `y`, seen in the frames of `seen`."""
+
+    x: float
+    y: float
+    speed: float
+    look: int
+    seen: range = range(1_000_000)
+
+    def box(self, frame: int) -> tuple[float, float, float, float]:
+        left = self.x + self.speed * frame
+        return left, self.y, left + WIDTH, self.y + HEIGHT
+
+
+def look(kind: int) -> np.ndarray:
+    histogram = np.full(BINS, 0.02)
+    histogram[kind % BINS] += 1.0
+    return histogram / histogram.sum()
+
+
+def seen_at(people: Iterable[Stroll], frame: int, jitter: float = 0.0, seed: int = 0) -> Detections:
+    """What a detector sees in a frame: all boxes, with noise of some pixels."""
+    there = [person for person in people if frame in person.seen]
+    if not there:
+        return Detections.empty(BINS)
+    rng = np.random.default_rng((seed, frame))
+    boxes = np.array([person.box(frame) for person in there]) + rng.normal(0.0, jitter, (len(there), 4))
+    looks = np.stack([look(person.look) for person in there])
+    return Detections(boxes, np.full(len(there), 0.9), looks)
+
+
+def tracker(settings: WindowSettings | None = None) -> OnlineTracker:
+    return OnlineTracker(settings or WindowSettings(), TEST_COSTS, solver_named("greedy-dp"))
+
+
+def follow(stream: Sequence[Detections], tracked: OnlineTracker, start: int = 0) -> list[WindowResult]:
+    """Push every frame and end the recording; give all results."""
+    results = [tracked.push(start + n, seen) for n, seen in enumerate(stream)]
+    return [result for result in [*results, tracked.flush()] if result is not None]
+
+
+def final_boxes(results: Sequence[WindowResult]) -> dict[int, dict[int, np.ndarray]]:
+    """Give the final box by frame and id."""
+    found: dict[int, dict[int, np.ndarray]] = {}
+    for result in results:
+        for track in result.tracks:
+            for frame in range(result.first, result.final_to + 1):
+                box = track.boxes[frame - result.first]
+                if not np.isnan(box[0]):
+                    found.setdefault(frame, {})[track.id] = box
+    return found

@@ -1,0 +1,122 @@
+"""The standard detector on drawn pictures: who is there is found, and what is not there is not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from drawn_people import HEIGHT, WIDTH, Figure, picture, watched
+
+from tracking.boxes import iou
+from tracking.detections import Detections
+from tracking.detectors import BackgroundDetector, BackgroundSettings, LooksSettings
+from tracking.detectors.heightline import HeightLineSettings, fit_line
+
+SURE = 0.4
+WALKER = Figure(10, 200, speed=2.0, begin=40)
+
+
+def best_overlap(seen: Detections, figure: Figure, frame: int) -> float:
+    """Give the best overlap with the figure among what the detector is sure of."""
+    sure = seen.boxes[seen.scores >= SURE]
+    return float(iou(sure, figure.box(frame)).max(initial=0.0))
+
+
+def test_a_walker_is_found_in_a_tight_box() -> None:
+    seen = watched(BackgroundDetector(), [WALKER], range(120))
+    overlaps = [best_overlap(seen[frame], WALKER, frame) for frame in range(45, 120)]
+    assert np.mean(np.array(overlaps) >= 0.5) >= 0.95
+    assert np.mean(overlaps) >= 0.7
+
+
+def test_nobody_is_found_where_nobody_is() -> None:
+    seen = watched(BackgroundDetector(), [], range(60))
+    assert all((frame.scores < SURE).all() for frame in seen)
+
+
+def test_two_people_side_by_side_are_two() -> None:
+    pair = [Figure(60, 200, speed=1.5, begin=40), Figure(95, 215, speed=1.5, begin=40)]
+    seen = watched(BackgroundDetector(), [*pair, Figure(300, 180, speed=-2.0, begin=40)], range(130))
+    for figure in pair:
+        found = [best_overlap(seen[frame], figure, frame) >= 0.5 for frame in range(90, 130)]
+        assert np.mean(found) >= 0.8
+
+
+def test_the_camera_s_gain_does_not_turn_the_scene_into_people() -> None:
+    detector = BackgroundDetector()
+    watched(detector, [], range(50))
+    brighter = watched(detector, [], range(50, 70), gain=1.15)
+    assert all((frame.scores < SURE).all() for frame in brighter)
+
+
+def test_somebody_who_stands_still_is_not_absorbed() -> None:
+    arrived = [Figure(10, 200, speed=2.0, begin=40, end=100), Figure(210, 200, begin=100)]
+    seen = watched(BackgroundDetector(), arrived, range(200))
+    assert np.mean([best_overlap(seen[frame], arrived[1], frame) >= 0.5 for frame in range(110, 200)]) > 0.95
+
+
+def test_the_ghost_of_somebody_who_was_there_from_the_start_vanishes() -> None:
+    leaves = Figure(150, 200, end=60)
+    detector = BackgroundDetector()
+    watched(detector, [leaves], range(60))
+    after = watched(detector, [], range(60, 130))
+    assert best_overlap(after[0], leaves, 0) >= 0.5, "there is no ghost to begin with"
+    assert all((frame.scores < SURE).all() for frame in after[-20:])
+
+
+def test_what_is_ignored_is_not_found() -> None:
+    right = ((WIDTH / 2, 0.0), (WIDTH, 0.0), (WIDTH, HEIGHT), (WIDTH / 2, HEIGHT))
+    hidden = Figure(260, 200, speed=-0.5, begin=40)
+    seen = watched(BackgroundDetector(BackgroundSettings(ignore=(right,))), [hidden], range(100))
+    assert all((frame.scores < SURE).all() for frame in seen)
+
+
+@pytest.mark.parametrize(("colour", "length"), [(True, 96), (False, 64)])
+def test_looks_tell_people_apart_by_colour(colour: bool, length: int) -> None:
+    red, blue = Figure(40, 200, 1.0, 40), Figure(250, 200, -1.0, 40, colour=(190, 110, 35))
+    detector = BackgroundDetector(BackgroundSettings(looks=LooksSettings(colour=colour)))
+    seen = watched(detector, [red, blue], range(80))[-1]
+    assert detector.bins == length == seen.histograms.shape[1]
+    np.testing.assert_allclose(seen.histograms.sum(axis=1), 1.0)
+    looks = [seen.histograms[np.argmax(iou(seen.boxes, figure.box(79)))] for figure in (red, blue)]
+    likeness = np.sqrt(looks[0] * looks[1]).sum()
+    assert (likeness < 0.85) == colour
+
+
+def test_the_same_frames_give_the_same_detections_to_the_byte() -> None:
+    first, second = (watched(BackgroundDetector(), [WALKER], range(80)) for _ in range(2))
+    for one, other in zip(first, second, strict=True):
+        for part in ("boxes", "scores", "histograms"):
+            assert getattr(one, part).tobytes() == getattr(other, part).tobytes()
+
+
+def test_another_size_or_type_is_refused() -> None:
+    detector = BackgroundDetector()
+    detector.detect(picture([], 0))
+    with pytest.raises(ValueError, match="size changed"):
+        detector.detect(picture([], 1)[:-2])
+    with pytest.raises(ValueError, match="uint8"):
+        detector.detect(picture([], 1)[..., 0])
+
+
+def test_a_third_of_wild_samples_does_not_move_the_height_line() -> None:
+    rng = np.random.default_rng(1)
+    foot = rng.uniform(100, 280, 300)
+    height = (0.6 * foot - 20.0) * rng.normal(1.0, 0.05, 300)
+    height[::3] *= 1.6
+    line = fit_line(np.stack([foot, height], axis=1), HeightLineSettings())
+    assert line is not None
+    np.testing.assert_allclose(line.at(np.array([120.0, 200.0, 280.0])), [52.0, 100.0, 148.0], rtol=0.06)
+
+
+def test_the_height_line_is_in_doubt_where_nobody_was_seen() -> None:
+    foot = np.linspace(150, 170, 20)
+    line = fit_line(np.stack([foot, 0.6 * foot - 20.0], axis=1), HeightLineSettings())
+    assert line is not None
+    near, far = line.doubt(np.array([160.0, 280.0]))
+    assert far > 2.0 * near
+
+
+def test_people_all_of_one_height_everywhere_are_no_floor() -> None:
+    foot = np.linspace(60, 280, 400)
+    steep = np.stack([foot, 200.0 - 0.5 * foot], axis=1)
+    assert fit_line(steep, HeightLineSettings()) is None

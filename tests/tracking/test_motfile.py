@@ -1,0 +1,60 @@
+"""Public detections as a detector: the right frame, scores in [0, 1], no doubles."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tracking.detectors import MotFileDetector, MotFileSettings
+
+NOTHING = np.empty((0, 0, 3), dtype=np.uint8)
+ROWS = """\
+1,-1,10,20,30,60,50,-1,-1,-1
+1,-1,11,20,30,60,40,-1,-1,-1
+1,-1,200,20,30,60,-10,-1,-1,-1
+3,-1,12,20,30,60,20,-1,-1,-1
+"""
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    path = tmp_path / "det.txt"
+    path.write_text(ROWS, encoding="utf-8")
+    return path
+
+
+def test_frames_come_in_order_and_those_without_a_row_are_empty(file: Path) -> None:
+    detector = MotFileDetector(file)
+    assert [len(detector.detect(NOTHING)) for _ in range(4)] == [2, 0, 1, 0]
+    assert detector.last == 2
+
+
+def test_a_frame_can_be_asked_for_by_number(file: Path) -> None:
+    detector = MotFileDetector(file, MotFileSettings(first_frame=100))
+    np.testing.assert_array_equal(detector.detect(NOTHING, 102).boxes, [[12, 20, 42, 80]])
+    assert len(detector.detect(NOTHING)) == 0
+    assert len(detector.detect(NOTHING, 99)) == 0
+
+
+def test_confidences_are_stretched_to_scores_best_first_and_doubles_go(file: Path) -> None:
+    seen = MotFileDetector(file).detect(NOTHING)
+    np.testing.assert_allclose(seen.scores, [1.0, 0.0])
+    np.testing.assert_array_equal(seen.boxes[:, 0], [10, 200])
+    both = MotFileDetector(file, MotFileSettings(apart=0.99)).detect(NOTHING)
+    np.testing.assert_allclose(both.scores, [1.0, 5 / 6, 0.0])
+    assert len(MotFileDetector(file, MotFileSettings(least_score=0.5)).detect(NOTHING)) == 1
+
+
+def test_appearance_comes_from_the_picture_where_there_is_one(file: Path) -> None:
+    assert MotFileDetector(file).detect(NOTHING).histograms.shape == (2, 0)
+    picture = np.full((100, 300, 3), 128, dtype=np.uint8)
+    looks = MotFileDetector(file).detect(picture).histograms
+    assert looks.shape == (2, 64)
+    np.testing.assert_allclose(looks[:, 32], 1.0)
+
+
+def test_a_missing_file_is_an_error(tmp_path: Path) -> None:
+    with pytest.raises(OSError, match="none"):
+        MotFileDetector(tmp_path / "none.txt")

@@ -1,0 +1,84 @@
+"""What every solver promises, on random windows against trying everything."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from random_networks import Case, best_by_trying, cases, network_of
+
+from tracking.solvers import OCCLUDED, Solution, solver_named
+from tracking.solvers.objective import conflict_count, nodes_of, objective
+
+CLOSE = 1e-9
+RELAXING = ("arcs", "columns")
+WITHOUT_CONFLICTS = (*RELAXING, "greedy-dp")
+bounded = settings(deadline=None, max_examples=60)
+
+
+def solved(case: Case, name: str) -> Solution:
+    return solver_named(name).solve(network_of(case))
+
+
+def test_an_unknown_solver_is_refused_with_the_names_there_are() -> None:
+    with pytest.raises(ValueError, match=r"'simplex'.*arcs, columns"):
+        solver_named("simplex")
+
+
+@pytest.mark.parametrize("name", WITHOUT_CONFLICTS)
+@bounded
+@given(case=cases(layouts=(0.0, 0.002)))
+def test_states_exist_and_keep_all_conflicts(name: str, case: Case) -> None:
+    network = network_of(case)
+    solution = solver_named(name).solve(network)
+    nodes = nodes_of(network, solution.states)
+    assert solution.states.shape == (network.objects, network.frames)
+    assert solution.states.dtype == np.int64
+    assert solution.states.min(initial=OCCLUDED) >= OCCLUDED
+    assert solution.report.objective == pytest.approx(objective(network, nodes), rel=CLOSE)
+    assert np.isfinite(solution.report.objective)
+    assert conflict_count(network, nodes) == solution.report.conflicts == 0
+
+
+@pytest.mark.parametrize("name", [*WITHOUT_CONFLICTS, "separate-dp"])
+@settings(deadline=None, max_examples=30)
+@given(case=cases(objects=2, frames=3, places=2, layouts=(0.0, 0.002)))
+def test_the_bound_is_below_the_optimum_and_whole_relaxations_are_optimal(name: str, case: Case) -> None:
+    network = network_of(case)
+    optimum = best_by_trying(network)
+    report = solver_named(name).solve(network).report
+    assert report.bound <= optimum + CLOSE
+    if report.conflicts == 0:
+        assert report.objective >= optimum - CLOSE
+    if report.integral:
+        assert report.objective == pytest.approx(optimum, rel=CLOSE)
+        assert report.gap < CLOSE
+
+
+@settings(deadline=None, max_examples=25)
+@given(case=cases(objects=3, frames=2, places=2))
+def test_three_objects_get_the_optimum_where_the_relaxation_is_whole(case: Case) -> None:
+    network = network_of(case)
+    optimum = best_by_trying(network)
+    for name in RELAXING:
+        report = solver_named(name).solve(network).report
+        assert report.bound <= optimum + CLOSE
+        assert not report.integral or report.objective == pytest.approx(optimum, rel=CLOSE)
+
+
+@settings(deadline=None, max_examples=150)
+@given(case=cases(objects=6, frames=6, places=6, layouts=(0.0, 0.0, 0.002)))
+def test_columns_finds_the_optimum_of_all_arcs(case: Case) -> None:
+    columns, arcs = solved(case, "columns").report, solved(case, "arcs").report
+    assert columns.bound == pytest.approx(arcs.bound, rel=CLOSE, abs=CLOSE)
+    if columns.integral and arcs.integral:
+        assert columns.objective == pytest.approx(arcs.objective, rel=CLOSE, abs=CLOSE)
+
+
+@pytest.mark.parametrize("name", [*WITHOUT_CONFLICTS, "separate-dp"])
+@settings(deadline=None, max_examples=10)
+@given(case=cases(objects=4, frames=4, places=4))
+def test_the_same_window_gives_the_same_states(name: str, case: Case) -> None:
+    first, second = solved(case, name), solved(case, name)
+    np.testing.assert_array_equal(first.states, second.states)
+    assert first.report == second.report

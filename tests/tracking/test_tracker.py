@@ -1,0 +1,218 @@
+"""The online tracker: what is final stays, who is there is found, who comes back keeps the number."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from strolls import Stroll, final_boxes, follow, seen_at, tracker
+
+from tracking.boxes import iou
+from tracking.detections import Detections
+from tracking.window import WindowResult, WindowSettings
+
+
+def _equal(first: list[WindowResult], second: list[WindowResult]) -> bool:
+    return [_shown(result) for result in first] == [_shown(result) for result in second]
+
+
+def _shown(result: WindowResult) -> tuple[object, ...]:
+    tracks = [(t.id, t.boxes.tobytes(), t.histogram.tobytes(), t.confidence) for t in result.tracks]
+    return result.first, result.last, result.final_to, tracks, result.report
+
+
+def _ids(results: list[WindowResult]) -> set[int]:
+    return {number for boxes in final_boxes(results).values() for number in boxes}
+
+
+@st.composite
+def streams(draw: st.DrawFn) -> list[Detections]:
+    """Some people, some of whom are missed now and then, and some clutter."""
+    people = [
+        Stroll(draw(st.integers(0, 300)), draw(st.integers(0, 100)), draw(st.integers(-4, 4)), look)
+        for look in range(draw(st.integers(0, 3)))
+    ]
+    seed = draw(st.integers(0, 1000))
+    rng = np.random.default_rng(seed)
+    frames = []
+    for frame in range(draw(st.integers(1, 45))):
+        there = [person for person in people if rng.random() < 0.85]
+        clutter = [Stroll(float(rng.integers(0, 300)), 50.0, 0.0, 7) for _ in range(rng.integers(0, 2))]
+        frames.append(seen_at([*there, *clutter], frame, jitter=1.5, seed=seed))
+    return frames
+
+
+@given(streams(), st.integers(0, 20), st.sampled_from([(15, 5), (12, 4), (7, 7), (6, 1)]))
+@settings(deadline=None, max_examples=25)
+def test_every_frame_becomes_final_once_and_in_order(
+    stream: list[Detections], start: int, size: tuple[int, int]
+) -> None:
+    window = WindowSettings(window=size[0], stride=size[1], birth_window=min(size[0], 15))
+    results = follow(stream, tracker(window), start)
+    assert results[0].first == start
+    assert results[-1].final_to == start + len(stream) - 1
+    for earlier, later in pairwise(results):
+        assert later.first == earlier.final_to + 1
+    for result in results:
+        assert result.last >= result.final_to >= result.first - 1
+        for track in result.tracks:
+            assert track.boxes.shape == (result.last - result.first + 1, 4)
+            assert not np.isnan(track.boxes).all()
+            assert 0.0 <= track.confidence <= 1.0
+        assert [track.id for track in result.tracks] == sorted({track.id for track in result.tracks})
+    for result in results[:-1]:
+        assert (result.last + 1) % window.stride == 0
+        assert result.final_to == max(result.last - window.lag, result.first - 1)
+
+
+@given(streams(), st.sets(st.integers(0, 44)))
+@settings(deadline=None, max_examples=25)
+def test_a_missed_frame_is_a_frame_without_detections(stream: list[Detections], missed: set[int]) -> None:
+    emptied = [Detections.empty(8) if n in missed else seen for n, seen in enumerate(stream)]
+    # The first and the last frame must be there for the two to be about the same frames.
+    kept = [n for n in range(len(stream)) if n not in missed or n in {0, len(stream) - 1}]
+    pushed, skipping = tracker(), tracker()
+    every = final_boxes(follow(emptied, pushed))
+    results = [skipping.push(n, emptied[n]) for n in kept] + [skipping.flush()]
+    some = final_boxes([result for result in results if result is not None])
+    assert every.keys() == some.keys()
+    for frame, boxes in every.items():
+        assert boxes.keys() == some[frame].keys()
+        assert all(np.array_equal(box, some[frame][number]) for number, box in boxes.items())
+
+
+@given(streams())
+@settings(deadline=None, max_examples=10)
+def test_trackers_share_nothing_and_repeat_themselves(stream: list[Detections]) -> None:
+    alone = follow(stream, tracker())
+    one, other = tracker(), tracker()
+    noise = [seen_at([Stroll(9.0, 9.0, 1.0, 5)], n) for n in range(len(stream))]
+    results = []
+    for n, seen in enumerate(stream):
+        results.append(one.push(n, seen))
+        other.push(n, noise[n])
+    results.append(one.flush())
+    assert _equal(alone, [result for result in results if result is not None])
+
+
+@pytest.mark.parametrize("first", [0, 3, 1000])
+def test_people_are_found_and_numbered_from_one(first: int) -> None:
+    people = [Stroll(20.0, 30.0, 2.0, 0), Stroll(300.0, 60.0, -1.5, 3)]
+    results = follow([seen_at(people, n, 1.0) for n in range(40)], tracker(), first)
+    found = final_boxes(results)
+    # Whoever is there from the start is shown from the first window that is long enough for the test.
+    assert min(found) < first + WindowSettings().stride
+    assert sorted(found) == list(range(min(found), first + 40))
+    for frame, boxes in found.items():
+        assert sorted(boxes) == [1, 2]
+        truth = {tuple(person.box(frame - first)) for person in people}
+        for box in boxes.values():
+            assert max(float(iou(box, np.array(real))) for real in truth) > 0.8
+
+
+def test_a_person_who_enters_later_is_born_and_shown_from_the_window_on() -> None:
+    people = [Stroll(20.0, 30.0, 2.0, 0), Stroll(250.0, 60.0, -1.0, 3, range(30, 200))]
+    results = follow([seen_at(people, n, 1.0) for n in range(60)], tracker())
+    found = final_boxes(results)
+    seen = [frame for frame, boxes in found.items() if 2 in boxes]
+    assert min(seen) <= 32
+    assert seen == list(range(min(seen), 60))
+
+
+def test_short_clutter_is_nobody() -> None:
+    person = Stroll(20.0, 30.0, 2.0, 0)
+    clutter = Stroll(300.0, 60.0, 0.0, 5, range(22, 29))
+    results = follow([seen_at([person, clutter], n, 1.0) for n in range(60)], tracker())
+    assert _ids(results) == {1}
+
+
+def test_a_person_hidden_behind_another_keeps_the_number() -> None:
+    # They meet at frame 50; the further one is not detected while they overlap.
+    front = Stroll(100.0, 40.0, 2.0, 0)
+    behind = Stroll(300.0, 36.0, -2.0, 4)
+    stream = []
+    for frame in range(100):
+        apart = abs(front.box(frame)[0] - behind.box(frame)[0]) > 25.0
+        stream.append(seen_at([front, behind] if apart else [front], frame, 1.0))
+    found = final_boxes(follow(stream, tracker()))
+    assert {number for boxes in found.values() for number in boxes} == {1, 2}
+    before, after = found[30], found[90]
+    of_front = {
+        min(b, key=lambda k, b=b, f=f: abs(b[k][0] - front.box(f)[0])) for f, b in ((30, before), (90, after))
+    }
+    assert len(of_front) == 1
+    assert sorted(after) == [1, 2]
+    assert len(found[50]) == 1
+
+
+def test_who_comes_back_soon_gets_the_number_back_and_who_comes_late_gets_a_new_one() -> None:
+    def ids(absence: int) -> set[int]:
+        seen = [n for n in range(60 + absence) if n < 30 or n >= 30 + absence]
+        stay = Stroll(100.0, 40.0, 0.0, 2)
+        stream = [seen_at([stay] if n in seen else [], n, 1.0) for n in range(60 + absence)]
+        return _ids(follow(stream, tracker(WindowSettings(forget_after=60))))
+
+    assert ids(40) == {1}
+    assert ids(80) == {1, 2}
+
+
+def test_somebody_else_at_the_same_place_is_somebody_else() -> None:
+    first, second = Stroll(100.0, 40.0, 0.0, 2, range(30)), Stroll(100.0, 40.0, 0.0, 6, range(70, 110))
+    results = follow([seen_at([first, second], n, 1.0) for n in range(110)], tracker())
+    assert _ids(results) == {1, 2}
+
+
+def test_two_boxes_on_one_person_are_one_object() -> None:
+    twins = [Stroll(50.0, 40.0, 1.0, 2), Stroll(53.0, 42.0, 1.0, 2)]
+    found = final_boxes(follow([seen_at(twins, n, 1.0) for n in range(60)], tracker()))
+    assert all(len(boxes) == 1 for boxes in found.values())
+
+
+def test_after_a_long_gap_everything_begins_again_without_a_result_for_the_gap() -> None:
+    person = Stroll(50.0, 40.0, 0.0, 2)
+    tracked = tracker()
+    before = [tracked.push(n, seen_at([person], n)) for n in range(23)]
+    ended = tracked.push(1_000_000_004, seen_at([person], 0))
+    assert ended is not None
+    assert ended.final_to == ended.last == 22
+    after = [tracked.push(1_000_000_005 + n, seen_at([person], 0)) for n in range(30)]
+    assert _ids([r for r in [*before, ended] if r is not None]) == {1}
+    assert _ids([r for r in [*after, tracked.flush()] if r is not None]) == {2}
+
+
+def test_memory_is_bounded_by_the_window_and_the_list() -> None:
+    window = WindowSettings(forget_after=30, most_objects=3)
+    tracked = tracker(window)
+    for n in range(600):
+        people = [Stroll(60.0 * k, 40.0, 0.0, (n // 40 + k) % 8) for k in range(5)]
+        tracked.push(n, seen_at(people if n % 40 < 25 else [], n))
+        assert len(tracked._seen) <= window.window + window.stride
+        assert len(tracked._objects) <= window.most_objects
+
+
+def test_frame_numbers_must_grow() -> None:
+    tracked = tracker()
+    tracked.push(4, Detections.empty(8))
+    with pytest.raises(ValueError, match="frame 4 came after frame 4"):
+        tracked.push(4, Detections.empty(8))
+
+
+def test_flush_without_frames_and_twice_gives_nothing() -> None:
+    tracked = tracker()
+    assert tracked.flush() is None
+    tracked.push(0, Detections.empty(8))
+    assert tracked.flush() is not None
+    assert tracked.flush() is None
+    assert tracked.push(4, Detections.empty(8)) is not None
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [{"stride": 0}, {"stride": 16}, {"birth_window": 16}, {"birth_visible": 0.0}, {"most_objects": 0}],
+)
+def test_settings_that_make_no_sense_are_refused(wrong: dict[str, float]) -> None:
+    with pytest.raises(ValueError, match=next(iter(wrong))):
+        WindowSettings(**wrong)  # type: ignore[arg-type]

@@ -1,0 +1,38 @@
+"""Frames or detections in, tracks out: detectors, the network model, its solvers, the online window."""
+
+from tracking.appearance import histograms
+from tracking.costs import CostSettings
+from tracking.detections import Detections
+from tracking.network import Network, build_network
+from tracking.presets import PAPER_COSTS
+from tracking.solvers.base import (
+    DEFAULT_SOLVER,
+    Solution,
+    Solver,
+    SolveReport,
+    solver_named,
+    solver_names,
+)
+from tracking.template import Template
+from tracking.tracker import OnlineTracker
+from tracking.window import WindowResult, WindowSettings, WindowTrack
+
+__all__ = [
+    "DEFAULT_SOLVER",
+    "PAPER_COSTS",
+    "CostSettings",
+    "Detections",
+    "Network",
+    "OnlineTracker",
+    "Solution",
+    "SolveReport",
+    "Solver",
+    "Template",
+    "WindowResult",
+    "WindowSettings",
+    "WindowTrack",
+    "build_network",
+    "histograms",
+    "solver_named",
+    "solver_names",
+]

@@ -1,0 +1,66 @@
+"""How an object looks: grey histograms of its box, and the distances between them."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracking.boxes import Floats
+
+GREY_LEVELS = 256
+
+AppearanceMeasure = Literal["bhattacharyya", "intersection"]
+
+
+def histograms(
+    grey: NDArray[np.uint8],
+    boxes: Floats,
+    bins: int = 64,
+    mask: NDArray[np.uint8] | None = None,
+) -> Floats:
+    """Give the grey histogram of each box, shape (K, bins), rows summing to 1 (paper II.D, Example 1).
+
+    `grey` is (H, W); `boxes` (K, 4) in pixels are cut to the image; `mask` (H, W), where given, leaves
+    only its non-zero pixels in. A box that holds no pixel gets the uniform histogram: it looks like
+    nothing in particular.
+
+    Raises:
+        ValueError: `bins` is not between 1 and 256.
+    """
+    if not 1 <= bins <= GREY_LEVELS:
+        raise ValueError(f"bins must be between 1 and {GREY_LEVELS}, not {bins}")
+    levels = np.arange(GREY_LEVELS) * bins // GREY_LEVELS
+    result = np.full((len(boxes), bins), 1.0 / bins)
+    for row, (left, top, right, bottom) in enumerate(_whole_pixels(boxes, grey.shape)):
+        pixels = grey[top:bottom, left:right]
+        kept = pixels.ravel() if mask is None else pixels[mask[top:bottom, left:right] != 0]
+        if kept.size:
+            result[row] = np.bincount(levels[kept], minlength=bins) / kept.size
+    return result
+
+
+def _whole_pixels(boxes: Floats, shape: tuple[int, ...]) -> NDArray[np.int64]:
+    """Round boxes (K, 4) to pixel ranges inside an image of `shape` (height, width)."""
+    height, width = shape[:2]
+    limits = np.array([width, height, width, height], dtype=np.float64)
+    return np.clip(np.rint(boxes), 0.0, limits).astype(np.int64)
+
+
+def appearance_distance(
+    first: Floats, second: Floats, measure: AppearanceMeasure = "bhattacharyya"
+) -> Floats:
+    """Compare all rows with all rows: g(.) of paper II.B, 0 for alike to 1 for nothing in common.
+
+    `first` is (..., I, B) and `second` (..., J, B); the result is (..., I, J). Where no appearance is
+    known (B = 0 on either side) everything is alike: 0.
+    """
+    if first.shape[-1] == 0 or second.shape[-1] == 0:
+        lead = np.broadcast_shapes(first.shape[:-2], second.shape[:-2])
+        return np.zeros((*lead, first.shape[-2], second.shape[-2]))
+    if measure == "intersection":
+        shared = np.minimum(first[..., :, None, :], second[..., None, :, :]).sum(axis=-1)
+        return np.asarray(np.clip(1.0 - shared, 0.0, 1.0))
+    likeness = np.sqrt(first) @ np.sqrt(np.swapaxes(second, -1, -2))
+    return np.asarray(np.sqrt(np.clip(1.0 - likeness, 0.0, 1.0)))

@@ -1,0 +1,91 @@
+"""The costs of all arcs of a window, from boxes and histograms (the cost table of paper II.B)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from tracking.appearance import appearance_distance
+from tracking.boxes import BOX_SIDES, Floats, displacement, heights
+from tracking.costs import CostSettings
+from tracking.places import Places
+from tracking.template import Template
+
+
+def node_costs(likeness: Floats, places: Places, settings: CostSettings) -> Floats:
+    """Give what every arc into a state costs, (n, M, S): `likeness` (n, M, K) to it, or the occlusion."""
+    objects, frames, width = likeness.shape
+    costs = np.empty((objects, frames, width + 1))
+    doubt = settings.confidence * (1.0 - places.scores)
+    costs[:, :, :width] = likeness + doubt
+    costs[:, :, :width][~np.broadcast_to(places.present, costs[:, :, :width].shape)] = np.inf
+    costs[:, :, width] = settings.change + settings.occlusion
+    return costs
+
+
+def source_costs(
+    templates: Sequence[Template], likeness: Floats, places: Places, settings: CostSettings
+) -> Floats:
+    """Give what the arcs from the source cost besides the node, (n, S); `likeness` is (n, M, K)."""
+    width = places.present.shape[2]
+    costs = np.full((len(templates), width + 1), settings.change)
+    costs[:, width] = 0.0
+    first_boxes = np.broadcast_to(places.boxes[:, 0], (len(templates), width, BOX_SIDES))
+    for n, template in enumerate(templates):
+        if template.box is not None:
+            moved = _moves(template.box[None], first_boxes[n], settings)[0]
+            costs[n, :width] = settings.appearance * likeness[n, 0] + moved
+    return costs
+
+
+def pair_costs(places: Places, settings: CostSettings) -> Floats:
+    """Give what the arcs between two frames cost besides the node, (P, M - 1, S, S)."""
+    sets, frames, width = places.present.shape
+    costs = np.zeros((sets, max(frames - 1, 0), width + 1, width + 1))
+    before, after = places.histograms[:, :-1], places.histograms[:, 1:]
+    seen = costs[:, :, :width, :width]
+    seen += settings.appearance * appearance_distance(before, after, settings.measure)
+    seen += _moves(places.boxes[:, :-1], places.boxes[:, 1:], settings)
+    costs[:, :, width, :width] = settings.change
+    return costs
+
+
+def sink_costs(objects: int, places: Places, settings: CostSettings) -> Floats:
+    """Give what the arcs into the sink cost, (n, S): one constant."""
+    return np.full((objects, places.present.shape[2] + 1), settings.change + settings.occlusion)
+
+
+def _moves(before: Floats, after: Floats, settings: CostSettings) -> Floats:
+    """Give the cost of moving from boxes (..., I, 4) to boxes (..., J, 4), (..., I, J)."""
+    before, after = before[..., :, None, :], after[..., None, :, :]
+    moved = displacement(before, after)
+    if settings.displacement_unit == "heights":
+        mean = (heights(before) + heights(after)) / 2.0
+        moved = moved / np.where(mean > 0.0, mean, 1.0)
+    costs = settings.displacement * moved
+    if settings.gate is not None:
+        costs[moved > settings.gate] = np.inf
+    return costs
+
+
+def template_distances(templates: Sequence[Template], places: Places, settings: CostSettings) -> Floats:
+    """Compare each template with each place: g(s_n, v), (n, M, K)."""
+    sets, frames, width, bins = places.histograms.shape
+    distances = np.zeros((len(templates), frames, width))
+    known = [n for n, template in enumerate(templates) if template.histogram.size and bins]
+    if not known:
+        return distances
+    wrong = {templates[n].histogram.size for n in known} - {bins}
+    if wrong:
+        raise ValueError(f"templates need histograms of {bins} bins like the frames, not {sorted(wrong)}")
+    looks = np.array([templates[n].histogram for n in known])
+    if sets == 1:
+        seen = places.histograms.reshape(frames * width, bins)
+        table = appearance_distance(looks, seen, settings.measure)
+        distances[known] = table.reshape(len(known), frames, width)
+    else:
+        own = places.histograms[known].reshape(len(known), frames * width, bins)
+        table = appearance_distance(looks[:, None], own, settings.measure)
+        distances[known] = table.reshape(len(known), frames, width)
+    return distances

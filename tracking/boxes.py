@@ -1,0 +1,80 @@
+"""Measures on boxes: `(..., 4)` float64 arrays `left, top, right, bottom` in pixels.
+
+All of them broadcast over the leading axes, so `measure(a[:, None], b[None])` compares all with all.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+BOX_SIDES = 4
+"""Numbers in a box: left, top, right, bottom."""
+
+Floats = NDArray[np.float64]
+
+_MEAN_SIDES = 0.5
+"""From the sum over four sides to the shift of a rigid box: each axis is counted by two sides."""
+
+_CORNERS_PER_SIDE = 2.0
+"""Each side of a box bounds two of its corners."""
+
+
+def widths(boxes: Floats) -> Floats:
+    """Give the widths in pixels, shape (...); negative extents count as none."""
+    return np.maximum(boxes[..., 2] - boxes[..., 0], 0.0)
+
+
+def heights(boxes: Floats) -> Floats:
+    """Give the heights in pixels, shape (...); negative extents count as none."""
+    return np.maximum(boxes[..., 3] - boxes[..., 1], 0.0)
+
+
+def areas(boxes: Floats) -> Floats:
+    """Give the areas in square pixels, shape (...)."""
+    return widths(boxes) * heights(boxes)
+
+
+def intersections(first: Floats, second: Floats) -> Floats:
+    """Give the areas in square pixels that two boxes share, shape (...)."""
+    left_top = np.maximum(first[..., :2], second[..., :2])
+    right_bottom = np.minimum(first[..., 2:], second[..., 2:])
+    sides = np.maximum(right_bottom - left_top, 0.0)
+    return np.asarray(sides[..., 0] * sides[..., 1])
+
+
+def overlap(first: Floats, second: Floats) -> Floats:
+    """Give the shared area over the average area, in [0, 1], shape (...) (paper II.B, conflict sets)."""
+    average = (areas(first) + areas(second)) / 2.0
+    return intersections(first, second) / np.where(average > 0.0, average, 1.0)
+
+
+def iou(first: Floats, second: Floats) -> Floats:
+    """Give the intersection over the union, in [0, 1], shape (...)."""
+    shared = intersections(first, second)
+    union = areas(first) + areas(second) - shared
+    return np.asarray(shared / np.where(union > 0.0, union, 1.0))
+
+
+def corner_distance(first: Floats, second: Floats) -> Floats:
+    """Give the total city-block distance of the 4 corners in pixels, shape (...) (paper II.B, Fig. 5).
+
+    A box moved by `(x, y)` is `4 (|x| + |y|)` away from itself.
+    """
+    return _CORNERS_PER_SIDE * _sides_apart(first, second)
+
+
+def displacement(first: Floats, second: Floats) -> Floats:
+    """Give the mean city-block distance of the corners in pixels, shape (...): d(.) of paper II.B.
+
+    A box moved by `(x, y)` has a displacement of `|x| + |y|`.
+    """
+    return _MEAN_SIDES * _sides_apart(first, second)
+
+
+def _sides_apart(first: Floats, second: Floats) -> Floats:
+    """Sum the distances of the four sides; side by side, which is faster than a sum over a short axis."""
+    apart = np.abs(first[..., 0] - second[..., 0])
+    for side in range(1, BOX_SIDES):
+        apart = apart + np.abs(first[..., side] - second[..., side])
+    return np.asarray(apart)

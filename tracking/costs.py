@@ -1,0 +1,66 @@
+"""The settings of the network's costs (paper II.B)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from tracking.appearance import AppearanceMeasure
+
+ConflictRule = Literal["corners", "overlap"]
+ConflictRows = Literal["clique", "star"]
+DisplacementUnit = Literal["pixels", "heights"]
+
+
+@dataclass(frozen=True, slots=True)
+class CostSettings:
+    """What a path through the network costs, and which places exclude each other.
+
+    An arc between two observations costs g(template, target) + λ1 g(from, to) + λ2 d(from, to); an arc
+    out of an occlusion c_a + g(template, target); an arc into an occlusion or into the sink c_a + c_b.
+
+    Raises:
+        ValueError: a weight is negative, or a gate or threshold is not positive.
+    """
+
+    # λ1: weight of the change of appearance between two frames; no unit (g is in [0, 1]).
+    appearance: float = 0.25
+    # λ2: weight of the displacement between two frames; cost per displacement unit (below).
+    displacement: float = 1.0
+    # What displacement (and the gate) count in: pixels of the image, or mean heights of the two boxes.
+    displacement_unit: DisplacementUnit = "heights"
+    # c_a: what a usual change of place and appearance between two frames costs.
+    change: float = 0.3
+    # c_b: above the appearance difference of one object to itself, below that of two objects.
+    occlusion: float = 0.5
+    # Added for an observation of score 0, falling to nothing at score 1: a hypothesis that explains
+    # nothing of its own is nearly as dear as being hidden. 0 is the paper.
+    confidence: float = 0.5
+    # How histograms are compared: g(.), in [0, 1].
+    measure: AppearanceMeasure = "bhattacharyya"
+    # Longest displacement from one frame to the next, in displacement units; None: any.
+    gate: float | None = None
+    # μ: weight of the spatial layout term, cost per pixel of L1 change between two objects; 0 is off.
+    layout: float = 0.0
+    # When two boxes occupy one place: by the city-block distance of their corners, or by their overlap.
+    conflict_rule: ConflictRule = "overlap"
+    # Rule "corners": boxes conflict below this total city-block distance of the 4 corners, pixels.
+    conflict_distance: float = 60.0
+    # Rule "overlap": boxes conflict above this ratio of shared to average area.
+    conflict_overlap: float = 0.5
+    # "clique": no two objects hold conflicting boxes. "star" is II.D to the letter: at most one path
+    # goes through the conflict set of every box, even where the box itself is nobody's; from three
+    # objects on that forbids more.
+    conflict_rows: ConflictRows = "clique"
+
+    def __post_init__(self) -> None:
+        weights = ("appearance", "displacement", "change", "occlusion", "confidence", "layout")
+        for name in weights:
+            if not getattr(self, name) >= 0.0:
+                raise ValueError(f"{name} must not be negative, not {getattr(self, name)}")
+        if self.gate is not None and not self.gate > 0.0:
+            raise ValueError(f"gate must be positive, not {self.gate}")
+        if not self.conflict_distance > 0.0:
+            raise ValueError(f"conflict_distance must be positive, not {self.conflict_distance}")
+        if not self.conflict_overlap > 0.0:
+            raise ValueError(f"conflict_overlap must be positive, not {self.conflict_overlap}")

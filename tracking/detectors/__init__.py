@@ -1,0 +1,29 @@
+"""Detectors: where objects might be in a frame."""
+
+from tracking.detectors.background import BackgroundDetector, BackgroundSettings
+from tracking.detectors.base import Detector, Image
+from tracking.detectors.boxfilter import BoxFilterSettings
+from tracking.detectors.explain import ExplainSettings
+from tracking.detectors.ghosts import GhostSettings
+from tracking.detectors.heightline import HeightLineSettings
+from tracking.detectors.looks import LooksSettings, colour_histograms
+from tracking.detectors.median import MedianSettings
+from tracking.detectors.mog2 import Mog2Settings
+from tracking.detectors.motfile import MotFileDetector, MotFileSettings
+
+__all__ = [
+    "BackgroundDetector",
+    "BackgroundSettings",
+    "BoxFilterSettings",
+    "Detector",
+    "ExplainSettings",
+    "GhostSettings",
+    "HeightLineSettings",
+    "Image",
+    "LooksSettings",
+    "MedianSettings",
+    "Mog2Settings",
+    "MotFileDetector",
+    "MotFileSettings",
+    "colour_histograms",
+]

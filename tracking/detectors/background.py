@@ -1,0 +1,146 @@
+"""The standard detector: people as what differs from a learned background."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal, Protocol
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from tracking.appearance import histograms
+from tracking.detections import Detections
+from tracking.detectors.base import Image, Mask
+from tracking.detectors.boxfilter import Band, BoxFilterSettings, find_peaks, scan_heights
+from tracking.detectors.explain import ExplainSettings, Explanation, explain
+from tracking.detectors.fit import shrink
+from tracking.detectors.ghosts import GhostSettings
+from tracking.detectors.grid import Grid
+from tracking.detectors.heightline import HeightLineLearner, HeightLineSettings
+from tracking.detectors.looks import LooksSettings, colour_histograms
+from tracking.detectors.median import MedianBackground, MedianSettings
+from tracking.detectors.mog2 import Mog2Background, Mog2Settings
+from tracking.detectors.shadow import ShadowSettings
+from tracking.detectors.split import Split
+
+# Pixels of the working picture per cell of the box filter, on each axis.
+CELL = 2
+_CHANNELS = 3
+
+
+@dataclass(frozen=True, slots=True)
+class BackgroundSettings:
+    """The background-subtraction detector of paper IV.A.2."""
+
+    model: Literal["median", "mog2"] = "median"  # how the background is learned
+    work_width: int = 360  # pixels; wider pictures are made smaller first
+    bins: int = 64  # bins of the grey histograms
+    ignore: tuple[tuple[tuple[float, float], ...], ...] = ()  # polygons of (x, y) in pixels to ignore
+    outside: float = 0.25  # people may be out of the picture by this share of the picture's height
+    looks: LooksSettings = field(default_factory=LooksSettings)
+    median: MedianSettings = field(default_factory=MedianSettings)
+    shadows: ShadowSettings = field(default_factory=ShadowSettings)
+    mog2: Mog2Settings = field(default_factory=Mog2Settings)
+    ghosts: GhostSettings = field(default_factory=GhostSettings)
+    boxes: BoxFilterSettings = field(default_factory=BoxFilterSettings)
+    heights: HeightLineSettings = field(default_factory=HeightLineSettings)
+    hypotheses: ExplainSettings = field(default_factory=ExplainSettings)
+
+
+class _Background(Protocol):
+    def split(self, image: Image) -> Split | None: ...
+
+    def learn(self, foreground: Mask, occupied: Mask) -> None: ...
+
+
+class BackgroundDetector:
+    """Finds standing people in the foreground of one camera. Deterministic, about a second to warm up."""
+
+    def __init__(self, settings: BackgroundSettings | None = None) -> None:
+        self.settings = settings or BackgroundSettings()
+        self._learner = HeightLineLearner(self.settings.heights)
+        self._background: _Background = (
+            MedianBackground(self.settings.median, self.settings.ghosts, self.settings.shadows)
+            if self.settings.model == "median"
+            else Mog2Background(self.settings.mog2)
+        )
+        self._shape: tuple[int, ...] | None = None
+        self._grid: Grid | None = None
+
+    def detect(self, image: Image, frame: int | None = None) -> Detections:  # noqa: ARG002 — Detector
+        """Give the hypotheses of the next frame; none while the background is not known yet.
+
+        Raises:
+            ValueError: not an `(H, W, 3)` uint8 picture, or another size than before.
+        """
+        grid = self._grid_of(image)
+        small = grid.shrunk(image)
+        split = self._background.split(small)
+        if split is None:
+            return Detections.empty(self.bins)
+        mask = _cleaned(split.foreground & grid.visible)
+        self._learner.watch(mask, grid.visible)
+        found = self._hypotheses(mask, split.shadow & grid.visible & ~mask, grid)
+        boxes = grid.to_work(found.boxes)
+        self._background.learn(mask, _occupied(boxes[: found.people], mask.shape))
+        return Detections(grid.to_picture(boxes), found.scores, self._looks(small, boxes, mask))
+
+    def _looks(self, small: Image, boxes: npt.NDArray[np.float64], mask: Mask) -> npt.NDArray[np.float64]:
+        if self.settings.looks.colour:
+            return colour_histograms(small, boxes, self.settings.looks.colour_bins, mask)
+        grey = np.asarray(cv2.cvtColor(small, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
+        return histograms(grey, boxes, self.settings.bins, mask)
+
+    @property
+    def bins(self) -> int:
+        """The length of a row of the histograms."""
+        return self.settings.looks.row if self.settings.looks.colour else self.settings.bins
+
+    def _hypotheses(self, mask: Mask, shadow: Mask, grid: Grid) -> Explanation:
+        settings = self.settings
+        foreground = grid.cells(mask)
+        line = self._learner.line
+        band = None
+        if line is not None:
+            heights = settings.heights
+            band = Band(line.in_cells(CELL, grid.margin), heights.tolerance, heights.doubt)
+        empty = np.maximum(grid.weight - foreground - grid.cells(shadow), 0.0)
+        cost = np.asarray(settings.boxes.background_cost * empty, dtype=np.float32)
+        tall = scan_heights(mask.shape[0] // CELL, settings.boxes)
+        peaks = find_peaks(foreground - cost, grid.weight, settings.boxes, tall, band)
+        found = explain(peaks, foreground, cost, grid.weight, settings.hypotheses)
+        return Explanation(shrink(found.boxes, foreground, grid.weight), found.scores, found.people)
+
+    def _grid_of(self, image: Image) -> Grid:
+        if image.ndim != _CHANNELS or image.shape[2] != _CHANNELS or image.dtype != np.uint8:
+            raise ValueError(f"a frame is (H, W, 3) uint8, not {image.shape} {image.dtype}")
+        if self._grid is None:
+            self._shape = image.shape
+            self._grid = Grid(
+                image.shape[:2], self.settings.work_width, CELL, self.settings.outside, self.settings.ignore
+            )
+        if image.shape != self._shape:
+            raise ValueError(f"the frames' size changed from {self._shape} to {image.shape}")
+        return self._grid
+
+
+# Closing joins a head to its shoulders where the hair looks like the wall behind.
+_CLOSE = np.ones((5, 3), dtype=np.uint8)
+# Around a person nothing is learned either: shadows of feet, hands, and the box may be a little off.
+_AROUND = 0.15
+
+
+def _cleaned(mask: Mask) -> Mask:
+    """Take out lonely pixels and close small holes."""
+    return np.asarray(cv2.morphologyEx(cv2.medianBlur(mask, 5), cv2.MORPH_CLOSE, _CLOSE), dtype=np.uint8)
+
+
+def _occupied(boxes: npt.NDArray[np.float64], shape: tuple[int, ...]) -> Mask:
+    """Give a mask `shape` that is 255 where somebody is."""
+    occupied = np.zeros(shape, dtype=np.uint8)
+    for left, top, right, bottom in boxes:
+        x, y = _AROUND * (right - left), _AROUND * (bottom - top)
+        rows = slice(max(int(top - y), 0), int(bottom + y) + 1)
+        occupied[rows, max(int(left - x), 0) : int(right + x) + 1] = 255
+    return occupied

@@ -1,0 +1,46 @@
+"""Blobs of the foreground that are one whole standing person alone: what the height line learns from."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from tracking.detectors.base import Mask
+
+# What an isolated person's blob looks like: width over height, filled share of its box, least height
+# in picture heights, and the margin in pixels to the border and to what is ignored.
+_THINNEST, _WIDEST = 0.2, 0.55
+_LEAST_FILL = 0.4
+_LEAST_HEIGHT = 0.08
+_MARGIN = 3
+_MERGED_AREA = 0.05
+
+
+def isolated_people(foreground: Mask, visible: Mask) -> list[tuple[float, float]]:
+    """Give foot row and height of every blob that looks like one whole standing person alone."""
+    rows, columns = foreground.shape
+    count, _, stats, _ = cv2.connectedComponentsWithStats(foreground)
+    found: list[tuple[float, float]] = []
+    for label in range(1, count):
+        left, top, width, height, area = (int(value) for value in stats[label])
+        upright = _THINNEST * height <= width <= _WIDEST * height and area >= _LEAST_FILL * width * height
+        inside = left >= _MARGIN and left + width <= columns - _MARGIN
+        inside = inside and top >= _MARGIN and top + height <= rows - _MARGIN
+        if not (upright and inside and height >= _LEAST_HEIGHT * rows):
+            continue
+        around = visible[top - _MARGIN : top + height + _MARGIN, left - _MARGIN : left + width + _MARGIN]
+        if around.all() and not _crowded(np.asarray(stats, dtype=np.int32), label):
+            found.append((float(top + height), float(height)))
+    return found
+
+
+def _crowded(stats: npt.NDArray[np.int32], label: int) -> bool:
+    """Say whether another sizeable blob reaches into this one's surroundings: a person in pieces."""
+    left, top, width, height, area = (int(value) for value in stats[label])
+    reach = height // 8
+    others = np.delete(stats[1:], label - 1, axis=0)
+    others = others[others[:, cv2.CC_STAT_AREA] >= _MERGED_AREA * area]
+    beside = (others[:, 0] > left + width + reach) | (others[:, 0] + others[:, 2] < left - reach)
+    apart = (others[:, 1] > top + height + reach) | (others[:, 1] + others[:, 3] < top - reach)
+    return bool((~(beside | apart)).any())

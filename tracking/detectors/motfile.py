@@ -1,0 +1,92 @@
+"""Detections from a MOTChallenge file, behind the interface of a detector."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from tracking.appearance import histograms
+from tracking.boxes import BOX_SIDES, iou
+from tracking.detections import Detections
+from tracking.detectors.base import Image
+from tracking.motchallenge import MotRow, read_rows
+
+
+@dataclass(frozen=True, slots=True)
+class MotFileSettings:
+    """Reading public detections."""
+
+    bins: int = 64  # bins of the grey histograms, where there is a picture
+    least_score: float = 0.0  # detections below this score (0..1, see `MotFileDetector`) are left out
+    apart: float = 0.7  # of two detections that overlap (IoU) by more, the one of lower score is left out
+    first_frame: int = 0  # frame number (pulse) of the file's frame 1
+
+
+class MotFileDetector:
+    """Gives the detections of a file frame by frame; appearance from the picture where there is one.
+
+    Confidences become scores in [0, 1]: as they are if all lie there, else stretched from the smallest
+    of the file to the largest (detectors write what they like, the files do not say the unit). Without
+    pictures (`image` of no pixels) histograms have no bins.
+
+    Raises:
+        ValueError: the file is no MOTChallenge text.
+        OSError: the file cannot be read.
+    """
+
+    def __init__(self, path: Path, settings: MotFileSettings | None = None) -> None:
+        self.settings = settings or MotFileSettings()
+        self._frames = _by_frame(read_rows(path))
+        self._next = self.settings.first_frame
+
+    @property
+    def last(self) -> int:
+        """The last frame number with a detection."""
+        return self.settings.first_frame + max(self._frames, default=0) - 1
+
+    def detect(self, image: Image, frame: int | None = None) -> Detections:
+        """Give the detections of the frame; none where the file has none."""
+        number = self._next if frame is None else frame
+        self._next = number + 1
+        bins = self.settings.bins if image.size else 0
+        rows = self._frames.get(number - self.settings.first_frame + 1)
+        if rows is None:
+            return Detections.empty(bins)
+        keep = _kept(rows, self.settings)
+        boxes, scores = rows[keep, :BOX_SIDES], rows[keep, BOX_SIDES]
+        if not bins:
+            return Detections(boxes, scores, np.empty((len(boxes), 0)))
+        grey = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
+        return Detections(boxes, scores, histograms(grey, boxes, bins))
+
+
+def _by_frame(rows: Sequence[MotRow]) -> dict[int, np.ndarray[tuple[int, int], np.dtype[np.float64]]]:
+    """Give the rows `left, top, right, bottom, score` of each frame, best first."""
+    confidences = [row.confidence for row in rows]
+    least, most = min(confidences, default=0.0), max(confidences, default=1.0)
+    if least >= 0.0 and most <= 1.0:
+        least, most = 0.0, 1.0
+    spread = most - least
+    frames: dict[int, list[tuple[float, ...]]] = {}
+    for row in rows:
+        score = (row.confidence - least) / spread if spread > 0.0 else 1.0
+        frames.setdefault(row.frame, []).append((*row.box, score))
+    return {
+        number: np.array(sorted(found, key=lambda row: (-row[-1], *row)), dtype=np.float64)
+        for number, found in frames.items()
+    }
+
+
+def _kept(rows: np.ndarray[tuple[int, int], np.dtype[np.float64]], settings: MotFileSettings) -> list[int]:
+    kept: list[int] = []
+    for index, row in enumerate(rows):
+        if row[BOX_SIDES] < settings.least_score:
+            break
+        overlaps = iou(rows[kept, :BOX_SIDES], row[:BOX_SIDES])
+        if overlaps.max(initial=0.0) <= settings.apart:
+            kept.append(index)
+    return kept

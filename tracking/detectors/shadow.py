@@ -1,0 +1,45 @@
+"""Shadows: darker than the floor, but of the floor's colour.
+
+Grey trousers look the same, so what looks like a shadow counts neither for a person nor against one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tracking.detectors.base import Image, Mask
+
+
+@dataclass(frozen=True, slots=True)
+class ShadowSettings:
+    """What looks like a shadow, by the ratio of the frame to the background in each channel."""
+
+    use: bool = True
+    darkest: float = 0.6  # least mean ratio: darker is clothing
+    lightest: float = 0.97  # largest mean ratio: lighter is no shadow
+    colour: float = 0.03  # largest spread of the ratio over the channels, in shares of their mean
+
+
+def shadow_mask(image: Image, background: Image, foreground: Mask, settings: ShadowSettings) -> Mask:
+    """Give the part of the foreground `(H, W)` that looks like a shadow.
+
+    Args:
+        image: `(H, W, 3)`.
+        background: `(H, W, 3)` at the gain of the image.
+        foreground: `(H, W)`, 255 where the two differ.
+        settings: the thresholds.
+    """
+    found = np.zeros_like(foreground)
+    where = np.flatnonzero(foreground)
+    if not settings.use or not where.size:
+        return found
+    new = image.reshape(-1, 3)[where].astype(np.float32) + 1.0
+    old = background.reshape(-1, 3)[where].astype(np.float32) + 1.0
+    ratio = new / old
+    mean = ratio.mean(axis=1)
+    spread = ratio.max(axis=1) - ratio.min(axis=1)
+    darker = (mean >= settings.darkest) & (mean <= settings.lightest)
+    found.ravel()[where[darker & (spread <= settings.colour * mean)]] = 255
+    return found

@@ -1,0 +1,141 @@
+"""MOTChallenge text: `frame,id,left,top,width,height,confidence,x,y,z`, one row per box.
+
+Frames count from 1 in the files and everywhere in this module; ids of detections are -1.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+# frame, id and the four numbers of the box; the others are optional.
+_LEAST_FIELDS = 6
+_MOST_FIELDS = 10
+_CONFIDENCE = 6
+# Larger frame numbers are a file of something else (timestamps), and would make a reader wait for ever.
+_LAST_FRAME = 10_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class MotRow:
+    """One box of one frame.
+
+    Attributes:
+        frame: from 1.
+        id: the object's number; -1 where it is a detection.
+        left: pixels, like `top`, `width` and `height`.
+        confidence: the detector's, in its own unit; 1 in tracks, 0 in ground truth that does not count.
+        visible: the ninth field of ground truth: the share of the object that is visible; -1 unknown.
+    """
+
+    frame: int
+    id: int
+    left: float
+    top: float
+    width: float
+    height: float
+    confidence: float = 1.0
+    visible: float = -1.0
+
+    @property
+    def box(self) -> tuple[float, float, float, float]:
+        """The box as `left, top, right, bottom` in pixels."""
+        return self.left, self.top, self.left + self.width, self.top + self.height
+
+
+def read_rows(path: Path) -> list[MotRow]:
+    """Read a MOTChallenge file, in the order of the file.
+
+    Raises:
+        ValueError: the file is no such text; the message names file and line.
+        OSError: the file cannot be read.
+    """
+    try:
+        text = path.read_text(encoding="ascii")
+    except UnicodeDecodeError as error:
+        raise ValueError(f"{path}: not a MOTChallenge text file (byte {error.start} is not ASCII)") from None
+    return list(parse_rows(text.splitlines(), str(path)))
+
+
+def parse_rows(lines: Iterable[str], name: str) -> Iterator[MotRow]:
+    """Read rows one by one; empty lines are skipped, `name` is what errors call the source.
+
+    Raises:
+        ValueError: a line is no row; the message is one line, `name:line: what is wrong`.
+    """
+    for number, line in enumerate(lines, start=1):
+        if line.strip():
+            try:
+                yield _row(line)
+            except ValueError as error:
+                raise ValueError(f"{name}:{number}: {error}") from None
+
+
+def format_row(row: MotRow) -> str:
+    """Give the row as text without the line's end: two decimals, the same bytes for the same row."""
+    numbers = (row.left, row.top, row.width, row.height, row.confidence)
+    return f"{row.frame},{row.id}," + ",".join(_decimal(number) for number in numbers) + ",-1,-1,-1"
+
+
+def format_rows(rows: Iterable[MotRow]) -> str:
+    """Give the text of a file: sorted by frame and id, each line ended."""
+    ordered = sorted(rows, key=lambda row: (row.frame, row.id, row.left, row.top))
+    return "".join(format_row(row) + "\n" for row in ordered)
+
+
+def write_rows(path: Path, rows: Iterable[MotRow]) -> None:
+    """Write a MOTChallenge file, whole or not at all: a reader never sees half of it.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    partial = path.with_name(path.name + ".part")
+    try:
+        partial.write_text(format_rows(rows), encoding="ascii")
+        partial.replace(path)
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def _decimal(number: float) -> str:
+    text = f"{number:.2f}"
+    # A negative zero would make equal boxes differ in the file.
+    return "0.00" if text == "-0.00" else text
+
+
+def _row(line: str) -> MotRow:
+    fields = [field.strip() for field in line.split(",")]
+    if not _LEAST_FIELDS <= len(fields) <= _MOST_FIELDS:
+        raise ValueError(f"expected {_LEAST_FIELDS} to {_MOST_FIELDS} fields, found {len(fields)}")
+    frame = _whole(fields[0], "frame")
+    if not 1 <= frame <= _LAST_FRAME:
+        raise ValueError(f"frame {frame} is not between 1 and {_LAST_FRAME}")
+    left, top, width, height = (
+        _number(field, name)
+        for field, name in zip(fields[2:6], ("left", "top", "width", "height"), strict=True)
+    )
+    if width <= 0.0 or height <= 0.0:
+        raise ValueError(f"a box needs a positive width and height, not {width:g} x {height:g}")
+    confidence = _number(fields[6], "confidence") if len(fields) > _CONFIDENCE else 1.0
+    # Ground truth has nine fields, `..., class, visible`; results have ten, the last three of them -1.
+    visible = _number(fields[8], "visible") if len(fields) == _MOST_FIELDS - 1 else -1.0
+    return MotRow(frame, _whole(fields[1], "id"), left, top, width, height, confidence, visible)
+
+
+def _whole(text: str, name: str) -> int:
+    number = _number(text, name)
+    if not number.is_integer():
+        raise ValueError(f"{name} is a whole number, not {text!r}")
+    return int(number)
+
+
+def _number(text: str, name: str) -> float:
+    try:
+        number = float(text)
+    except ValueError:
+        raise ValueError(f"{name} is a number, not {text[:40]!r}") from None
+    if not math.isfinite(number):
+        raise ValueError(f"{name} is a finite number, not {text[:40]!r}")
+    return number

@@ -1,0 +1,113 @@
+"""The linear program of paper II.D as written: a variable for each arc ξ, node y, location p and p+, p-."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracking.boxes import BOX_SIDES
+from tracking.network import Network
+from tracking.solvers.assemble import Assembly
+from tracking.solvers.highs import LinearProgram
+
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ArcProgram:
+    """The program, and where its variables are.
+
+    Attributes:
+        program: the linear program.
+        nodes: (n, M, S) the column of each y, -1 where there is no such node.
+        defining: (y,) the rows that define the y, in the order of their columns: y = sum of arcs.
+        arcs: how many columns are arcs; they come first.
+        moves: (pairs, M - 1, 4, 2) the columns p+ and p- of the layout term; empty when μ is 0.
+    """
+
+    program: LinearProgram
+    nodes: Ints
+    defining: Ints
+    arcs: int
+    moves: Ints
+
+
+def arc_program(network: Network, allowed: NDArray[np.bool_] | None = None) -> ArcProgram:
+    """Write down the program of a network with at least one object.
+
+    `allowed` (n, M - 1, S, S), where given, leaves only its arcs between frames in.
+    """
+    build = Assembly()
+    exists = np.isfinite(network.node)
+    # Arcs are the first columns, nodes the next: the flow rows join them.
+    pair = network.pair[network.sets] + network.node[:, 1:, None, :]
+    usable = np.isfinite(pair) & exists[:, :-1, :, None]
+    if allowed is not None:
+        usable &= allowed
+    start = network.source + network.node[:, 0]
+    from_source, between, to_sink = np.nonzero(np.isfinite(start)), np.nonzero(usable), _ends(network, exists)
+    source_arcs = build.columns(start[from_source])
+    pair_arcs = build.columns(pair[between])
+    sink_arcs = build.columns(network.sink[to_sink])
+    nodes = np.full(network.node.shape, -1, dtype=np.int64)
+    nodes[exists] = build.columns(np.zeros(int(exists.sum())))
+
+    count = int(exists.sum())
+    into, out_of = np.full(nodes.shape, -1), np.full(nodes.shape, -1)
+    into[exists], out_of[exists] = build.rows(count, 0.0, 0.0), build.rows(count, 0.0, 0.0)
+    build.put(into[exists], nodes[exists], -1.0)
+    build.put(out_of[exists], nodes[exists], -1.0)
+    build.put(build.rows(network.objects, 1.0, 1.0)[from_source[0]], source_arcs, 1.0)
+    build.put(build.rows(network.objects, 1.0, 1.0)[to_sink[0]], sink_arcs, 1.0)
+    build.put(into[from_source[0], 0, from_source[1]], source_arcs, 1.0)
+    n, m, i, j = between
+    build.put(out_of[n, m, i], pair_arcs, 1.0)
+    build.put(into[n, m + 1, j], pair_arcs, 1.0)
+    build.put(out_of[to_sink[0], -1, to_sink[1]], sink_arcs, 1.0)
+
+    _add_conflicts(build, network, nodes)
+    arcs = len(source_arcs) + len(pair_arcs) + len(sink_arcs)
+    moves = _add_layout(build, network, nodes)
+    return ArcProgram(build.program(), nodes, into[exists], arcs, moves)
+
+
+def _ends(network: Network, exists: NDArray[np.bool_]) -> tuple[Ints, ...]:
+    return np.nonzero(np.isfinite(network.sink) & exists[:, -1])
+
+
+def _add_conflicts(build: Assembly, network: Network, nodes: Ints) -> None:
+    """Let at most one path go through each conflict row."""
+    for m in range(network.frames):
+        rows = network.rows(m)
+        row, n, place = np.nonzero(rows)
+        column = nodes[n, m, place]
+        build.put(build.rows(len(rows), -np.inf, 1.0)[row[column >= 0]], column[column >= 0], 1.0)
+
+
+def _add_layout(build: Assembly, network: Network, nodes: Ints) -> Ints:
+    """Add p, tied to y, and p+ - p- = the change of the vector between two objects, for all pairs."""
+    pairs = list(combinations(range(network.objects), 2))
+    steps = network.frames - 1
+    if not network.layout or not pairs or not steps:
+        return np.empty((len(pairs), steps, BOX_SIDES, 0), dtype=np.int64)
+    shape = (network.objects, network.frames, BOX_SIDES)
+    location = build.columns(np.zeros(int(np.prod(shape))), lower=-np.inf).reshape(shape)
+    tie = build.rows(location.size, 0.0, 0.0).reshape(shape)
+    build.put(tie, location, 1.0)
+    n, m, state = np.nonzero(nodes >= 0)
+    build.put(tie[n, m], nodes[n, m, state][:, None], -network.locations[network.sets[n], m, state])
+
+    first, second = np.array(pairs).T
+    moves = build.columns(np.full(len(pairs) * steps * BOX_SIDES * 2, network.layout))
+    moves = moves.reshape(len(pairs), steps, BOX_SIDES, 2)
+    change = build.rows(moves.size // 2, 0.0, 0.0).reshape(moves.shape[:3])
+    build.put(change, moves[..., 0], 1.0)
+    build.put(change, moves[..., 1], -1.0)
+    build.put(change, location[first, :-1], -1.0)
+    build.put(change, location[first, 1:], 1.0)
+    build.put(change, location[second, :-1], 1.0)
+    build.put(change, location[second, 1:], -1.0)
+    return moves

@@ -1,0 +1,97 @@
+"""What all solvers share: the answer, its proof, and how a solver is found by name."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Protocol, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracking.network import Network
+
+OCCLUDED = -1
+"""The state of an object that is on no observation of a frame."""
+
+# Modules are imported when asked for: a tracker with a dynamic program need not load the LP solver.
+_SOLVERS = {
+    "arcs": ("tracking.solvers.arcs", "Arcs"),
+    "columns": ("tracking.solvers.columns", "Columns"),
+    "exact": ("tracking.solvers.exact", "Exact"),
+    "extended-dp": ("tracking.solvers.extended_dp", "ExtendedDp"),
+    "greedy-dp": ("tracking.solvers.greedy_dp", "GreedyDp"),
+    "l2": ("tracking.solvers.l2", "L2"),
+    "separate-dp": ("tracking.solvers.separate_dp", "SeparateDp"),
+}
+
+DEFAULT_SOLVER = "columns"
+
+
+@dataclass(frozen=True, slots=True)
+class SolveReport:
+    """What is proven about an answer.
+
+    Attributes:
+        solver: the name of the solver.
+        objective: cost of the integer states returned (II.C).
+        bound: proven lower bound of the cost of any states without conflicts.
+        integral: the relaxation gave whole paths by itself: nothing was rounded, and the answer is the
+            global optimum.
+        conflicts: pairs of objects and frames of the answer that conflict; only `separate-dp`, which
+            does not look at conflicts, leaves any.
+        rounds: how often the linear program (or a dynamic program over all objects) was solved.
+    """
+
+    solver: str
+    objective: float
+    bound: float
+    integral: bool
+    conflicts: int
+    rounds: int
+
+    @property
+    def gap(self) -> float:
+        """How far the answer may be from the optimum, relative to max(1, |objective|); never negative."""
+        return max(0.0, self.objective - self.bound) / max(1.0, abs(self.objective))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Solution:
+    """Where each object is in each frame of a window.
+
+    Attributes:
+        states: (n, M) int64, the index of the observation in its frame, or -1: occluded.
+        report: what is proven about it.
+    """
+
+    states: NDArray[np.int64]
+    report: SolveReport
+
+
+class Solver(Protocol):
+    """Finds the paths of all objects of a window; stateless, so that one serves many trackers."""
+
+    @property
+    def name(self) -> str:
+        """The name in the registry."""
+
+    def solve(self, network: Network) -> Solution:
+        """Give the states of all objects in all frames; the same network gives the same answer."""
+
+
+def solver_names() -> tuple[str, ...]:
+    """Give the names of all solvers, sorted."""
+    return tuple(sorted(_SOLVERS))
+
+
+def solver_named(name: str) -> Solver:
+    """Give the solver of that name.
+
+    Raises:
+        ValueError: there is none; the message lists the names.
+    """
+    if name not in _SOLVERS:
+        raise ValueError(f"no solver is called {name!r}; there are {', '.join(solver_names())}")
+    module, factory = _SOLVERS[name]
+    return cast("Solver", getattr(import_module(module), factory)())

@@ -1,0 +1,44 @@
+"""`columns`: the relaxation of paper II.D by column generation, with a proof. The default solver."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tracking.network import Network
+from tracking.solvers.arc_master import arcs_of_paths
+from tracking.solvers.arc_search import ArcSearch
+from tracking.solvers.base import Solution
+from tracking.solvers.conflict_finder import ConflictFinder
+from tracking.solvers.finish import finished, nothing
+from tracking.solvers.greedy_dp import greedy_paths
+from tracking.solvers.layout_ascent import guessed
+from tracking.solvers.objective import objective
+from tracking.solvers.path_search import PathSearch
+from tracking.solvers.relaxed import Relaxed
+
+
+class Columns:
+    """The optimum of the relaxation from a few of its columns; equal to `arcs`, and many times faster."""
+
+    name = "columns"
+
+    def solve(self, network: Network) -> Solution:
+        """Solve the relaxation and round it where it is not whole."""
+        if not network.objects:
+            return nothing(self.name, network)
+        return finished(self.name, network, relaxation_by_columns(network))
+
+
+def relaxation_by_columns(network: Network) -> Relaxed:
+    """Give the optimum of the relaxation of a network with at least one object.
+
+    Paths are the columns where only conflicts couple the objects; under the layout term, which whole
+    paths fit badly, arcs are.
+    """
+    if not network.layout:
+        return PathSearch(network).run()
+    start = greedy_paths(network).nodes
+    starts = arcs_of_paths(np.arange(network.objects), start)
+    search = ArcSearch(network, starts, [], ConflictFinder(network))
+    search.enter_guess(guessed(network, objective(network, start)))
+    return search.run()

@@ -1,0 +1,126 @@
+"""`extended-dp`: dynamic programming over the joint states of all objects (paper I.A, reference [1])."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tracking.boxes import Floats
+from tracking.conflicts import Bools
+from tracking.network import Network
+from tracking.solvers.base import Solution
+from tracking.solvers.finish import Proof, answered, nothing
+from tracking.solvers.objective import Ints
+
+_LARGEST = 30_000_000
+"""Numbers held at once, 240 MB: three objects with 70 places, say."""
+
+
+class ExtendedDp:
+    """The integer optimum by trying all joint states; an oracle for up to three objects or so.
+
+    Without the layout term the step from one frame to the next separates by object, and a window costs
+    O(M n S^(n+1)); with it, O(M S^(2n)).
+    """
+
+    name = "extended-dp"
+
+    def solve(self, network: Network) -> Solution:
+        """Give the cheapest states without conflicts; the bound is their cost.
+
+        Raises:
+            ValueError: the joint states of the objects are too many to hold.
+        """
+        if not network.objects:
+            return nothing(self.name, network)
+        power = 2 * network.objects if network.layout else network.objects + 1
+        if (network.places + 1) ** power > _LARGEST:
+            raise ValueError(
+                f"extended-dp cannot hold the joint states of {network.objects} objects in"
+                f" {network.places} places; columns or exact can"
+            )
+        nodes = _Joint(network).best()
+        return answered(network, nodes, Proof(self.name, np.inf, integral=True, rounds=1))
+
+
+class _Joint:
+    """Joint states are arrays of n axes of S states each."""
+
+    def __init__(self, network: Network) -> None:
+        self._network = network
+        self._exclusions = network.exclusions()
+
+    def best(self) -> Ints:
+        """Go forward over all frames, and trace back the cheapest."""
+        network = self._network
+        costs = [self._sum(network.source + network.node[:, 0]) + self._bars(0)]
+        for m in range(1, network.frames):
+            step = self._step_with_layout if network.layout else self._step
+            costs.append(step(costs[-1], m - 1) + self._sum(network.node[:, m]) + self._bars(m))
+        nodes = np.empty((network.objects, network.frames), dtype=np.int64)
+        last = costs[-1] + self._sum(network.sink)
+        nodes[:, -1] = np.unravel_index(int(last.argmin()), last.shape)
+        for m in range(network.frames - 2, -1, -1):
+            arriving = costs[m] + self._into(m, nodes[:, m + 1])
+            nodes[:, m] = np.unravel_index(int(arriving.argmin()), arriving.shape)
+        return nodes
+
+    def _sum(self, single: Floats) -> Floats:
+        """Add costs of single objects (n, S) over joint states."""
+        objects = len(single)
+        total = np.zeros((1,) * objects)
+        for n in range(objects):
+            total = total + single[n].reshape([-1 if axis == n else 1 for axis in range(objects)])
+        return total
+
+    def _bars(self, frame: int) -> Floats:
+        """Give infinity for joint states in conflict, else 0."""
+        network = self._network
+        objects, places = network.objects, network.places
+        bars = np.zeros((places + 1,) * objects)
+        for a in range(objects):
+            for b in range(a + 1, objects):
+                barred = self._pair_bars(frame, a, b)
+                axes = [axis for axis in range(objects) if axis not in {a, b}]
+                bars = bars + np.where(np.expand_dims(barred, axes), np.inf, 0.0)
+        return bars
+
+    def _pair_bars(self, frame: int, first: int, second: int) -> Bools:
+        network = self._network
+        places, sets = network.places, network.sets
+        barred = np.zeros((places + 1, places + 1), dtype=np.bool_)
+        rows = slice(sets[first] * places, (sets[first] + 1) * places)
+        columns = slice(sets[second] * places, (sets[second] + 1) * places)
+        barred[:places, :places] = self._exclusions[frame, rows, columns]
+        return barred
+
+    def _step(self, costs: Floats, step: int) -> Floats:
+        """Take the arcs of one object after the other."""
+        network = self._network
+        for n in range(network.objects):
+            pair = network.pair[network.sets[n], step]
+            ahead = np.moveaxis(costs, n, -1)[..., :, None] + pair
+            costs = np.moveaxis(ahead.min(axis=-2), -1, n)
+        return costs
+
+    def _step_with_layout(self, costs: Floats, step: int) -> Floats:
+        """Take the arcs of all objects together."""
+        arriving = np.empty(costs.shape)
+        for target in np.ndindex(costs.shape):
+            arriving[target] = (costs + self._into(step, np.array(target))).min()
+        return arriving
+
+    def _into(self, step: int, target: Ints) -> Floats:
+        """Give the costs of the arcs from every joint state into one, n axes."""
+        network = self._network
+        sets = network.sets
+        total = self._sum(network.pair[sets, step, :, target])
+        if not network.layout:
+            return total
+        moves = network.locations[sets, step + 1, target][:, None] - network.locations[sets, step]
+        objects = network.objects
+        for a in range(objects):
+            for b in range(a + 1, objects):
+                apart = np.abs(moves[a][:, None] - moves[b][None]).sum(axis=2)
+                axes = [axis for axis in range(objects) if axis not in {a, b}]
+                total = total + network.layout * np.expand_dims(apart, axes)
+        return total

@@ -1,0 +1,116 @@
+"""The LP solver, called in one way everywhere: one thread, dual simplex, no presolve, no clock."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import highspy
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from tracking.boxes import Floats
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LinearProgram:
+    """Minimise `costs x` with `row_lower <= matrix x <= row_upper` and `lower <= x <= upper`."""
+
+    costs: Floats
+    lower: Floats
+    upper: Floats
+    matrix: sparse.csc_array
+    row_lower: Floats
+    row_upper: Floats
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LinearSolution:
+    """The optimum: `values` (columns,), `duals` (rows,), the `objective`, and simplex `iterations`."""
+
+    values: Floats
+    duals: Floats
+    objective: float
+    iterations: int
+
+
+_DUAL, _AS_IT_STANDS = 1, 0
+"""Simplex strategies: dual, best from nothing; or primal after new columns and dual after new rows."""
+
+
+def quiet_highs(*, growing: bool = False) -> highspy.Highs:
+    """Give a solver that is deterministic and says nothing; `growing`: for a program that gets columns."""
+    solver: highspy.Highs = highspy.Highs()  # type: ignore[no-untyped-call]
+    options: dict[str, bool | int | float | str] = {
+        "output_flag": False,
+        "threads": 1,
+        "parallel": "off",
+        "solver": "simplex",
+        "simplex_strategy": _AS_IT_STANDS if growing else _DUAL,
+        "presolve": "off",
+        "random_seed": 0,
+        "primal_feasibility_tolerance": 1e-9,
+        "dual_feasibility_tolerance": 1e-9,
+    }
+    for name, value in options.items():
+        if solver.setOptionValue(name, value) != highspy.HighsStatus.kOk:
+            raise RuntimeError(f"the LP solver does not take {name} = {value}")
+    return solver
+
+
+def highs_model(program: LinearProgram) -> highspy.HighsLp:
+    """Put a program into the solver's own form."""
+    model = highspy.HighsLp()
+    rows, columns = program.matrix.shape
+    model.num_col_ = columns
+    model.num_row_ = rows
+    model.col_cost_ = program.costs
+    model.col_lower_ = program.lower
+    model.col_upper_ = program.upper
+    model.row_lower_ = program.row_lower
+    model.row_upper_ = program.row_upper
+    model.a_matrix_.format_ = highspy.MatrixFormat.kColwise
+    model.a_matrix_.start_ = program.matrix.indptr
+    model.a_matrix_.index_ = program.matrix.indices
+    model.a_matrix_.value_ = program.matrix.data
+    return model
+
+
+def optimum(solver: highspy.Highs) -> LinearSolution:
+    """Run the solver and give what it found.
+
+    Raises:
+        RuntimeError: the program has no optimum, which no network gives rise to.
+    """
+    solver.run()
+    status = solver.getModelStatus()
+    if status != highspy.HighsModelStatus.kOptimal:
+        # A basis kept from before columns and rows came may be too ill-conditioned to go on from.
+        solver.clearSolver()
+        solver.run()
+        status = solver.getModelStatus()
+    if status != highspy.HighsModelStatus.kOptimal:
+        raise RuntimeError(f"the LP solver ended with {solver.modelStatusToString(status)}")
+    found = solver.getSolution()
+    info = solver.getInfo()
+    return LinearSolution(
+        values=np.asarray(found.col_value),
+        duals=np.asarray(found.row_dual),
+        objective=float(info.objective_function_value),
+        iterations=int(info.simplex_iteration_count),
+    )
+
+
+def solve_program(program: LinearProgram, integer: NDArray[np.bool_] | None = None) -> LinearSolution:
+    """Solve one program from nothing; columns where `integer` is true are whole."""
+    solver = quiet_highs()
+    model = highs_model(program)
+    if integer is not None:
+        kinds = (highspy.HighsVarType.kContinuous, highspy.HighsVarType.kInteger)
+        model.integrality_ = [kinds[int(whole)] for whole in integer]
+        for name in ("mip_rel_gap", "mip_abs_gap"):
+            solver.setOptionValue(name, 0.0)
+        solver.setOptionValue("presolve", "on")
+        solver.setOptionValue("solver", "choose")
+    solver.passModel(model)
+    return optimum(solver)

@@ -1,0 +1,109 @@
+"""The layout term in a program of arcs: moves δ of the objects, and what pairs of moves differ by."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import highspy
+import numpy as np
+from scipy import sparse
+
+from tracking.boxes import BOX_SIDES, Floats
+from tracking.network import Network
+from tracking.solvers.objective import Ints
+
+
+class LayoutRows:
+    """Columns δ, p+ and p- and their rows; the network has two frames or more.
+
+    A row per object, step and side says that δ is the move of the flow; a row per pair of objects, step
+    and side says that p+ - p- is the difference of two moves. The duals of the pair rows are within
+    [-μ, μ], and those of the moves are sums of them: a potential on the nodes, so that Viterbi prices it.
+
+    With `squared`, the term is μ times the square of the difference, which p+ alone, then free, stands
+    for; its duals have no limits.
+    """
+
+    def __init__(self, network: Network, highs: highspy.Highs, *, squared: bool) -> None:
+        self._network = network
+        self._squared = squared
+        self._pairs = np.array(list(combinations(range(network.objects), 2)), dtype=np.int64).reshape(-1, 2)
+        steps = (network.frames - 1, BOX_SIDES)
+        moves, differences = (network.objects, *steps), (len(self._pairs), *steps)
+        first = highs.getNumRow()
+        count = int(np.prod(moves)) + int(np.prod(differences))
+        zeros = np.zeros(count)
+        none = np.empty(0, dtype=np.int32)
+        highs.addRows(count, zeros, zeros, 0, np.zeros(count, dtype=np.int32), none, np.empty(0))
+        rows = np.arange(first, first + count)
+        self._moves = rows[: int(np.prod(moves))].reshape(moves)
+        self._differences = rows[int(np.prod(moves)) :].reshape(differences)
+        self._add_columns(highs)
+
+    def _add_columns(self, highs: highspy.Highs) -> None:
+        """Add δ, free, and p+ and p-, each at the cost μ."""
+        moves, differences, first_row = self._moves, self._differences, int(self._moves.flat[0])
+        count = moves.size + 2 * differences.size
+        delta = np.arange(moves.size).reshape(moves.shape)
+        plus = np.arange(moves.size, moves.size + differences.size).reshape(differences.shape)
+        a, b = self._pairs.T
+        entries = [
+            (moves, delta, -1.0),
+            (differences, delta[a], 1.0),
+            (differences, delta[b], -1.0),
+            (differences, plus, -1.0),
+            (differences, plus + differences.size, 1.0),
+        ]
+        row = np.concatenate([rows.ravel() - first_row for rows, _, _ in entries])
+        column = np.concatenate([columns.ravel() for _, columns, _ in entries])
+        value = np.concatenate([np.full(rows.size, sign) for rows, _, sign in entries])
+        matrix = sparse.csc_array((value, (row, column)), shape=(moves.size + differences.size, count))
+        lower, costs = np.zeros(count), np.full(count, self._network.layout)
+        upper = np.full(count, np.inf)
+        lower[: moves.size], costs[: moves.size] = -np.inf, 0.0
+        if self._squared:
+            lower[plus], costs[:], upper[plus + differences.size] = -np.inf, 0.0, 0.0
+        highs.addCols(
+            count,
+            costs,
+            lower,
+            upper,
+            matrix.nnz,
+            matrix.indptr[:-1].astype(np.int32),
+            (matrix.indices + first_row).astype(np.int32),
+            matrix.data,
+        )
+        if self._squared:
+            self._add_squares(highs, plus.ravel(), count)
+
+    def _add_squares(self, highs: highspy.Highs, squared: Ints, count: int) -> None:
+        """Let the columns `squared` cost μ times their squares."""
+        hessian = highspy.HighsHessian()
+        hessian.dim_ = count
+        hessian.format_ = highspy.HessianFormat.kTriangular
+        hessian.start_ = np.searchsorted(squared, np.arange(count + 1)).astype(np.int32)
+        hessian.index_ = squared.astype(np.int32)
+        hessian.value_ = np.full(len(squared), 2.0 * self._network.layout)
+        if highs.passHessian(hessian) != highspy.HighsStatus.kOk:
+            raise RuntimeError("the solver does not take the squares of the layout term")
+
+    def entries(self, owner: Ints, step: Ints, origin: Ints, target: Ints) -> tuple[Ints, Floats]:
+        """Give the rows and values, both (A, 4), of arcs from frame `step` to the next."""
+        where, sets = self._network.locations, self._network.sets[owner]
+        return self._moves[owner, step], where[sets, step + 1, target] - where[sets, step, origin]
+
+    def forces(self, duals: Floats) -> Floats:
+        """Give what a pixel of difference costs each pair, (pairs, M - 1, 4), exactly feasible duals."""
+        forces = duals[self._differences]
+        return forces if self._squared else np.clip(forces, -self._network.layout, self._network.layout)
+
+    def pulls(self, forces: Floats) -> Floats:
+        """Give what a move by a pixel earns each object, (n, M - 1, 4)."""
+        pulls = np.zeros(self._moves.shape)
+        np.add.at(pulls, self._pairs[:, 0], forces)
+        np.add.at(pulls, self._pairs[:, 1], -forces)
+        return pulls
+
+    def slack(self, forces: Floats) -> float:
+        """Give what the bound loses to the forces: the conjugate of the square, nothing for the L1 norm."""
+        return float((forces**2).sum() / (4.0 * self._network.layout)) if self._squared else 0.0

@@ -1,0 +1,79 @@
+"""What states cost and whether they conflict: the discrete problem of paper II.C."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracking.boxes import Floats
+from tracking.network import Network
+from tracking.solvers.base import OCCLUDED
+
+Ints = NDArray[np.int64]
+
+
+def nodes_of(network: Network, states: Ints) -> Ints:
+    """Give node numbers for states: the occlusion node is the last one instead of -1."""
+    return np.where(states == OCCLUDED, network.places, states)
+
+
+def states_of(network: Network, nodes: Ints) -> Ints:
+    """Give states for node numbers: occluded is -1."""
+    return np.where(nodes == network.places, OCCLUDED, nodes)
+
+
+def path_costs(network: Network, nodes: Ints) -> Floats:
+    """Give the cost of each object's path through `nodes` (n, M), (n,); infinite where an arc is missing."""
+    each = np.arange(network.objects)
+    frames = np.arange(network.frames)
+    visited = network.node[each[:, None], frames, nodes].sum(axis=1)
+    between = network.pair[network.sets[:, None], frames[:-1], nodes[:, :-1], nodes[:, 1:]].sum(axis=1)
+    ends = network.source[each, nodes[:, 0]] + network.sink[each, nodes[:, -1]]
+    return np.asarray(visited + between + ends)
+
+
+def layout_cost(network: Network, nodes: Ints, power: int = 1) -> float:
+    """Give the layout term of II.C without its weight μ, over all pairs of objects.
+
+    `power` 1: the L1 norm, pixels; 2: the square of the L2 norm, square pixels.
+    """
+    moves = np.diff(locations_at(network, nodes), axis=1)
+    apart = (np.abs(moves[:, None] - moves[None]) ** power).sum(axis=(2, 3))
+    return float(np.triu(apart, 1).sum())
+
+
+def locations_at(network: Network, nodes: Ints) -> Floats:
+    """Give the location vectors p of objects in `nodes`, (n, M, 4) pixels."""
+    return network.locations[network.sets[:, None], np.arange(network.frames), nodes]
+
+
+def objective(network: Network, nodes: Ints, power: int = 1) -> float:
+    """Give the cost of all paths together, the layout term with its `power` included (II.C)."""
+    total = float(path_costs(network, nodes).sum())
+    if network.layout:
+        total += network.layout * layout_cost(network, nodes, power)
+    return total
+
+
+def conflict_count(network: Network, nodes: Ints) -> int:
+    """Count the pairs of objects that exclude each other, over all frames."""
+    exclusions = network.exclusions()
+    visible = nodes < network.places
+    places = np.where(visible, network.sets[:, None] * network.places + nodes, 0)
+    first, second = np.triu_indices(network.objects, 1)
+    if not exclusions.size or not len(first):
+        return 0
+    frames = np.arange(network.frames)
+    barred = exclusions[frames, places[first], places[second]]
+    return int((barred & visible[first] & visible[second]).sum())
+
+
+def block(network: Network, exclusions: NDArray[np.bool_], node: Floats, taken: tuple[int, Ints]) -> None:
+    """Make infinite in `node` (n, M, S) what others cannot take once `taken`, object and path, is fixed."""
+    owner, path = taken
+    places = network.places
+    others = np.arange(network.objects) != owner
+    for m in np.flatnonzero(path < places):
+        barred = exclusions[m, network.sets[owner] * places + path[m]].reshape(-1, places)
+        barred = np.broadcast_to(barred, (network.objects, places)) & others[:, None]
+        node[:, m, :places][barred] = np.inf

@@ -1,0 +1,117 @@
+"""The relaxation over whole paths as columns (Dantzig-Wolfe), restricted to the paths met so far."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tracking.boxes import Floats
+from tracking.conflicts import Bools
+from tracking.network import Network
+from tracking.solvers.conflict_finder import ConflictRow
+from tracking.solvers.highs import optimum, quiet_highs
+from tracking.solvers.objective import Ints
+from tracking.solvers.viterbi import Paths
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MasterPoint:
+    """The optimum of a restricted program.
+
+    Attributes:
+        objective: its cost.
+        prices: (R,) what going through each conflict row costs, not negative.
+        worths: (n,) the cost below which a path of an object would better the program.
+    """
+
+    objective: float
+    prices: Floats
+    worths: Floats
+
+
+class PathMaster:
+    """Chooses, for the objects added to it, the cheapest mixture of their paths that keeps the rows."""
+
+    def __init__(self, network: Network) -> None:
+        self._network = network
+        self._highs = quiet_highs(growing=True)
+        self._known: set[tuple[int, bytes]] = set()
+        self._owners = np.empty(0, dtype=np.int64)
+        self._paths = np.empty((0, network.frames), dtype=np.int64)
+        self._values = np.empty(0)
+        self._object_rows: dict[int, int] = {}
+        self._conflict_rows: list[int] = []
+        self.rows: list[ConflictRow] = []
+
+    def add_objects(self, objects: Sequence[int]) -> None:
+        """Let the program choose for these objects, too; give them paths before the next `solve`."""
+        first = len(self._object_rows) + len(self.rows)
+        self._object_rows.update({n: first + k for k, n in enumerate(objects)})
+        count = len(objects)
+        starts = np.zeros(count, dtype=np.int32)
+        self._highs.addRows(
+            count, np.ones(count), np.ones(count), 0, starts, np.empty(0, dtype=np.int32), np.empty(0)
+        )
+
+    def add_paths(self, owners: Ints, paths: Paths) -> int:
+        """Add the paths that are new; give their number."""
+        new = []
+        for k, (owner, nodes) in enumerate(zip(owners.tolist(), paths.nodes, strict=True)):
+            key = (owner, nodes.tobytes())
+            if key not in self._known and np.isfinite(paths.costs[k]):
+                self._known.add(key)
+                new.append(k)
+        if not new:
+            return 0
+        owners, nodes = owners[new], paths.nodes[new]
+        entries = self._entries(owners, nodes)
+        column, row = np.nonzero(entries)
+        starts = np.searchsorted(column, np.arange(len(new))).astype(np.int32)
+        index = np.concatenate([self._row_numbers(), self._conflict_rows]).astype(np.int32)[row]
+        zeros, endless = np.zeros(len(new)), np.full(len(new), np.inf)
+        self._highs.addCols(
+            len(new), paths.costs[new], zeros, endless, len(row), starts, index, np.ones(len(row))
+        )
+        self._owners = np.concatenate([self._owners, owners])
+        self._paths = np.concatenate([self._paths, nodes])
+        return len(new)
+
+    def _row_numbers(self) -> Ints:
+        return np.array(list(self._object_rows.values()), dtype=np.int64)
+
+    def _entries(self, owners: Ints, nodes: Ints) -> Bools:
+        """Say which paths are in which rows, (paths, object rows and then conflict rows)."""
+        own = owners[:, None] == np.array(list(self._object_rows), dtype=np.int64)
+        through = [row.members[owners, nodes[:, row.frame]] for row in self.rows]
+        return np.column_stack([own, *through])
+
+    def add_rows(self, rows: Sequence[ConflictRow]) -> None:
+        """Bind the program by more conflict rows."""
+        for row in rows:
+            through = np.flatnonzero(row.members[self._owners, self._paths[:, row.frame]])
+            self._conflict_rows.append(len(self._object_rows) + len(self.rows))
+            self.rows.append(row)
+            self._highs.addRow(-np.inf, 1.0, len(through), through.astype(np.int32), np.ones(len(through)))
+
+    def solve(self) -> MasterPoint:
+        """Choose anew."""
+        found = optimum(self._highs)
+        self._values = found.values
+        worths = np.full(self._network.objects, np.inf)
+        worths[list(self._object_rows)] = found.duals[self._row_numbers()]
+        prices = np.maximum(0.0, -found.duals[self._conflict_rows]) if self.rows else np.empty(0)
+        return MasterPoint(found.objective, prices, worths)
+
+    def used(self) -> tuple[Ints, Ints]:
+        """Give the paths in use: their objects (P,) and nodes (P, M)."""
+        used = np.flatnonzero(self._values > 0.0)
+        return self._owners[used], self._paths[used]
+
+    def put_usage(self, usage: Floats) -> None:
+        """Write y of the objects added into `usage` (n, M, S)."""
+        usage[list(self._object_rows)] = 0.0
+        frames = np.arange(self._network.frames)
+        used = np.flatnonzero(self._values > 0.0)
+        np.add.at(usage, (self._owners[used, None], frames, self._paths[used]), self._values[used, None])

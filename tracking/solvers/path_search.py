@@ -1,0 +1,124 @@
+"""Column generation over whole paths, for windows without layout term.
+
+Every object starts on its cheapest path. Where these conflict, the objects concerned, and no others,
+enter a small program that mixes their paths so that the rows they broke hold. Its duals price the places
+of the rows; a Viterbi pass over the priced network finds each object's best path or proves that there is
+no better one. Objects that never meet never share a row, so the program falls into independent groups
+by itself; most objects of most windows never enter it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tracking.network import Network
+from tracking.solvers.arc_master import arcs_of_paths
+from tracking.solvers.arc_search import ArcSearch
+from tracking.solvers.conflict_finder import ConflictFinder, ConflictRow
+from tracking.solvers.objective import Ints, path_costs
+from tracking.solvers.path_master import MasterPoint, PathMaster
+from tracking.solvers.pricing import Pricing
+from tracking.solvers.relaxed import CLOSE, Relaxed
+from tracking.solvers.viterbi import Paths, Trellis
+
+_FEW_OBJECTS = 12
+"""Up to so many objects in conflict, paths settle sooner than arcs do."""
+
+_ROUNDS_OF_FEW, _ROUNDS_OF_MANY = 50, 4
+"""Rounds of paths before arcs take over."""
+
+
+class PathSearch:
+    """One search; `run` it once. The network has at least one object and no layout term."""
+
+    def __init__(self, network: Network) -> None:
+        self._network = network
+        self._finder = ConflictFinder(network)
+        self._master = PathMaster(network)
+        self._pricing = Pricing(Trellis.of(network))
+        self._alone = self._pricing.alone
+        self._bound = -np.inf
+        self._priced = network.node
+        self._point = MasterPoint(0.0, np.empty(0), np.empty(0))
+        self._active = np.zeros(network.objects, dtype=np.bool_)
+        self._usage = np.zeros(network.node.shape)
+        each, frames = np.indices(self._alone.nodes.shape)
+        self._usage[each, frames, self._alone.nodes] = 1.0
+
+    def run(self) -> Relaxed:
+        """Find the optimum of the relaxation."""
+        self._keep_rows()
+        if not self._active.any():
+            return Relaxed(self._usage, float(self._alone.costs.sum()), self._priced, 0)
+        rounds = 0
+        while rounds < (_ROUNDS_OF_FEW if self._active.sum() <= _FEW_OBJECTS else _ROUNDS_OF_MANY):
+            rounds += 1
+            if not self._enter_better_paths():
+                return Relaxed(self._usage, self._bound, self._priced, rounds)
+            self._solve()
+            self._keep_rows()
+        return self._by_arcs(rounds)
+
+    def _by_arcs(self, rounds: int) -> Relaxed:
+        """Go on from the arcs of the paths in use: many objects that meet want parts of paths combined."""
+        owners, nodes = self._master.used()
+        calm = np.flatnonzero(~self._active)
+        starts = arcs_of_paths(
+            np.concatenate([owners, calm]), np.concatenate([nodes, self._alone.nodes[calm]])
+        )
+        found = ArcSearch(self._network, starts, self._master.rows, self._finder).run()
+        return Relaxed(found.usage, found.bound, found.priced, found.rounds + rounds)
+
+    def _solve(self) -> None:
+        self._point = self._master.solve()
+        self._master.put_usage(self._usage)
+
+    def _keep_rows(self) -> None:
+        """Bind the program by the rows it breaks until it breaks none."""
+        while rows := self._finder.broken(self._usage):
+            self._bind(rows)
+            self._solve()
+
+    def _bind(self, rows: list[ConflictRow]) -> None:
+        """Let the objects that break the rows, and paths around all rows, into the program."""
+        concerned = np.zeros(self._network.objects, dtype=np.bool_)
+        for row in rows:
+            concerned |= (self._usage[:, row.frame] * row.members).any(axis=1)
+        new = np.flatnonzero(concerned & ~self._active)
+        self._active[new] = True
+        if len(new):
+            self._master.add_objects(new.tolist())
+        self._master.add_rows(rows)
+        # Occluded all along, an object keeps every row: the program always has a solution.
+        hidden = np.full((self._network.objects, self._network.frames), self._network.places)
+        self._master.add_paths(new, Paths(hidden, path_costs(self._network, hidden)).only(new))
+        self._master.add_paths(new, self._alone.only(new))
+        self._enter_detours(np.flatnonzero(concerned))
+
+    def _enter_detours(self, objects: Ints) -> None:
+        """Let in, for each of the objects, the best path that goes through no row at all."""
+        node = self._network.node.copy()
+        for row in self._master.rows:
+            node[:, row.frame][row.members] = np.inf
+        self._master.add_paths(objects, self._pricing.best_paths(node, objects))
+
+    def _enter_better_paths(self) -> bool:
+        """Price all paths; let the better ones in; say whether there are any. Keeps the bound."""
+        active, point = np.flatnonzero(self._active), self._point
+        node = self._network.node.copy()
+        for price, row in zip(point.prices, self._master.rows, strict=True):
+            if price > 0.0:
+                node[:, row.frame][row.members] += price
+        self._priced = node
+        paths = self._pricing.best_paths(node, active)
+        others = float(self._alone.costs[~self._active].sum())
+        cost = others + point.objective
+        self._bound = others + float(paths.costs.sum() - point.prices.sum())
+        if cost - self._bound <= CLOSE * max(1.0, abs(cost)):
+            return False
+        nodes = self._alone.nodes.copy()
+        nodes[active] = paths.nodes
+        true_costs = path_costs(self._network, nodes)[active]
+        better = paths.costs < point.worths[active]
+        entering = Paths(paths.nodes[better], true_costs[better])
+        return self._master.add_paths(active[better], entering) > 0

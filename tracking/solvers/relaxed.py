@@ -1,0 +1,28 @@
+"""The optimum of the relaxation, however it was found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from tracking.boxes import Floats
+
+CLOSE = 1e-11
+"""Relative distance of cost and bound at which the optimum is proven; far below the 1e-9 promised."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Relaxed:
+    """The optimum of the relaxation.
+
+    Attributes:
+        usage: y (n, M, S), how much of each object goes through each node.
+        bound: its cost, as the prices prove it.
+        priced: (n, M, S) the costs of nodes with the prices of conflicts and of the layout on them, at
+            which the cheapest paths prove the bound.
+        rounds: how often paths or arcs were priced.
+    """
+
+    usage: Floats
+    bound: float
+    priced: Floats
+    rounds: int

@@ -1,0 +1,76 @@
+"""What the tracker remembers of each object between windows: the object list of paper II.E."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tracking.boxes import Floats
+from tracking.template import Template
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sighting:
+    """An object in one final frame.
+
+    Attributes:
+        frame: the frame number.
+        box: `(4,)` pixels.
+        histogram: `(B,)` of that box.
+        alone: nobody else is close enough to be in the box.
+    """
+
+    frame: int
+    box: Floats
+    histogram: Floats
+    alone: bool
+
+
+class RememberedObject:
+    """One entry of the object list.
+
+    Attributes:
+        id: its number.
+        histogram: `(B,)`, its template, renewed by every sighting.
+        box: `(4,)`, where it was last seen.
+        frame: the frame in which that was.
+        confirmed: it was seen in a final frame; before that it may vanish.
+        present: it was seen in the last final frame.
+    """
+
+    __slots__ = ("box", "confirmed", "frame", "histogram", "id", "present")
+
+    def __init__(self, number: int, histogram: Floats, box: Floats, frame: int) -> None:
+        self.id = number
+        self.histogram = histogram
+        self.box = box
+        self.frame = frame
+        self.confirmed = False
+        self.present = False
+
+    def template(self) -> Template:
+        """Give the source node: without a place where the object is hidden in the last final frame."""
+        return Template(self.id, self.histogram, self.box if self.present else None)
+
+    def see(self, sighting: Sighting, rate: float) -> None:
+        """Take over what one final frame shows; `rate` is the template's share that it renews.
+
+        Where others are close, the box holds some of them: it does not enter the template.
+        """
+        self.box = sighting.box
+        self.frame = sighting.frame
+        self.confirmed = True
+        if sighting.alone and self.histogram.size:
+            self.histogram = (1.0 - rate) * self.histogram + rate * sighting.histogram
+
+    def hidden_for(self, frame: int) -> int:
+        """Give for how many frames it has not been seen at `frame`."""
+        return max(frame - self.frame, 0)
+
+
+def mean_histogram(histograms: Floats) -> Floats:
+    """Give the mean of histograms `(K, B)`, `(B,)`, summing to 1."""
+    mean = histograms.mean(axis=0)
+    total = float(mean.sum())
+    return np.asarray(mean / total) if total > 0.0 else np.asarray(mean)

@@ -1,0 +1,228 @@
+"""Online tracking of one camera: the network program in a moving window (paper II.E)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from tracking.appearance import appearance_distance
+from tracking.births import Birth, find_births
+from tracking.boxes import BOX_SIDES, Floats, iou
+from tracking.detections import Detections
+from tracking.duplicates import duplicates
+from tracking.network import CostSettings, build_network
+from tracking.reach import reachable, within_reach
+from tracking.solvers.base import OCCLUDED, Solver, SolveReport, solver_named
+from tracking.templates import RememberedObject, Sighting
+from tracking.window import WindowResult, WindowSettings, WindowTrack, joined
+
+# Two boxes that overlap (IoU) by this much hold parts of each other's object.
+_CROWDED = 0.15
+# A new object that is on so few of the window's frames once all are solved together was none.
+_LEAST_SEEN = 3
+
+
+class OnlineTracker:
+    """Tracks the objects of one camera. Deterministic; memory bounded by the window and the object list.
+
+    Windows end at frames n where `stride` divides n + 1, so all cameras end theirs at the same frames.
+    The window reaches from the first frame that is not final yet to the newest; the templates are the
+    objects as they were in the last final frame: one frame of overlap.
+    """
+
+    def __init__(self, window: WindowSettings, costs: CostSettings, solver: Solver) -> None:
+        self._window = window
+        self._costs = costs
+        self._solver = solver
+        # One object alone is a shortest path: dynamic programming is exact.
+        self._single = solver_named("separate-dp")
+        self._seen: dict[int, Detections] = {}
+        self._objects: list[RememberedObject] = []
+        self._next_id = 1
+        self._first: int | None = None
+        self._last: int | None = None
+
+    def push(self, frame: int, detections: Detections) -> WindowResult | None:
+        """Take the detections of a frame; give a result where one or more windows end.
+
+        A frame number that is left out is a frame without detections. After a gap longer than
+        `forget_after` everything before it is final, all objects are forgotten, and the frames of the
+        gap are in no result.
+
+        Raises:
+            ValueError: the frame number is not larger than the last one.
+        """
+        if self._last is not None and frame <= self._last:
+            raise ValueError(f"frame {frame} came after frame {self._last}")
+        results: list[WindowResult] = []
+        if self._last is None:
+            self._first = frame
+        elif frame - self._last > self._window.forget_after:
+            return self._start_again(frame, detections)
+        else:
+            results += [self._solve(end, end - self._window.lag) for end in self._ends(self._last + 1, frame)]
+        self._seen[frame] = detections
+        self._last = frame
+        if (frame + 1) % self._window.stride == 0:
+            results.append(self._solve(frame, frame - self._window.lag))
+        return joined(results)
+
+    def flush(self) -> WindowResult | None:
+        """End the recording: all frames become final. `None` where they were already."""
+        return joined(self._end())
+
+    def _start_again(self, frame: int, detections: Detections) -> WindowResult | None:
+        """After a long gap: end what was before, and begin with this frame as with a first one.
+
+        No window ends at this frame, so that no result has to span the gap.
+        """
+        result = self.flush()
+        self._objects = []
+        self._seen = {frame: detections}
+        self._first = self._last = frame
+        return result
+
+    def _end(self) -> list[WindowResult]:
+        if self._first is None or self._last is None or self._last < self._first:
+            return []
+        return [self._solve(self._last, self._last)]
+
+    def _ends(self, start: int, stop: int) -> list[int]:
+        """Give the window ends in `start <= n < stop`."""
+        stride = self._window.stride
+        return list(range(start + (-(start + 1)) % stride, stop, stride))
+
+    def _solve(self, end: int, final_to: int) -> WindowResult:
+        """Solve the window that ends at `end` and make the frames up to `final_to` final."""
+        first = self._first if self._first is not None else end
+        numbers = range(first, end + 1)
+        frames = [self._frame(number) for number in numbers]
+        states, report = self._assign(first, frames)
+        born = self._give_birth(first, frames, states)
+        if born:
+            states, report = self._assign(first, frames)
+        boxes = [_boxes_of(row, frames) for row in states]
+        gone = self._gone(boxes)
+        tracks = tuple(
+            WindowTrack(item.id, rows, item.histogram, _confidence(row, frames))
+            for item, row, rows in zip(self._objects, states, boxes, strict=True)
+            if item.id not in gone and not np.isnan(rows).all()
+        )
+        alive = [n for n, item in enumerate(self._objects) if item.id not in gone]
+        self._objects = [self._objects[n] for n in alive]
+        self._finish(first, final_to, frames, states[alive])
+        return WindowResult(first, end, max(final_to, first - 1), tracks, report)
+
+    def _frame(self, number: int) -> Detections:
+        return self._seen[number] if number in self._seen else Detections.empty(self._bins())
+
+    def _bins(self) -> int:
+        return next((seen.histograms.shape[1] for seen in self._seen.values()), 0)
+
+    def _assign(self, first: int, frames: Sequence[Detections]) -> tuple[npt.NDArray[np.int64], SolveReport]:
+        """Solve the window for all remembered objects: states `(n, F)`, -1 where hidden."""
+        states = np.full((len(self._objects), len(frames)), OCCLUDED, dtype=np.int64)
+        allowed = [
+            [reachable(item, first + m, seen, self._window) for m, seen in enumerate(frames)]
+            if item.hidden_for(first - 1) <= self._window.long_hidden
+            else []
+            for item in self._objects
+        ]
+        # An object that nothing in the window can be is hidden throughout: it need not enter the program.
+        inside = [n for n, places in enumerate(allowed) if any(place.any() for place in places)]
+        if not inside:
+            report = SolveReport(self._solver.name, 0.0, 0.0, integral=True, conflicts=0, rounds=0)
+            return states, report
+        templates = [self._objects[n].template() for n in inside]
+        network = build_network(templates, frames, self._costs)
+        solution = self._solver.solve(within_reach(network, [allowed[n] for n in inside]))
+        states[inside] = solution.states
+        return states, solution.report
+
+    def _give_birth(self, first: int, frames: list[Detections], states: npt.NDArray[np.int64]) -> bool:
+        """Add new objects to the list; say whether there are any."""
+        start = max(len(frames) - self._window.birth_window, 0)
+        test = frames[start:]
+        taken = [
+            seen.boxes[[state for state in states[:, start + m] if state != OCCLUDED]]
+            for m, seen in enumerate(test)
+        ]
+        added = False
+        for birth in find_births(test, taken, self._window, self._costs, self._single):
+            frame = first + start + birth.offset
+            if self._come_back(first, frame, birth):
+                added = True
+            elif self._make_room(first, states):
+                self._objects.append(RememberedObject(self._next_id, birth.histogram, birth.box, frame))
+                self._next_id += 1
+                added = True
+        return added
+
+    def _come_back(self, first: int, frame: int, birth: Birth) -> bool:
+        """Give somebody new the entry of a long hidden object that looks the same, where there is one."""
+        away = [item for item in self._objects if item.hidden_for(first - 1) > self._window.long_hidden]
+        if not away or not birth.histogram.size:
+            return False
+        looks = np.stack([item.histogram for item in away])
+        distances = appearance_distance(birth.histogram[None], looks, self._costs.measure)[0]
+        best = int(np.argmin(distances))
+        if distances[best] > self._window.same_distance:
+            return False
+        away[best].box, away[best].frame = birth.box, frame
+        return True
+
+    def _make_room(self, frame: int, states: npt.NDArray[np.int64]) -> bool:
+        """Forget the longest hidden object where the list is full; say whether there is room."""
+        if len(self._objects) < self._window.most_objects:
+            return True
+        shown = {item.id for item, row in zip(self._objects, states, strict=False) if (row != OCCLUDED).any()}
+        hidden = [item for item in self._objects[: len(states)] if item.id not in shown]
+        if hidden:
+            # `max` takes the first of equals: the lowest id.
+            self._objects.remove(max(hidden, key=lambda item: item.hidden_for(frame)))
+        return bool(hidden)
+
+    def _gone(self, boxes: Sequence[Floats]) -> set[int]:
+        """Give the ids that end with this window: a second track on somebody, a new one that was none."""
+        ids = [item.id for item in self._objects]
+        gone = set(duplicates(ids, boxes, self._window.duplicate))
+        for item, rows in zip(self._objects, boxes, strict=True):
+            if not item.confirmed and np.count_nonzero(~np.isnan(rows[:, 0])) < _LEAST_SEEN:
+                gone.add(item.id)
+        return gone
+
+    def _finish(
+        self, first: int, final_to: int, frames: Sequence[Detections], states: npt.NDArray[np.int64]
+    ) -> None:
+        """Make the frames up to `final_to` final: renew the object list, forget what is long hidden."""
+        if final_to < first:
+            return
+        for m, seen in enumerate(frames[: final_to - first + 1]):
+            column = states[:, m]
+            shown = seen.boxes[column[column != OCCLUDED]]
+            for item, state in zip(self._objects, column, strict=True):
+                item.present = bool(state != OCCLUDED)
+                if item.present:
+                    alone = bool(np.count_nonzero(iou(seen.boxes[state], shown) > _CROWDED) <= 1)
+                    look = seen.histograms[state]
+                    item.see(Sighting(first + m, seen.boxes[state], look, alone), self._window.template_rate)
+        forget_after = self._window.forget_after
+        self._objects = [item for item in self._objects if item.hidden_for(final_to) <= forget_after]
+        self._seen = {number: seen for number, seen in self._seen.items() if number > final_to}
+        self._first = final_to + 1
+
+
+def _boxes_of(row: npt.NDArray[np.int64], frames: Sequence[Detections]) -> Floats:
+    """Give the boxes of one object's states `(F,)`, `(F, 4)`, NaN where it is hidden."""
+    boxes = np.full((len(frames), BOX_SIDES), np.nan)
+    for m, state in enumerate(row):
+        if state != OCCLUDED:
+            boxes[m] = frames[m].boxes[state]
+    return boxes
+
+
+def _confidence(row: npt.NDArray[np.int64], frames: Sequence[Detections]) -> float:
+    scores = [float(frames[m].scores[state]) for m, state in enumerate(row) if state != OCCLUDED]
+    return sum(scores) / len(frames)

@@ -1,0 +1,112 @@
+"""What goes into the online tracker's window and what comes out of it (paper II.E)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tracking.boxes import BOX_SIDES, Floats
+from tracking.solvers.base import SolveReport
+
+
+@dataclass(frozen=True, slots=True)
+class WindowSettings:
+    """The moving window, births and deaths.
+
+    Raises:
+        ValueError: a number of frames or a share makes no sense.
+    """
+
+    window: int = 15  # M: frames of a window; a frame is final when this less the stride have followed it
+    stride: int = 5  # s: frames between two windows, which end at the frames n where s divides n + 1
+    birth_window: int = 15  # frames over which a new object is tested; at most the window
+    birth_visible: float = 0.75  # share of the test's frames in which a new object must be seen
+    birth_cost: float = 0.7  # mean cost per frame that its path may have: appearance, motion, confidence
+    birth_score: float = 0.3  # least score of the detections that a new object may begin with
+    birth_tests: int = 8  # tests per window at most, best detections first
+    apart: float = 0.35  # overlap (IoU) with a known object above which a detection is not somebody new
+    duplicate: float = 0.8  # mean overlap of two tracks above which they are one object
+    forget_after: int = 250  # F: frames hidden after which an object is forgotten and its number retired
+    most_objects: int = 24  # objects remembered at most; the longest hidden is forgotten first
+    template_rate: float = 0.05  # share of an object's template renewed by each final frame it is seen in
+    reach: float = 0.5  # box heights by which an object may jump between two frames
+    reach_per_frame: float = 0.045  # box heights added to that for each further frame since it was seen
+    grow: float = 1.5  # factor by which its height may change meanwhile
+    long_hidden: int = 50  # frames hidden after which an object only comes back the way new ones are born
+    same_distance: float = 0.35  # largest appearance distance of somebody new who is one of those, 0..1
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.stride <= self.window:
+            raise ValueError(f"stride must be between 1 and the window of {self.window}, not {self.stride}")
+        if not 1 <= self.birth_window <= self.window:
+            raise ValueError(
+                f"birth_window must be between 1 and the window of {self.window}, not {self.birth_window}"
+            )
+        if not 0.0 < self.birth_visible <= 1.0:
+            raise ValueError(f"birth_visible is a share between 0 and 1, not {self.birth_visible}")
+        if self.forget_after < 1 or self.most_objects < 1:
+            raise ValueError("forget_after and most_objects must be at least 1")
+
+    @property
+    def lag(self) -> int:
+        """Frames that follow a final frame at least before it is final."""
+        return self.window - self.stride
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WindowTrack:
+    """One object in one window.
+
+    Attributes:
+        id: the object's number: from 1 in each tracker, never used again.
+        boxes: `(F, 4)` pixels, one row per frame of the window, NaN where the object is hidden.
+        histogram: `(B,)`, its template.
+        confidence: mean score of its boxes over the window, 0 where hidden; in [0, 1].
+    """
+
+    id: int
+    boxes: Floats
+    histogram: Floats
+    confidence: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WindowResult:
+    """The tracks of the frames `first`..`last`.
+
+    Attributes:
+        first: the first frame that was not final before.
+        last: the newest frame.
+        final_to: every frame up to this one is final and never changes again; the others are provisional.
+            An object of which no frame is final yet may still vanish.
+        tracks: the objects that are seen in any of the frames, by ascending id.
+        report: what the solver has proven about the last window.
+    """
+
+    first: int
+    last: int
+    final_to: int
+    tracks: tuple[WindowTrack, ...]
+    report: SolveReport
+
+
+def joined(results: list[WindowResult]) -> WindowResult | None:
+    """Give one result for windows that were solved one after the other; `None` for no window.
+
+    Later windows overwrite what was provisional in earlier ones.
+    """
+    if len(results) <= 1:
+        return results[0] if results else None
+    first, newest = results[0].first, results[-1]
+    rows: dict[int, WindowTrack] = {}
+    for result in results:
+        kept = result.last if result is newest else result.final_to
+        for track in result.tracks:
+            boxes = np.full((newest.last - first + 1, BOX_SIDES), np.nan)
+            if track.id in rows:
+                boxes = rows[track.id].boxes
+            boxes[result.first - first : kept - first + 1] = track.boxes[: kept - result.first + 1]
+            rows[track.id] = replace(track, boxes=boxes)
+    seen = [rows[id_] for id_ in sorted(rows) if not np.isnan(rows[id_].boxes).all()]
+    return replace(newest, first=first, tracks=tuple(seen))
