@@ -1,0 +1,102 @@
+"""From the picture to the ground plane: foot points through homographies."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+_MAX_CONDITION = 1e12
+"""Above this a 3x3 matrix, scaled by rows and columns, has no inverse worth the name in float64."""
+
+
+def checked_homography(matrix: ArrayLike, name: str) -> NDArray[np.float64]:
+    """Return the homography (image pixels -> ground plane) as a (3, 3) float64 array, if it is one.
+
+    Args:
+        matrix: anything that NumPy makes an array of.
+        name: whose homography it is, for the message.
+
+    Raises:
+        ValueError: in one line that names `name`: not 3x3, not finite numbers, or not invertible.
+    """
+    try:
+        homography = np.array(matrix, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ValueError(f"the homography of {name} is not a 3x3 matrix of numbers") from None
+    if homography.shape != (3, 3):
+        raise ValueError(f"the homography of {name} has shape {homography.shape}, not (3, 3)")
+    if not np.isfinite(homography).all():
+        raise ValueError(f"the homography of {name} has entries that are not finite numbers")
+    # Image coordinates are hundreds and the last row is thousandths: judge it with both evened out.
+    rows = np.abs(homography).max(axis=1, keepdims=True)
+    evened = homography / np.where(rows > 0, rows, 1.0)
+    columns = np.abs(evened).max(axis=0, keepdims=True)
+    evened = evened / np.where(columns > 0, columns, 1.0)
+    if not np.linalg.cond(evened) < _MAX_CONDITION:
+        raise ValueError(f"the homography of {name} is not invertible")
+    return homography
+
+
+def feet(boxes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Foot point of each box, the middle of its lower edge: (..., 4) -> (..., 2) in pixels."""
+    return np.stack([(boxes[..., 0] + boxes[..., 2]) / 2.0, boxes[..., 3]], axis=-1)
+
+
+def to_ground(homography: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Map image points to the ground plane: (..., 2) pixels -> (..., 2) ground units.
+
+    A point on or above the horizon stands nowhere on the ground and becomes NaN, as does a NaN point.
+    The ground is taken to lie below the horizon in the picture (a camera that is not upside down).
+    """
+    mapped = _homogeneous(homography, points)
+    depth = _depth(homography, mapped)
+    return np.asarray(mapped[..., :2] / np.where(depth > 0, mapped[..., 2], np.nan)[..., None])
+
+
+def person_heights(homography: NDArray[np.float64], boxes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Guess the height of the person in each box in ground units: (..., 4) -> (...), NaN where unknown.
+
+    At the foot point one pixel to the side is as long as one pixel upwards on a standing person (square
+    pixels, a camera without much roll or tilt): box height times ground units per sideways pixel. It
+    tells what a "step" is in a ground plane of any unit.
+    """
+    sideways = _steps(homography, feet(boxes))[..., 0]
+    return np.asarray(np.hypot(sideways[..., 0], sideways[..., 1]) * (boxes[..., 3] - boxes[..., 1]))
+
+
+def foot_spread(
+    homography: NDArray[np.float64], boxes: NDArray[np.float64], sideways: float, upwards: float
+) -> NDArray[np.float64]:
+    """Covariance of each foot point on the ground: (..., 4) -> (..., 2, 2) ground units squared.
+
+    A box is found to within `sideways` and `upwards` (standard deviations, shares of its height). On the
+    ground the latter is long, and along the line of sight: how far off somebody stands is what a
+    camera knows least.
+    """
+    tall = boxes[..., 3] - boxes[..., 1]
+    axes = _steps(homography, feet(boxes)) * tall[..., None, None] * np.array([sideways, upwards])
+    x, y = axes[..., 0, :], axes[..., 1, :]
+    xx, xy, yy = (x * x).sum(axis=-1), (x * y).sum(axis=-1), (y * y).sum(axis=-1)
+    return np.stack([np.stack([xx, xy], axis=-1), np.stack([xy, yy], axis=-1)], axis=-2)
+
+
+def _steps(homography: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Ground vectors of one pixel to the right and one down, as columns: (..., 2) -> (..., 2, 2)."""
+    mapped = _homogeneous(homography, points)
+    w = np.where(_depth(homography, mapped) > 0, mapped[..., 2], np.nan)[..., None, None]
+    # d(X/w) = (dX w - X dw) / w^2, both pixel axes at once.
+    return np.asarray((homography[:2, :2] * w - mapped[..., :2, None] * homography[2, :2]) / w**2)
+
+
+def _homogeneous(homography: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+    # Sums of products in a fixed order: a BLAS may sum differently by batch size, and with it the result.
+    x, y = points[..., 0:1], points[..., 1:2]
+    return np.asarray(homography[:, 0] * x + homography[:, 1] * y + homography[:, 2])
+
+
+def _depth(homography: NDArray[np.float64], mapped: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Homogeneous third coordinate, signed so that it is positive below the horizon."""
+    # Far down the picture the y term rules the sign; a plan view (no y term) has no horizon.
+    down = homography[2, 1]
+    sign = np.sign(down) if down != 0 else np.sign(mapped[..., 2])
+    return np.asarray(mapped[..., 2] * sign)

@@ -1,0 +1,179 @@
+"""The window's choice is the best there is, and breaks off nowhere."""
+
+from __future__ import annotations
+
+from itertools import pairwise, product
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from bestview import NO_VIEW_COST, Choices, choose_views
+
+INF = np.inf
+
+
+def choose(cost: list[list[float]], previous: int, switch_cost: float, cuts: list[bool]) -> list[int]:
+    """Choose for one object, from its (N, C) costs."""
+    choices = choose_views(np.array([cost], float), np.array([previous]), switch_cost, np.array(cuts))
+    return [int(view) for view in choices.views[0]]
+
+
+def price(cost: NDArray[np.float64], views: tuple[int, ...], previous: int, switch_cost: float) -> float:
+    """Cost of one object's views over its (N, C) costs, written the slow and obvious way."""
+    total, current = 0.0, previous
+    for frame, view in enumerate(views):
+        if view < 0:
+            total += NO_VIEW_COST
+            continue
+        total += cost[frame, view] + (switch_cost if current not in (-1, view) else 0.0)
+        current = view
+    return total
+
+
+def exhaustive(
+    cost: NDArray[np.float64], previous: int, switch_cost: float, cuts: list[bool]
+) -> tuple[float, tuple[int, ...]]:
+    """Try every sequence that the rules allow; ties: stay with the camera, else the lowest index."""
+    frames, cameras = cost.shape
+    bounds = [frame for frame in range(frames) if cuts[frame]] + [frames]
+    head: list[int] = []
+    for frame in range(bounds[0]):
+        going = previous >= 0 and np.isfinite(cost[frame, previous]) and (frame == 0 or head[-1] >= 0)
+        head.append(previous if going else -1)
+    options = []
+    for start, end in pairwise(bounds):
+        possible = [c for c in range(cameras) if np.isfinite(cost[start:end, c]).all()] or [-1]
+        options.append([(view,) * (end - start) for view in possible])
+
+    def rank(views: tuple[int, ...]) -> tuple[float, list[int]]:
+        order, current = [], previous
+        for view in views:
+            order.append(-1 if view in (-1, current) else view)
+            current = view if view >= 0 else current
+        return price(cost, views, previous, switch_cost), order
+
+    every = [tuple(head) + tuple(v for gop in parts for v in gop) for parts in product(*options)]
+    best = min(every, key=rank)
+    return rank(best)[0], best
+
+
+# Eighths add up exactly in floating point, so equal sums are equal and the rule for ties is tested too.
+EIGHTHS = st.integers(0, 8).map(lambda n: n / 8)
+COSTS = st.one_of(EIGHTHS, EIGHTHS, EIGHTHS, st.just(INF))
+
+
+@st.composite
+def windows(draw: st.DrawFn) -> tuple[NDArray[np.float64], NDArray[np.int64], float, list[bool]]:
+    objects, frames, cameras = draw(st.integers(1, 3)), draw(st.integers(1, 5)), draw(st.integers(1, 3))
+    size = objects * frames * cameras
+    cost = np.array(draw(st.lists(COSTS, min_size=size, max_size=size))).reshape(objects, frames, cameras)
+    ints = st.lists(st.integers(-1, cameras - 1), min_size=objects, max_size=objects)
+    cuts = st.lists(st.booleans(), min_size=frames, max_size=frames)
+    return cost, np.array(draw(ints)), draw(st.sampled_from([0.0, 0.125, 0.5, 1.0, 2.0])), draw(cuts)
+
+
+@settings(deadline=None, max_examples=250)
+@given(windows())
+def test_no_sequence_of_cameras_is_better(
+    window: tuple[NDArray[np.float64], NDArray[np.int64], float, list[bool]],
+) -> None:
+    cost, previous, switch_cost, cuts = window
+    choices = choose_views(cost, previous, switch_cost, np.array(cuts))
+    for k in range(len(cost)):
+        best_cost, best = exhaustive(cost[k], int(previous[k]), switch_cost, cuts)
+        assert tuple(choices.views[k]) == best
+        assert choices.costs[k] == best_cost
+
+
+@settings(deadline=None, max_examples=50)
+@given(windows())
+def test_objects_do_not_influence_each_other(
+    window: tuple[NDArray[np.float64], NDArray[np.int64], float, list[bool]],
+) -> None:
+    cost, previous, switch_cost, cuts = window
+    together = choose_views(cost, previous, switch_cost, np.array(cuts))
+    for k in range(len(cost)):
+        alone = choose_views(cost[k : k + 1], previous[k : k + 1], switch_cost, np.array(cuts))
+        assert np.array_equal(alone.views[0], together.views[k])
+
+
+def test_a_short_better_view_is_not_worth_a_cut_and_a_long_one_is() -> None:
+    glimpse = [[0.5, 0.5], [0.5, 0.1], [0.5, 0.5], [0.5, 0.5]]
+    lasting = [[0.5, 0.5], [0.5, 0.1], [0.5, 0.1], [0.5, 0.1]]
+    assert choose(glimpse, 0, 1.0, [True] * 4) == [0, 0, 0, 0]
+    assert choose(lasting, 0, 1.0, [True] * 4) == [0, 1, 1, 1]
+
+
+def test_without_a_switching_cost_every_frame_takes_its_best_view() -> None:
+    assert choose([[0.5, 0.1], [0.1, 0.5], [0.5, 0.1]], 0, 0.0, [True] * 3) == [1, 0, 1]
+
+
+def test_a_cut_waits_for_the_next_gop() -> None:
+    assert choose([[1.0, 0.0]] * 4, 0, 0.5, [False, False, True, False]) == [0, 0, 1, 1]
+
+
+def test_a_tie_stays_with_the_camera_and_else_takes_the_lowest_index() -> None:
+    equal = [[0.5, 0.5, 0.5]] * 3
+    assert choose(equal, 1, 0.0, [True] * 3) == [1, 1, 1]
+    assert choose(equal, -1, 0.0, [True] * 3) == [0, 0, 0]
+
+
+def test_a_camera_missing_somewhere_in_a_gop_is_not_cut_to() -> None:
+    cost = [[0.9, 0.1], [0.9, 0.1], [0.9, INF], [0.9, 0.1]]
+    assert choose(cost, 0, 0.0, [True, False, False, False]) == [0, 0, 0, 0]
+
+
+def test_a_camera_that_dies_inside_a_running_gop_is_shown_until_then() -> None:
+    cost = [[0.1, 0.9], [INF, 0.9], [0.1, 0.9], [0.1, 0.9]]
+    assert choose(cost, 0, 0.5, [False, False, False, True]) == [0, -1, -1, 0]
+
+
+def test_a_hole_is_not_a_cut() -> None:
+    cost = [[0.5, 0.5], [INF, INF], [0.5, 0.25]]
+    assert choose(cost, 0, 0.5, [True] * 3) == [0, -1, 0]
+
+
+def test_a_stream_cannot_begin_in_the_middle_of_a_gop() -> None:
+    assert choose([[0.1], [0.1], [0.1]], -1, 1.0, [False, True, False]) == [-1, 0, 0]
+
+
+def test_nothing_to_choose_from_gives_no_view() -> None:
+    nobody = choose_views(np.zeros((0, 3, 2)), np.zeros(0, int), 1.0, np.ones(3, bool))
+    blind = choose_views(np.zeros((2, 3, 0)), np.full(2, -1), 1.0, np.ones(3, bool))
+    assert nobody.views.shape == (0, 3)
+    assert (blind.views == -1).all()
+    assert blind.costs.tolist() == [3.0, 3.0]
+
+
+def test_the_caller_keeps_its_arrays() -> None:
+    cost, previous = np.array([[[0.5, 0.1]] * 3]), np.array([0])
+    before = cost.copy()
+    choose_views(cost, previous, 0.1, np.ones(3, bool))
+    assert np.array_equal(cost, before)
+    assert previous.tolist() == [0]
+
+
+def test_what_makes_no_sense_is_refused() -> None:
+    cost, cuts = np.zeros((1, 2, 2)), np.ones(2, bool)
+
+    def refused(match: str, *arguments: object) -> None:
+        with pytest.raises(ValueError, match=match):
+            choose_views(*arguments)  # type: ignore[arg-type]
+
+    refused("not a number", np.full((1, 2, 2), np.nan), np.array([0]), 1.0, cuts)
+    refused("outside", cost, np.array([2]), 1.0, cuts)
+    refused("switching cost", cost, np.array([0]), -1.0, cuts)
+    refused("cut_allowed", cost, np.array([0]), 1.0, np.ones(3, bool))
+    refused("previous", cost, np.array([0, 1]), 1.0, cuts)
+    refused("cost has shape", np.zeros((2, 2)), np.array([0]), 1.0, cuts)
+
+
+def test_a_thousand_objects_are_chosen_for_at_once() -> None:
+    rng = np.random.default_rng(7)
+    cost = rng.random((1000, 25, 16))
+    choices = choose_views(cost, rng.integers(-1, 16, 1000), 2.0, np.arange(25) % 5 == 2)
+    assert isinstance(choices, Choices)
+    assert choices.views.shape == (1000, 25)

@@ -1,0 +1,85 @@
+"""Feet through a homography come to stand where the person stands."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from bestview import checked_homography, feet, foot_spread, person_heights, to_ground
+
+
+def looking_along(height: float = 3.0, focal: float = 400.0) -> NDArray[np.float64]:
+    """Give the homography of a level camera over (0, 0), looking along +Y: 640x480, metres."""
+    ground_to_image = np.array([[focal, 320.0, 0.0], [0.0, 240.0, focal * height], [0.0, 1.0, 0.0]])
+    return np.linalg.inv(ground_to_image)
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.floats(-20, 20), st.floats(1, 50))
+def test_a_ground_point_comes_back_from_its_picture(x: float, y: float) -> None:
+    pixel = np.array([320 + 400 * x / y, 240 + 400 * 3 / y])
+    assert to_ground(looking_along(), pixel) == pytest.approx([x, y], rel=1e-6, abs=1e-6)
+
+
+@pytest.mark.parametrize("scale", [1.0, -2.5])
+def test_nobody_stands_on_or_above_the_horizon(scale: float) -> None:
+    points = np.array([[320, 239], [320, 240], [np.nan, 300], [320, 300]], float)
+    ground = to_ground(scale * looking_along(), points)
+    assert np.isnan(ground[:3]).all()
+    assert np.isfinite(ground[3]).all()
+
+
+def test_feet_are_in_the_middle_of_the_lower_edge() -> None:
+    assert feet(np.array([[10, 20, 30, 80]], float)).tolist() == [[20, 80]]
+
+
+def test_a_person_is_as_tall_on_the_ground_as_in_the_picture() -> None:
+    y, tall = 8.0, 1.75
+    foot = 240 + 400 * 3 / y
+    box = np.array([[400.0, foot - 400 * tall / y, 440.0, foot]])
+    assert person_heights(looking_along(), box) == pytest.approx([tall])
+
+
+def test_how_far_off_somebody_stands_is_less_certain_than_in_which_direction() -> None:
+    near, far = (np.array([310.0, 240 + 1200 / y - 700 / y, 330.0, 240 + 1200 / y]) for y in (5.0, 10.0))
+    spreads = foot_spread(looking_along(), np.array([near, far]), sideways=0.05, upwards=0.05)
+    across, along = np.sqrt(spreads[:, 0, 0]), np.sqrt(spreads[:, 1, 1])
+    assert across == pytest.approx([0.05 * 1.75] * 2)  # a share of the person's height, near or far
+    assert (along > across).all()
+    assert along[1] == pytest.approx(2 * along[0])  # level rays meet the ground ever more flatly
+
+
+@pytest.mark.parametrize(
+    ("matrix", "match"),
+    [
+        ([[1, 0], [0, 1]], r"of door has shape \(2, 2\)"),
+        ([[1, 0, 0], [0, 1, 0], [0, 0, float("nan")]], "of door has entries that are not finite"),
+        ([[1, 2, 3], [2, 4, 6], [0, 0, 1]], "of door is not invertible"),
+        ([[0, 0, 0], [0, 0, 0], [0, 0, 0]], "of door is not invertible"),
+        ("north", "of door is not a 3x3 matrix"),
+        ([[1, 0, 0], [0, 1], [0, 0, 1]], "of door is not a 3x3 matrix"),
+    ],
+)
+def test_a_matrix_that_is_no_homography_is_refused_by_name(matrix: object, match: str) -> None:
+    with pytest.raises(ValueError, match=match) as refusal:
+        checked_homography(matrix, "door")  # type: ignore[arg-type]
+    assert "\n" not in str(refusal.value)
+
+
+def test_a_homography_in_any_unit_is_accepted() -> None:
+    for unit in (1e-3, 1.0, 1e4):
+        scaled = np.diag([unit, unit, 1.0]) @ looking_along()
+        assert np.array_equal(checked_homography(scaled.tolist(), "door"), scaled)
+
+
+def test_the_recordings_homographies_are_accepted(shared_data: Path) -> None:
+    for scene in ("campus4", "lab4", "pets09", "terrace"):
+        ground = json.loads((shared_data / scene / "ground.json").read_text())
+        for camera, matrix in ground["homography"].items():
+            checked_homography(matrix, camera)

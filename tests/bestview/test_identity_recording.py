@@ -1,0 +1,94 @@
+"""On a real recording, with trackers as bad as real ones, most pairs of views agree on who is who."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from bestview import IdentityRegistry, IdentitySettings, LocalTrack
+
+FRAMES, WINDOW, STRIDE = 1200, 15, 5
+NOISE = 0.06  # of the box height, on every edge, correlated in time
+BREAK_EVERY = 200  # frames after which a tracker loses its track and begins another, on average
+
+Boxes = dict[int, NDArray[np.float64]]
+Track = tuple[int, NDArray[np.float64]]  # person, and (FRAMES, 4) boxes, NaN where hidden
+
+
+def people(path: Path) -> dict[int, Boxes]:
+    """Read the ground truth: person -> frame (from 0) -> box; only where the annotator saw the person."""
+    found: dict[int, Boxes] = {}
+    for line in path.read_text().splitlines():
+        frame, person, left, top, width, height, _, _, visible = (float(x) for x in line.split(",")[:9])
+        if visible:
+            box = np.array([left, top, left + width, top + height])
+            found.setdefault(int(person), {})[int(frame) - 1] = box
+    return found
+
+
+def broken(truth: dict[int, Boxes], rng: np.random.Generator) -> list[Track]:
+    """Make a bad tracker's tracks of the truth, in the order in which they begin."""
+    tracks: list[tuple[int, int, NDArray[np.float64]]] = []
+    for person, boxes in sorted(truth.items()):
+        last, shake = -FRAMES, np.zeros(4)
+        for frame in sorted(boxes):
+            if frame - last > WINDOW or rng.random() < 1 / BREAK_EVERY:
+                tracks.append((frame, person, np.full((FRAMES, 4), np.nan)))
+            shake = 0.8 * shake + 0.6 * rng.normal(size=4)
+            tracks[-1][2][frame] = boxes[frame] + NOISE * shake * (boxes[frame][3] - boxes[frame][1])
+            last = frame
+    return [(person, boxes) for _, person, boxes in sorted(tracks, key=lambda item: item[:2])]
+
+
+def agreement(
+    tracks: Mapping[str, list[Track]],
+    homographies: Mapping[str, NDArray[np.float64] | None],
+) -> tuple[float, float, int]:
+    """Precision and recall of "these two views show one person", and how many numbers were given."""
+    registry = IdentityRegistry(IdentitySettings(), homographies)
+    right = wrong = missed = numbers = 0
+    for last in range(STRIDE - 1, FRAMES, STRIDE):
+        given, who = [], {}
+        first = max(0, last - WINDOW + 1)
+        for camera, mine in tracks.items():
+            for local, (person, boxes) in enumerate(mine):
+                rows = boxes[first : last + 1]
+                if not np.isnan(rows).all():
+                    given.append(LocalTrack(camera, local, first, rows, np.zeros(64)))
+                    who[given[-1].key] = person
+        update = registry.update(given, last)
+        numbers = max(numbers, *update.born, 0)
+        for one, two in combinations(who, 2):
+            if one.camera != two.camera:
+                same = update.numbers.get(one, -1) == update.numbers.get(two, -2)
+                right += same and who[one] == who[two]
+                wrong += same and who[one] != who[two]
+                missed += not same and who[one] == who[two]
+    return right / max(right + wrong, 1), right / (right + missed), numbers
+
+
+@pytest.mark.parametrize("cameras", [("c0", "c1"), ("c0", "c1", "c2", "c3")])
+def test_views_agree_on_who_is_who_on_a_common_ground(shared_data: Path, cameras: tuple[str, ...]) -> None:
+    rng = np.random.default_rng(1)
+    folder = shared_data / "terrace"
+    matrices = json.loads((folder / "ground.json").read_text())["homography"]
+    tracks = {camera: broken(people(folder / "gt" / f"{camera}.txt"), rng) for camera in cameras}
+    precision, recall, numbers = agreement(tracks, {c: np.array(matrices[c], float) for c in cameras})
+    assert precision > 0.95
+    assert recall > 0.9
+    assert numbers <= 8  # of five people, in more than thirty tracks of two views
+
+
+def test_without_ground_and_looks_nobody_is_taken_for_somebody_else(shared_data: Path) -> None:
+    rng = np.random.default_rng(1)
+    folder = shared_data / "terrace" / "gt"
+    tracks = {camera: broken(people(folder / f"{camera}.txt"), rng) for camera in ("c0", "c1")}
+    precision, recall, numbers = agreement(tracks, {"c0": None, "c1": None})
+    assert (precision, recall) == (0.0, 0.0)  # no pair is joined at all
+    assert numbers <= 16  # each view's fragments still find together
