@@ -1,0 +1,1 @@
+"""The processes: cameras, best-view service, HTTP, wiring, configuration and the command line."""

@@ -1,0 +1,127 @@
+"""zenoh for asyncio: publish, subscribe and liveliness, bounded everywhere."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from typing import Self
+
+import zenoh
+
+from server.wire.config import Zenoh
+from server.wire.errors import UserError
+from server.wire.inbox import Inbox, Message
+
+_DROP_AFTER_US = 20_000
+"""zenoh drops a message after 1 ms in a full queue by default: too soon for an I picture's burst."""
+
+
+class Bus:
+    """One zenoh session. Close it, or the process never ends: zenoh's threads are not daemons."""
+
+    def __init__(self, session: zenoh.Session) -> None:
+        self._session = session
+        self._publishers: dict[str, zenoh.Publisher] = {}
+        self._undeclare: list[Callable[[], None]] = []
+
+    @classmethod
+    def router(cls, settings: Zenoh) -> Self:
+        """Open the session that all others connect to (the best-view service's).
+
+        Raises:
+            UserError: the address cannot be listened on.
+        """
+        config = _config(settings, "router")
+        try:
+            config.insert_json5("listen/endpoints", json.dumps([settings.listen]))
+            return cls(zenoh.open(config))
+        except zenoh.ZError as error:
+            raise UserError(
+                f"zenoh.listen: cannot listen on {settings.listen}; is the port in use?"
+            ) from error
+
+    @classmethod
+    def client(cls, settings: Zenoh) -> Self:
+        """Open a session of the site's router; it need not be there yet, and may go and come back.
+
+        Raises:
+            UserError: the address is not one that zenoh understands.
+        """
+        config = _config(settings, "peer")
+        # A peer, not a client: a client's session cannot be opened while the router is away.
+        config.insert_json5("connect/timeout_ms", "-1")  # keep trying in the background
+        config.insert_json5("connect/exit_on_failure", "false")
+        config.insert_json5("listen/endpoints", "[]")
+        config.insert_json5(
+            "connect/retry", '{"period_init_ms": 100, "period_max_ms": 1000, "period_increase_factor": 2}'
+        )
+        try:
+            config.insert_json5("connect/endpoints", json.dumps([settings.connect]))
+            return cls(zenoh.open(config))
+        except zenoh.ZError as error:
+            raise UserError(f"zenoh.connect: cannot use {settings.connect}: {error}") from error
+
+    def publish(self, key: str, payload: bytes, attachment: bytes | None = None) -> None:
+        """Send a message; it is dropped where a receiver is too slow or nobody is there."""
+        publisher = self._publishers.get(key)
+        if publisher is None:
+            publisher = self._session.declare_publisher(
+                key,
+                congestion_control=zenoh.CongestionControl.DROP,
+                priority=zenoh.Priority.DATA,  # one priority for all: a camera's messages stay in order
+            )
+            self._publishers[key] = publisher
+        publisher.put(payload, attachment=attachment)
+
+    def subscribe(self, key: str, handler: Callable[[Message], None]) -> Inbox[Message]:
+        """Call ``handler`` on the event loop for every message under ``key`` (a key expression)."""
+        inbox = Inbox(handler)
+
+        def receive(sample: zenoh.Sample) -> None:
+            attachment = sample.attachment.to_bytes() if sample.attachment is not None else b""
+            inbox.put(Message(str(sample.key_expr), sample.payload.to_bytes(), attachment))
+
+        self._undeclare.append(self._session.declare_subscriber(key, receive).undeclare)
+        return inbox
+
+    def declare_alive(self, key: str) -> None:
+        """Say that this process is there, until it closes its session or is gone."""
+        self._undeclare.append(self._session.liveliness().declare_token(key).undeclare)
+
+    def watch_alive(self, key: str, handler: Callable[[str, bool], None]) -> None:
+        """Call ``handler(key, is_there)`` on the event loop for all that are there now, come and go."""
+
+        def unpack(message: Message) -> None:
+            handler(message.key, message.payload == b"1")
+
+        inbox = Inbox(unpack)
+
+        def receive(sample: zenoh.Sample) -> None:
+            there = sample.kind == zenoh.SampleKind.PUT
+            inbox.put(Message(str(sample.key_expr), b"1" if there else b"0", b""))
+
+        subscriber = self._session.liveliness().declare_subscriber(key, receive, history=True)
+        self._undeclare.append(subscriber.undeclare)
+
+    def close(self) -> None:
+        """Undeclare everything and close the session."""
+        for undeclare in reversed(self._undeclare):
+            undeclare()
+        self._undeclare.clear()
+        self._publishers.clear()
+        self._session.close()  # type: ignore[no-untyped-call]
+
+
+def _config(settings: Zenoh, mode: str) -> zenoh.Config:
+    config = zenoh.Config()
+    for key, value in {
+        "mode": mode,
+        "scouting/multicast/enabled": False,  # a site is what its configuration says, not who is nearby
+        "scouting/gossip/enabled": False,  # all traffic goes by the router: cameras need not reach each other
+        "transport/link/tx/lease": int(settings.lease_s * 1000),
+        "transport/link/tx/queue/congestion_control/drop/wait_before_drop": _DROP_AFTER_US,
+        "transport/link/tx/queue/size/data": 16,
+        "transport/shared_memory/enabled": False,
+    }.items():
+        config.insert_json5(key, json.dumps(value))
+    return config

@@ -1,0 +1,251 @@
+"""The configuration of one site: one YAML file that every process reads.
+
+A key can be overridden from the environment: ``MYVIEW_SECTION__KEY=value`` (``MYVIEW_HTTP__PORT=8081``).
+Every default is documented in ``configs/demo.yaml``.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    NonNegativeFloat,
+    PositiveFloat,
+    PositiveInt,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
+from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, SettingsConfigDict
+
+from bestview import IdentitySettings, checked_homography
+from server.wire.library import validated
+from tracking import DEFAULT_SOLVER, CostSettings, WindowSettings, solver_named
+from tracking.detectors import BackgroundSettings
+
+Polygon = Annotated[list[tuple[float, float]], Field(min_length=3)]
+"""Corners in pixels of the camera's own picture."""
+
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,31}$")]
+"""A name that fits into a zenoh key, a URL and a file name."""
+
+
+def _even(value: int) -> int:
+    if value % 2:
+        raise ValueError("must be even: H.264 stores colour at half the size")
+    return value
+
+
+def _endpoint(value: str) -> str:
+    if not _ENDPOINT.fullmatch(value):
+        raise ValueError(f"{value!r} is not an address such as tcp/127.0.0.1:7447")
+    return value
+
+
+_ENDPOINT = re.compile(r"[a-z]+/[^\s/]+:[0-9]{1,5}([?#]\S*)?")
+
+Endpoint = Annotated[str, AfterValidator(_endpoint)]
+"""Where zenoh connects to or listens: protocol/host:port."""
+
+Side = Annotated[int, Field(ge=16, le=8192), AfterValidator(_even)]
+"""Width or height of a picture in pixels; x264 cannot encode much smaller or larger ones."""
+
+Port = Annotated[int, Field(ge=1, le=65535)]
+
+
+class Section(BaseModel):
+    """A part of the configuration: a key that it does not know is an error, never ignored."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Site(Section):
+    """What all cameras share. Every camera's picture is scaled to one size, so that any can follow any."""
+
+    name: Name = "site"
+    fps: Annotated[float, Field(gt=0, le=1000, allow_inf_nan=False)] = 25.0
+    width: Side = 640
+    height: Side = 360
+
+
+class Sync(Section):
+    """The pulse server."""
+
+    host: str = "127.0.0.1"
+    """Where cameras find the server."""
+    bind: str = "127.0.0.1"
+    """The address the server listens on."""
+    port: Port = 7400
+    start_timeout_s: NonNegativeFloat = 20.0
+    """How long pulse 0 waits for all cameras to be there, so that recordings start at their first frame."""
+
+
+class Zenoh(Section):
+    """The message bus. The best-view service is its router: no separate daemon is needed."""
+
+    connect: Endpoint = "tcp/127.0.0.1:7447"
+    """Where cameras find the router."""
+    listen: Endpoint = "tcp/127.0.0.1:7447"
+    """Where the best-view service's router listens."""
+    lease_s: PositiveFloat = 1.0
+    """A process that is silent this long counts as gone."""
+
+
+class Encode(Section):
+    """H.264. Identical in all cameras: that is what makes cutting without re-encoding possible."""
+
+    gop: PositiveInt = 10
+    """Frames in a closed group of pictures; views can change only where one begins."""
+    crf: Annotated[int, Field(ge=0, le=51)] = 23
+    """x264's constant quality: smaller is better and larger; 18 to 28 is sensible."""
+    preset: Literal["ultrafast", "superfast", "veryfast", "faster", "fast", "medium"] = "ultrafast"
+
+
+class Camera(Section):
+    """One camera."""
+
+    id: Name
+    source: str
+    """A file, a folder of images, a URL that FFmpeg opens, /dev/video0, or scene:NAME?camera=0&…"""
+    offset: int = 0
+    """A recording shows its frame n - offset at pulse n."""
+    at_end: Literal["stop", "loop"] = "stop"
+    """What a recording does after its last frame."""
+    options: dict[str, str] = {}
+    """Options for FFmpeg's opener, e.g. rtsp_transport: tcp."""
+    ignore: list[Polygon] = []
+    """Parts of the picture where nobody is looked for, in pixels of the camera's own picture."""
+    ground: list[list[float]] | None = None
+    """3x3 homography from the camera's own picture (pixels) to the ground plane."""
+    detections: Path | None = None
+    """A MOTChallenge detection file to use instead of looking for people in the picture."""
+
+    @field_validator("ground")
+    @classmethod
+    def _ground_is_invertible(
+        cls, ground: list[list[float]] | None, info: ValidationInfo
+    ) -> list[list[float]] | None:
+        if ground is not None:
+            checked_homography(ground, f"camera {info.data.get('id', '?')}")
+        return ground
+
+
+class Track(Section):
+    """Following people in one camera: the network LP over a moving window (paper, II)."""
+
+    solver: str = DEFAULT_SOLVER
+    backlog_s: PositiveFloat = 2.0
+    """Seconds of frames that may wait on a busy machine; a camera's older ones are left out, and said so."""
+    window: Annotated[WindowSettings, validated(WindowSettings)] = WindowSettings()
+    costs: Annotated[CostSettings, validated(CostSettings)] = CostSettings()
+
+    @field_validator("solver")
+    @classmethod
+    def _solver_is_known(cls, solver: str) -> str:
+        solver_named(solver)
+        return solver
+
+
+class View(Section):
+    """The best-view service."""
+
+    lookahead: PositiveInt = 25
+    """Frames the choice of a view looks ahead: N of the paper's section III; all of it is delay."""
+    switch_cost_s: NonNegativeFloat = 0.08
+    """λ: a cut is worth it when it saves this many seconds of not seeing the person at all."""
+    late_after_s: PositiveFloat = 0.5
+    """How long to wait for a camera's tracks before going on without that camera."""
+    buffer_s: PositiveFloat = 10.0
+    """Video kept per camera."""
+    identity: Annotated[IdentitySettings, validated(IdentitySettings)] = IdentitySettings()
+
+
+class Http(Section):
+    """The page, the streams and the API."""
+
+    host: str = "127.0.0.1"
+    port: Annotated[int, Field(ge=0, le=65535)] = 8080
+    viewers_max: PositiveInt = 1000
+    """Streams served at once; one more gets 503."""
+    viewer_queue_gops: PositiveInt = 8
+    """A viewer that falls behind by more loses whole GOPs."""
+
+
+class Config(BaseSettings):
+    """A whole site."""
+
+    model_config = SettingsConfigDict(
+        extra="forbid",
+        frozen=True,
+        env_prefix="MYVIEW_",
+        env_nested_delimiter="__",
+    )
+
+    site: Site = Site()
+    sync: Sync = Sync()
+    zenoh: Zenoh = Zenoh()
+    encode: Encode = Encode()
+    cameras: Annotated[list[Camera], Field(min_length=1)]
+    ground: Path | None = None
+    """A JSON file with one homography per camera; a camera's own `ground` goes before it."""
+    detect: Annotated[BackgroundSettings, validated(BackgroundSettings)] = BackgroundSettings()
+    """Finding people in a picture: background subtraction and box filters (paper, IV.A.2)."""
+    track: Track = Track()
+    view: View = View()
+    http: Http = Http()
+
+    @classmethod
+    def settings_customise_sources(
+        cls,
+        settings_cls: type[BaseSettings],
+        init_settings: PydanticBaseSettingsSource,
+        env_settings: PydanticBaseSettingsSource,
+        dotenv_settings: PydanticBaseSettingsSource,
+        file_secret_settings: PydanticBaseSettingsSource,
+    ) -> tuple[PydanticBaseSettingsSource, ...]:
+        """Let the environment go before the file."""
+        del settings_cls, dotenv_settings, file_secret_settings
+        return env_settings, init_settings
+
+    @model_validator(mode="after")
+    def _cameras_have_different_names(self) -> Self:
+        ids = [camera.id for camera in self.cameras]
+        for camera_id in ids:
+            if ids.count(camera_id) > 1:
+                raise ValueError(f"cameras: two cameras are called {camera_id!r}; every id must be its own")
+        return self
+
+    @model_validator(mode="after")
+    def _lookahead_covers_the_tracker(self) -> Self:
+        window = self.track.window
+        least = self.encode.gop + window.window - window.stride
+        if self.view.lookahead < least:
+            raise ValueError(
+                f"view.lookahead: is {self.view.lookahead} frames but must be at least {least} "
+                "(encode.gop + track.window.window - track.window.stride), "
+                "so that a view is chosen on tracks that no longer change"
+            )
+        return self
+
+    def camera(self, camera_id: str) -> Camera:
+        """Give one camera.
+
+        Raises:
+            KeyError: there is none of this id.
+        """
+        for camera in self.cameras:
+            if camera.id == camera_id:
+                return camera
+        raise KeyError(f"no camera {camera_id!r}; there are {', '.join(self.camera_ids)}")
+
+    @property
+    def camera_ids(self) -> Sequence[str]:
+        """The cameras' names in the order of the configuration: the order of every camera axis."""
+        return tuple(camera.id for camera in self.cameras)

@@ -1,0 +1,62 @@
+"""From a foreign library's threads to the event loop, bounded."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+log = logging.getLogger(__name__)
+
+PENDING_MAX = 4096
+"""Messages held for a busy event loop: several seconds of a site of eight cameras."""
+
+Item = TypeVar("Item")
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """One message of the bus as it came."""
+
+    key: str
+    payload: bytes
+    attachment: bytes
+
+
+class Inbox(Generic[Item]):
+    """Keeps the newest items and wakes the loop once for as many as have come.
+
+    When the loop is too slow the oldest are lost and counted in ``lost``: memory never grows and the sender
+    never waits.
+    """
+
+    def __init__(self, handler: Callable[[Item], None], pending_max: int = PENDING_MAX) -> None:
+        self._handler = handler
+        self._loop = asyncio.get_running_loop()
+        self._pending: deque[Item] = deque(maxlen=pending_max)
+        self._woken = False
+        self.lost = 0
+
+    def put(self, item: Item) -> None:
+        """Take an item, in any thread."""
+        if len(self._pending) == self._pending.maxlen:
+            self.lost += 1
+        self._pending.append(item)
+        if not self._woken:
+            self._woken = True
+            try:
+                self._loop.call_soon_threadsafe(self._drain)
+            except RuntimeError:
+                log.debug("an item came after the event loop had closed")
+
+    def _drain(self) -> None:
+        self._woken = False
+        while self._pending:
+            item = self._pending.popleft()
+            try:
+                self._handler(item)
+            except Exception:  # one bad item must not keep back those behind it
+                log.exception("handling what came failed")

@@ -1,0 +1,139 @@
+"""From a YAML file to a :class:`Config`, or to one line that says what is wrong with it."""
+
+from __future__ import annotations
+
+import difflib
+import json
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import yaml
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+from pydantic_settings import SettingsError
+
+from bestview import checked_homography
+from server.wire.config import Camera, Config
+from server.wire.errors import UserError
+from server.wire.sources import resolved
+
+
+def load_config(path: Path) -> Config:
+    """Read a site's configuration; paths in it are relative to the file.
+
+    Raises:
+        UserError: the file cannot be read, or something in it is wrong.
+    """
+    return build_config(read_content(path), where=str(path), folder=path.parent)
+
+
+def read_content(path: Path) -> dict[str, Any]:
+    """Read a configuration file's sections, unchecked.
+
+    Raises:
+        UserError: it cannot be read, or is no mapping of sections.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise UserError(f"{path}: cannot read the configuration: {_reason(error)}") from error
+    try:
+        content = yaml.safe_load(text)
+    except (yaml.YAMLError, ValueError) as error:  # ValueError: a date or a number that cannot be one
+        raise UserError(f"{path}: is not valid YAML: {' '.join(str(error).split())}") from error
+    if not isinstance(content, dict) or not all(isinstance(section, str) for section in content):
+        raise UserError(f"{path}: a configuration is a mapping of sections, such as 'cameras:'")
+    return content
+
+
+def build_config(content: Mapping[str, Any], *, where: str, folder: Path) -> Config:
+    """Check a configuration's content and resolve what it refers to.
+
+    Raises:
+        UserError: something is wrong; the text begins with ``where``.
+    """
+    _no_unknown_environment(where)
+    try:
+        config = Config(**content)
+    except ValidationError as error:
+        raise UserError(_one_line(where, error)) from error
+    except SettingsError as error:
+        raise UserError(f"{where}: environment: {error}; a section's whole value must be JSON") from error
+    homographies = _homographies(folder / config.ground, where) if config.ground else {}
+    try:
+        cameras = [_resolved(camera, homographies, folder) for camera in config.cameras]
+    except ValueError as error:
+        raise UserError(f"{where}: {error}") from error
+    return config.model_copy(update={"cameras": cameras})
+
+
+def _resolved(camera: Camera, homographies: Mapping[str, Any], folder: Path) -> Camera:
+    """Make paths absolute and fill in the ground homography from the file for all cameras."""
+    ground = camera.ground if camera.ground is not None else homographies.get(camera.id)
+    detections = folder / camera.detections if camera.detections else None
+    source = resolved(camera.source, folder)
+    return camera.model_copy(update={"ground": ground, "source": source, "detections": detections})
+
+
+def _homographies(path: Path, where: str) -> dict[str, list[list[float]]]:
+    """Read ``{"homography": {"c0": [[…], […], […]]}}``.
+
+    Raises:
+        UserError: it cannot be read, or a matrix in it is not an invertible 3x3.
+    """
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        matrices = dict(content["homography"])
+    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+        raise UserError(f"{where}: ground: cannot read {path}: {_reason(error)}") from error
+    except (KeyError, TypeError, ValueError) as error:
+        raise UserError(f'{where}: ground: {path} has no {{"homography": {{camera: 3x3}}}}') from error
+    for camera_id, matrix in matrices.items():
+        try:
+            checked_homography(matrix, f"camera {camera_id}")
+        except ValueError as error:
+            raise UserError(f"{where}: ground: {path}: {error}") from error
+    return matrices
+
+
+def _reason(error: Exception) -> str:
+    if isinstance(error, OSError) and error.strerror:
+        return error.strerror
+    return " ".join(str(error).split())
+
+
+def _one_line(where: str, error: ValidationError) -> str:
+    errors = error.errors()
+    more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
+    return f"{where}: {_plain(errors[0])}{more}"
+
+
+def _plain(detail: ErrorDetails) -> str:
+    place = ".".join(str(part) for part in detail["loc"])
+    message = detail["msg"].removeprefix("Value error, ")
+    if detail["type"] == "extra_forbidden":
+        close = difflib.get_close_matches(str(detail["loc"][-1]), _known_keys(detail["loc"][:-1]), n=1)
+        message = "unknown key" + (f"; did you mean {close[0]!r}?" if close else "")
+    return f"{place}: {message}" if place else message
+
+
+def _known_keys(section: tuple[int | str, ...]) -> list[str]:
+    """List the keys of a section, given the way to it."""
+    model: Any = Config
+    for part in section:
+        if isinstance(part, int):
+            model = Camera
+        elif isinstance(model, type) and issubclass(model, BaseModel) and part in model.model_fields:
+            model = model.model_fields[part].annotation
+    return list(model.model_fields) if isinstance(model, type) and issubclass(model, BaseModel) else []
+
+
+def _no_unknown_environment(where: str) -> None:
+    """Refuse ``MYVIEW_HTP__PORT``: pydantic-settings would pass over it in silence."""
+    sections = [name.upper() for name in Config.model_fields]
+    for name in os.environ:
+        section, nested, _ = name.removeprefix("MYVIEW_").partition("__")
+        if name.startswith("MYVIEW_") and nested and section not in sections:
+            raise UserError(f"{where}: environment: {name}: there is no section {section.lower()!r}")

@@ -1,0 +1,173 @@
+"""The messages on the bus, and the keys they travel under.
+
+Everything but pictures is JSON, so that any zenoh subscriber can read it; video travels as plain Annex B
+H.264 with a small JSON head in zenoh's attachment. Numbers survive the way exactly: JSON floats are written
+with as many digits as they need.
+
+========================================  =======================================  =====================
+key                                       payload                                  attachment
+========================================  =======================================  =====================
+``myview/SITE/camera/ID/video``           one access unit, Annex B H.264           :class:`FrameHead`
+``myview/SITE/camera/ID/tracks``          :class:`CameraTracks`
+``myview/SITE/camera/ID/status``          :class:`CameraStatus`
+``myview/SITE/camera/ID/thumbs/LOCAL``    JPEG of one person                       :class:`ThumbHead`
+``myview/SITE/camera/ID/alive``           liveliness token
+``myview/SITE/bestview/choices``          :class:`GopChoices`
+``myview/SITE/bestview/alive``            liveliness token
+========================================  =======================================  =====================
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import msgspec
+
+Pulse = Annotated[int, msgspec.Meta(ge=0, le=2**40)]
+"""A frame number; the bound is a thousand years at 25 frames a second, and keeps times within 64 bits."""
+
+Pixels = Annotated[int, msgspec.Meta(ge=1, le=2**16)]
+
+Number = Annotated[int, msgspec.Meta(ge=0, le=2**62)]
+
+Box = tuple[float, float, float, float]
+"""Left, top, right, bottom in pixels of the site's picture."""
+
+
+class FrameHead(msgspec.Struct, frozen=True, kw_only=True):
+    """What one access unit is. Times are unix seconds by the camera's clock."""
+
+    pulse: Pulse
+    key: bool
+    """It begins a GOP: SPS, PPS and an IDR picture are inside."""
+    boot: Number
+    """Which run of the camera process: a restarted camera has another one."""
+    due: float
+    """When the pulse was due."""
+    taken: float
+    """When the picture was there."""
+    encoded: float
+
+
+class Track(msgspec.Struct, frozen=True, kw_only=True):
+    """One person in one camera over a window."""
+
+    id: Number
+    """The tracker's own number: one per person, camera and boot."""
+    boxes: list[Box | None]
+    """One per frame of the window; null where the person is hidden."""
+    histogram: list[float]
+    confidence: float
+
+
+class Solve(msgspec.Struct, frozen=True, kw_only=True):
+    """How well the window's program was solved."""
+
+    objective: float
+    bound: float
+    gap: float
+    integral: bool
+    rounds: int
+
+
+class CameraTracks(msgspec.Struct, frozen=True, kw_only=True):
+    """What a camera knows after solving one window."""
+
+    camera: str
+    boot: Number
+    size: tuple[Pixels, Pixels]
+    """Width and height of the camera's own picture; boxes are in the site's, which it was scaled into."""
+    epoch: Pulse
+    """Which of the site's windows: it ends with pulse (epoch + 1) · stride - 1, or with the recording."""
+    first: Pulse
+    """First frame (pulse number) of the window."""
+    last: Annotated[int, msgspec.Meta(ge=-1, le=2**40)]
+    """Last frame; -1 or before ``first`` where there was none."""
+    final_to: int
+    """Every frame up to this one never changes again."""
+    ended: bool
+    """The recording is over: nothing follows."""
+    shed: list[Pulse]
+    """Frames of this epoch that were missed or not searched for people because the machine was too busy."""
+    tracks: list[Track]
+    solve: Solve | None
+    solved_at: float = 0.0
+    """When the window was solved, unix seconds by the camera's clock; 0 offline."""
+
+
+class CameraStatus(msgspec.Struct, frozen=True, kw_only=True):
+    """How a camera is, once a second."""
+
+    camera: str
+    boot: int
+    state: str
+    """starting, live, away (the source gives no pictures now) or ended."""
+    pulse: int
+    fps: float
+    """Frames taken in the last second or so."""
+    missed: int
+    """Pulses without a frame since the start."""
+    shed: int
+    """Frames not searched for people since the start."""
+    in_step: bool
+    """Pulses come from the server; otherwise the camera goes on at its own rate."""
+    clock_offset: float
+    """Server's clock minus the camera's, seconds."""
+    round_trip: float
+
+
+class ThumbHead(msgspec.Struct, frozen=True, kw_only=True):
+    """Which person a thumbnail shows."""
+
+    track: Number
+    boot: Number
+    pulse: Pulse
+
+
+class Cut(msgspec.Struct, frozen=True, kw_only=True):
+    """A change of view."""
+
+    object: int
+    pulse: int
+    from_camera: str = msgspec.field(name="from")
+    to_camera: str = msgspec.field(name="to")
+
+
+class GopChoices(msgspec.Struct, frozen=True, kw_only=True):
+    """The chosen camera of every object for one GOP, and the final boxes of its frames."""
+
+    first: int
+    frames: int
+    choices: dict[int, str]
+    boxes: dict[str, list[list[tuple[int, float, float, float, float]]]]
+    """Per camera and frame: object, left, top, right, bottom."""
+    cuts: list[Cut]
+
+
+_CAMERA_PART = 3
+
+
+PULSE_CLIENT = "bestview"
+"""The best-view service's name at the pulse server, which waits for it before pulse 0."""
+
+
+@dataclass(frozen=True, slots=True)
+class Keys:
+    """The zenoh key expressions of a site."""
+
+    site: str
+
+    def camera(self, camera_id: str, what: str) -> str:
+        """Name a camera's key; ``*`` as the id stands for all cameras."""
+        return f"myview/{self.site}/camera/{camera_id}/{what}"
+
+    def bestview(self, what: str) -> str:
+        """Name a key of the best-view service."""
+        return f"myview/{self.site}/bestview/{what}"
+
+
+def camera_of(key: str) -> str:
+    """Give the camera id inside a camera's key; empty where there is none."""
+    parts = key.split("/")
+    return parts[_CAMERA_PART] if len(parts) > _CAMERA_PART else ""

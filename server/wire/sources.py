@@ -1,0 +1,35 @@
+"""How a camera's ``source`` is written, and which kind of source that is."""
+
+from __future__ import annotations
+
+from enum import Enum
+from pathlib import Path
+
+
+class SourceKind(Enum):
+    """Where pictures come from."""
+
+    SCENE = "scene"
+    """The synthetic scene: ``scene:room?camera=0``."""
+    FOLDER = "folder"
+    """A folder of images, in the order of their names."""
+    FILE = "file"
+    """A recording: frame n - offset at pulse n, however busy the machine is."""
+    STREAM = "stream"
+    """A camera: its newest picture at every pulse."""
+
+
+def kind_of(source: str) -> SourceKind:
+    """Tell the kind of a source from how it is written."""
+    if source.startswith("scene:"):
+        return SourceKind.SCENE
+    if "://" in source or source.startswith("/dev/"):
+        return SourceKind.STREAM
+    return SourceKind.FOLDER if Path(source).is_dir() else SourceKind.FILE
+
+
+def resolved(source: str, folder: Path) -> str:
+    """Make a relative path relative to ``folder`` (the configuration's); leave URLs and scenes alone."""
+    if source.startswith("scene:") or "://" in source:
+        return source
+    return str((folder / source).absolute())

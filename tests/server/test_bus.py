@@ -1,0 +1,203 @@
+"""zenoh for asyncio: who comes first does not matter, routers may come and go, closing ends everything."""
+
+from __future__ import annotations
+
+import asyncio
+import subprocess
+import sys
+import threading
+from collections import deque
+
+import pytest
+from pydantic import ValidationError
+
+from server.run.setup import free_port
+from server.wire.bus import Bus
+from server.wire.config import Zenoh
+from server.wire.errors import UserError
+from server.wire.inbox import Inbox, Message
+
+PATIENCE = 20.0  # seconds until a test that awaits something has failed
+
+
+@pytest.fixture
+def settings() -> Zenoh:
+    address = f"tcp/127.0.0.1:{free_port()}"
+    return Zenoh(connect=address, listen=address)
+
+
+class Heard:
+    """What came, awaitable."""
+
+    def __init__(self) -> None:
+        self.queue: asyncio.Queue[Message] = asyncio.Queue()
+
+    async def next(self) -> Message:
+        async with asyncio.timeout(PATIENCE):
+            return await self.queue.get()
+
+
+class Presence:
+    """Who is there, awaitable."""
+
+    def __init__(self) -> None:
+        self.there: set[str] = set()
+        self._changed = asyncio.Event()
+
+    def note(self, key: str, there: bool) -> None:
+        (self.there.add if there else self.there.discard)(key)
+        self._changed.set()
+
+    async def until(self, *keys: str) -> None:
+        async with asyncio.timeout(PATIENCE):
+            while self.there != set(keys):
+                await self._changed.wait()
+                self._changed.clear()
+
+
+async def test_a_message_comes_with_its_key_and_attachment(settings: Zenoh) -> None:
+    router, client = Bus.router(settings), Bus.client(settings)
+    heard, there = Heard(), Presence()
+    router.subscribe("myview/hall/*/video", heard.queue.put_nowait)
+    client.watch_alive("myview/hall/bestview", there.note)
+    router.declare_alive("myview/hall/bestview")
+    await there.until("myview/hall/bestview")
+    client.publish("myview/hall/c0/video", b"picture", b"head")
+    assert await heard.next() == Message("myview/hall/c0/video", b"picture", b"head")
+    client.publish("myview/hall/c0/video", b"picture")
+    assert (await heard.next()).attachment == b""
+    client.close()
+    router.close()
+
+
+async def test_messages_of_one_session_stay_in_order(settings: Zenoh) -> None:
+    router, client = Bus.router(settings), Bus.client(settings)
+    heard, there = Heard(), Presence()
+    router.subscribe("a/**", heard.queue.put_nowait)
+    client.watch_alive("router", there.note)
+    router.declare_alive("router")
+    await there.until("router")
+    for number in range(200):
+        client.publish(f"a/{'bc'[number % 2]}", str(number).encode() + bytes(1000 * (number % 7)))
+        await asyncio.sleep(0)
+    got = [int((await heard.next()).payload.split(b"\0")[0]) for _ in range(200)]
+    assert got == list(range(200))
+    client.close()
+    router.close()
+
+
+async def test_a_client_may_come_before_the_router_and_survives_its_restart(settings: Zenoh) -> None:
+    client = Bus.client(settings)
+    there = Presence()
+    client.watch_alive("router", there.note)
+    client.declare_alive("client")
+    for _ in range(2):
+        router = Bus.router(settings)
+        heard, clients = Heard(), Presence()
+        router.subscribe("word", heard.queue.put_nowait)
+        router.watch_alive("client", clients.note)
+        router.declare_alive("router")
+        await there.until("router")
+        await clients.until("client")
+        client.publish("word", b"hello")
+        assert (await heard.next()).payload == b"hello"
+        router.close()
+        await there.until()
+    client.close()
+
+
+async def test_who_closes_is_seen_to_be_gone_and_who_was_there_before_is_seen_to_be_there(
+    settings: Zenoh,
+) -> None:
+    router, client = Bus.router(settings), Bus.client(settings)
+    client.declare_alive("camera/c0")
+    first = Presence()
+    router.watch_alive("camera/*", first.note)
+    await first.until("camera/c0")
+    late = Presence()
+    router.watch_alive("camera/*", late.note)
+    await late.until("camera/c0")
+    client.close()
+    await first.until()
+    router.close()
+
+
+async def test_two_routers_of_one_address_cannot_be(settings: Zenoh) -> None:
+    router = Bus.router(settings)
+    with pytest.raises(UserError, match=r"zenoh\.listen: cannot listen on tcp/127") as caught:
+        Bus.router(settings)
+    assert "\n" not in str(caught.value)
+    router.close()
+
+
+async def test_an_address_that_is_none_is_refused() -> None:
+    for address in ("nonsense", "tcp/127.0.0.1", "127.0.0.1:7447", "tcp/a b:1"):
+        with pytest.raises(ValidationError, match="is not an address such as tcp"):
+            Zenoh(connect=address)
+    with pytest.raises(UserError, match=r"zenoh\.connect: cannot use smoke/signal:1") as caught:
+        Bus.client(Zenoh(connect="smoke/signal:1"))
+    assert "\n" not in str(caught.value)
+
+
+SCRIPT = """
+import asyncio
+from server.wire.bus import Bus
+from server.wire.config import Zenoh
+async def main():
+    address = "tcp/127.0.0.1:{port}"
+    settings = Zenoh(connect=address, listen=address)
+    buses = [Bus.router(settings), Bus.client(settings)]
+    for bus in buses:
+        bus.subscribe("a", print)
+        bus.watch_alive("b", print)
+        bus.declare_alive("b")
+        bus.publish("a", b"x")
+    for bus in reversed(buses):
+        bus.close()
+asyncio.run(main())
+"""
+
+
+def test_a_process_that_closes_its_sessions_exits() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", SCRIPT.format(port=free_port())], timeout=PATIENCE, check=False
+    )
+    assert done.returncode == 0
+
+
+async def test_what_comes_from_threads_is_handled_on_the_loop_in_order() -> None:
+    got: list[tuple[int, int]] = []
+    done = asyncio.Event()
+
+    def handle(number: int) -> None:
+        got.append((number, threading.get_ident()))
+        if number == 999:
+            done.set()
+
+    inbox = Inbox(handle)
+    thread = threading.Thread(target=lambda: deque(map(inbox.put, range(1000)), maxlen=0))
+    thread.start()
+    async with asyncio.timeout(PATIENCE):
+        await done.wait()
+    thread.join()
+    assert got == [(number, threading.get_ident()) for number in range(1000)]
+
+
+async def test_a_busy_loop_loses_the_oldest_and_counts_them() -> None:
+    got: list[int] = []
+    inbox = Inbox(got.append, pending_max=10)
+    for number in range(25):
+        inbox.put(number)
+    await asyncio.sleep(0)
+    assert got == list(range(15, 25))
+    assert inbox.lost == 15
+
+
+async def test_one_item_that_cannot_be_handled_keeps_back_no_other(caplog: pytest.LogCaptureFixture) -> None:
+    got: list[float] = []
+    inbox: Inbox[int] = Inbox(lambda number: got.append(1 / number))
+    for number in (1, 0, 2):
+        inbox.put(number)
+    await asyncio.sleep(0)
+    assert got == [1.0, 0.5]
+    assert "ZeroDivisionError" in caplog.text

@@ -1,0 +1,117 @@
+"""A configuration is right, or one line says what is wrong with it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from server.run.setup import DEMO
+from server.wire.errors import UserError
+from server.wire.loading import build_config, load_config
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def site(**changes: Any) -> dict[str, Any]:
+    return {"cameras": [{"id": "c0", "source": "c0.mp4"}, {"id": "c1", "source": "c1.mp4"}], **changes}
+
+
+def complaint(content: dict[str, Any], folder: Path = Path()) -> str:
+    with pytest.raises(UserError) as caught:
+        build_config(content, where="site.yaml", folder=folder)
+    text = str(caught.value)
+    assert "\n" not in text, "an error is one line"
+    assert text.startswith("site.yaml: ")
+    return text
+
+
+def test_unknown_key_is_refused_and_the_likely_one_is_named() -> None:
+    assert "cameras.0.sourc: unknown key; did you mean 'source'?" in complaint(
+        {"cameras": [{"id": "c0", "source": "x", "sourc": "y"}]}
+    )
+    assert "http.prt: unknown key; did you mean 'port'?" in complaint(site(http={"prt": 1}))
+
+
+def test_unknown_key_in_a_librarys_settings_is_refused_at_any_depth() -> None:
+    assert "did you mean 'stride'?" in complaint(site(track={"window": {"strid": 5}}))
+    assert "unknown key" in complaint(site(detect={"median": {"no_such": 5}}))
+
+
+def test_two_cameras_of_one_name_are_refused() -> None:
+    cameras = [{"id": "c0", "source": "a"}, {"id": "c0", "source": "b"}]
+    assert "two cameras are called 'c0'" in complaint({"cameras": cameras})
+
+
+def test_homography_that_is_not_invertible_is_refused_with_its_camera() -> None:
+    flat = [[1.0, 2.0, 3.0], [2.0, 4.0, 6.0], [0.0, 0.0, 1.0]]
+    text = complaint({"cameras": [{"id": "door", "source": "a", "ground": flat}]})
+    assert "camera door" in text
+    assert "not invertible" in text
+
+
+def test_ground_file_is_checked_as_a_cameras_own_homography_is(tmp_path: Path) -> None:
+    (tmp_path / "ground.json").write_text('{"homography": {"c0": [[1, 0], [0, 1]]}}')
+    assert "camera c0" in complaint(site(ground="ground.json"), tmp_path)
+    (tmp_path / "ground.json").write_text("not json")
+    assert "cannot read" in complaint(site(ground="ground.json"), tmp_path)
+    assert "No such file" in complaint(site(ground="absent.json"), tmp_path)
+
+
+def test_lookahead_shorter_than_the_trackers_lag_is_refused_with_the_least_that_would_do() -> None:
+    assert "must be at least 20" in complaint(site(view={"lookahead": 19}))
+
+
+@pytest.mark.parametrize(
+    ("section", "value"),
+    [("site", {"fps": 0}), ("site", {"width": 333}), ("encode", {"gop": 0}), ("http", {"port": 70000})],
+)
+def test_values_out_of_range_are_refused(section: str, value: dict[str, Any]) -> None:
+    assert f"{section}.{next(iter(value))}" in complaint(site(**{section: value}))
+
+
+def test_unknown_solver_is_refused_with_the_known_ones() -> None:
+    assert "columns" in complaint(site(track={"solver": "oracle"}))
+
+
+def test_environment_goes_before_the_file(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("MYVIEW_HTTP__PORT", "9999")
+    config = build_config(site(http={"port": 1234}), where="site.yaml", folder=Path())
+    assert config.http.port == 9999
+    assert config.http.host == "127.0.0.1"
+
+
+def test_environment_for_an_unknown_section_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("MYVIEW_HTP__PORT", "9999")
+    assert "MYVIEW_HTP__PORT" in complaint(site())
+
+
+def test_paths_are_relative_to_the_configuration(tmp_path: Path) -> None:
+    path = tmp_path / "site.yaml"
+    path.write_text(yaml.safe_dump(site()))
+    config = load_config(path)
+    assert config.camera("c0").source == str(tmp_path / "c0.mp4")
+
+
+@pytest.mark.parametrize("content", ["[1, 2]", "a: [", "", "\x00"])
+def test_what_is_no_mapping_of_sections_is_refused(content: str, tmp_path: Path) -> None:
+    path = tmp_path / "site.yaml"
+    path.write_text(content)
+    with pytest.raises(UserError, match=r"site\.yaml") as caught:
+        load_config(path)
+    assert "\n" not in str(caught.value)
+
+
+def test_every_example_configuration_loads() -> None:
+    examples = sorted((ROOT / "configs").glob("*.yaml"))
+    assert examples
+    for example in examples:
+        load_config(example)
+
+
+def test_the_demos_example_is_the_demo() -> None:
+    example = load_config(ROOT / "configs" / "demo.yaml")
+    embedded = build_config(DEMO, where="demo", folder=Path())
+    assert example == embedded

@@ -1,0 +1,70 @@
+"""A camera's own picture in the site's, and coordinates there and back."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from server.wire.fit import Fit
+
+sides = st.integers(16, 4000)
+sizes = st.tuples(sides, sides)
+places = st.lists(st.tuples(*[st.floats(-5000, 5000)] * 4), min_size=1, max_size=5)
+
+
+@given(sizes, sizes, places)
+def test_boxes_come_back_from_the_site_as_they_went(
+    own: tuple[int, int], site: tuple[int, int], boxes: list[tuple[float, float, float, float]]
+) -> None:
+    fit, given_boxes = Fit(own, site), np.array(boxes)
+    np.testing.assert_allclose(fit.boxes_to_own(fit.boxes_to_site(given_boxes)), given_boxes, atol=1e-6)
+
+
+@given(sizes, sizes)
+def test_the_whole_picture_is_in_the_sites_undistorted_and_touches_two_sides(
+    own: tuple[int, int], site: tuple[int, int]
+) -> None:
+    left, top, right, bottom = Fit(own, site).boxes_to_site(np.array([[0.0, 0.0, *own]]))[0]
+    assert (right - left) / own[0] == pytest.approx((bottom - top) / own[1])
+    assert min(left, top) >= 0
+    assert right <= site[0] + 1e-6
+    assert bottom <= site[1] + 1e-6
+    assert max((right - left) / site[0], (bottom - top) / site[1]) == pytest.approx(1.0)
+
+
+def test_a_picture_of_the_sites_size_passes_untouched() -> None:
+    picture = np.random.default_rng(0).integers(0, 255, (48, 64, 3), dtype=np.uint8)
+    assert Fit((64, 48), (64, 48)).image(picture) is picture
+
+
+@pytest.mark.parametrize(
+    ("own", "bars"),
+    [((64, 64), (slice(None), slice(0, 8))), ((128, 48), (slice(0, 12), slice(None)))],
+)
+def test_what_is_left_over_is_black_and_the_rest_is_the_picture(
+    own: tuple[int, int], bars: tuple[slice, slice]
+) -> None:
+    white = np.full((own[1], own[0], 3), 255, dtype=np.uint8)
+    fitted = Fit(own, (64, 48)).image(white)
+    assert fitted.shape == (48, 64, 3)
+    assert (fitted[bars] == 0).all()
+    assert (fitted[24, 32] == 255).all()
+    assert 0.3 < fitted.mean() / 255 < 0.8
+
+
+def test_what_is_at_a_place_of_the_picture_is_at_that_place_in_the_sites() -> None:
+    picture = np.zeros((100, 50, 3), dtype=np.uint8)
+    picture[60:80, 10:30] = 255
+    fit = Fit((50, 100), (200, 200))
+    left, top, right, bottom = fit.boxes_to_site(np.array([[10.0, 60.0, 30.0, 80.0]]))[0]
+    fitted = fit.image(picture)
+    rows, columns = np.nonzero(fitted[:, :, 0] > 127)
+    assert (columns.min(), rows.min(), columns.max() + 1, rows.max() + 1) == (left, top, right, bottom)
+    np.testing.assert_array_equal(fit.to_site(np.array([[10.0, 60.0]])), [[left, top]])
+
+
+def test_a_picture_that_changes_its_size_on_the_way_still_fits() -> None:
+    fit = Fit((64, 48), (64, 48))
+    assert fit.image(np.zeros((100, 100, 3), np.uint8)).shape == (48, 64, 3)
