@@ -1,0 +1,1 @@
+"""One camera: take, encode once, find, follow, publish."""

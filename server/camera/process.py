@@ -1,0 +1,186 @@
+"""One camera's process: on every pulse take a frame, encode it, publish it, and follow everybody in it."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from typing import TypeVar
+
+import msgspec
+
+from camsync import ClientSettings, Pulse, PulseClient
+from server.camera.meter import Meter
+from server.camera.pipeline import CameraPipeline
+from server.camera.sources import Image, SourceEnded
+from server.camera.thumbs import thumbnails
+from server.wire.bus import Bus
+from server.wire.config import Config
+from server.wire.messages import CameraStatus, CameraTracks, FrameHead, Keys, ThumbHead
+
+log = logging.getLogger(__name__)
+
+T = TypeVar("T")
+
+_STATUS_EVERY_S = 1.0
+_MARKS_PER_PICTURE = 10
+"""Frame numbers that may wait for each picture that may; more are left out, as if missed."""
+
+
+class CameraProcess:
+    """Runs a pipeline on the pulses. Two threads of its own: video must never wait for tracking.
+
+    Raises:
+        UserError: the source cannot be opened.
+    """
+
+    def __init__(self, config: Config, camera_id: str) -> None:
+        self._config, self._id = config, camera_id
+        self._boot = time.time_ns() // 1_000_000
+        self._keys = Keys(config.site.name)
+        self._pipeline = CameraPipeline(config, camera_id, self._boot)
+        self._video = ThreadPoolExecutor(1, "video")
+        self._tracking = ThreadPoolExecutor(1, "tracking")
+        fps = config.site.fps
+        self._backlog_pictures = max(1, round(config.track.backlog_s * fps))
+        self._backlog: asyncio.Queue[tuple[int, Image | None] | None] = asyncio.Queue(
+            maxsize=_MARKS_PER_PICTURE * self._backlog_pictures
+        )
+        self._meter = Meter(fps)
+        self._state = "starting"
+        self._end = 0
+        """The first pulse that the recording has no frame for, once it is over."""
+        self._bus: Bus | None = None
+
+    async def run(self) -> None:
+        """Serve until the recording is over (a camera's never is)."""
+        self._bus = bus = Bus.client(self._config.zenoh)
+        try:
+            await self._wait_for_bestview(bus)
+            bus.declare_alive(self._keys.camera(self._id, "alive"))
+            tasks = [
+                asyncio.create_task(self._follow_pulses(), name="pulses"),
+                asyncio.create_task(self._track(), name="track"),
+                asyncio.create_task(self._tell_status(), name="status"),
+            ]
+            try:
+                await self._until_over(*tasks[:2])
+                self._send_status()
+            finally:
+                for task in tasks:
+                    task.cancel()
+                await asyncio.gather(*tasks, return_exceptions=True)
+        finally:
+            bus.close()
+            self._video.shutdown(wait=True)
+            self._tracking.shutdown(wait=True)
+            self._pipeline.close()
+
+    @staticmethod
+    async def _until_over(video: asyncio.Task[None], tracking: asyncio.Task[None]) -> None:
+        """Wait for both; what ends one of them by an error ends the process, which is then started anew."""
+        await asyncio.wait({video, tracking}, return_when=asyncio.FIRST_EXCEPTION)
+        for task in (video, tracking):
+            if task.done():
+                task.result()
+
+    async def _wait_for_bestview(self, bus: Bus) -> None:
+        """Wait until frames have somewhere to go: what is sent to nobody is lost, and with it frame 0."""
+        there = asyncio.Event()
+        bus.watch_alive(self._keys.bestview("alive"), lambda _, alive: there.set() if alive else None)
+        try:
+            await asyncio.wait_for(there.wait(), self._config.sync.start_timeout_s)
+        except TimeoutError:
+            log.warning("camera %s: no best-view service at %s yet", self._id, self._config.zenoh.connect)
+
+    async def _follow_pulses(self) -> None:
+        sync, fps = self._config.sync, self._config.site.fps
+        # A recording makes up for a stall; a camera goes on with its newest picture.
+        queue = self._backlog_pictures if self._pipeline.source.recorded else 2
+        settings = ClientSettings(queue=queue, free_run_after=sync.start_timeout_s)
+        client = PulseClient(sync.host, sync.port, self._id, fps_hint=fps, settings=settings)
+        async with client as pulses:
+            self._meter.watch(pulses)
+            async for pulse in pulses:
+                try:
+                    await self._on_pulse(pulse)
+                except SourceEnded:
+                    log.info("camera %s: the recording is over", self._id)
+                    self._state, self._end = "ended", pulse.number
+                    await self._backlog.put(None)
+                    return
+
+    async def _on_pulse(self, pulse: Pulse) -> None:
+        image = await self._in(self._video, lambda: self._pipeline.take(pulse.number))
+        if image is None:
+            if not self._pipeline.source.recorded:
+                self._state = "away"
+            self._meter.missed(pulse.number, 1 + pulse.missed)
+            self._queue_for_tracking(pulse.number, None)
+            return
+        self._state = "live"
+        taken = time.time()
+        unit = await self._in(self._video, lambda: self._pipeline.encode(pulse.number, image))
+        head = FrameHead(
+            pulse=pulse.number,
+            key=unit.key,
+            boot=self._boot,
+            due=pulse.due,
+            taken=taken,
+            encoded=time.time(),
+        )
+        self._publish("video", unit.data, msgspec.json.encode(head))
+        self._meter.frame(pulse.number, pulse.missed)
+        self._queue_for_tracking(pulse.number, image)
+
+    def _queue_for_tracking(self, pulse: int, image: Image | None) -> None:
+        """Hand a frame to the tracker; when it is far behind, only the frame's number."""
+        shed = image is not None and self._backlog.qsize() >= self._backlog_pictures
+        if shed:
+            self._meter.shed()
+        if not self._backlog.full():
+            self._backlog.put_nowait((pulse, None if shed else image))
+
+    async def _track(self) -> None:
+        """Follow everybody, frame by frame, behind the video."""
+        thumbs_every = round(self._config.site.fps)
+        while (item := await self._backlog.get()) is not None:
+            pulse, image = item
+            tracks = await self._in(self._tracking, partial(self._pipeline.track, pulse, image))
+            if tracks is None:
+                continue
+            self._send_tracks(tracks)
+            if image is not None and tracks.epoch * self._config.track.window.stride % thumbs_every < (
+                self._config.track.window.stride
+            ):
+                await self._send_thumbnails(image, tracks)
+        self._send_tracks(await self._in(self._tracking, lambda: self._pipeline.finish(self._end)))
+
+    def _send_tracks(self, tracks: CameraTracks) -> None:
+        self._publish("tracks", msgspec.json.encode(msgspec.structs.replace(tracks, solved_at=time.time())))
+
+    async def _send_thumbnails(self, image: Image, tracks: CameraTracks) -> None:
+        pictures = await self._in(self._tracking, lambda: thumbnails(image, tracks))
+        for track, jpeg in pictures.items():
+            head = ThumbHead(track=track, boot=self._boot, pulse=tracks.last)
+            self._publish(f"thumbs/{track}", jpeg, msgspec.json.encode(head))
+
+    async def _tell_status(self) -> None:
+        while True:
+            self._send_status()
+            await asyncio.sleep(_STATUS_EVERY_S)
+
+    def _send_status(self) -> None:
+        status: CameraStatus = self._meter.status(self._id, self._boot, self._state)
+        self._publish("status", msgspec.json.encode(status))
+
+    def _publish(self, what: str, payload: bytes, attachment: bytes | None = None) -> None:
+        if self._bus is not None:
+            self._bus.publish(self._keys.camera(self._id, what), payload, attachment)
+
+    @staticmethod
+    async def _in(pool: ThreadPoolExecutor, work: Callable[[], T]) -> T:
+        return await asyncio.get_running_loop().run_in_executor(pool, work)

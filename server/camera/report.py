@@ -1,0 +1,92 @@
+"""From the tracker's windows to the messages that a camera sends."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from server.wire.epochs import closing_epoch, epoch_of_window
+from server.wire.messages import Box, CameraTracks, Solve, Track
+from tracking import SolveReport, WindowResult, WindowTrack
+
+
+class Reporter:
+    """Writes a camera's messages, and keeps count of the frames that were not searched for people."""
+
+    def __init__(self, camera: str, boot: int, size: tuple[int, int], stride: int) -> None:
+        self._camera, self._boot, self._size, self._stride = camera, boot, size, stride
+        self._shed: list[int] = []
+
+    def shed(self, pulses: Iterable[int]) -> None:
+        """Note frames that nobody was looked for in; the next message says so."""
+        self._shed.extend(pulses)
+
+    def regular(self, result: WindowResult) -> CameraTracks:
+        """Report a window."""
+        return self._message(result, epoch_of_window(result.last, self._stride), ended=False)
+
+    def closing(self, result: WindowResult | None, last: int) -> CameraTracks:
+        """Report the end of the recording."""
+        epoch = closing_epoch(last, self._stride)
+        if result is not None:
+            return self._message(result, epoch, ended=True)
+        return CameraTracks(
+            camera=self._camera,
+            boot=self._boot,
+            size=self._size,
+            epoch=epoch,
+            first=last + 1,
+            last=last,
+            final_to=last,
+            ended=True,
+            shed=self._taken_shed(),
+            tracks=[],
+            solve=None,
+        )
+
+    def _message(self, result: WindowResult, epoch: int, *, ended: bool) -> CameraTracks:
+        return CameraTracks(
+            camera=self._camera,
+            boot=self._boot,
+            size=self._size,
+            epoch=epoch,
+            first=result.first,
+            last=result.last,
+            final_to=result.final_to,
+            ended=ended,
+            shed=self._taken_shed(),
+            tracks=[_track(track) for track in result.tracks],
+            solve=_solve(result.report),
+        )
+
+    def _taken_shed(self) -> list[int]:
+        shed, self._shed = self._shed, []
+        return shed
+
+
+def _track(track: WindowTrack) -> Track:
+    return Track(
+        id=track.id,
+        boxes=[_box(row) for row in track.boxes],
+        histogram=[float(share) for share in track.histogram],
+        confidence=float(track.confidence),
+    )
+
+
+def _box(row: NDArray[np.float64]) -> Box | None:
+    left, top, right, bottom = (float(side) for side in row)
+    return None if np.isnan(left) else (left, top, right, bottom)
+
+
+def _solve(report: SolveReport | None) -> Solve | None:
+    if report is None:
+        return None
+    return Solve(
+        objective=report.objective,
+        bound=report.bound,
+        gap=report.gap,
+        integral=report.integral,
+        rounds=report.rounds,
+    )

@@ -1,0 +1,79 @@
+"""A pinhole camera over a ground plane."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats: TypeAlias = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Viewpoint:
+    """Where a camera hangs and where it looks, in metres; the world's z axis points up."""
+
+    position: tuple[float, float, float]
+    target: tuple[float, float, float]
+    field_of_view: float = 72.0  # horizontal, degrees
+
+
+@dataclass(frozen=True, slots=True)
+class Perspective:
+    """Projection of world points (metres) to picture points (pixels).
+
+    Picture coordinates are continuous: pixel ``(i, j)`` covers ``[i, i + 1) x [j, j + 1)``.
+    """
+
+    centre: Floats  # (3,) optical centre, metres
+    axes: Floats  # (3, 3) rows: right, down, forward
+    focal: float  # pixels
+    width: int  # pixels
+    height: int  # pixels
+
+    @classmethod
+    def of(cls, view: Viewpoint, width: int, height: int) -> Perspective:
+        """Hang a camera at a viewpoint, its horizon level."""
+        centre = np.array(view.position, dtype=np.float64)
+        forward = np.array(view.target, dtype=np.float64) - centre
+        forward /= np.linalg.norm(forward)
+        right = np.cross(forward, (0.0, 0.0, 1.0))
+        right /= np.linalg.norm(right)
+        axes = np.stack([right, np.cross(forward, right), forward])
+        focal = 0.5 * width / math.tan(math.radians(view.field_of_view) / 2)
+        return cls(centre, axes, focal, width, height)
+
+    def project(self, points: Floats) -> tuple[Floats, Floats]:
+        """Project ``(N, 3)`` world points to ``(N, 2)`` pixels and their ``(N,)`` depths in metres.
+
+        A point at or behind the camera is projected as if it were 5 cm in front of it.
+        """
+        local = (points - self.centre) @ self.axes.T
+        depth = local[:, 2]
+        scale = self.focal / np.maximum(depth, 0.05)
+        pixels = local[:, :2] * scale[:, None]
+        pixels += (self.width / 2, self.height / 2)
+        return pixels, depth
+
+    def rays(self, columns: Floats, rows: Floats) -> Floats:
+        """Give the unit directions ``(R, C, 3)`` of the picture points ``columns x rows``."""
+        across = (columns - self.width / 2) / self.focal
+        down = (rows - self.height / 2) / self.focal
+        right, below, forward = self.axes
+        directions = forward + across[None, :, None] * right + down[:, None, None] * below
+        unit: Floats = directions / np.linalg.norm(directions, axis=2, keepdims=True)
+        return unit
+
+    def homography(self) -> Floats:
+        """Give the ``(3, 3)`` map from picture points to the floor, in metres; its last entry is 1."""
+        intrinsic = np.array(
+            [[self.focal, 0, self.width / 2], [0, self.focal, self.height / 2], [0, 0, 1]], dtype=np.float64
+        )
+        shift = -self.axes @ self.centre
+        to_picture = intrinsic @ np.column_stack([self.axes[:, 0], self.axes[:, 1], shift])
+        back = np.linalg.inv(to_picture)
+        normalised: Floats = back / back[2, 2]
+        return normalised

@@ -1,0 +1,37 @@
+"""Where a camera's pictures come from."""
+
+from __future__ import annotations
+
+from server.camera.sources.base import Image, Source, SourceEnded
+from server.camera.sources.folder import Folder
+from server.camera.sources.recording import Recording
+from server.camera.sources.stage import Stage
+from server.camera.sources.stream import Stream
+from server.wire.config import Camera, Site
+from server.wire.errors import AwayError, UserError
+from server.wire.sources import SourceKind, kind_of
+
+__all__ = ["Image", "Recording", "Source", "SourceEnded", "open_source"]
+
+
+def open_source(camera: Camera, site: Site) -> Source:
+    """Open a camera's source.
+
+    Raises:
+        UserError: it cannot be opened; the text says which camera and why.
+        AwayError: the same, of a network camera or device that may yet come.
+    """
+    try:
+        match kind_of(camera.source):
+            case SourceKind.SCENE:
+                return Stage(camera.source, site).warm_up()
+            case SourceKind.STREAM:
+                return Stream(camera.source, camera.options)
+            case SourceKind.FOLDER:
+                return Folder(camera.source, camera.offset, camera.at_end)
+            case SourceKind.FILE:
+                return Recording(camera.source, camera.offset, camera.at_end)
+    except UserError as error:
+        # A network camera may only be switched off; a file that is not there will not come by itself.
+        away = kind_of(camera.source) is SourceKind.STREAM
+        raise (AwayError if away else UserError)(f"camera {camera.id}: {error}") from error

@@ -1,0 +1,36 @@
+"""What every source of pictures can do."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Image = NDArray[np.uint8]
+"""``(height, width, 3)`` BGR."""
+
+
+class SourceEnded(Exception):  # noqa: N818 — an end, not an error
+    """The recording has no picture for this pulse or any later one."""
+
+
+class Source(Protocol):
+    """Gives the picture of a pulse. Used from one thread at a time; ``take`` may block."""
+
+    size: tuple[int, int]
+    """Width and height of its pictures in pixels."""
+    recorded: bool
+    """A recording waits for nobody: its picture of a pulse is the same whenever it is asked for."""
+
+    def take(self, pulse: int) -> Image | None:
+        """Give the picture of a pulse; pulses must grow. None: there is none (yet).
+
+        Raises:
+            SourceEnded: the recording is over.
+        """
+        ...
+
+    def close(self) -> None:
+        """Let go of files, devices and connections."""
+        ...

@@ -1,0 +1,67 @@
+"""Opening what FFmpeg opens, with errors that a person can act on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import av
+import numpy as np
+from av.container import InputContainer
+from av.video.codeccontext import VideoCodecContext
+from av.video.frame import VideoFrame
+from av.video.stream import VideoStream
+
+from server.camera.sources.base import Image
+from server.wire.errors import UserError
+
+_DEFAULT_FPS = 25.0
+
+
+@dataclass(frozen=True, slots=True)
+class Opened:
+    """An open video."""
+
+    container: InputContainer
+    stream: VideoStream
+    size: tuple[int, int]
+    fps: float
+    frames: int
+
+
+def open_video(
+    source: str,
+    options: Mapping[str, str] | None = None,
+    timeout: tuple[float, float] | None = None,
+) -> Opened:
+    """Open the first video stream; ``timeout`` is (seconds to open, seconds to read).
+
+    Raises:
+        UserError: it cannot be opened, or there is no video in it.
+    """
+    device = source.startswith("/dev/")
+    try:
+        container = av.open(
+            source, format="v4l2" if device else None, options=dict(options or {}), timeout=timeout
+        )
+    except (av.error.FFmpegError, OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or " ".join(str(error).split())
+        raise UserError(f"{source}: cannot open this video: {reason}") from error
+    if not container.streams.video:
+        container.close()
+        raise UserError(f"{source}: there is no video in this file")
+    stream = container.streams.video[0]
+    context: VideoCodecContext | None = (
+        stream.codec_context
+    )  # PyAV's types do not know that it may be missing
+    if context is None or not context.width or not context.height:
+        container.close()
+        raise UserError(f"{source}: cannot decode this video: no picture size in it; is the file whole?")
+    context.thread_count = 1  # one process per camera already uses the cores
+    fps = float(stream.average_rate) if stream.average_rate else _DEFAULT_FPS
+    return Opened(container, stream, (context.width, context.height), fps, stream.frames)
+
+
+def bgr(picture: VideoFrame) -> Image:
+    """Give a decoded picture as ``(height, width, 3)`` BGR."""
+    return np.asarray(picture.to_ndarray(format="bgr24"), dtype=np.uint8)

@@ -1,0 +1,60 @@
+"""The synthetic scene as a camera: ``scene:room?camera=0&cameras=3&objects=4&seed=1``."""
+
+from __future__ import annotations
+
+import re
+from typing import Self
+from urllib.parse import parse_qsl
+
+from server.camera.scene import Scene
+from server.camera.sources.base import Image
+from server.wire.config import Site
+from server.wire.errors import UserError
+
+_WHOLE = re.compile(r"[0-9]{1,18}")
+_DEFAULTS = {"camera": 0, "cameras": 3, "objects": 4, "seed": 1}
+
+
+class Stage:
+    """Draws the picture of a pulse; endless.
+
+    Raises:
+        UserError: the scene is unknown, or its parameters are wrong.
+    """
+
+    recorded = True
+
+    def __init__(self, source: str, site: Site) -> None:
+        name, _, query = source.removeprefix("scene:").partition("?")
+        values = dict(_DEFAULTS)
+        for key, value in parse_qsl(query, keep_blank_values=True):
+            if key not in values or not _WHOLE.fullmatch(value):
+                raise UserError(
+                    f"{source}: {key}={value} is not a whole number for one of {', '.join(values)}"
+                )
+            values[key] = int(value)
+        if values["camera"] >= values["cameras"]:
+            raise UserError(f"{source}: camera {values['camera']} of {values['cameras']}: they count from 0")
+        self._camera = values.pop("camera")
+        try:
+            self._scene = Scene(name=name, width=site.width, height=site.height, fps=site.fps, **values)
+        except ValueError as error:
+            raise UserError(f"{source}: {error}") from error
+        self.size = (site.width, site.height)
+
+    def warm_up(self) -> Self:
+        """Draw once: painting the room takes a second, which must not be while pulses go by."""
+        self._scene.image(self._camera, 0)
+        return self
+
+    def take(self, pulse: int) -> Image | None:
+        """Draw the picture of a pulse."""
+        return self._scene.image(self._camera, pulse)
+
+    @property
+    def ground(self) -> list[list[float]]:
+        """The homography from the picture to the floor in metres, as a configuration holds it."""
+        return [[float(entry) for entry in row] for row in self._scene.homography(self._camera)]
+
+    def close(self) -> None:
+        """Nothing is held open."""

@@ -1,0 +1,90 @@
+"""A camera: RTSP, HTTP, V4L2 or whatever else FFmpeg opens; its newest picture at every pulse."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Mapping
+
+import av
+from av.video.frame import VideoFrame
+from av.video.stream import VideoStream
+
+from server.camera.sources.base import Image
+from server.camera.sources.opening import Opened, bgr, open_video
+from server.wire.errors import UserError
+
+log = logging.getLogger(__name__)
+
+_OPEN_S, _READ_S = 10.0, 5.0
+_RETRY_FIRST_S, _RETRY_MAX_S = 0.5, 10.0
+_STALE_S = 2.0
+"""A picture older than this is not shown again: the camera counts as away."""
+
+
+class Stream:
+    """Reads the camera in a thread, so that a pulse never waits for it; reconnects by itself."""
+
+    recorded = False
+
+    def __init__(self, url: str, options: Mapping[str, str]) -> None:
+        self._url, self._options = url, options
+        opened = open_video(url, options, (_OPEN_S, _READ_S))
+        self.size = opened.size
+        self._lock = threading.Lock()
+        self._newest: VideoFrame | None = None
+        self._newest_at = 0.0
+        self._closing = threading.Event()
+        self._thread = threading.Thread(target=self._run, args=(opened,), name="source", daemon=True)
+        self._thread.start()
+
+    def take(self, pulse: int) -> Image | None:
+        """Give the newest picture; None while the camera is away."""
+        del pulse
+        with self._lock:
+            picture = self._newest if time.monotonic() - self._newest_at < _STALE_S else None
+        return None if picture is None else bgr(picture)
+
+    def close(self) -> None:
+        """Stop reading."""
+        self._closing.set()
+        self._thread.join(_READ_S)
+
+    def _run(self, opened: Opened | None) -> None:
+        pause = _RETRY_FIRST_S
+        while not self._closing.is_set():
+            if opened is not None and self._read(opened):
+                pause = _RETRY_FIRST_S
+            if self._closing.wait(pause):
+                return
+            pause = min(2 * pause, _RETRY_MAX_S)
+            try:
+                opened = open_video(self._url, self._options, (_OPEN_S, _READ_S))
+            except UserError as error:
+                opened = None
+                log.warning("%s; trying again in %.1f s", error, pause)
+
+    def _read(self, opened: Opened) -> bool:
+        """Read until the connection ends; tell whether any picture came."""
+        any_picture = False
+        try:
+            for packet in opened.container.demux(opened.stream):
+                if self._closing.is_set():
+                    break
+                any_picture |= self._decode(packet)
+        except (av.error.FFmpegError, OSError) as error:
+            log.warning("%s: reading stopped: %s", self._url, error)
+        finally:
+            opened.container.close()
+        return any_picture
+
+    def _decode(self, packet: av.Packet[VideoStream]) -> bool:
+        try:
+            pictures = [picture for picture in packet.decode() if isinstance(picture, VideoFrame)]
+        except av.error.InvalidDataError:
+            return False
+        if pictures:
+            with self._lock:
+                self._newest, self._newest_at = pictures[-1], time.monotonic()
+        return bool(pictures)

@@ -1,0 +1,149 @@
+"""Cameras whose every frame and word a test decides, and a small site to send them to."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from bestview import IdentityUpdate, LocalTrack
+from server.camera.encode import AccessUnit, Encoder
+from server.view.align import Epoch
+from server.view.service import BestViewService
+from server.wire.config import Config, Encode, Site
+from server.wire.epochs import end_of_epoch
+from server.wire.inbox import Message
+from server.wire.loading import build_config
+from server.wire.messages import Box, CameraStatus, CameraTracks, FrameHead, Keys, ThumbHead, Track
+
+WIDTH, HEIGHT, FPS = 64, 48, 25
+GOP = STRIDE = 5
+CAMERAS = ("c0", "c1")
+SMALL: Box = (10.0, 10.0, 16.0, 28.0)
+LARGE: Box = (20.0, 4.0, 36.0, 44.0)
+
+
+def small_config(cameras: Sequence[str] = CAMERAS, **changes: Any) -> Config:
+    """Give a site in which every epoch is a GOP, and whoever is seen once is somebody."""
+    content: dict[str, Any] = {
+        "site": {"name": "hall", "fps": FPS, "width": WIDTH, "height": HEIGHT},
+        "encode": {"gop": GOP},
+        "cameras": [{"id": camera, "source": "scene:room"} for camera in cameras],
+        "track": {"window": {"window": 5, "stride": STRIDE, "birth_window": 5}},
+        "view": {"lookahead": 2 * GOP, "switch_cost_s": 0.04, "identity": {"confirm_updates": 1}},
+    }
+    for section, value in changes.items():
+        content[section] = {**content.get(section, {}), **value} if isinstance(value, dict) else value
+    return build_config(content, where="hall", folder=Path())
+
+
+@cache
+def encoded(seed: int, frames: int = 40, *, gop: int = GOP, crf: int = 23) -> tuple[AccessUnit, ...]:
+    """Encode pictures that differ from camera to camera (by seed) and from frame to frame."""
+    encoder = Encoder(Site(width=WIDTH, height=HEIGHT, fps=FPS), Encode(gop=gop, crf=crf))
+    rng = np.random.default_rng(seed)
+    pictures = rng.integers(0, 255, (frames, HEIGHT // 8, WIDTH // 8, 3), dtype=np.uint8)
+    return tuple(
+        encoder.encode(pulse, np.repeat(np.repeat(picture, 8, axis=0), 8, axis=1))
+        for pulse, picture in enumerate(pictures)
+    )
+
+
+def look(person: int) -> list[float]:
+    """Give a histogram by which a person can be told from others."""
+    return [1.0 if place == person % 8 else 0.0 for place in range(8)]
+
+
+def word(camera: str, epoch: int, boxes: Mapping[int, Box | None], **changes: Any) -> CameraTracks:
+    """Give a camera's word on an epoch: where each track is, all epoch long."""
+    last = end_of_epoch(epoch, STRIDE)
+    message = CameraTracks(
+        camera=camera,
+        boot=1,
+        size=(WIDTH, HEIGHT),
+        epoch=epoch,
+        first=last - STRIDE + 1,
+        last=last,
+        final_to=last,
+        ended=False,
+        shed=[],
+        tracks=[
+            Track(id=track, boxes=[box] * STRIDE, histogram=look(track), confidence=1.0)
+            for track, box in boxes.items()
+        ],
+        solve=None,
+    )
+    return msgspec.structs.replace(message, **changes)
+
+
+def epoch_of(number: int, *words: CameraTracks) -> Epoch:
+    """Give an epoch as the aligner would."""
+    return Epoch(number, end_of_epoch(number, STRIDE), {message.camera: message for message in words})
+
+
+def video(camera: str, unit: AccessUnit, boot: int = 1) -> Message:
+    """Give a frame as it comes from the bus."""
+    head = FrameHead(pulse=unit.pulse, key=unit.key, boot=boot, due=0.0, taken=0.0, encoded=0.0)
+    return Message(Keys("hall").camera(camera, "video"), unit.data, msgspec.json.encode(head))
+
+
+def tracks(message: CameraTracks) -> Message:
+    """Give a word as it comes from the bus."""
+    return Message(Keys("hall").camera(message.camera, "tracks"), msgspec.json.encode(message), b"")
+
+
+def thumbnail(camera: str, track: int, jpeg: bytes, pulse: int = 0, boot: int = 1) -> Message:
+    """Give a small picture as it comes from the bus."""
+    head = ThumbHead(track=track, boot=boot, pulse=pulse)
+    return Message(Keys("hall").camera(camera, f"thumbs/{track}"), jpeg, msgspec.json.encode(head))
+
+
+def status(camera: str, **changes: Any) -> Message:
+    """Give a status as it comes from the bus."""
+    told = CameraStatus(
+        camera=camera,
+        boot=1,
+        state="live",
+        pulse=0,
+        fps=25.0,
+        missed=0,
+        shed=0,
+        in_step=True,
+        clock_offset=0.0,
+        round_trip=0.001,
+    )
+    payload = msgspec.json.encode(msgspec.structs.replace(told, **changes))
+    return Message(Keys("hall").camera(camera, "status"), payload, b"")
+
+
+class TrackNumbers:
+    """An identity registry for which a track's number is the person's, in every camera."""
+
+    def update(self, tracks: Sequence[LocalTrack], last_frame: int) -> IdentityUpdate:
+        """Give everybody their number."""
+        del last_frame
+        return IdentityUpdate({track.key: track.local for track in tracks}, (), (), (), ())
+
+
+class FedService(BestViewService):
+    """The best-view service without a bus: a test hands it what cameras would send."""
+
+    def come(self, *cameras: str) -> None:
+        """Let cameras be there."""
+        for camera in cameras:
+            self.intake.alive(Keys("hall").camera(camera, "alive"), there=True)
+
+    def feed(self, epoch: int, seen: Mapping[str, Mapping[int, Box | None]]) -> None:
+        """Send an epoch's frames and words of the cameras in ``seen``, and decide."""
+        for seed, camera in enumerate(self.config.camera_ids):
+            if camera not in seen:
+                continue
+            for unit in encoded(seed)[epoch * STRIDE : (epoch + 1) * STRIDE]:
+                self.intake.video(video(camera, unit))
+            self.intake.tracks(tracks(word(camera, epoch, seen[camera])))
+        self.pulse = end_of_epoch(epoch, STRIDE)
+        self.decide()

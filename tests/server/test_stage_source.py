@@ -1,0 +1,64 @@
+"""The synthetic scene as a camera, and what is wrong with a scene's address."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from server.camera.scene import Scene
+from server.camera.sources.stage import Stage
+from server.wire.config import Site
+from server.wire.errors import UserError
+from server.wire.sources import SourceKind, kind_of
+
+SITE = Site(width=128, height=72)
+
+
+def test_the_address_says_which_camera_of_which_scene() -> None:
+    stage = Stage("scene:room?camera=1&cameras=2&objects=3&seed=5", SITE)
+    scene = Scene("room", 2, 3, 5, 128, 72, 25.0)
+    assert stage.size == (128, 72)
+    np.testing.assert_array_equal(stage.take(30), scene.image(1, 30))
+
+
+def test_defaults_are_the_demos() -> None:
+    np.testing.assert_array_equal(
+        Stage("scene:room", SITE).take(0), Scene("room", 3, 4, 1, 128, 72).image(0, 0)
+    )
+
+
+@pytest.mark.parametrize(
+    ("source", "why"),
+    [
+        ("scene:cellar", "there is no scene 'cellar'"),
+        ("scene:", "there is no scene ''"),
+        ("scene:room?camera=3", "they count from 0"),
+        ("scene:room?camera=-1", "camera=-1 is not a whole number"),
+        ("scene:room?camera=", "camera= is not a whole number"),
+        ("scene:room?seed=one", "seed=one is not a whole number"),
+        ("scene:room?seed=²", "is not a whole number"),
+        (f"scene:room?seed={'9' * 5000}", "is not a whole number"),
+        ("scene:room?people=3", "people=3 is not a whole number for one of camera, cameras, objects, seed"),
+        ("scene:room?cameras=1000", "cameras must be"),
+        ("scene:room?cameras=0", "they count from 0"),
+    ],
+)
+def test_a_wrong_address_is_refused_with_the_reason(source: str, why: str) -> None:
+    with pytest.raises(UserError) as caught:
+        Stage(source, SITE)
+    assert why in str(caught.value)
+    assert str(caught.value).startswith(source)
+
+
+@pytest.mark.parametrize(
+    ("source", "kind"),
+    [
+        ("scene:room", SourceKind.SCENE),
+        ("rtsp://camera/stream", SourceKind.STREAM),
+        ("/dev/video0", SourceKind.STREAM),
+        ("/", SourceKind.FOLDER),
+        ("a.mp4", SourceKind.FILE),
+    ],
+)
+def test_the_kind_of_a_source_shows_in_how_it_is_written(source: str, kind: SourceKind) -> None:
+    assert kind_of(source) is kind

@@ -1,0 +1,135 @@
+"""A camera over the network: its newest picture at every pulse, and a new connection when it was away."""
+
+from __future__ import annotations
+
+import http.server
+import threading
+import time
+from collections.abc import Callable, Iterator
+
+import cv2
+import numpy as np
+import pytest
+from videos_by_hand import HEIGHT, STEP, WIDTH, frame_in
+
+from server.camera.sources import open_source, stream
+from server.camera.sources.stream import Stream
+from server.wire.config import Camera, Site
+from server.wire.errors import UserError
+
+PATIENCE = 20.0  # seconds until a test that awaits something has failed
+
+
+class MotionJpeg:
+    """A network camera by hand: shows the picture it is told to, until it is unplugged."""
+
+    def __init__(self) -> None:
+        self.frame = 0
+        self._unplugged = threading.Event()
+        self._server: http.server.ThreadingHTTPServer | None = None
+        self._thread: threading.Thread | None = None
+
+    def plug_in(self, port: int = 0) -> int:
+        camera, unplugged = self, threading.Event()
+
+        class Handler(http.server.BaseHTTPRequestHandler):
+            def do_GET(self) -> None:
+                self.send_response(200)
+                self.send_header("Content-Type", "multipart/x-mixed-replace; boundary=frame")
+                self.end_headers()
+                while not unplugged.wait(0.02):
+                    grey = np.full((HEIGHT, WIDTH, 3), STEP * camera.frame, np.uint8)
+                    jpeg = cv2.imencode(".jpg", grey)[1].tobytes()
+                    part = b"--frame\r\nContent-Type: image/jpeg\r\nContent-Length: %d\r\n\r\n" % len(jpeg)
+                    try:
+                        self.wfile.write(part + jpeg + b"\r\n")
+                    except OSError:
+                        return
+
+            def log_message(self, *_: object) -> None:
+                pass
+
+        http.server.ThreadingHTTPServer.allow_reuse_address = True
+        self._unplugged = unplugged
+        self._server = http.server.ThreadingHTTPServer(("127.0.0.1", port), Handler)
+        self._thread = threading.Thread(target=self._server.serve_forever, args=(0.02,))
+        self._thread.start()
+        return int(self._server.server_address[1])
+
+    def unplug(self) -> None:
+        self._unplugged.set()
+        if self._server is not None and self._thread is not None:
+            self._server.shutdown()
+            self._thread.join()
+            self._server.server_close()
+        self._server = self._thread = None
+
+
+@pytest.fixture
+def camera() -> Iterator[MotionJpeg]:
+    it = MotionJpeg()
+    yield it
+    it.unplug()
+
+
+def until(condition: Callable[[], bool]) -> None:
+    """Wait for what a thread does; there is no event for it from outside."""
+    end = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < end, "it has not come"
+        time.sleep(0.01)
+
+
+def shown(source: Stream) -> int | None:
+    picture = source.take(0)
+    return None if picture is None else frame_in(picture)
+
+
+def test_the_newest_picture_is_shown(camera: MotionJpeg) -> None:
+    source = Stream(f"http://127.0.0.1:{camera.plug_in()}/", {})
+    try:
+        assert source.size == (WIDTH, HEIGHT)
+        until(lambda: shown(source) == 0)
+        camera.frame = 7
+        until(lambda: shown(source) == 7)
+        assert shown(source) == 7, "a picture may be taken more than once"
+    finally:
+        source.close()
+
+
+def test_a_camera_that_was_away_is_shown_again_and_nothing_old_meanwhile(
+    camera: MotionJpeg, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(stream, "_STALE_S", 0.2)
+    monkeypatch.setattr(stream, "_RETRY_FIRST_S", 0.05)
+    port = camera.plug_in()
+    source = Stream(f"http://127.0.0.1:{port}/", {})
+    try:
+        until(lambda: shown(source) == 0)
+        camera.unplug()
+        until(lambda: shown(source) is None)
+        camera.frame = 9
+        camera.plug_in(port)
+        until(lambda: shown(source) == 9)
+    finally:
+        source.close()
+
+
+def test_closing_ends_the_thread(camera: MotionJpeg) -> None:
+    source = Stream(f"http://127.0.0.1:{camera.plug_in()}/", {})
+    source.close()
+    assert not source._thread.is_alive()
+
+
+@pytest.mark.parametrize("url", ["http://127.0.0.1:1/", "rtsp://127.0.0.1:1/door", "nonsense://door"])
+def test_a_camera_that_is_not_there_is_refused_in_one_line(url: str) -> None:
+    with pytest.raises(UserError, match="camera door: ") as caught:
+        open_source(Camera(id="door", source=url), Site())
+    assert "\n" not in str(caught.value)
+    assert url in str(caught.value)
+
+
+def test_options_are_passed_on(camera: MotionJpeg) -> None:
+    port = camera.plug_in()
+    source = Stream(f"http://127.0.0.1:{port}/", {"user_agent": "MyView"})
+    source.close()

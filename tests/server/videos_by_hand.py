@@ -1,0 +1,55 @@
+"""Small videos in which every frame can be told by its grey, whole and damaged."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from pathlib import Path
+
+import av
+import numpy as np
+from av.video.stream import VideoStream
+
+WIDTH, HEIGHT = 64, 48
+STEP = 10
+"""Grey levels between two frames."""
+
+
+def write_video(path: Path, frames: int, *, codec: str = "libx264", b_frames: int = 0) -> Path:
+    """Write a video whose frame n has the grey STEP * n; a key frame every 10."""
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream(codec, rate=25)
+        assert isinstance(stream, VideoStream)
+        stream.width, stream.height = WIDTH, HEIGHT
+        stream.pix_fmt = "yuvj420p" if codec == "mjpeg" else "yuv420p"
+        if codec == "libx264":
+            stream.options = {
+                "preset": "veryfast",
+                "crf": "8",
+                "g": "10",
+                "bf": str(b_frames),
+                "sc_threshold": "0",
+            }
+        for number in range(frames):
+            picture = np.full((HEIGHT, WIDTH, 3), STEP * number, dtype=np.uint8)
+            frame = av.VideoFrame.from_ndarray(picture, format="bgr24")
+            frame.pts, frame.time_base = number, Fraction(1, 25)
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode(None))
+    return path
+
+
+def damage(path: Path, packets: list[int]) -> Path:
+    """Overwrite some packets, counted in the order of decoding, with noise."""
+    with av.open(str(path)) as container:
+        places = [(packet.pos or 0, packet.size) for packet in container.demux(video=0) if packet.size]
+    data = bytearray(path.read_bytes())
+    for number in packets:
+        start, size = places[number]
+        data[start : start + size] = np.random.default_rng(number).bytes(size)
+    path.write_bytes(data)
+    return path
+
+
+def frame_in(picture: np.ndarray[tuple[int, ...], np.dtype[np.uint8]]) -> int:
+    """Tell which frame a picture is."""
+    return round(float(picture.mean()) / STEP)
