@@ -1,0 +1,1 @@
+"""The best-view service: line the cameras up, decide, splice."""

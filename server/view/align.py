@@ -1,0 +1,129 @@
+"""Lining the cameras up: an epoch is decided when every camera that can has spoken, or time is up."""
+
+from __future__ import annotations
+
+from collections.abc import Container, Sequence
+from dataclasses import dataclass, field
+
+from server.wire.epochs import end_of_epoch
+from server.wire.messages import CameraTracks
+
+
+@dataclass(frozen=True, slots=True)
+class Epoch:
+    """All that is known of one epoch."""
+
+    number: int
+    last: int
+    """Its last pulse."""
+    tracks: dict[str, CameraTracks]
+    """By camera, in the order of the configuration."""
+    late: tuple[str, ...] = ()
+    """Cameras that were waited for in vain, and cameras whose word on it was lost on the way."""
+
+
+@dataclass(slots=True)
+class _Place:
+    """One camera's place in the line."""
+
+    there: bool = False
+    boot: int | None = None
+    first: int | None = None
+    """First pulse of this boot."""
+    ended: bool = False
+    trusted: bool = True
+    """False after it was late: it is not waited for until it is in time again."""
+    waiting: dict[int, CameraTracks] = field(default_factory=dict)
+
+
+class Aligner:
+    """Collects the cameras' messages by epoch. It has no clock: it is told which pulse it is.
+
+    ``grace`` is how many pulses after an epoch's end a camera that is there is waited for.
+    """
+
+    def __init__(self, cameras: Sequence[str], stride: int, grace: int) -> None:
+        self.stride, self._grace = stride, grace
+        self._places = {camera: _Place() for camera in cameras}
+        self._next: int | None = None
+        self.late_messages = dict.fromkeys(cameras, 0)
+
+    def come(self, camera: str) -> None:
+        """A camera is there."""
+        self._places[camera].there = True
+
+    def gone(self, camera: str) -> None:
+        """A camera's process is gone; what it said before still counts."""
+        place = self._places[camera]
+        place.there, place.first, place.boot = False, None, None
+
+    def frame(self, camera: str, boot: int, pulse: int) -> None:
+        """A camera's frame came: from its pulse on the camera takes part."""
+        place = self._places[camera]
+        place.there = True
+        if place.boot != boot:
+            place.boot, place.first, place.ended, place.trusted = boot, pulse, False, True
+        if self._next is None:
+            self._next = pulse // self.stride
+
+    def tracks(self, message: CameraTracks) -> None:
+        """A camera's window came."""
+        place = self._places[message.camera]
+        if self._next is None:
+            self._next = message.epoch
+        if message.epoch < self._next:
+            self.late_messages[message.camera] += 1
+            # It ended while nobody waited for it: that must not be lost, or its end is waited for.
+            place.ended |= message.ended
+            return
+        place.waiting[message.epoch] = message
+        place.trusted = True
+
+    @property
+    def all_ended(self) -> bool:
+        """Whether every camera's recording is over and was taken out."""
+        return all(place.ended and not place.waiting for place in self._places.values())
+
+    def ready(self, now: int) -> list[Epoch]:
+        """Take out the epochs that can be decided at pulse ``now``, in order."""
+        epochs = []
+        while (epoch := self._ready(now)) is not None:
+            epochs.append(epoch)
+        return epochs
+
+    def _ready(self, now: int) -> Epoch | None:
+        number = self._next
+        if number is None or self.all_ended:
+            return None
+        end = end_of_epoch(number, self.stride)
+        missing = [name for name, place in self._places.items() if self._awaited(place, end)]
+        any_word = any(place.waiting for place in self._places.values())
+        if missing and now <= end + self._grace:
+            return None
+        if not any_word and now <= end + self._grace:
+            return None
+        late = tuple(missing)
+        for name in late:
+            self._places[name].trusted = False
+        self._next = number + 1
+        taken = {}
+        for name, place in self._places.items():
+            message = place.waiting.pop(number, None)
+            if message is not None:
+                taken[name] = message
+                place.ended |= message.ended
+        return Epoch(number, end, taken, (*late, *self._skipped(end, taken)))
+
+    def _skipped(self, end: int, taken: Container[str]) -> list[str]:
+        """List the cameras whose word on an epoch is lost: they were there, and have spoken of later ones."""
+        return [
+            name
+            for name, place in self._places.items()
+            if name not in taken and place.waiting and place.first is not None and place.first <= end
+        ]
+
+    def _awaited(self, place: _Place, end: int) -> bool:
+        """Tell whether this camera's word on the epoch is still to come."""
+        if place.waiting or place.ended or not place.there or not place.trusted:
+            return False  # a word on a later epoch: on this one there will be none
+        return place.first is None or place.first <= end

@@ -1,0 +1,92 @@
+"""What is known now, for the API and the page: who is there, which camera shows whom, and why."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from server.view.decide import GopDecision, ObjectChoice
+from server.wire.messages import Cut, GopChoices
+
+
+@dataclass(slots=True)
+class Standing:
+    """One object's present view."""
+
+    choice: ObjectChoice
+    first: int
+    """First frame of the newest decided GOP."""
+    frames: int
+    since: int
+    """The frame of the last cut."""
+    cameras: tuple[str, ...]
+    """Who sees the object at the end of that GOP."""
+
+
+class Board:
+    """Remembers every object's newest decision."""
+
+    def __init__(self) -> None:
+        self.standings: dict[int, Standing] = {}
+        self.merged: dict[int, int] = {}
+        self.cuts = 0
+
+    def put(self, decision: GopDecision) -> GopChoices:
+        """Take a decision over; give it as the message that is published and sent to the page."""
+        cuts = []
+        for choice in decision.choices:
+            cut = _cut(choice, decision.first)
+            if cut is not None:
+                cuts.append(cut)
+            self._stand(decision, choice)
+        numbers = {choice.number for choice in decision.choices}
+        self.standings = {number: it for number, it in self.standings.items() if number in numbers}
+        self.merged = decision.merged
+        self.cuts += len(cuts)
+        return GopChoices(
+            first=decision.first,
+            frames=decision.frames,
+            choices={choice.number: choice.camera for choice in decision.choices if choice.camera},
+            boxes={
+                camera: [[(number, *box) for number, box in frame.items()] for frame in frames]
+                for camera, frames in decision.boxes.items()
+            },
+            cuts=cuts,
+        )
+
+    def resolve(self, number: int) -> int:
+        """Give the number that a merged one goes by now."""
+        return self.merged.get(number, number)
+
+    def _stand(self, decision: GopDecision, choice: ObjectChoice) -> None:
+        known = self.standings.get(choice.number)
+        stays = known is not None and known.choice.camera == choice.camera
+        self.standings[choice.number] = Standing(
+            choice=choice,
+            first=decision.first,
+            frames=decision.frames,
+            since=known.since if known is not None and stays else decision.first,
+            cameras=tuple(
+                camera for camera, frames in decision.boxes.items() if frames and choice.number in frames[-1]
+            ),
+        )
+
+
+def _cut(choice: ObjectChoice, pulse: int) -> Cut | None:
+    if choice.camera is None or choice.before is None or choice.camera == choice.before:
+        return None
+    return Cut(object=choice.number, pulse=pulse, from_camera=choice.before, to_camera=choice.camera)
+
+
+def reason(choice: ObjectChoice) -> str:
+    """Say in one plain sentence why this view was chosen."""
+    camera = choice.camera
+    if camera is None:
+        return "No camera's picture can be shown at the moment."
+    if choice.away or not any(choice.seen.values()):
+        return f"Nobody sees this person at the moment; {camera} saw them last."
+    possible = {name: cost for name, cost in choice.costs.items() if cost is not None}
+    if len(possible) == 1:
+        return f"{camera} is the only camera whose picture can be shown."
+    if camera in possible and possible[camera] <= min(possible.values()):
+        return f"{camera} sees this person best over the next frames."
+    return f"Another camera sees this person a little better than {camera}, but not enough to be worth a cut."

@@ -1,0 +1,114 @@
+"""One stream to any number of viewers: bounded, and nobody slows anybody else."""
+
+from __future__ import annotations
+
+import asyncio
+from collections import deque
+from collections.abc import AsyncIterator
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Chunk:
+    """A piece of a stream; viewers share the bytes."""
+
+    data: bytes
+    start: bool
+    """A viewer may begin here."""
+
+
+class Viewer:
+    """One viewer's place in a stream: iterate over it for the bytes to send."""
+
+    def __init__(self, backlog: list[Chunk], starts_max: int) -> None:
+        self._starts_max = starts_max
+        self._queue: deque[Chunk] = deque(backlog)
+        self._begun = bool(backlog)
+        self._closed = False
+        self._wake = asyncio.Event()
+        self.lost = 0
+        """GOPs lost because the viewer fell behind."""
+
+    def put(self, chunk: Chunk) -> None:
+        """Queue a chunk; whoever is too far behind loses all that waits and goes on with this start.
+
+        What comes before a viewer's first start is of no use to them: it is left out.
+        """
+        self._begun |= chunk.start
+        if not self._begun:
+            return
+        if chunk.start:
+            waiting = sum(queued.start for queued in self._queue)
+            if waiting >= self._starts_max:
+                self._queue.clear()
+                self.lost += waiting
+        self._queue.append(chunk)
+        self._wake.set()
+
+    def put_first(self, chunk: Chunk) -> None:
+        """Put a chunk before all that waits."""
+        self._begun |= chunk.start
+        self._queue.appendleft(chunk)
+        self._wake.set()
+
+    def close(self) -> None:
+        """End the stream after what is queued."""
+        self._closed = True
+        self._wake.set()
+
+    async def __aiter__(self) -> AsyncIterator[bytes]:
+        """Give the bytes in order until the stream ends."""
+        while True:
+            while self._queue:
+                yield self._queue.popleft().data
+            if self._closed:
+                return
+            self._wake.clear()
+            await self._wake.wait()
+
+
+class Channel:
+    """Hands every chunk to every viewer; whoever comes begins with the newest ``starts_kept`` starts."""
+
+    def __init__(self, *, starts_kept: int = 1, queue_starts: int = 8) -> None:
+        self._starts_kept = starts_kept
+        self._queue_starts = queue_starts
+        self._kept: deque[Chunk] = deque()
+        self._viewers: set[Viewer] = set()
+        self._closed = False
+
+    @property
+    def viewers(self) -> int:
+        """How many are watching."""
+        return len(self._viewers)
+
+    def publish(self, chunk: Chunk) -> None:
+        """Send a chunk to everybody."""
+        self._kept.append(chunk)
+        starts = sum(kept.start for kept in self._kept)
+        while starts > self._starts_kept or (self._kept and not self._kept[0].start):
+            starts -= self._kept.popleft().start
+        self.tell(chunk)
+
+    def tell(self, chunk: Chunk) -> None:
+        """Send a chunk to everybody who is here now, and to nobody who comes later."""
+        for viewer in self._viewers:
+            viewer.put(chunk)
+
+    def join(self) -> Viewer:
+        """Let somebody in; call :meth:`leave` in the end."""
+        viewer = Viewer(list(self._kept), self._queue_starts)
+        self._viewers.add(viewer)
+        if self._closed:
+            viewer.close()
+        return viewer
+
+    def leave(self, viewer: Viewer) -> None:
+        """Let somebody go."""
+        self._viewers.discard(viewer)
+
+    def close(self) -> None:
+        """End the stream for everybody."""
+        self._closed = True
+        for viewer in self._viewers:
+            viewer.close()

@@ -1,0 +1,128 @@
+"""Fragmented MP4 by hand (ISO/IEC 14496-12 and -15): one track, one clock, fragments that stand alone.
+
+A library's muxer keeps a fragment back until it knows the next packet, and builds every stream anew. Here a
+fragment is made once per camera and frame, and every stream is a list of references to such fragments.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from server.view.h264 import ParameterSets
+
+TIMESCALE = 90_000
+"""Ticks a second: divisible by 24, 25, 30 and 50 frames a second."""
+
+_TRACK = 1
+_SYNC_SAMPLE = 0x02000000
+"""sample_depends_on = 2: an I picture (8.8.3.1)."""
+_OTHER_SAMPLE = 0x01010000
+"""sample_depends_on = 1, sample_is_non_sync_sample."""
+_TFDT_AT = 8 + 16 + 8 + 16 + 12
+"""Where a fragment's decode time stands: behind the heads of moof, mfhd, traf, tfhd and tfdt."""
+_MATRIX = struct.pack(">9I", 0x10000, 0, 0, 0, 0x10000, 0, 0, 0, 0x40000000)
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """One frame ready for a fragment."""
+
+    data: bytes
+    """NAL units behind their lengths."""
+    key: bool
+
+
+def ticks(pulse: int, fps: float) -> int:
+    """Give the presentation time of a pulse: the media time of a frame is exactly pulse / fps."""
+    return round(pulse * TIMESCALE / fps)
+
+
+def init_segment(parameters: ParameterSets, width: int, height: int) -> bytes:
+    """Give ``ftyp`` and ``moov``: what a player needs before the first fragment, the same for all streams."""
+    return (
+        _box("ftyp", b"iso5" + struct.pack(">I", 512) + b"iso5iso6avc1mp41")
+        + _box(
+            "moov",
+            _full("mvhd", 0, 0, struct.pack(">5I", 0, 0, 1000, 0, 0x10000) + struct.pack(">H", 0x100)
+                  + bytes(10) + _MATRIX + bytes(24) + struct.pack(">I", _TRACK + 1)),
+            _box(
+                "trak",
+                _full("tkhd", 0, 3, struct.pack(">5I", 0, 0, _TRACK, 0, 0) + bytes(16) + _MATRIX
+                      + struct.pack(">2I", width << 16, height << 16)),
+                _box(
+                    "mdia",
+                    _full("mdhd", 0, 0, struct.pack(">4I2H", 0, 0, TIMESCALE, 0, 0x55C4, 0)),
+                    _full("hdlr", 0, 0, bytes(4) + b"vide" + bytes(12) + b"MyView\x00"),
+                    _box(
+                        "minf",
+                        _full("vmhd", 0, 1, bytes(8)),
+                        _box("dinf", _full("dref", 0, 0, struct.pack(">I", 1) + _full("url ", 0, 1, b""))),
+                        _box(
+                            "stbl",
+                            _full("stsd", 0, 0, struct.pack(">I", 1) + _avc1(parameters, width, height)),
+                            _full("stts", 0, 0, bytes(4)),
+                            _full("stsc", 0, 0, bytes(4)),
+                            _full("stsz", 0, 0, bytes(8)),
+                            _full("stco", 0, 0, bytes(4)),
+                        ),
+                    ),
+                ),
+            ),
+            _box("mvex", _full("trex", 0, 0, struct.pack(">5I", _TRACK, 1, 0, 0, 0))),
+        )
+    )  # fmt: skip
+
+
+def fragment(samples: Sequence[Sample], first: int, fps: float) -> bytes:
+    """Give ``moof`` and ``mdat`` of consecutive frames, the first of them shown at pulse ``first``."""
+    edges = [ticks(first + number, fps) for number in range(len(samples) + 1)]
+    entries = b"".join(
+        struct.pack(
+            ">3I",
+            edges[number + 1] - edges[number],
+            len(sample.data),
+            _SYNC_SAMPLE if sample.key else _OTHER_SAMPLE,
+        )
+        for number, sample in enumerate(samples)
+    )
+    # The sequence number only has to grow; taken from the pulse, a fragment fits into any stream.
+    header = _full("mfhd", 0, 0, struct.pack(">I", (first + 1) & 0xFFFFFFFF))
+    track = _full("tfhd", 0, 0x020000, struct.pack(">I", _TRACK)) + _full(
+        "tfdt", 1, 0, struct.pack(">Q", edges[0])
+    )
+    run_bytes = 8 + 4 + 4 + 4 + len(entries)
+    moof_bytes = 8 + len(header) + 8 + len(track) + run_bytes
+    run = _full("trun", 0, 0x000701, struct.pack(">Ii", len(samples), moof_bytes + 8) + entries)
+    return _box("moof", header, _box("traf", track, run)) + _box("mdat", *(s.data for s in samples))
+
+
+def _avc1(parameters: ParameterSets, width: int, height: int) -> bytes:
+    sps, pps = parameters.sps, parameters.pps
+    configuration = (
+        b"\x01" + sps[1:4] + b"\xff\xe1" + struct.pack(">H", len(sps)) + sps
+        + b"\x01" + struct.pack(">H", len(pps)) + pps
+    )  # fmt: skip
+    return _box(
+        "avc1",
+        bytes(6) + struct.pack(">H", 1) + bytes(16) + struct.pack(">2H", width, height)
+        + struct.pack(">2I", 0x480000, 0x480000) + bytes(4) + struct.pack(">H", 1) + bytes(32)
+        + struct.pack(">Hh", 24, -1),
+        _box("avcC", configuration),
+    )  # fmt: skip
+
+
+def _box(kind: str, *parts: bytes) -> bytes:
+    body = b"".join(parts)
+    return struct.pack(">I", 8 + len(body)) + kind.encode("ascii") + body
+
+
+def _full(kind: str, version: int, flags: int, body: bytes) -> bytes:
+    return _box(kind, struct.pack(">I", version << 24 | flags), body)
+
+
+def rebased(frame: bytes, by: int) -> bytes:
+    """Move a fragment of :func:`fragment` in time by ``by`` ticks."""
+    (time,) = struct.unpack_from(">Q", frame, _TFDT_AT)
+    return frame[:_TFDT_AT] + struct.pack(">Q", time + by) + frame[_TFDT_AT + 8 :]

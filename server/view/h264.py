@@ -1,0 +1,65 @@
+"""As much of H.264's byte stream as splicing needs (ITU-T H.264, Annex B)."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+_START_CODE = re.compile(b"\x00\x00\x01")
+
+NAL_IDR = 5
+NAL_SPS = 7
+NAL_PPS = 8
+NAL_AUD = 9
+
+_SPS_MIN_BYTES = 4
+"""NAL header, profile, constraint flags and level: what a decoder's configuration record repeats."""
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterSets:
+    """What a decoder must know before the first picture; equal in all cameras that are spliced."""
+
+    sps: bytes
+    pps: bytes
+
+    @property
+    def codec(self) -> str:
+        """The codec string of RFC 6381, e.g. ``avc1.42C01E``."""
+        return f"avc1.{self.sps[1:4].hex().upper()}"
+
+
+def nal_units(access_unit: bytes) -> list[bytes]:
+    """Split an Annex B access unit into its NAL units, without start codes.
+
+    Bytes before the first start code are not part of any unit and are left out, and so are empty units.
+    """
+    starts = [match.end() for match in _START_CODE.finditer(access_unit)]
+    if not starts:
+        return []
+    ends = [start - 3 for start in starts[1:]] + [len(access_unit)]
+    # A 4-byte start code's first zero, and trailing_zero_8bits, belong to no unit (B.1.1).
+    units = (access_unit[start:end].rstrip(b"\x00") for start, end in zip(starts, ends, strict=True))
+    return [unit for unit in units if unit]
+
+
+def nal_type(unit: bytes) -> int:
+    """Give nal_unit_type (7.3.1)."""
+    return unit[0] & 0x1F
+
+
+def parameter_sets(units: list[bytes]) -> ParameterSets | None:
+    """Find the sequence and picture parameter sets among NAL units, or None where one is missing."""
+    sps = next((unit for unit in units if nal_type(unit) == NAL_SPS), None)
+    pps = next((unit for unit in units if nal_type(unit) == NAL_PPS), None)
+    if sps is None or pps is None or len(sps) < _SPS_MIN_BYTES:
+        return None
+    return ParameterSets(sps, pps)
+
+
+def sample(units: list[bytes]) -> bytes:
+    """Give the units as an MP4 sample: each behind its length (ISO/IEC 14496-15, 5.3.2).
+
+    Parameter sets stay in the sample: they cost some bytes a GOP, and a decoder that joins at a cut is right.
+    """
+    return b"".join(len(unit).to_bytes(4, "big") + unit for unit in units if nal_type(unit) != NAL_AUD)

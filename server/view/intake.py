@@ -1,0 +1,168 @@
+"""What comes from the cameras: frames onto the shelves, tracks to the aligner, states for the page."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import msgspec
+
+from server.view.agreement import ParameterMismatchError
+from server.view.align import Aligner
+from server.view.sense import makes_sense
+from server.view.shelf import Shelf, Shelved
+from server.wire.inbox import Message
+from server.wire.messages import CameraStatus, CameraTracks, FrameHead, ThumbHead, camera_of
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(slots=True)
+class CameraState:
+    """How a camera is, as far as the best-view service knows."""
+
+    alive: bool = False
+    refused: str = ""
+    """Why its frames are not used; empty when they are."""
+    status: CameraStatus | None = None
+    ended: bool = False
+    bad_messages: int = 0
+    frames: int = 0
+
+    @property
+    def word(self) -> str:
+        """The state in one word."""
+        if self.refused:
+            return "refused"
+        if self.ended:
+            return "ended"
+        if not self.frames:
+            return "starting"
+        return "live" if self.alive and not self.away else "gone"
+
+    @property
+    def away(self) -> bool:
+        """Whether the camera's process is there, but its source gives no pictures."""
+        return self.status is not None and self.status.state == "away"
+
+    @property
+    def message(self) -> str:
+        """What a person should know of it, if anything."""
+        if self.refused:
+            return self.refused
+        if self.alive and self.away:
+            return "its source gives no pictures; it is tried again"
+        return ""
+
+
+@dataclass(frozen=True, slots=True)
+class Thumbnail:
+    """A small picture of a person."""
+
+    jpeg: bytes
+    pulse: int
+
+
+class Intake:
+    """Takes the cameras' messages in. What cannot be understood is counted and dropped."""
+
+    def __init__(
+        self, shelves: Mapping[str, Shelf], aligner: Aligner, on_frame: Callable[[str, Shelved], None]
+    ) -> None:
+        self._shelves, self._aligner, self._on_frame = shelves, aligner, on_frame
+        self.states = {camera: CameraState() for camera in shelves}
+        self.thumbnails: dict[tuple[str, int, int], Thumbnail] = {}
+        """By camera, boot and track."""
+        self._frame_head = msgspec.json.Decoder(FrameHead)
+        self._tracks = msgspec.json.Decoder(CameraTracks)
+        self._status = msgspec.json.Decoder(CameraStatus)
+        self._thumb_head = msgspec.json.Decoder(ThumbHead)
+
+    def alive(self, key: str, there: bool) -> None:
+        """A camera's liveliness token came or went."""
+        camera = camera_of(key)
+        state = self.states.get(camera)
+        if state is None:
+            log.warning("camera %s is not in the configuration; it is ignored", camera)
+            return
+        state.alive = there
+        state.status = None  # what was said before is of another time
+        if there:
+            state.refused, state.ended = "", False
+            self._aligner.come(camera)
+        else:
+            self._aligner.gone(camera)
+            self._drop_thumbnails(camera)
+        log.info("camera %s %s", camera, "is there" if there else "is gone")
+
+    def video(self, message: Message) -> None:
+        """Shelve a frame."""
+        state, camera = self._state_of(message)
+        if state is None:
+            return
+        try:
+            head = self._frame_head.decode(message.attachment)
+            if state.refused:
+                return
+            frame = self._shelves[camera].put(head.pulse, head.boot, message.payload, key=head.key)
+        except msgspec.DecodeError:
+            state.bad_messages += 1
+        except ParameterMismatchError as error:
+            state.refused = f"{error}; are all cameras of this site run with the same configuration?"
+            log.error("camera %s is refused: %s", camera, state.refused)  # noqa: TRY400 — says all there is
+        else:
+            state.frames += 1
+            self._aligner.frame(camera, head.boot, head.pulse)
+            self._on_frame(camera, frame)
+
+    def tracks(self, message: Message) -> None:
+        """Hand a window's tracks to the aligner."""
+        state, camera = self._state_of(message)
+        if state is None:
+            return
+        try:
+            tracks = self._tracks.decode(message.payload)
+        except msgspec.DecodeError:
+            state.bad_messages += 1
+            return
+        if tracks.camera != camera or not makes_sense(tracks, self._aligner.stride):
+            state.bad_messages += 1
+            return
+        state.ended = tracks.ended
+        self._aligner.tracks(tracks)
+
+    def status(self, message: Message) -> None:
+        """Note how a camera is."""
+        state, _ = self._state_of(message)
+        if state is None:
+            return
+        try:
+            state.status = self._status.decode(message.payload)
+        except msgspec.DecodeError:
+            state.bad_messages += 1
+
+    def thumbnail(self, message: Message) -> None:
+        """Keep the newest small picture of a track."""
+        state, camera = self._state_of(message)
+        if state is None:
+            return
+        try:
+            head = self._thumb_head.decode(message.attachment)
+        except msgspec.DecodeError:
+            state.bad_messages += 1
+            return
+        self.thumbnails[camera, head.boot, head.track] = Thumbnail(message.payload, head.pulse)
+
+    def forget_thumbnails_before(self, pulse: int) -> None:
+        """Let go of the small pictures of tracks that were not seen since."""
+        for key in [key for key, thumbnail in self.thumbnails.items() if thumbnail.pulse < pulse]:
+            del self.thumbnails[key]
+
+    def _state_of(self, message: Message) -> tuple[CameraState | None, str]:
+        camera = camera_of(message.key)
+        return self.states.get(camera), camera
+
+    def _drop_thumbnails(self, camera: str) -> None:
+        for key in [key for key in self.thumbnails if key[0] == camera]:
+            del self.thumbnails[key]

@@ -1,0 +1,140 @@
+"""Who is who: from every camera's own track numbers to one number per person."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bestview import IdentityRegistry, IdentitySettings, LocalTrack, TrackKey
+from server.view.align import Epoch
+from server.view.history import BoxHistory
+from server.view.locals import LocalNumbers
+from server.wire.fit import Fit
+from server.wire.messages import Box, CameraTracks
+
+
+class People:
+    """Joins the cameras' tracks epoch by epoch, and remembers who was where.
+
+    ``homographies`` map each camera's own picture to the ground; None where there is none.
+    """
+
+    def __init__(
+        self,
+        settings: IdentitySettings,
+        cameras: Sequence[str],
+        homographies: Mapping[str, NDArray[np.float64] | None],
+        site_size: tuple[int, int],
+    ) -> None:
+        self._registry = IdentityRegistry(settings, homographies)
+        self._remembered = settings.forget_after
+        self._site_size = site_size
+        self._histories = {camera: BoxHistory() for camera in cameras}
+        self._locals = LocalNumbers()
+        self._numbers: dict[TrackKey, int] = {}
+        self._heard: dict[TrackKey, int] = {}
+        self.fits: dict[str, Fit] = {}
+        """How each camera's own picture lies in the site's; known from its first word on."""
+        self.first_seen: dict[int, int] = {}
+        self.last_seen: dict[int, int] = {}
+        self.away: set[int] = set()
+        """Those whom no camera has seen for a while; they are remembered."""
+        self.merged: dict[int, int] = {}
+        """Numbers that turned out to be another's."""
+
+    def update(self, epoch: Epoch) -> None:
+        """Take over what all cameras said about an epoch."""
+        tracks: list[LocalTrack] = []
+        for camera, message in epoch.tracks.items():
+            local_of = self._locals.of(message)
+            self._histories[camera].put(message, local_of)
+            fit = self.fits.setdefault(camera, Fit(message.size, self._site_size))
+            tracks += _local_tracks(message, local_of, fit)
+        update = self._registry.update(tracks, epoch.last)
+        for track in tracks:
+            # Who has left a person for one not confirmed yet has no number for now.
+            self._numbers.pop(track.key, None)
+        self._numbers.update(update.numbers)
+        for track in tracks:
+            self._heard[track.key] = epoch.last
+            self._note_seen(track)
+        self.away = (self.away | set(update.gone)) - set(update.returned)
+        for merge in update.merged:
+            self._merge(merge.kept, merge.lost)
+        self._forget(epoch.last)
+
+    @property
+    def known(self) -> list[int]:
+        """Everybody's number, in order; those who are away too."""
+        return sorted(self.first_seen)
+
+    def number(self, camera: str, local: int) -> int | None:
+        """Give the person's number behind a camera's local one; None while it is not confirmed."""
+        return self._numbers.get(TrackKey(camera, local))
+
+    def boxes(self, camera: str, pulse: int) -> dict[int, Box]:
+        """Give everybody's box in a camera's frame by the person's number, in the numbers' order."""
+        numbered: dict[int, Box] = {}
+        for local, box in self._histories[camera].at(pulse).items():
+            number = self.number(camera, local)
+            if number is not None:
+                numbered.setdefault(number, box)
+        return dict(sorted(numbered.items()))
+
+    def whose(self, camera: str, boot: int, track: int) -> int | None:
+        """Give the person's number behind a tracker's number."""
+        local = self._locals.known(camera, boot, track)
+        return None if local is None else self.number(camera, local)
+
+    def forget_boxes_before(self, pulse: int) -> None:
+        """Let go of the boxes before a pulse."""
+        for history in self._histories.values():
+            history.forget_before(pulse)
+
+    def _note_seen(self, track: LocalTrack) -> None:
+        number = self._numbers.get(track.key)
+        rows = np.flatnonzero(~np.isnan(track.boxes[:, 0]))
+        if number is None or not rows.size:
+            return
+        first, last = track.first + int(rows[0]), track.first + int(rows[-1])
+        self.first_seen[number] = min(first, self.first_seen.get(number, first))
+        self.last_seen[number] = max(last, self.last_seen.get(number, last))
+
+    def _merge(self, kept: int, lost: int) -> None:
+        self.merged = {old: kept if new == lost else new for old, new in self.merged.items()} | {lost: kept}
+        self._numbers = {key: kept if number == lost else number for key, number in self._numbers.items()}
+        first, last = self.first_seen.pop(lost, None), self.last_seen.pop(lost, None)
+        self.away.discard(lost)
+        if first is not None and last is not None:
+            self.first_seen[kept] = min(first, self.first_seen.get(kept, first))
+            self.last_seen[kept] = max(last, self.last_seen.get(kept, last))
+
+    def _forget(self, now: int) -> None:
+        """Let go of tracks and people that were not heard of for as long as the registry remembers."""
+        for key in [key for key, heard in self._heard.items() if heard < now - self._remembered]:
+            del self._heard[key]
+            self._numbers.pop(key, None)
+            self._locals.forget(key)
+        for number in [number for number, last in self.last_seen.items() if last < now - self._remembered]:
+            del self.first_seen[number], self.last_seen[number]
+            self.away.discard(number)
+            self.merged = {old: new for old, new in self.merged.items() if new != number}
+
+
+def _local_tracks(message: CameraTracks, local_of: Mapping[int, int], fit: Fit) -> list[LocalTrack]:
+    """Give the tracks of a message with boxes in the camera's own picture."""
+    hidden = (np.nan,) * 4
+    return [
+        LocalTrack(
+            camera=message.camera,
+            local=local_of[track.id],
+            first=message.first,
+            boxes=fit.boxes_to_own(
+                np.array([box or hidden for box in track.boxes], dtype=np.float64).reshape(-1, 4)
+            ),
+            histogram=np.array(track.histogram, dtype=np.float64),
+        )
+        for track in message.tracks
+    ]

@@ -1,0 +1,173 @@
+"""The best-view service: takes in what the cameras send, decides, splices."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable
+from pathlib import Path
+
+import msgspec
+
+from camsync import PulseClient
+from server.view.agreement import Agreement
+from server.view.align import Aligner, Epoch
+from server.view.board import Board
+from server.view.decide import Decider, GopDecision, homographies
+from server.view.intake import Intake
+from server.view.record import Recorder
+from server.view.shelf import Shelf
+from server.view.splice import Splicer
+from server.wire.bus import Bus
+from server.wire.config import Config
+from server.wire.errors import UserError
+from server.wire.inbox import Message
+from server.wire.messages import PULSE_CLIENT, GopChoices, Keys
+
+log = logging.getLogger(__name__)
+
+
+class BestViewService:
+    """Everything of the best-view process but HTTP. ``out`` is a folder for tracks and choices."""
+
+    def __init__(self, config: Config, out: Path | None = None) -> None:
+        self.config = config
+        cameras = config.camera_ids
+        grace, stride = round(config.view.late_after_s * config.site.fps), config.track.window.stride
+        # What is waited for must still be there when it is decided.
+        frames = max(
+            round(config.view.buffer_s * config.site.fps), 4 * (config.view.lookahead + grace + stride)
+        )
+        self.agreement = Agreement()
+        self.shelves = {camera: Shelf(config.site.fps, frames, self.agreement) for camera in cameras}
+        self.aligner = Aligner(cameras, stride, grace)
+        self.splicer = Splicer(self.shelves, config.http)
+        self.intake = Intake(self.shelves, self.aligner, self.splicer.frame)
+        self.decider = Decider(
+            config, homographies(config), lambda camera, pulse: self.shelves[camera].has(pulse)
+        )
+        self.board = Board()
+        self.pulse = -1
+        self.pulse0: float | None = None
+        """When pulse 0 was due, unix seconds; None before the first pulse."""
+        self.late_epochs = 0
+        self.on_decision: list[Callable[[GopChoices], None]] = []
+        self._out = out
+        self._recorder: Recorder | None = None
+        self._bus: Bus | None = None
+        self._keys = Keys(config.site.name)
+        self._changed = asyncio.Event()
+
+    def open(self) -> None:
+        """Open the bus, which the cameras connect to.
+
+        Raises:
+            UserError: its address is in use.
+        """
+        self._bus = bus = Bus.router(self.config.zenoh)
+        handlers = {
+            "video": self.intake.video,
+            "tracks": self._tracks,
+            "status": self.intake.status,
+            "thumbs/*": self.intake.thumbnail,
+        }
+        for what, handler in handlers.items():
+            bus.subscribe(self._keys.camera("*", what), handler)
+        bus.watch_alive(self._keys.camera("*", "alive"), self._alive)
+        bus.declare_alive(self._keys.bestview("alive"))
+
+    async def run(self) -> None:
+        """Serve until every camera's recording is over.
+
+        Raises:
+            UserError: the output folder cannot be written.
+        """
+        if self._out is not None:  # not before all ports are listened on: a failed start leaves no files
+            self._recorder = self._record(self._out)
+        follow = asyncio.create_task(self._follow_pulses(), name="pulses")
+        follow.add_done_callback(lambda _: self._changed.set())
+        try:
+            while not self.aligner.all_ended:
+                await self._changed.wait()
+                self._changed.clear()
+                if follow.done():
+                    await follow  # raises what ended it
+                self.decide()
+            last = max(shelf.newest for shelf in self.shelves.values())
+            for decision in self.decider.finish(last):
+                self._publish(decision)
+            log.info("every camera's recording is over")
+        finally:
+            follow.cancel()
+            await asyncio.gather(follow, return_exceptions=True)
+
+    def decide(self) -> None:
+        """Decide and publish whatever can be decided by now."""
+        for epoch in self.aligner.ready(self.pulse):
+            self._step(epoch)
+
+    def _record(self, out: Path) -> Recorder:
+        try:
+            return Recorder(out, self.config.camera_ids, self.decider.people.fits)
+        except OSError as error:
+            raise UserError(f"{out}: cannot write there: {error.strerror}") from error
+
+    def close(self) -> None:
+        """End all streams and let go of the bus and the files."""
+        self.splicer.close()
+        if self._recorder is not None:
+            self._recorder.close()
+        if self._bus is not None:
+            self._bus.close()
+
+    async def _follow_pulses(self) -> None:
+        sync, fps = self.config.sync, self.config.site.fps
+        async with PulseClient(sync.host, sync.port, PULSE_CLIENT, fps_hint=fps) as pulses:
+            async for pulse in pulses:
+                self.pulse = pulse.number
+                self.pulse0 = pulse.due - pulse.number / fps
+                self._changed.set()
+
+    def _tracks(self, message: Message) -> None:
+        self.intake.tracks(message)
+        self._changed.set()
+
+    def _alive(self, key: str, there: bool) -> None:
+        self.intake.alive(key, there)
+        self._changed.set()
+
+    def _step(self, epoch: Epoch) -> None:
+        self._note_late(epoch)
+        for decision in self.decider.step(epoch):
+            self._publish(decision)
+
+    def _publish(self, decision: GopDecision) -> None:
+        """Say which boxes go with the frames before the frames are sent."""
+        choices = self.board.put(decision)
+        for tell in self.on_decision:
+            tell(choices)
+        self.splicer.decision(decision)
+        self.splicer.forget({*self.decider.people.known, *decision.merged})
+        if self._bus is not None:
+            self._bus.publish(self._keys.bestview("choices"), msgspec.json.encode(choices))
+        if self._recorder is not None:
+            self._recorder.write(decision)
+            self._note_lost(self._recorder, decision)
+        self.intake.forget_thumbnails_before(decision.first - self.config.view.identity.forget_after)
+
+    def _note_lost(self, recorder: Recorder, decision: GopDecision) -> None:
+        """Note the pictures of a GOP that did not come, of cameras that were delivering."""
+        for camera, shelf in self.shelves.items():
+            recorder.late(camera, shelf.lost(decision.first, decision.frames), "no picture")
+
+    def _note_late(self, epoch: Epoch) -> None:
+        stride = self.config.track.window.stride
+        for camera in epoch.late:
+            self.late_epochs += 1
+            log.warning("camera %s: its tracks for pulses up to %d came too late", camera, epoch.last)
+        if self._recorder is None:
+            return
+        for camera in epoch.late:
+            self._recorder.late(camera, range(epoch.last - stride + 1, epoch.last + 1), "tracks late")
+        for camera, message in epoch.tracks.items():
+            self._recorder.late(camera, message.shed, "not searched")

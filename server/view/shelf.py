@@ -1,0 +1,66 @@
+"""One camera's newest frames as fragments, by pulse: what every stream takes from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from server.view.agreement import Agreement
+from server.view.fmp4 import Sample, fragment
+from server.view.h264 import nal_units, parameter_sets, sample
+
+
+@dataclass(frozen=True, slots=True)
+class Shelved:
+    """One frame, ready to be sent to anybody."""
+
+    key: bool
+    boot: int
+    fragment: bytes
+
+
+class Shelf:
+    """Keeps the last ``frames`` frames of one camera; each is made into a fragment once, when it comes.
+
+    All shelves of a site have one ``agreement`` about the parameter sets.
+    """
+
+    def __init__(self, fps: float, frames: int, agreement: Agreement) -> None:
+        self._fps = fps
+        self._frames = frames
+        self._agreement = agreement
+        self._shelved: dict[int, Shelved] = {}
+        self.newest = -1
+
+    def put(self, pulse: int, boot: int, access_unit: bytes, *, key: bool) -> Shelved:
+        """Shelve an access unit.
+
+        Raises:
+            ParameterMismatchError: its parameter sets are not the site's, and the camera must be refused.
+        """
+        units = nal_units(access_unit)
+        if key:
+            self._agreement.check(parameter_sets(units))
+        shelved = Shelved(key, boot, fragment([Sample(sample(units), key)], pulse, self._fps))
+        self._shelved[pulse] = shelved
+        self.newest = max(self.newest, pulse)
+        while len(self._shelved) > self._frames:
+            del self._shelved[next(iter(self._shelved))]
+        return shelved
+
+    def lost(self, first: int, frames: int) -> list[int]:
+        """List the pulses among these whose frames did not come, though earlier and later ones did."""
+        oldest = next(iter(self._shelved), self.newest + 1)
+        span = range(max(first, oldest), min(first + frames, self.newest + 1))
+        return [pulse for pulse in span if pulse not in self._shelved]
+
+    def has(self, pulse: int) -> bool:
+        """Tell whether the frame is here."""
+        return pulse in self._shelved
+
+    def get(self, pulse: int) -> Shelved | None:
+        """Give one frame."""
+        return self._shelved.get(pulse)
+
+    def gop(self, first: int, frames: int) -> bytes:
+        """Give the fragments of consecutive frames in one piece; all of them must be here."""
+        return b"".join(self._shelved[pulse].fragment for pulse in range(first, first + frames))

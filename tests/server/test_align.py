@@ -1,0 +1,123 @@
+"""Epochs come out in order, complete where they can be, and never wait for the dead."""
+
+from __future__ import annotations
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from server.view.align import Aligner, Epoch
+from server.wire.messages import CameraTracks
+
+STRIDE, GRACE = 5, 12
+CAMERAS = ("c0", "c1", "c2")
+
+
+def word(camera: str, epoch: int, *, boot: int = 1, ended: bool = False) -> CameraTracks:
+    last = (epoch + 1) * STRIDE - 1
+    return CameraTracks(
+        camera=camera,
+        boot=boot,
+        size=(64, 48),
+        epoch=epoch,
+        first=last,
+        last=last,
+        final_to=last,
+        ended=ended,
+        shed=[],
+        tracks=[],
+        solve=None,
+    )
+
+
+def begun(*cameras: str) -> Aligner:
+    aligner = Aligner(CAMERAS, STRIDE, GRACE)
+    for camera in cameras:
+        aligner.come(camera)
+        aligner.frame(camera, 1, 0)
+    return aligner
+
+
+def heard(epochs: list[Epoch]) -> list[tuple[int, tuple[str, ...], tuple[str, ...]]]:
+    return [(epoch.number, tuple(epoch.tracks), epoch.late) for epoch in epochs]
+
+
+def test_an_epoch_waits_for_every_camera_that_is_there() -> None:
+    aligner = begun("c0", "c1")
+    aligner.tracks(word("c0", 0))
+    assert aligner.ready(now=5) == []
+    aligner.tracks(word("c1", 0))
+    assert heard(aligner.ready(now=5)) == [(0, ("c0", "c1"), ())]
+
+
+@given(st.permutations([(camera, epoch) for camera in CAMERAS for epoch in range(4)]))
+def test_the_epochs_are_the_same_in_whatever_order_the_cameras_messages_mix(
+    order: list[tuple[str, int]],
+) -> None:
+    aligner = begun(*CAMERAS)
+    counts = dict.fromkeys(CAMERAS, 0)
+    epochs = []
+    for camera, _ in order:  # a camera's own messages stay in order, as on the bus
+        aligner.tracks(word(camera, counts[camera]))
+        counts[camera] += 1
+        epochs += aligner.ready(now=0)
+    assert heard(epochs) == [(number, CAMERAS, ()) for number in range(4)]
+
+
+def test_a_camera_that_is_late_is_left_out_once_and_not_waited_for_until_it_is_in_time_again() -> None:
+    aligner = begun("c0", "c1")
+    aligner.tracks(word("c0", 0))
+    assert aligner.ready(now=4 + GRACE) == []
+    assert heard(aligner.ready(now=5 + GRACE)) == [(0, ("c0",), ("c1",))]
+    aligner.tracks(word("c0", 1))
+    assert heard(aligner.ready(now=10)) == [(1, ("c0",), ())], "no waiting for the late one"
+    aligner.tracks(word("c1", 0))
+    assert aligner.late_messages["c1"] == 1
+    aligner.tracks(word("c1", 2))
+    assert aligner.ready(now=15) == [], "in time again: c0 is waited for as c1 would be"
+    aligner.tracks(word("c0", 2))
+    assert heard(aligner.ready(now=15)) == [(2, ("c0", "c1"), ())]
+
+
+def test_a_camera_that_is_gone_is_not_waited_for() -> None:
+    aligner = begun("c0", "c1")
+    aligner.tracks(word("c0", 0))
+    aligner.gone("c1")
+    assert heard(aligner.ready(now=5)) == [(0, ("c0",), ())]
+
+
+def test_a_camera_that_comes_back_takes_part_from_its_first_frame_on() -> None:
+    aligner = begun("c0", "c1")
+    aligner.gone("c1")
+    aligner.come("c1")
+    aligner.frame("c1", 2, 7)
+    aligner.tracks(word("c0", 0))
+    assert heard(aligner.ready(now=5)) == [(0, ("c0",), ())]
+    aligner.tracks(word("c0", 1))
+    assert aligner.ready(now=10) == [], "frame 7 is in epoch 1"
+    aligner.tracks(word("c1", 1, boot=2))
+    assert heard(aligner.ready(now=10)) == [(1, ("c0", "c1"), ())]
+
+
+def test_a_camera_whose_recording_is_over_is_not_waited_for_and_the_last_ends_everything() -> None:
+    aligner = begun("c0", "c1")
+    aligner.gone("c2")
+    for camera in ("c0", "c1"):
+        aligner.tracks(word(camera, 0, ended=camera == "c0"))
+    assert heard(aligner.ready(now=5)) == [(0, ("c0", "c1"), ())]
+    assert not aligner.all_ended
+    aligner.tracks(word("c1", 1))
+    assert heard(aligner.ready(now=10)) == [(1, ("c1",), ())]
+
+
+def test_when_every_camera_is_gone_time_goes_on() -> None:
+    aligner = begun("c0")
+    aligner.gone("c0")
+    assert heard(aligner.ready(now=9 + GRACE + 1)) == [(0, (), ()), (1, (), ())]
+
+
+def test_a_camera_whose_word_on_an_epoch_was_lost_is_not_waited_for_and_the_loss_is_told() -> None:
+    aligner = begun("c0", "c1")
+    aligner.tracks(word("c0", 1))
+    aligner.tracks(word("c1", 0))
+    aligner.tracks(word("c1", 1))
+    assert heard(aligner.ready(now=0)) == [(0, ("c1",), ("c0",)), (1, ("c0", "c1"), ())]

@@ -1,0 +1,78 @@
+"""Viewers share a stream; whoever is slow loses whole GOPs and slows nobody."""
+
+from __future__ import annotations
+
+import asyncio
+
+from server.view.channel import Channel, Chunk
+
+
+def gop(number: int) -> Chunk:
+    return Chunk(b"%d" % number, start=True)
+
+
+async def take(viewer: object, count: int) -> list[bytes]:
+    got = []
+    async with asyncio.timeout(5):
+        async for data in viewer:  # type: ignore[attr-defined]
+            got.append(data)
+            if len(got) == count:
+                break
+    return got
+
+
+async def test_a_viewer_starts_at_once_with_the_newest_gop() -> None:
+    channel = Channel()
+    for number in range(3):
+        channel.publish(gop(number))
+    assert await take(channel.join(), 1) == [b"2"]
+
+
+async def test_a_viewer_of_single_frames_starts_where_the_gop_begins() -> None:
+    channel = Channel()
+    for data, start in [(b"I1", True), (b"P2", False), (b"I3", True), (b"P4", False)]:
+        channel.publish(Chunk(data, start))
+    assert await take(channel.join(), 2) == [b"I3", b"P4"]
+
+
+async def test_a_viewer_that_falls_behind_loses_whole_gops_and_others_lose_none() -> None:
+    channel = Channel(queue_starts=3)
+    slow, quick = channel.join(), channel.join()
+    seen = []
+    for number in range(10):
+        channel.publish(Chunk(b"I%d" % number, start=True))
+        channel.publish(Chunk(b"P%d" % number, start=False))
+        seen += await take(quick, 2)
+    assert len(seen) == 20
+    assert slow.lost > 0
+    left = await take(slow, 2)
+    assert left[0][:1] == b"I", "never a broken GOP"
+    assert left[1] == b"P" + left[0][1:]
+
+
+async def test_memory_is_bounded_however_slow_a_viewer_is() -> None:
+    channel = Channel(queue_starts=3)
+    slow = channel.join()
+    for number in range(1000):
+        channel.publish(gop(number))
+    assert len(slow._queue) <= 3
+
+
+async def test_the_end_comes_after_what_was_queued() -> None:
+    channel = Channel()
+    viewer = channel.join()
+    channel.publish(gop(1))
+    channel.close()
+    async with asyncio.timeout(5):
+        assert [data async for data in viewer] == [b"1"]
+    assert channel.viewers == 1
+    channel.leave(viewer)
+    assert channel.viewers == 0
+
+
+async def test_whoever_joins_after_the_end_gets_what_was_last_and_the_end() -> None:
+    channel = Channel()
+    channel.publish(gop(1))
+    channel.close()
+    async with asyncio.timeout(5):
+        assert [data async for data in channel.join()] == [b"1"]

@@ -1,0 +1,178 @@
+"""Who is shown by which camera: bigger boxes win, cuts wait for GOPs, what is not there is not chosen."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import pytest
+from cameras_by_hand import CAMERAS, GOP, LARGE, SMALL, STRIDE, TrackNumbers, epoch_of, small_config, word
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from server.view.board import Board, reason
+from server.view.decide import Decider, GopDecision
+from server.wire.messages import Box
+
+Seen = Mapping[str, Mapping[int, Box | None]]
+A, B = CAMERAS
+EVERY_FRAME: Callable[[str, int], bool] = lambda _camera, _pulse: True  # noqa: E731 — a default of the tests
+
+
+def decider(has: Callable[[str, int], bool] = EVERY_FRAME, **changes: Any) -> Decider:
+    it = Decider(small_config(**changes), dict.fromkeys(CAMERAS), has)
+    it.people._registry = TrackNumbers()  # type: ignore[assignment]
+    return it
+
+
+def decide(it: Decider, story: Sequence[Seen], *, end: int | None = None) -> list[GopDecision]:
+    """Tell a story epoch by epoch; ``end`` is the last frame when the recordings are over."""
+    decisions = []
+    for number, seen in enumerate(story):
+        decisions += it.step(
+            epoch_of(number, *(word(camera, number, boxes) for camera, boxes in seen.items()))
+        )
+    return decisions + ([] if end is None else it.finish(end))
+
+
+def shown(decisions: list[GopDecision], number: int = 1) -> list[str | None]:
+    return [choice.camera for it in decisions for choice in it.choices if choice.number == number]
+
+
+def test_a_gop_is_decided_when_its_look_ahead_is_known() -> None:
+    it = decider()
+    assert decide(it, [{A: {1: SMALL}, B: {}}]) == []
+    [decision] = it.step(epoch_of(1, word(A, 1, {1: SMALL}), word(B, 1, {})))
+    assert (decision.first, decision.frames) == (0, GOP)
+
+
+def test_the_camera_with_the_bigger_box_shows_the_person() -> None:
+    decisions = decide(decider(), [{A: {1: SMALL}, B: {1: LARGE}}] * 4)
+    assert shown(decisions) == [B, B, B]
+    costs = decisions[-1].choices[0].costs
+    assert (costs[A] or 0.0) > (costs[B] or 0.0) > 0.0
+
+
+def test_a_little_better_is_not_worth_a_cut_and_much_better_is() -> None:
+    larger: Box = (20.0, 4.0, 36.5, 44.0)
+    before: Seen = {A: {1: LARGE}, B: {1: SMALL}}
+    between: Seen = {A: {1: LARGE}, B: {1: larger}}
+    after: Seen = {A: {1: SMALL}, B: {1: LARGE}}
+    decisions = decide(decider(), [before] * 2 + [between] * 3 + [after] * 3)
+    assert shown(decisions) == [A, A, A, A, B, B, B]
+    assert "a little better than c0, but not enough" in reason(decisions[2].choices[0])
+
+
+def test_a_person_who_is_seen_by_one_camera_alone_is_shown_by_it() -> None:
+    decisions = decide(decider(), [{A: {}, B: {1: SMALL}}] * 3)
+    assert shown(decisions) == [B, B]
+
+
+def test_views_change_only_where_gops_begin_and_boxes_are_of_the_gops_frames() -> None:
+    story = [{A: {1: LARGE}, B: {}}] * 3 + [{A: {}, B: {}}] * 3
+    decisions = decide(decider(), story, end=6 * STRIDE - 1)
+    assert [it.first for it in decisions] == [n * GOP for n in range(6)]
+    for it in decisions:
+        assert all(len(frames) == it.frames for frames in it.boxes.values())
+    assert decisions[0].boxes[A] == [{1: LARGE}] * GOP
+    assert decisions[3].boxes[A] == [{}] * GOP
+
+
+def test_a_camera_of_which_a_frame_is_missing_is_not_chosen_for_that_gop() -> None:
+    it = decider(has=lambda camera, pulse: (camera, pulse) != (A, GOP + 2))
+    decisions = decide(it, [{A: {1: LARGE}, B: {}}] * 5, end=5 * STRIDE - 1)
+    assert shown(decisions) == [A, B, A, A, A]
+    assert decisions[1].choices[0].costs[A] is None
+
+
+def test_where_no_camera_can_be_shown_none_is_chosen_and_the_stream_goes_on_after() -> None:
+    it = decider(has=lambda _camera, pulse: pulse // GOP != 1)
+    decisions = decide(it, [{A: {1: LARGE}, B: {}}] * 5, end=5 * STRIDE - 1)
+    assert shown(decisions) == [A, None, A, A, A]
+    assert reason(decisions[1].choices[0]) == "No camera's picture can be shown at the moment."
+
+
+@pytest.mark.parametrize("left", range(1, GOP + 1))
+def test_the_end_decides_what_is_left_a_partial_gop_too(left: int) -> None:
+    end = 2 * GOP + left - 1
+    decisions = decide(decider(), [{A: {1: LARGE}, B: {}}] * 3, end=end)
+    assert [(it.first, it.frames) for it in decisions] == [(0, GOP), (GOP, GOP), (2 * GOP, left)]
+    assert shown(decisions) == [A] * 3
+    assert all(len(frames) == left for frames in decisions[-1].boxes.values())
+
+
+def test_the_end_of_nothing_decides_nothing() -> None:
+    assert decider().finish(100) == []
+
+
+def test_a_service_that_starts_in_the_middle_begins_with_the_next_gop() -> None:
+    it = decider(encode={"gop": 10}, view={"lookahead": 20})
+    decisions = []
+    for number in range(5, 12):
+        decisions += it.step(epoch_of(number, word(A, number, {1: SMALL})))
+    assert [decision.first for decision in decisions] == [30, 40]
+
+
+@settings(deadline=None, max_examples=15)
+@given(
+    st.lists(
+        st.fixed_dictionaries(
+            {
+                camera: st.dictionaries(st.integers(1, 3), st.sampled_from([SMALL, LARGE, None]), max_size=3)
+                for camera in CAMERAS
+            }
+        ),
+        min_size=1,
+        max_size=8,
+    ),
+    st.sets(st.tuples(st.sampled_from(CAMERAS), st.integers(0, 39)), max_size=5),
+)
+def test_the_same_epochs_give_the_same_decisions_and_none_shows_what_is_missing(
+    story: list[Seen], missing: set[tuple[str, int]]
+) -> None:
+    end = len(story) * STRIDE - 1
+    one, two = (
+        decide(decider(has=lambda camera, pulse: (camera, pulse) not in missing), story, end=end)
+        for _ in "12"
+    )
+    assert one == two
+    assert sum(it.frames for it in one) == end + 1
+    for it in one:
+        for choice in it.choices:
+            for pulse in range(it.first, it.first + it.frames):
+                assert (choice.camera, pulse) not in missing
+
+
+def test_a_cut_is_told_once_with_both_cameras() -> None:
+    it = decider(has=lambda camera, pulse: (camera, pulse // GOP) != (A, 1))
+    board = Board()
+    told = [board.put(decision) for decision in decide(it, [{A: {1: LARGE}, B: {}}] * 4, end=19)]
+    assert [[(cut.from_camera, cut.to_camera, cut.pulse) for cut in it.cuts] for it in told] == [
+        [],
+        [(A, B, GOP)],
+        [(B, A, 2 * GOP)],
+        [],
+    ]
+    assert board.cuts == 2
+    assert board.standings[1].since == 2 * GOP
+    assert board.standings[1].cameras == (A,)
+    assert told[0].choices == {1: A}
+    assert told[0].boxes[A][0] == [(1, *LARGE)]
+
+
+def test_after_a_hole_the_same_camera_is_no_cut() -> None:
+    it = decider(has=lambda _camera, pulse: pulse // GOP != 1)
+    board = Board()
+    for decision in decide(it, [{A: {1: LARGE}, B: {}}] * 4, end=19):
+        board.put(decision)
+    assert board.cuts == 0
+
+
+def test_the_reason_is_one_plain_sentence_for_every_case() -> None:
+    story: list[Seen] = [{A: {1: LARGE}, B: {}}] * 2
+    only_a = decide(decider(has=lambda camera, _pulse: camera == A), story)[0].choices[0]
+    assert reason(only_a) == "c0 is the only camera whose picture can be shown."
+    best = decide(decider(), story)[0].choices[0]
+    assert reason(best) == "c0 sees this person best over the next frames."
+    away = decide(decider(), [*story, *[{A: {}, B: {}}] * 3])[-1].choices[0]
+    assert reason(away) == "Nobody sees this person at the moment; c0 saw them last."

@@ -1,0 +1,219 @@
+"""What cameras send is taken in, or counted and dropped: nothing from outside raises."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import msgspec
+import pytest
+from cameras_by_hand import (
+    CAMERAS,
+    FPS,
+    HEIGHT,
+    LARGE,
+    SMALL,
+    STRIDE,
+    WIDTH,
+    encoded,
+    status,
+    thumbnail,
+    tracks,
+    video,
+    word,
+)
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bestview import IdentitySettings
+from server.view.agreement import Agreement
+from server.view.align import Aligner
+from server.view.intake import Intake
+from server.view.people import People
+from server.view.shelf import Shelf, Shelved
+from server.wire.inbox import Message
+from server.wire.messages import Keys
+
+KEYS = Keys("hall")
+
+
+class Hall:
+    """An intake and what it fills."""
+
+    def __init__(self) -> None:
+        agreement = Agreement()
+        self.shelves = {camera: Shelf(FPS, 50, agreement) for camera in CAMERAS}
+        self.aligner = Aligner(CAMERAS, STRIDE, grace=5)
+        self.frames: list[tuple[str, Shelved]] = []
+        self.intake = Intake(self.shelves, self.aligner, lambda *frame: self.frames.append(frame))
+        for camera in CAMERAS:
+            self.intake.alive(KEYS.camera(camera, "alive"), there=True)
+
+    def handle(self, what: str, message: Message) -> None:
+        handlers = {
+            "video": self.intake.video,
+            "tracks": self.intake.tracks,
+            "status": self.intake.status,
+            "thumbs": self.intake.thumbnail,
+        }
+        handlers[what](message)
+
+    def bad(self, camera: str = "c0") -> int:
+        return self.intake.states[camera].bad_messages
+
+
+KINDS = ["video", "tracks", "status", "thumbs"]
+anything = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text(),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=5), inner, max_size=3),
+    max_leaves=8,
+)
+
+
+@settings(deadline=None, max_examples=200)
+@given(what=st.sampled_from(KINDS), payload=st.binary(max_size=100), attachment=st.binary(max_size=100))
+def test_any_bytes_are_counted_and_dropped(what: str, payload: bytes, attachment: bytes) -> None:
+    hall = Hall()
+    hall.handle(what, Message(KEYS.camera("c0", what), payload, attachment))
+    assert hall.bad() == 1
+    assert not hall.frames
+    assert hall.aligner.ready(now=100) == []
+
+
+@settings(deadline=None, max_examples=100)
+@given(what=st.sampled_from(KINDS), key=st.text(max_size=40))
+def test_any_key_is_ignored(what: str, key: str) -> None:
+    hall = Hall()
+    hall.handle(what, Message(key, b"", b""))
+    hall.intake.alive(key, there=True)
+    assert hall.bad() == 0
+
+
+GOOD: dict[str, Message] = {
+    "video": video("c0", encoded(0)[0]),
+    "tracks": tracks(word("c0", 0, {1: SMALL})),
+    "status": status("c0"),
+    "thumbs": thumbnail("c0", 1, b"jpeg"),
+}
+
+
+@settings(deadline=None, max_examples=80)
+@given(data=st.data(), what=st.sampled_from(KINDS))
+def test_one_wrong_field_raises_neither_here_nor_further_on(data: st.DataObject, what: str) -> None:
+    hall, good = Hall(), GOOD[what]
+    in_head = bool(good.attachment)
+    fields: dict[str, Any] = msgspec.json.decode(good.attachment if in_head else good.payload)
+    name = data.draw(st.sampled_from(sorted(fields)))
+    fields[name] = data.draw(anything | st.integers(-(2**70), 2**70))
+    changed = json.dumps(fields).encode()
+    hall.handle(
+        what, Message(good.key, good.payload, changed) if in_head else Message(good.key, changed, b"")
+    )
+    people = People(IdentitySettings(), CAMERAS, dict.fromkeys(CAMERAS), (WIDTH, HEIGHT))
+    for epoch in hall.aligner.ready(now=10**4):
+        people.update(epoch)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"last": 3},
+        {"last": 5},
+        {"first": 1},
+        {"first": 10, "last": 0},
+        {"first": 0, "last": 10**9, "tracks": []},
+        {"epoch": -1},
+        {"epoch": 10**30},
+        {"size": (0, 48)},
+        {"camera": "c1"},
+        {"tracks": word("c0", 0, {1: SMALL}).tracks * 2},
+    ],
+)
+def test_a_word_that_cannot_be_true_is_refused(changes: dict[str, Any]) -> None:
+    hall = Hall()
+    fields = {**msgspec.json.decode(GOOD["tracks"].payload), **msgspec.to_builtins(changes)}
+    payload = json.dumps(fields).encode()
+    hall.intake.tracks(Message(GOOD["tracks"].key, payload, b""))
+    assert hall.bad() == 1
+
+
+def test_cameras_that_nobody_configured_are_ignored() -> None:
+    hall = Hall()
+    hall.intake.video(video("cellar", encoded(0)[0]))
+    hall.intake.tracks(tracks(word("cellar", 0, {})))
+    hall.intake.alive(KEYS.camera("cellar", "alive"), there=True)
+    assert list(hall.intake.states) == list(CAMERAS)
+    assert not hall.frames
+
+
+def test_a_camera_of_other_parameters_is_refused_and_its_frames_reach_nobody() -> None:
+    hall = Hall()
+    hall.intake.video(video("c0", encoded(0)[0]))
+    for unit in encoded(1, crf=40)[:10]:
+        hall.intake.video(video("c1", unit))
+    state = hall.intake.states["c1"]
+    assert state.word == "refused"
+    assert "differ from the other cameras'" in state.refused
+    assert "same configuration?" in state.refused
+    assert "\n" not in state.refused
+    assert [camera for camera, _ in hall.frames] == ["c0"]
+    assert not any(hall.shelves["c1"].has(pulse) for pulse in range(10))
+
+
+def test_a_refused_camera_that_is_started_again_with_the_right_settings_is_welcome() -> None:
+    hall = Hall()
+    hall.intake.video(video("c0", encoded(0)[0]))
+    hall.intake.video(video("c1", encoded(1, crf=40)[0]))
+    hall.intake.alive(KEYS.camera("c1", "alive"), there=False)
+    hall.intake.alive(KEYS.camera("c1", "alive"), there=True)
+    hall.intake.video(video("c1", encoded(1)[5], boot=2))
+    assert hall.intake.states["c1"].word == "live"
+    assert hall.shelves["c1"].has(5)
+
+
+def test_a_cameras_state_follows_what_it_does() -> None:
+    hall = Hall()
+    state = hall.intake.states["c0"]
+    words = [state.word]
+    hall.intake.video(video("c0", encoded(0)[0]))
+    words.append(state.word)
+    hall.intake.alive(KEYS.camera("c0", "alive"), there=False)
+    words.append(state.word)
+    hall.intake.alive(KEYS.camera("c0", "alive"), there=True)
+    hall.intake.tracks(tracks(word("c0", 0, {}, ended=True)))
+    words.append(state.word)
+    hall.intake.alive(KEYS.camera("c0", "alive"), there=False)
+    words.append(state.word)
+    hall.intake.alive(KEYS.camera("c0", "alive"), there=True)
+    words.append(state.word)
+    assert words == ["starting", "live", "gone", "ended", "ended", "live"]
+
+
+def test_small_pictures_are_kept_by_run_and_track_until_they_are_old_or_the_camera_is_gone() -> None:
+    hall = Hall()
+    hall.intake.thumbnail(thumbnail("c0", 1, b"old", pulse=5))
+    hall.intake.thumbnail(thumbnail("c0", 2, b"new", pulse=50))
+    hall.intake.thumbnail(thumbnail("c1", 1, b"other", pulse=50))
+    hall.intake.forget_thumbnails_before(20)
+    assert [kept.jpeg for kept in hall.intake.thumbnails.values()] == [b"new", b"other"]
+    hall.intake.alive(KEYS.camera("c1", "alive"), there=False)
+    assert list(hall.intake.thumbnails) == [("c0", 1, 2)]
+
+
+def test_a_status_is_kept() -> None:
+    hall = Hall()
+    hall.intake.status(status("c0", fps=24.5))
+    told = hall.intake.states["c0"].status
+    assert told is not None
+    assert told.fps == 24.5
+
+
+def test_frames_and_words_become_epochs() -> None:
+    hall = Hall()
+    for seed, camera in enumerate(CAMERAS):
+        for unit in encoded(seed)[:STRIDE]:
+            hall.intake.video(video(camera, unit))
+        hall.intake.tracks(tracks(word(camera, 0, {1: LARGE})))
+    [epoch] = hall.aligner.ready(now=4)
+    assert list(epoch.tracks) == list(CAMERAS)
+    assert len(hall.frames) == 2 * STRIDE

@@ -1,0 +1,140 @@
+"""Who was where: numbers that outlive a camera's restarts, merges, and forgetting."""
+
+from __future__ import annotations
+
+import pytest
+from cameras_by_hand import CAMERAS, HEIGHT, LARGE, SMALL, STRIDE, WIDTH, epoch_of, word
+
+from bestview import IdentitySettings, IdentityUpdate, LocalTrack, Merge, TrackKey
+from server.view.history import BoxHistory
+from server.view.locals import LocalNumbers
+from server.view.people import People
+
+
+def people(**settings: int) -> People:
+    identity = IdentitySettings(**{"confirm_updates": 1, **settings})
+    return People(identity, CAMERAS, dict.fromkeys(CAMERAS), (WIDTH, HEIGHT))
+
+
+class Dictated:
+    """An identity registry that says what a test wants."""
+
+    def __init__(self, *updates: IdentityUpdate) -> None:
+        self._updates = list(updates)
+
+    def update(self, tracks: list[LocalTrack], last_frame: int) -> IdentityUpdate:
+        del tracks, last_frame
+        return self._updates.pop(0)
+
+
+def said(numbers: dict[tuple[str, int], int], *merged: Merge) -> IdentityUpdate:
+    keys = {TrackKey(*key): number for key, number in numbers.items()}
+    return IdentityUpdate(numbers=keys, born=(), returned=(), gone=(), merged=merged)
+
+
+def dictated(*updates: IdentityUpdate) -> People:
+    it = people()
+    it._registry = Dictated(*updates)  # type: ignore[assignment]
+    return it
+
+
+def test_a_later_word_on_a_frame_replaces_an_earlier_one() -> None:
+    history = BoxHistory()
+    history.put(word("c0", 0, {7: SMALL}), {7: 1})
+    history.put(word("c0", 0, {7: LARGE, 8: None}), {7: 1, 8: 2})
+    assert history.at(0) == {1: LARGE}
+    history.forget_before(3)
+    assert history.at(2) == {}
+    assert history.at(3) == {1: LARGE}
+
+
+def test_a_restarted_cameras_first_track_is_not_its_former_first_track() -> None:
+    numbers = LocalNumbers()
+    assert numbers.of(word("c0", 0, {1: SMALL, 2: SMALL})) == {1: 1, 2: 2}
+    assert numbers.of(word("c0", 1, {1: SMALL}, boot=2)) == {1: 3}
+    assert numbers.of(word("c1", 1, {1: SMALL})) == {1: 1}
+    assert numbers.known("c0", 1, 1) == 1
+    assert numbers.known("c0", 2, 1) == 3
+
+
+def test_a_forgotten_track_that_comes_back_has_a_new_number() -> None:
+    numbers = LocalNumbers()
+    numbers.of(word("c0", 0, {1: SMALL}))
+    numbers.forget(TrackKey("c0", 1))
+    assert numbers.known("c0", 1, 1) is None
+    assert numbers.of(word("c0", 5, {1: SMALL})) == {1: 2}
+
+
+def test_people_are_where_their_tracks_are() -> None:
+    it = people()
+    it.update(epoch_of(0, word("c0", 0, {1: SMALL, 2: LARGE}), word("c1", 0, {1: None})))
+    first, second = it.known
+    assert it.boxes("c0", 4) == {first: SMALL, second: LARGE}
+    assert it.boxes("c1", 4) == {}
+    assert it.whose("c0", 1, 2) == second
+    assert it.whose("c0", 9, 2) is None
+
+
+def test_first_and_last_seen_are_the_frames_with_a_box() -> None:
+    it = people()
+    for epoch in range(3):
+        it.update(epoch_of(epoch, word("c0", epoch, {1: SMALL if epoch < 2 else None})))
+    [number] = it.known
+    assert (it.first_seen[number], it.last_seen[number]) == (0, 2 * STRIDE - 1)
+
+
+def test_a_restarted_cameras_people_do_not_inherit_the_boxes_of_others() -> None:
+    it = people()
+    it.update(epoch_of(0, word("c0", 0, {1: SMALL})))
+    it.update(epoch_of(1, word("c0", 1, {1: LARGE}, boot=2)))
+    [before], [after] = it.boxes("c0", 0), it.boxes("c0", STRIDE)
+    assert it.whose("c0", 1, 1) == before
+    assert it.whose("c0", 2, 1) == after
+
+
+def test_a_merged_number_lives_on_as_the_others_and_chains_are_followed() -> None:
+    it = dictated(
+        said({("c0", 1): 1, ("c0", 2): 2, ("c1", 1): 3}),
+        said({("c0", 1): 1, ("c0", 2): 2, ("c1", 1): 2}, Merge(kept=2, lost=3)),
+        said({("c0", 1): 1, ("c0", 2): 1, ("c1", 1): 1}, Merge(kept=1, lost=2)),
+    )
+    for epoch in range(3):
+        it.update(epoch_of(epoch, word("c0", epoch, {1: SMALL, 2: None}), word("c1", epoch, {1: LARGE})))
+    assert it.known == [1]
+    assert it.merged == {3: 1, 2: 1}
+    assert it.boxes("c1", 0) == {1: LARGE}, "in frames past, too"
+
+
+def test_who_has_left_a_person_for_one_not_confirmed_yet_has_no_number() -> None:
+    it = dictated(said({("c0", 1): 1}), said({}))
+    it.update(epoch_of(0, word("c0", 0, {1: SMALL})))
+    it.update(epoch_of(1, word("c0", 1, {1: SMALL})))
+    assert it.boxes("c0", STRIDE) == {}
+    assert it.number("c0", 1) is None
+
+
+def test_two_tracks_of_one_person_in_one_picture_give_one_box() -> None:
+    it = dictated(said({("c0", 1): 1, ("c0", 2): 1}))
+    it.update(epoch_of(0, word("c0", 0, {1: SMALL, 2: LARGE})))
+    assert it.boxes("c0", 0) == {1: SMALL}
+
+
+def test_people_who_were_gone_for_long_are_forgotten_with_all_that_is_known_of_them() -> None:
+    it = people(gone_after=STRIDE, forget_after=3 * STRIDE)
+    it.update(epoch_of(0, word("c0", 0, {1: SMALL})))
+    [number] = it.known
+    for epoch in range(1, 4):
+        it.update(epoch_of(epoch, word("c0", epoch, {})))
+    assert it.known == [number]
+    assert it.away == {number}
+    it.update(epoch_of(9, word("c0", 9, {})))
+    assert it.known == []
+    assert it.away == set()
+    assert it.whose("c0", 1, 1) is None
+    assert not it._numbers
+    assert not it._heard
+
+
+@pytest.mark.parametrize("pulse", [-1, 0, 4, 1000])
+def test_nothing_is_known_of_frames_that_nobody_spoke_of(pulse: int) -> None:
+    assert people().boxes("c0", pulse) == {}

@@ -1,0 +1,99 @@
+"""What is written down: tracks and choices to the byte, and a film per person."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import av
+import numpy as np
+from cameras_by_hand import CAMERAS, FPS, GOP, HEIGHT, LARGE, SMALL, WIDTH, encoded
+from test_splice import choice
+
+from server.run.films import Films
+from server.view.agreement import Agreement
+from server.view.decide import GopDecision, ObjectChoice
+from server.view.record import Recorder
+from server.view.shelf import Shelf
+from server.wire.config import Site
+from server.wire.fit import Fit
+from server.wire.messages import Box
+
+A, B = CAMERAS
+SITE = Site(width=WIDTH, height=HEIGHT, fps=FPS)
+
+
+def decision(
+    gop: int, *choices: ObjectChoice, frames: int = GOP, **boxes: list[dict[int, Box]]
+) -> GopDecision:
+    nobody: list[dict[int, Box]] = [{}] * frames
+    return GopDecision(gop * GOP, frames, choices, {it: boxes.get(it, nobody) for it in CAMERAS}, {})
+
+
+def test_the_files_are_these_bytes(tmp_path: Path) -> None:
+    fits = {A: Fit((2 * WIDTH, 2 * HEIGHT), (WIDTH, HEIGHT)), B: Fit((WIDTH, HEIGHT), (WIDTH, HEIGHT))}
+    recorder = Recorder(tmp_path / "out", CAMERAS, fits)
+    boxes: list[dict[int, Box]] = [{1: SMALL}, {1: SMALL, 2: LARGE}]
+    recorder.write(decision(0, choice(1, A), choice(2, None), frames=2, c0=boxes))
+    recorder.write(decision(1, choice(1, B), choice(2, A, away=True), frames=1, c1=[{2: LARGE}]))
+    recorder.late(B, range(3, 5), "tracks late")
+    recorder.close()
+    files = {str(path.relative_to(tmp_path / "out")): path.read_bytes() for path in tmp_path.rglob("*.*")}
+    assert files == {
+        "tracks/c0.txt": b"1,1,20.00,20.00,12.00,36.00,1.00,-1,-1,-1\n"
+        b"2,1,20.00,20.00,12.00,36.00,1.00,-1,-1,-1\n"
+        b"2,2,40.00,8.00,32.00,80.00,1.00,-1,-1,-1\n",
+        "tracks/c1.txt": b"6,2,20.00,4.00,16.00,40.00,1.00,-1,-1,-1\n",
+        "choices.csv": b"frame,object,camera\n1,1,c0\n2,1,c0\n6,1,c1\n",
+        "late.csv": b"frame,camera,what\n4,c1,tracks late\n5,c1,tracks late\n",
+    }
+
+
+def films(folder: Path) -> tuple[Films, dict[str, Shelf]]:
+    agreement = Agreement()
+    shelves = {camera: Shelf(FPS, 40, agreement) for camera in CAMERAS}
+    for seed, camera in enumerate(CAMERAS):
+        for unit in encoded(seed):
+            shelves[camera].put(unit.pulse, 1, unit.data, key=unit.key)
+    return Films(folder, shelves, agreement, SITE), shelves
+
+
+def own_pictures(seed: int) -> list[np.ndarray[tuple[int, ...], np.dtype[np.uint8]]]:
+    decoder = av.VideoCodecContext.create("h264", "r")
+    decoded = [picture for unit in encoded(seed) for picture in decoder.decode(av.Packet(unit.data))]
+    decoded += decoder.decode(None)
+    return [np.asarray(picture.to_ndarray(format="yuv420p"), dtype=np.uint8) for picture in decoded]
+
+
+def test_a_film_begins_at_time_0_and_shows_the_chosen_cameras_pixels(tmp_path: Path) -> None:
+    it, _ = films(tmp_path / "best")
+    for gop, camera in [(2, A), (3, B), (4, A)]:
+        it.write(decision(gop, choice(7, camera)))
+    it.close()
+    assert it.numbers == [7]
+    with av.open(str(tmp_path / "best" / "object-7.mp4"), "r") as film:
+        pictures = list(film.decode(video=0))
+    assert [picture.time for picture in pictures] == [number / FPS for number in range(3 * GOP)]
+    alone = [own_pictures(seed) for seed in range(2)]
+    for number, picture in enumerate(pictures):
+        seed = 1 if GOP <= number < 2 * GOP else 0
+        np.testing.assert_array_equal(picture.to_ndarray(format="yuv420p"), alone[seed][2 * GOP + number])
+
+
+def test_a_film_ends_with_the_last_gop_in_which_the_person_was_about(tmp_path: Path) -> None:
+    it, _ = films(tmp_path / "best")
+    story = [(0, False), (1, True), (2, False), (3, True), (4, True)]
+    for gop, away in story:
+        it.write(decision(gop, choice(1, A, away=away)))
+    it.close()
+    with av.open(str(tmp_path / "best" / "object-1.mp4"), "r") as film:
+        assert len(list(film.decode(video=0))) == 3 * GOP, "who comes back is shown all the way"
+
+
+def test_what_cannot_be_shown_is_a_hole_in_time(tmp_path: Path) -> None:
+    it, _ = films(tmp_path / "best")
+    for gop, camera in [(0, A), (1, None), (2, B)]:
+        it.write(decision(gop, choice(1, camera)))
+    it.close()
+    with av.open(str(tmp_path / "best" / "object-1.mp4"), "r") as film:
+        times = [round(float(picture.time or 0) * FPS) for picture in film.decode(video=0)]
+    assert times == [*range(GOP), *range(2 * GOP, 3 * GOP)]
