@@ -1,0 +1,1 @@
+"""HTTP on top of the best-view service: page, streams, API, events, metrics."""

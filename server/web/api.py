@@ -1,0 +1,111 @@
+"""The API: JSON about the site, its cameras, the people, and why each view was chosen."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import msgspec
+from aiohttp import web
+from prometheus_client import CollectorRegistry, generate_latest
+
+from server.view.service import BestViewService
+from server.web.events import Events
+from server.web.keys import EVENTS, METRICS, SERVICE
+from server.web.schema import Problem
+from server.web.streams import send_viewer
+from server.web.views import cameras_info, choice_info, objects_info, site_info, thumbnail_of
+
+routes = web.RouteTableDef()
+
+
+def answer(content: Any, status: int = 200) -> web.Response:
+    """Give a JSON answer."""
+    return web.Response(
+        body=msgspec.json.encode(content),
+        status=status,
+        content_type="application/json",
+        headers={"Cache-Control": "no-store", "Access-Control-Allow-Origin": "*"},
+    )
+
+
+def problem(status: int, error: str) -> web.Response:
+    """Say in one line why there is no answer."""
+    return answer(Problem(error), status)
+
+
+def _service(request: web.Request) -> BestViewService:
+    return request.app[SERVICE]
+
+
+@routes.get("/api/site")
+async def get_site(request: web.Request) -> web.Response:
+    """Describe the site."""
+    return answer(site_info(_service(request)))
+
+
+@routes.get("/api/objects")
+async def get_objects(request: web.Request) -> web.Response:
+    """List everybody who is known."""
+    return answer(objects_info(_service(request)))
+
+
+@routes.get("/api/cameras")
+async def get_cameras(request: web.Request) -> web.Response:
+    """List the cameras and how they are."""
+    return answer(cameras_info(_service(request)))
+
+
+@routes.get("/api/objects/{object:[0-9]{1,9}}/choice")
+async def get_choice(request: web.Request) -> web.Response:
+    """Say which camera shows this person, since when, and why."""
+    number = int(request.match_info["object"])
+    choice = choice_info(_service(request), number)
+    return problem(404, f"there is no object {number}") if choice is None else answer(choice)
+
+
+@routes.get("/objects/{object:[0-9]{1,9}}/thumb.jpg")
+async def get_thumbnail(request: web.Request) -> web.Response:
+    """Give a small picture of this person."""
+    service = _service(request)
+    number = int(request.match_info["object"])
+    thumbnail = thumbnail_of(service, service.board.resolve(number))
+    if thumbnail is None:
+        return problem(404, f"there is no picture of object {number}")
+    return web.Response(
+        body=thumbnail.jpeg, content_type="image/jpeg", headers={"Cache-Control": "private, max-age=60"}
+    )
+
+
+@routes.get("/api/events")
+async def get_events(request: web.Request) -> web.StreamResponse:
+    """Tell what happens as it happens: server-sent events."""
+    events: Events = request.app[EVENTS]
+    viewer = events.join()
+    try:
+        return await send_viewer(request, viewer, b"", {"Content-Type": "text/event-stream"})
+    finally:
+        events.leave(viewer)
+
+
+@routes.get("/healthz")
+async def get_health(request: web.Request) -> web.Response:
+    """Say that the process answers."""
+    del request
+    return web.Response(text="ok\n")
+
+
+@routes.get("/readyz")
+async def get_ready(request: web.Request) -> web.Response:
+    """Say whether there is anything to show: a camera whose frames come in."""
+    service = _service(request)
+    live = [camera for camera, state in service.intake.states.items() if state.word == "live"]
+    if not live:
+        return web.Response(text="no camera delivers frames\n", status=503)
+    return web.Response(text=f"{len(live)} of {len(service.intake.states)} cameras\n")
+
+
+@routes.get("/metrics")
+async def get_metrics(request: web.Request) -> web.Response:
+    """Give the metrics in Prometheus' text format."""
+    metrics: CollectorRegistry = request.app[METRICS]
+    return web.Response(body=generate_latest(metrics), headers={"Content-Type": "text/plain; version=0.0.4"})

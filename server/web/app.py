@@ -1,0 +1,94 @@
+"""The HTTP application, and serving it."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager
+
+from aiohttp import web
+
+from server.view.service import BestViewService
+from server.web import api, openapi, page, video
+from server.web.api import problem
+from server.web.events import Events
+from server.web.keys import EVENTS, METRICS, SERVICE
+from server.web.metrics import registry
+from server.wire.config import Http
+from server.wire.errors import UserError
+
+log = logging.getLogger(__name__)
+
+_CLOSE_S = 1.0
+"""How long viewers have to take what was sent before the server ends."""
+
+
+@web.middleware
+async def one_line_errors(
+    request: web.Request, handler: Callable[[web.Request], Awaitable[web.StreamResponse]]
+) -> web.StreamResponse:
+    """Answer every error with one line of JSON; a traceback is for the log."""
+    try:
+        return await handler(request)
+    except web.HTTPMethodNotAllowed as error:
+        answer = problem(error.status, f"{request.method} is not possible here")
+        answer.headers["Allow"] = error.headers["Allow"]
+        return answer
+    except web.HTTPNotFound as error:
+        return problem(error.status, f"there is nothing at {request.path}")
+    except web.HTTPException as error:
+        if error.status < web.HTTPBadRequest.status_code:
+            raise
+        return problem(error.status, error.reason)
+    except (ConnectionError, asyncio.CancelledError):
+        raise
+    except Exception:
+        log.exception("answering %s %s failed", request.method, request.path)
+        return problem(500, "the server made a mistake; its log says more")
+
+
+def make_app(service: BestViewService) -> web.Application:
+    """Give the application on top of a service."""
+    app = web.Application(middlewares=[one_line_errors])
+    app[SERVICE], app[EVENTS], app[METRICS] = service, Events(service), registry(service)
+    for module in (api, video, openapi, page):
+        app.add_routes(module.routes)
+    app.cleanup_ctx.append(_telling)
+    app.on_shutdown.append(_end_streams)
+    return app
+
+
+@asynccontextmanager
+async def serving(app: web.Application, settings: Http) -> AsyncIterator[int]:
+    """Serve the application; give the port.
+
+    Raises:
+        UserError: the port cannot be listened on.
+    """
+    runner = web.AppRunner(app, access_log=None, shutdown_timeout=_CLOSE_S, handler_cancellation=True)
+    await runner.setup()
+    try:
+        site = web.TCPSite(runner, settings.host, settings.port)
+        try:
+            await site.start()
+        except OSError as error:
+            reason = error.strerror or error
+            raise UserError(
+                f"http.port: cannot listen on {settings.host}:{settings.port}: {reason}"
+            ) from error
+        yield runner.addresses[0][1]
+    finally:
+        await runner.cleanup()
+
+
+async def _telling(app: web.Application) -> AsyncIterator[None]:
+    task = asyncio.create_task(app[EVENTS].run(), name="events")
+    yield
+    task.cancel()
+    await asyncio.gather(task, return_exceptions=True)
+
+
+async def _end_streams(app: web.Application) -> None:
+    app[EVENTS].close()
+    app[SERVICE].splicer.close()

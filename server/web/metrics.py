@@ -1,0 +1,62 @@
+"""``/metrics`` for Prometheus: read from the service when it is asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from prometheus_client import CollectorRegistry, Metric, ProcessCollector
+from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily
+from prometheus_client.registry import Collector
+
+from server.view.service import BestViewService
+
+
+class ServiceCollector(Collector):
+    """Gives the service's numbers."""
+
+    def __init__(self, service: BestViewService) -> None:
+        self._service = service
+
+    def collect(self) -> Iterable[Metric]:
+        """Give all metrics as they are now."""
+        service = self._service
+        yield GaugeMetricFamily("myview_pulse", "Newest pulse.", value=service.pulse)
+        yield GaugeMetricFamily("myview_objects", "People known.", value=len(service.board.standings))
+        yield GaugeMetricFamily("myview_viewers", "Streams being watched.", value=service.splicer.viewers)
+        yield CounterMetricFamily("myview_cuts", "Changes of view.", value=service.board.cuts)
+        yield CounterMetricFamily(
+            "myview_late_epochs",
+            "Windows decided without a camera that was there.",
+            value=service.late_epochs,
+        )
+        yield from self._cameras()
+
+    def _cameras(self) -> Iterable[Metric]:
+        live = GaugeMetricFamily("myview_camera_live", "The camera delivers frames.", labels=["camera"])
+        frames = CounterMetricFamily("myview_camera_frames", "Frames received.", labels=["camera"])
+        missed = CounterMetricFamily("myview_camera_missed", "Pulses without a frame.", labels=["camera"])
+        shed = CounterMetricFamily("myview_camera_shed", "Frames not searched for people.", labels=["camera"])
+        bad = CounterMetricFamily("myview_camera_bad_messages", "Messages not understood.", labels=["camera"])
+        offset = GaugeMetricFamily(
+            "myview_camera_clock_offset_seconds",
+            "Pulse server's clock minus the camera's.",
+            labels=["camera"],
+        )
+        for camera, state in self._service.intake.states.items():
+            labels = [camera]
+            live.add_metric(labels, float(state.word == "live"))
+            frames.add_metric(labels, state.frames)
+            bad.add_metric(labels, state.bad_messages)
+            if state.status is not None:
+                missed.add_metric(labels, state.status.missed)
+                shed.add_metric(labels, state.status.shed)
+                offset.add_metric(labels, state.status.clock_offset)
+        return [live, frames, missed, shed, bad, offset]
+
+
+def registry(service: BestViewService) -> CollectorRegistry:
+    """Give the metrics of a service and its process."""
+    metrics = CollectorRegistry()
+    metrics.register(ServiceCollector(service))
+    ProcessCollector(registry=metrics)
+    return metrics

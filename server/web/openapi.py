@@ -1,0 +1,95 @@
+"""The API's own description: OpenAPI 3.1 made from the routes and the schemas, and a page to read it."""
+
+from __future__ import annotations
+
+import html
+import inspect
+import re
+from importlib.metadata import version
+from typing import Any
+
+import msgspec
+from aiohttp import web
+
+from server.web.schema import Cameras, Choice, Objects, Problem, SiteInfo
+
+routes = web.RouteTableDef()
+
+_JSON = {
+    "/api/site": SiteInfo,
+    "/api/objects": Objects,
+    "/api/cameras": Cameras,
+    "/api/objects/{object}/choice": Choice,
+}
+_OTHER = {
+    "/objects/{object}/best.mp4": "video/mp4",
+    "/cameras/{camera}/live.mp4": "video/mp4",
+    "/objects/{object}/thumb.jpg": "image/jpeg",
+    "/api/events": "text/event-stream",
+    "/healthz": "text/plain",
+    "/readyz": "text/plain",
+    "/metrics": "text/plain",
+}
+_UNAVAILABLE = {"/objects/{object}/best.mp4", "/cameras/{camera}/live.mp4", "/readyz"}
+
+
+def describe(app: web.Application) -> dict[str, Any]:
+    """Give the OpenAPI document of an application's routes."""
+    _, components = msgspec.json.schema_components(
+        [*_JSON.values(), Problem], ref_template="#/components/schemas/{name}"
+    )
+    paths = {}
+    for route in app.router.routes():
+        if route.method != "GET" or route.resource is None:
+            continue
+        path = re.sub(r"\{(\w+):[^/]*\}(?=[/.]|$)", r"{\1}", route.resource.canonical)
+        if path in _JSON or path in _OTHER:
+            paths[path] = {"get": _operation(path, inspect.getdoc(route.handler) or "")}
+    return {
+        "openapi": "3.1.0",
+        "info": {"title": "MyView", "version": version("myview")},
+        "paths": dict(sorted(paths.items())),
+        "components": {"schemas": components},
+    }
+
+
+def _operation(path: str, summary: str) -> dict[str, Any]:
+    if path in _JSON:
+        content = {"application/json": {"schema": {"$ref": f"#/components/schemas/{_JSON[path].__name__}"}}}
+    else:
+        content = {_OTHER[path]: {}}
+    error = {"application/json": {"schema": {"$ref": "#/components/schemas/Problem"}}}
+    responses: dict[str, Any] = {"200": {"description": "OK", "content": content}}
+    names = re.findall(r"\{(\w+)\}", path)
+    if names:
+        responses["404"] = {"description": "There is none of this name.", "content": error}
+    if path in _UNAVAILABLE:
+        responses["503"] = {"description": "Not now; try again later."}
+    schemas = {"object": {"type": "integer", "minimum": 0}, "camera": {"type": "string"}}
+    parameters = [{"name": name, "in": "path", "required": True, "schema": schemas[name]} for name in names]
+    return {"summary": summary.splitlines()[0], "parameters": parameters, "responses": responses}
+
+
+@routes.get("/api/openapi.json")
+async def get_openapi(request: web.Request) -> web.Response:
+    """Describe the API to programs."""
+    return web.Response(body=msgspec.json.encode(describe(request.app)), content_type="application/json")
+
+
+@routes.get("/api")
+async def get_readable(request: web.Request) -> web.Response:
+    """Describe the API to people."""
+    rows = "".join(
+        f"<tr><td><code>GET {html.escape(path)}</code></td>"
+        f"<td>{html.escape(item['get']['summary'])}</td></tr>"
+        for path, item in describe(request.app)["paths"].items()
+    )
+    page = (
+        "<!doctype html><html lang=en><meta charset=utf-8><title>MyView: the API</title>"
+        "<meta name=viewport content='width=device-width'>"
+        "<style>body{font:16px/1.5 system-ui;background:#15171a;color:#dde;margin:2rem auto;max-width:60rem;"
+        "padding:0 1rem}td{padding:.3rem 1rem .3rem 0;vertical-align:top}a{color:#6c6}</style>"
+        f"<h1>MyView: the API</h1><table>{rows}</table>"
+        "<p>Schemas: <a href='/api/openapi.json'>openapi.json</a></p></html>"
+    )
+    return web.Response(text=page, content_type="text/html")

@@ -1,0 +1,96 @@
+"""What the API answers. ``/api/openapi.json`` is made from these."""
+
+from __future__ import annotations
+
+import msgspec
+
+
+class SiteInfo(msgspec.Struct, frozen=True):
+    """The site, and how pulse numbers map to time."""
+
+    name: str
+    fps: float
+    width: int
+    height: int
+    gop: int
+    lookahead_frames: int
+    codec: str | None
+    """RFC 6381 codec string of every stream; null before the first key frame."""
+    pulse0: float | None
+    """When pulse 0 was due: unix seconds by the server's clock."""
+    now: float
+    """The server's clock, unix seconds."""
+    cameras: list[str]
+
+
+class ObjectInfo(msgspec.Struct, frozen=True):
+    """One person."""
+
+    object: int
+    first_seen: int
+    """Pulse."""
+    last_seen: int
+    """Pulse."""
+    visible: bool
+    """Some camera sees the person now."""
+    camera: str | None
+    """The camera that shows the person now."""
+    cameras: list[str]
+    """The cameras that see the person now."""
+    thumbnail: str | None
+    """Where a small picture is; the address changes with the picture."""
+
+
+class Objects(msgspec.Struct, frozen=True):
+    """Everybody who is known."""
+
+    objects: list[ObjectInfo]
+
+
+class CameraInfo(msgspec.Struct, frozen=True):
+    """One camera."""
+
+    camera: str
+    state: str
+    """starting, live, gone, ended or refused."""
+    pulse: int
+    """The newest frame."""
+    late: int
+    """Epochs whose tracks came too late."""
+    fps: float
+    missed: int
+    shed: int
+    in_step: bool
+    """Pulses come from the server; otherwise the camera goes on at its own rate."""
+    message: str
+
+
+class Cameras(msgspec.Struct, frozen=True):
+    """All cameras of the site."""
+
+    cameras: list[CameraInfo]
+
+
+class Choice(msgspec.Struct, frozen=True):
+    """Why this view."""
+
+    object: int
+    first: int
+    """First pulse of the newest decided GOP."""
+    frames: int
+    camera: str | None
+    since: int
+    """Pulse of the last cut."""
+    costs: dict[str, float | None]
+    """Mean cost a frame of each camera over the look-ahead; null: cannot be shown."""
+    seen: dict[str, float]
+    """Share of the look-ahead in which each camera sees the person."""
+    switch_cost: float
+    """What a cut costs, in frames of not seeing the person."""
+    reason: str
+
+
+class Problem(msgspec.Struct, frozen=True):
+    """Why there is no answer."""
+
+    error: str

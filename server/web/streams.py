@@ -1,0 +1,52 @@
+"""Endless answers: video and events, each at its viewer's own pace."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping
+
+from aiohttp import web
+
+from server.view.channel import Channel, Viewer
+
+log = logging.getLogger(__name__)
+
+_STREAM_HEADERS = {
+    "Cache-Control": "no-store",
+    "Access-Control-Allow-Origin": "*",
+    "X-Accel-Buffering": "no",  # or a proxy in front collects what should be live
+}
+
+
+async def send_stream(
+    request: web.Request, channel: Channel, head: bytes, headers: Mapping[str, str]
+) -> web.StreamResponse:
+    """Send ``head`` and then the channel for as long as both live."""
+    viewer = channel.join()
+    try:
+        return await send_viewer(request, viewer, head, headers)
+    finally:
+        channel.leave(viewer)
+
+
+async def send_viewer(
+    request: web.Request, viewer: Viewer, head: bytes, headers: Mapping[str, str]
+) -> web.StreamResponse:
+    """Send ``head`` and what a viewer is given, from a place that the caller took and will give up."""
+    response = web.StreamResponse(headers={**_STREAM_HEADERS, **headers})
+    await response.prepare(request)
+    if request.method == "HEAD":
+        return response
+    return await _send(response, viewer, head)
+
+
+async def _send(response: web.StreamResponse, viewer: Viewer, head: bytes) -> web.StreamResponse:
+    try:
+        if head:
+            await response.write(head)
+        async for data in viewer:
+            await response.write(data)
+        await response.write_eof()
+    except (ConnectionError, TimeoutError) as error:
+        log.debug("a viewer has gone: %s", error)
+    return response

@@ -1,0 +1,102 @@
+"""From the service's state to the API's answers."""
+
+from __future__ import annotations
+
+import time
+
+from server.view.board import reason
+from server.view.intake import Thumbnail
+from server.view.service import BestViewService
+from server.web.schema import CameraInfo, Cameras, Choice, ObjectInfo, Objects, SiteInfo
+
+
+def site_info(service: BestViewService) -> SiteInfo:
+    """Describe the site."""
+    config, parameters = service.config, service.agreement.parameters
+    return SiteInfo(
+        name=config.site.name,
+        fps=config.site.fps,
+        width=config.site.width,
+        height=config.site.height,
+        gop=config.encode.gop,
+        lookahead_frames=config.view.lookahead,
+        codec=None if parameters is None else parameters.codec,
+        pulse0=service.pulse0,
+        now=time.time(),
+        cameras=list(config.camera_ids),
+    )
+
+
+def objects_info(service: BestViewService) -> Objects:
+    """List everybody who has a stream, in the order of their numbers."""
+    people = service.decider.people
+    objects = []
+    for number, standing in sorted(service.board.standings.items()):
+        thumbnail = thumbnail_of(service, number)
+        objects.append(
+            ObjectInfo(
+                object=number,
+                first_seen=people.first_seen.get(number, standing.first),
+                last_seen=people.last_seen.get(number, standing.first),
+                visible=bool(standing.cameras),
+                camera=standing.choice.camera,
+                cameras=list(standing.cameras),
+                thumbnail=None if thumbnail is None else f"objects/{number}/thumb.jpg?v={thumbnail.pulse}",
+            )
+        )
+    return Objects(objects)
+
+
+def cameras_info(service: BestViewService) -> Cameras:
+    """List all cameras."""
+    cameras = []
+    for camera, state in service.intake.states.items():
+        status = state.status
+        cameras.append(
+            CameraInfo(
+                camera=camera,
+                state=state.word,
+                pulse=service.shelves[camera].newest,
+                late=service.aligner.late_messages[camera],
+                fps=status.fps if status else 0.0,
+                missed=status.missed if status else 0,
+                shed=status.shed if status else 0,
+                in_step=status.in_step if status else False,
+                message=state.message,
+            )
+        )
+    return Cameras(cameras)
+
+
+def choice_info(service: BestViewService, number: int) -> Choice | None:
+    """Explain an object's view; None for an unknown object."""
+    standing = service.board.standings.get(service.board.resolve(number))
+    if standing is None:
+        return None
+    return Choice(
+        object=standing.choice.number,
+        first=standing.first,
+        frames=standing.frames,
+        camera=standing.choice.camera,
+        since=standing.since,
+        costs=standing.choice.costs,
+        seen=standing.choice.seen,
+        switch_cost=service.decider.switch_cost,
+        reason=reason(standing.choice),
+    )
+
+
+def thumbnail_of(service: BestViewService, number: int) -> Thumbnail | None:
+    """Give the newest small picture of a person, from the chosen camera where it has a recent one."""
+    standing = service.board.standings.get(number)
+    chosen = standing.choice.camera if standing else None
+    own = [
+        (camera == chosen, thumbnail)
+        for (camera, boot, track), thumbnail in service.intake.thumbnails.items()
+        if service.decider.people.whose(camera, boot, track) == number
+    ]
+    if not own:
+        return None
+    newest = max(thumbnail.pulse for _, thumbnail in own)
+    recent = newest - round(3 * service.config.site.fps)
+    return max(own, key=lambda it: (it[0] and it[1].pulse >= recent, it[1].pulse))[1]
