@@ -1,0 +1,34 @@
+"""The best-view service's process. Recorded or live sites: no codec is even loaded here."""
+
+from __future__ import annotations
+
+import logging
+from pathlib import Path
+
+from camsync import SyncError
+from server.run.calibration import with_scene_ground
+from server.view.service import BestViewService
+from server.web.app import make_app, serving
+from server.wire.config import Config
+from server.wire.errors import AwayError
+
+log = logging.getLogger(__name__)
+
+
+async def bestview_process(config: Config, out: Path | None = None) -> None:
+    """Run the best-view service with its page, streams and API.
+
+    Raises:
+        UserError: a port cannot be listened on, or the output folder cannot be written.
+        AwayError: it lost the pulses for good.
+    """
+    service = BestViewService(with_scene_ground(config), out)
+    try:
+        service.open()
+        async with serving(make_app(service), config.http) as port:
+            log.info("page, streams and API on http://%s:%d/", config.http.host, port)
+            await service.run()
+    except SyncError as error:
+        raise AwayError(f"bestview: {error}") from error
+    finally:
+        service.close()

@@ -1,0 +1,49 @@
+"""What is checked before anything is started, so that one line says it and nothing is left behind."""
+
+from __future__ import annotations
+
+import socket
+
+from server.camera.pipeline import CameraPipeline
+from server.wire.config import Config
+from server.wire.errors import UserError
+from server.wire.sources import SourceKind, kind_of
+
+
+def check_port_free(host: str, port: int, what: str) -> None:
+    """Make sure that a port can be listened on, before anything is started.
+
+    Raises:
+        UserError: it cannot.
+    """
+    with socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET) as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((host, port))
+        except OSError as error:
+            raise UserError(f"{what}: cannot listen on {host}:{port}: {error.strerror}") from error
+
+
+def check_ports(config: Config) -> None:
+    """Refuse at once when a port is taken, rather than in one of five processes.
+
+    Raises:
+        UserError: one is.
+    """
+    check_port_free(config.http.host, config.http.port, "http.port")
+    check_port_free(config.sync.bind, config.sync.port, "sync.port")
+    protocol, _, address = config.zenoh.listen.partition("/")
+    host, _, port = address.rpartition(":")
+    if protocol == "tcp" and port.isdecimal():
+        check_port_free(host.strip("[]"), int(port), "zenoh.listen")
+
+
+def check_recordings(config: Config) -> None:
+    """Refuse at once what no camera process could open; live cameras may come and go.
+
+    Raises:
+        UserError: a recording, a scene or a file of detections cannot be opened.
+    """
+    for it in config.cameras:
+        if kind_of(it.source) is not SourceKind.STREAM:
+            CameraPipeline(config, it.id).close()

@@ -1,0 +1,57 @@
+"""The command line: one entry point, exit code 0, or one line that says what is wrong and another code."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+
+import typer
+
+from server.run import file_commands, site_commands, viewer_commands
+from server.run.ending import end_with_parent
+from server.wire.errors import UserError
+
+app = typer.Typer(
+    help="MyView: pick a person; see them, live, from whichever camera sees them best.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+for command in (
+    site_commands.demo,
+    site_commands.up,
+    site_commands.sync,
+    site_commands.camera,
+    site_commands.bestview,
+    file_commands.render,
+    file_commands.track,
+    file_commands.scene,
+    viewer_commands.watch,
+):
+    app.command()(command)
+
+_INTERRUPTED = 130
+_TERMINATED = 143
+
+
+def main() -> None:
+    """Run the command line; no traceback for bad input."""
+    if os.environ.get("MYVIEW_SUPERVISED"):
+        end_with_parent()
+    # So that what is half-written is tidied away; what runs until it is told to end has its own handler.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(_TERMINATED))
+    try:
+        app()
+    except UserError as error:
+        typer.echo(f"myview: {error}", err=True)
+        sys.exit(error.code)
+    except KeyboardInterrupt:
+        sys.exit(_INTERRUPTED)
+    except BrokenPipeError:  # whoever read our output has gone, e.g. `myview watch URL | head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(0)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,102 @@
+"""The commands that turn files into files.
+
+Each imports what it runs only when it runs, so that a process loads no more than it needs.
+"""
+
+from __future__ import annotations
+
+import logging
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from server.wire.errors import UserError
+from server.wire.loading import read_content
+from server.wire.output import whole_folder
+
+OutFolder = Annotated[Path, typer.Option("--out", help="A new folder to write into.")]
+
+
+def render(
+    videos: Annotated[list[Path], typer.Argument(metavar="VIDEO…", help="One recorded view each.")],
+    out: OutFolder,
+    config: Annotated[Path | None, typer.Option("--config", help="Settings, and cameras by name.")] = None,
+    det: Annotated[
+        list[Path] | None, typer.Option("--det", help="Detections (MOTChallenge) instead, one per view.")
+    ] = None,
+    ground: Annotated[Path | None, typer.Option("--ground", help="Homographies (JSON) per view.")] = None,
+) -> None:
+    """Render the best view of everybody in recorded views: videos, tracks, choices and plots."""
+    from server.run.progress import bar, total_frames
+    from server.run.render import render as render_views
+    from server.run.setup import config_for_videos
+
+    logging.basicConfig(format="%(message)s", level=logging.WARNING)
+    base = read_content(config) if config else {}
+    loaded = config_for_videos(
+        videos,
+        base=base,
+        where=str(config or "myview render"),
+        folder=config.parent if config else Path(),
+        ground=ground,
+        detections=det or [],
+    )
+    with whole_folder(out) as folder, bar("frames") as progress:
+        task = progress.add_task("rendering", total=total_frames(videos))
+        numbers = render_views(loaded, folder, lambda done: progress.update(task, completed=done))
+    who = ", ".join(map(str, numbers)) if numbers else "nobody"
+    typer.echo(f"{out}: best views of {len(numbers)} people ({who}), tracks, choices.csv and plots")
+
+
+def track(
+    out: Annotated[Path, typer.Option("--out", help="The file to write: MOTChallenge text.")],
+    video: Annotated[Path | None, typer.Argument(metavar="[VIDEO]", help="Not needed with --det.")] = None,
+    det: Annotated[Path | None, typer.Option("--det", help="Detections, MOTChallenge text.")] = None,
+    solver: Annotated[str | None, typer.Option(help="Which solver of the network program.")] = None,
+    config: Annotated[Path | None, typer.Option("--config", help="Settings of detector and tracker.")] = None,
+) -> None:
+    """Track everybody in one video, or in its detections alone."""
+    from server.run.progress import bar, total_frames
+    from server.run.track import track_one
+
+    with bar("frames") as progress:
+        task = progress.add_task("tracking", total=total_frames([video]) if video else None)
+        count = track_one(
+            video,
+            det,
+            out,
+            config,
+            solver,
+            lambda done: progress.update(task, completed=done),
+        )
+    typer.echo(f"{out}: {count} people")
+
+
+def scene(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="Which scene, e.g. room.")],
+    out: OutFolder,
+    cameras: Annotated[int, typer.Option(min=1)] = 3,
+    objects: Annotated[int, typer.Option(min=1)] = 4,
+    seconds: Annotated[float, typer.Option(min=0.04)] = 20.0,
+    seed: Annotated[int, typer.Option(min=0)] = 1,
+    size: Annotated[str, typer.Option(help="WIDTHxHEIGHT in pixels.")] = "640x360",
+    fps: Annotated[float, typer.Option(min=1.0)] = 25.0,
+) -> None:
+    """Write a synthetic multi-view recording with ground truth."""
+    from server.camera.scene import Scene, write_recording
+    from server.run.progress import bar
+
+    width, _, height = size.partition("x")
+    if not (width.isdecimal() and height.isdecimal()):
+        raise UserError(f"--size: {size!r} is not WIDTHxHEIGHT, such as 640x360")
+    try:
+        drawn = Scene(name, cameras, objects, seed, int(width), int(height), fps)
+        with bar("frames") as progress:
+            task = progress.add_task("drawing", total=None)
+            write_recording(
+                drawn, out, seconds, lambda done, total: progress.update(task, completed=done, total=total)
+            )
+    except (ValueError, OSError) as error:
+        raise UserError(str(error)) from error
+    typer.echo(f"{out}: {cameras} views, gt/ and ground.json")

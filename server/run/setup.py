@@ -1,0 +1,124 @@
+"""Configurations that are not in a file: for recordings named on the command line, and for the demo."""
+
+from __future__ import annotations
+
+import re
+import socket
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from server.camera.sources.opening import open_video
+from server.wire.config import Config
+from server.wire.errors import UserError
+from server.wire.loading import build_config
+from server.wire.sources import SourceKind, kind_of
+
+_NAME_CHARACTERS = 32
+
+DEMO: dict[str, Any] = {
+    "site": {"name": "demo", "fps": 25, "width": 640, "height": 360},
+    "cameras": [
+        {"id": f"c{number}", "source": f"scene:room?camera={number}&cameras=3&objects=4&seed=1"}
+        for number in range(3)
+    ],
+}
+"""The embedded synthetic scene; `configs/demo.yaml` says the same with every setting explained."""
+
+
+def config_for_videos(
+    videos: Sequence[Path],
+    *,
+    base: Mapping[str, Any] | None = None,
+    where: str = "myview render",
+    folder: Path = Path(),
+    ground: Path | None = None,
+    detections: Sequence[Path] = (),
+) -> Config:
+    """Give a configuration for recorded views, named after their files; each is played once.
+
+    ``base`` is the content of a configuration file (in ``folder``): its settings hold, and those of its
+    cameras with the same names. Without a site in it, rate and size are the first view's.
+
+    Raises:
+        UserError: a view cannot be opened or never ends, two have one name, or something in the configuration
+            is wrong.
+    """
+    if detections and len(detections) != len(videos):
+        raise UserError(
+            f"--det: {len(detections)} detection files for {len(videos)} views; give one for each, in order"
+        )
+    content = dict(base or {})
+    known = {str(camera.get("id")): camera for camera in _cameras_of(content, where)}
+    for video in videos:
+        _check_recorded(video)
+    if "site" not in content:
+        content["site"] = _site_like(videos[0])
+    cameras = []
+    for number, video in enumerate(videos):
+        name = camera_name(video)
+        source = str(video.absolute())
+        camera = {**known.get(name, {}), "id": name, "source": source, "at_end": "stop"}
+        if detections:
+            camera["detections"] = str(detections[number].absolute())
+        cameras.append(camera)
+    content["cameras"] = cameras
+    if ground is not None:
+        content["ground"] = str(ground.absolute())
+    return build_config(content, where=where, folder=folder)
+
+
+def camera_name(video: Path) -> str:
+    """Give the name of a view: its file's, with a dash for whatever a camera's name cannot have."""
+    return re.sub(r"[^A-Za-z0-9_-]+", "-", video.stem).lstrip("-_")[:_NAME_CHARACTERS] or "view"
+
+
+def _check_recorded(video: Path) -> None:
+    if kind_of(str(video)) not in {SourceKind.FILE, SourceKind.FOLDER}:
+        raise UserError(f"{video}: is not a recorded video or a folder of images")
+    if not video.exists():
+        raise UserError(f"{video}: no such file or folder")
+
+
+def _cameras_of(content: Mapping[str, Any], where: str) -> list[dict[str, Any]]:
+    cameras = content.get("cameras") or []
+    if not isinstance(cameras, list) or not all(isinstance(camera, dict) for camera in cameras):
+        raise UserError(f"{where}: cameras: is a list of cameras, each with id and source")
+    return cameras
+
+
+def _site_like(video: Path) -> dict[str, Any]:
+    """Take rate and size from a view; a size that H.264 cannot store is rounded down by a pixel."""
+    if kind_of(str(video)) is not SourceKind.FILE:
+        return {}
+    opened = open_video(str(video))
+    opened.container.close()
+    width, height = opened.size
+    return {"fps": opened.fps, "width": width - width % 2, "height": height - height % 2}
+
+
+def demo_config(folder: Path, port: int) -> tuple[Path, Config]:
+    """Write the demo's configuration into a folder, on ports that are free."""
+    sync, bus = free_port(), free_port()
+    content = {
+        **DEMO,
+        "sync": {"port": sync},
+        "zenoh": {"connect": f"tcp/127.0.0.1:{bus}", "listen": f"tcp/127.0.0.1:{bus}"},
+        "http": {"port": port},
+    }
+    path = folder / "demo.yaml"
+    path.write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
+    return path, build_config(content, where="demo", folder=folder)
+
+
+def free_port(preferred: int = 0) -> int:
+    """Give the preferred port if it is free, else any that is."""
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind(("127.0.0.1", preferred))
+        except OSError:
+            probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])

@@ -1,0 +1,94 @@
+"""The commands that run a site or a part of it.
+
+Each imports what it runs only when it runs, so that a process loads no more than it needs.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from server.run.ending import run_process, run_until_told
+from server.run.logs import log_to_stderr
+from server.wire.errors import UserError
+from server.wire.loading import load_config
+from server.wire.output import check_new_folder
+
+ConfigPath = Annotated[Path, typer.Argument(metavar="CONFIG", help="The site's configuration, a YAML file.")]
+LogFolder = Annotated[
+    Path | None, typer.Option("--out", help="Write tracks and camera choices into this new folder.")
+]
+
+
+def sync(config: ConfigPath) -> None:
+    """Send frame pulses over TCP: one process of a site."""
+    from server.run.sync import sync_process
+
+    log_to_stderr("sync")
+    loaded = load_config(config)
+    run_process(lambda: sync_process(loaded))
+
+
+def camera(
+    config: ConfigPath, camera_id: Annotated[str, typer.Argument(metavar="ID", help="Which camera.")]
+) -> None:
+    """Run one camera: take, encode, track, publish: one process of a site."""
+    from server.run.camera import camera_process
+
+    log_to_stderr(camera_id)
+    loaded = load_config(config)
+    if camera_id not in loaded.camera_ids:
+        raise UserError(
+            f"{config}: there is no camera {camera_id!r}; there are {', '.join(loaded.camera_ids)}"
+        )
+    run_process(lambda: camera_process(loaded, camera_id))
+
+
+def bestview(config: ConfigPath, out: LogFolder = None) -> None:
+    """Choose, splice and serve: the page, the streams and the API of a site."""
+    from server.run.bestview import bestview_process
+
+    log_to_stderr("bestview")
+    loaded = load_config(config)
+    if out is not None:
+        check_new_folder(out)
+    run_process(lambda: bestview_process(loaded, out))
+
+
+def up(
+    config: ConfigPath,
+    port: Annotated[
+        int | None, typer.Option(min=0, max=65535, help="HTTP port, instead of the configuration's.")
+    ] = None,
+    out: LogFolder = None,
+) -> None:
+    """Run a whole site on this machine: every process, watched and restarted."""
+    from server.run.checks import check_ports, check_recordings
+    from server.run.supervise import Supervisor
+
+    log_to_stderr("up")
+    environment = {} if port is None else {"MYVIEW_HTTP__PORT": str(port)}
+    os.environ.update(environment)
+    loaded = load_config(config)
+    if out is not None:
+        check_new_folder(out)
+    check_ports(loaded)
+    check_recordings(loaded)
+    supervisor = Supervisor(config, loaded, environment, out)
+    asyncio.run(run_until_told(supervisor.run))
+
+
+def demo(
+    port: Annotated[int | None, typer.Option(min=0, max=65535, help="HTTP port; 8080 if it is free.")] = None,
+    seconds: Annotated[float | None, typer.Option(help="End by itself after this long.")] = None,
+    no_browser: Annotated[bool, typer.Option("--no-browser", help="Do not open a browser.")] = False,
+) -> None:
+    """Show the system at work on an embedded synthetic scene."""
+    from server.run.demo import run_demo
+
+    log_to_stderr("demo")
+    asyncio.run(run_until_told(lambda: run_demo(port, seconds, open_browser=not no_browser)))

@@ -1,0 +1,129 @@
+"""All processes of a configuration on one machine, watched and restarted."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import os
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from server.wire.config import Config
+from server.wire.errors import UserError
+
+log = logging.getLogger(__name__)
+
+_RETRY_FIRST_S, _RETRY_MAX_S = 0.2, 10.0
+_SETTLED_S = 10.0
+"""A process that ran this long has started well: its next restart is quick again."""
+_END_S = 5.0
+"""How long processes have to end before they are killed."""
+
+
+@dataclass(slots=True)
+class Child:
+    """One process and how it fares."""
+
+    name: str
+    arguments: Sequence[str]
+    process: asyncio.subprocess.Process | None = None
+    restarts: int = 0
+    done: asyncio.Event = field(default_factory=asyncio.Event)
+    """It has ended by itself with nothing left to do."""
+
+
+class Supervisor:
+    """Starts one process each for the pulses, every camera and the best view; restarts what dies.
+
+    A camera whose recording is over ends with 0 and stays so; when the best-view service ends with 0,
+    everything is over.
+    """
+
+    def __init__(
+        self, config_path: Path, config: Config, environment: Mapping[str, str], out: Path | None
+    ) -> None:
+        self._environment = {**os.environ, **environment, "MYVIEW_SUPERVISED": "1"}
+        path = str(config_path)
+        self._out = out
+        self.children = [
+            Child("bestview", ["bestview", path]),
+            Child("sync", ["sync", path]),
+            *(Child(camera, ["camera", path, camera]) for camera in config.camera_ids),
+        ]
+
+    async def run(self) -> None:
+        """Run everything until the best-view service has nothing left to do, or this task is cancelled.
+
+        Raises:
+            UserError: a process refused its input; what it said stands in the log above.
+        """
+        watchers = [asyncio.create_task(self._watch(child), name=child.name) for child in self.children]
+        try:
+            over = asyncio.create_task(self.children[0].done.wait())
+            finished, _ = await asyncio.wait([over, *watchers], return_when=asyncio.FIRST_COMPLETED)
+            while over not in finished:
+                for watcher in finished:
+                    watcher.result()  # raises what a process refused
+                pending = [watcher for watcher in watchers if not watcher.done()]
+                finished, _ = await asyncio.wait([over, *pending], return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            await self._end(watchers)
+
+    async def _watch(self, child: Child) -> None:
+        pause = _RETRY_FIRST_S
+        loop = asyncio.get_running_loop()
+        while True:
+            started = loop.time()
+            child.process = await asyncio.create_subprocess_exec(
+                sys.executable,
+                "-m",
+                "server.run.cli",
+                *self._arguments(child),
+                env=self._environment,
+                process_group=0,  # Ctrl-C in a terminal is for the supervisor alone
+            )
+            code = await child.process.wait()
+            if code == 0:
+                log.info("%s has ended", child.name)
+                child.done.set()
+                return
+            if code == UserError.code and child.restarts == 0:
+                raise UserError(f"{child.name} could not start")
+            if loop.time() - started > _SETTLED_S:
+                pause = _RETRY_FIRST_S
+            log.warning("%s died (%s); starting it again in %.1f s", child.name, _cause(code), pause)
+            await asyncio.sleep(pause)
+            pause = min(2 * pause, _RETRY_MAX_S)
+            child.restarts += 1
+
+    def _arguments(self, child: Child) -> Sequence[str]:
+        """Give a process's arguments; a restarted best view numbers people anew, in its own files."""
+        if self._out is None or child is not self.children[0]:
+            return child.arguments
+        out = self._out / f"restart-{child.restarts}" if child.restarts else self._out
+        return [*child.arguments, "--out", str(out)]
+
+    async def _end(self, watchers: Sequence[asyncio.Task[None]]) -> None:
+        for watcher in watchers:
+            watcher.cancel()
+        await asyncio.gather(*watchers, return_exceptions=True)
+        processes = [child.process for child in self.children if child.process is not None]
+        running = [process for process in processes if process.returncode is None]
+        for process in running:
+            process.terminate()
+        _, late = (
+            await asyncio.wait([asyncio.create_task(process.wait()) for process in running], timeout=_END_S)
+            if running
+            else ((), ())
+        )
+        if late:
+            for process in running:
+                if process.returncode is None:
+                    process.kill()
+            await asyncio.wait(late)
+
+
+def _cause(code: int) -> str:
+    return f"killed by signal {-code}" if code < 0 else f"exit code {code}"

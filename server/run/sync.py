@@ -1,0 +1,41 @@
+"""The process that sends the pulses."""
+
+from __future__ import annotations
+
+import asyncio
+import errno
+import logging
+
+from camsync import PulseServer
+from server.wire.config import Config
+from server.wire.errors import UserError
+from server.wire.messages import PULSE_CLIENT
+
+log = logging.getLogger(__name__)
+
+
+async def sync_process(config: Config) -> None:
+    """Send pulses; pulse 0 waits for all cameras and the best-view service.
+
+    Raises:
+        UserError: the port cannot be listened on.
+    """
+    sync = config.sync
+    server = PulseServer(
+        config.site.fps,
+        expect={*config.camera_ids, PULSE_CLIENT},
+        start_timeout=sync.start_timeout_s,
+        host=sync.bind,
+        port=sync.port,
+    )
+    try:
+        await server.start()
+    except OSError as error:
+        taken = error.errno == errno.EADDRINUSE
+        reason = "the port is in use" if taken else (error.strerror or error)
+        raise UserError(f"sync.port: cannot listen on {sync.bind}:{sync.port}: {reason}") from error
+    log.info("pulses at %g a second on %s:%d", config.site.fps, sync.bind, server.port)
+    try:
+        await asyncio.Event().wait()
+    finally:
+        await server.stop()

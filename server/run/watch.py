@@ -1,0 +1,60 @@
+"""``myview watch``: who is there, or somebody's best view, shown as it comes or recorded."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from client import ClientError, Progress, objects, watch
+from server.wire.errors import UserError
+
+_TELL_EVERY_S = 1.0
+
+
+async def run_watch(url: str, number: int | None, out: Path | None, seconds: float | None) -> None:
+    """List who is there, or follow somebody.
+
+    Raises:
+        UserError: the server cannot be reached, does not know them, or the file cannot be written.
+    """
+    try:
+        if number is None:
+            await _list(url)
+            return
+        watched = await watch(url, number, out, seconds, _Teller())
+    except (ClientError, ValueError) as error:
+        raise UserError(f"watch: {error}") from error
+    except OSError as error:
+        raise UserError(f"{out}: cannot write there: {error.strerror}") from error
+    where = f" in {out}" if out else ""
+    typer.echo(f"object {number}: {watched.seconds:.1f} s, {watched.cuts} cuts{where}")
+    if not watched.complete:
+        raise UserError("watch: the server went away before the end")
+
+
+async def _list(url: str) -> None:
+    table = Table("object", "visible", "shown by", "seen by", box=None)
+    for it in await objects(url):
+        table.add_row(str(it.object), "yes" if it.visible else "no", it.camera or "-", " ".join(it.cameras))
+    Console().print(table)
+
+
+class _Teller:
+    """Says once a second how far it is, on standard error."""
+
+    def __init__(self) -> None:
+        self._told = 0.0
+
+    def __call__(self, progress: Progress) -> None:
+        now = time.monotonic()
+        if now - self._told >= _TELL_EVERY_S:
+            self._told = now
+            typer.echo(
+                f"{progress.seconds:6.1f} s  {progress.bytes / 1e6:6.2f} MB  "
+                f"camera {progress.camera or '-'}  {progress.cuts} cuts",
+                err=True,
+            )

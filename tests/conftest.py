@@ -1,0 +1,18 @@
+"""Fixtures that every room's tests share."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+
+@pytest.fixture(scope="session")
+def shared_data() -> Path:
+    """Give the folder of real multi-view recordings, or skip: it is not part of the project."""
+    default = Path(__file__).resolve().parents[2] / "shared" / "data"
+    folder = Path(os.environ.get("MYVIEW_TEST_DATA", default))
+    if not folder.is_dir():
+        pytest.skip(f"needs the recordings in {folder} (or in the folder that MYVIEW_TEST_DATA names)")
+    return folder

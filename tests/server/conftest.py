@@ -1,0 +1,16 @@
+"""What the server's tests share."""
+
+from __future__ import annotations
+
+import os
+
+import pytest
+from halls import busy, hall
+
+__all__ = ["busy", "hall"]
+
+
+@pytest.fixture(autouse=True)
+def _no_settings_from_outside(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in [name for name in os.environ if name.startswith("MYVIEW_") and "__" in name]:
+        monkeypatch.delenv(name)

@@ -1,0 +1,79 @@
+"""Ending well: a signal that comes while processes are being started waits until each is known."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+
+import pytest
+
+from server.run.ending import ending_later
+
+PATIENCE = 10.0
+
+
+@pytest.fixture(params=[signal.SIGTERM, signal.SIGINT])
+def handled(request: pytest.FixtureRequest) -> Iterator[tuple[signal.Signals, list[int]]]:
+    """A signal, and those of its kind that were handled."""
+    seen: list[int] = []
+    before = signal.signal(request.param, lambda number, _: seen.append(number))
+    yield request.param, seen
+    signal.signal(request.param, before)
+
+
+@pytest.fixture
+def other_thread() -> Iterator[int]:
+    """A thread that may take every signal, as a library's threads do; gives its identity."""
+    over = threading.Event()
+    thread = threading.Thread(target=over.wait, args=(PATIENCE,))
+    thread.start()
+    assert thread.ident is not None
+    yield thread.ident
+    over.set()
+    thread.join()
+
+
+def until(seen: list[int], length: int) -> None:
+    end = time.monotonic() + PATIENCE
+    while len(seen) < length:
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
+def test_a_signal_waits_even_when_another_thread_takes_it(
+    handled: tuple[signal.Signals, list[int]], other_thread: int
+) -> None:
+    number, seen = handled
+    with ending_later():
+        signal.pthread_kill(other_thread, number)
+        signal.pthread_kill(other_thread, number)
+        while number in signal.sigpending():
+            pass
+        assert seen == []
+    until(seen, 1)
+    assert seen == [number], "once, however often it came"
+    signal.pthread_kill(other_thread, number)
+    until(seen, 2)  # and it is not put off afterwards
+
+
+def test_nothing_came_nothing_happens(handled: tuple[signal.Signals, list[int]]) -> None:
+    with ending_later():
+        pass
+    assert handled[1] == []
+
+
+def test_a_child_inherits_the_mask_and_can_lift_it() -> None:
+    code = (
+        "import signal; from server.run.ending import end_at_once_again as again\n"
+        "def blocked(): return {2, 15} & set(signal.pthread_sigmask(signal.SIG_BLOCK, ()))\n"
+        "before = blocked(); again(); print(len(before), len(blocked()))"
+    )
+    with ending_later():
+        done = subprocess.run(
+            [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True
+        )
+    assert done.stdout.split() == ["2", "0"]
