@@ -1,0 +1,67 @@
+"""The server's events as they happen."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+
+import msgspec
+from yarl import URL
+
+from client.http import AwayError, ContractError, HttpSettings, get, server_url
+from client.model import EVENTS, Event
+from client.sse import EventStreamError, SentEvent, SseParser
+
+_DEFAULT = HttpSettings()
+
+
+async def events(url: str, settings: HttpSettings = _DEFAULT) -> AsyncIterator[Event]:
+    """Give Site, Objects, Cameras and Gop events, for ever; events of other names are passed over.
+
+    When the server goes away the client connects again; the server then says anew how things stand, so that
+    an event may come twice.
+
+    Raises:
+        ValueError: ``url`` is no address.
+        AwayError: ``settings.retries`` attempts in a row brought nothing.
+        ClientError: the server refuses, or what it says is not understood.
+    """
+    address = server_url(url) / "api/events"
+    failures = 0
+    while True:
+        try:
+            async for event in _once(address, settings):
+                failures = 0
+                yield event
+        except AwayError as error:
+            problem = error
+        else:
+            problem = AwayError(f"{address.origin()}: the stream of events has ended")
+        failures += 1
+        if failures > settings.retries:
+            raise problem
+        await asyncio.sleep(settings.backoff(failures))
+
+
+async def _once(address: URL, settings: HttpSettings) -> AsyncIterator[Event]:
+    parser = SseParser()
+    async with get(address, settings, "text/event-stream") as answer:
+        async for data in answer.content.iter_any():
+            try:
+                sent = parser.feed(data)
+            except EventStreamError as error:
+                raise ContractError(f"{address}: {error}") from error
+            for one in sent:
+                event = _decode(one)
+                if event is not None:
+                    yield event
+
+
+def _decode(sent: SentEvent) -> Event | None:
+    kind = EVENTS.get(sent.name)
+    if kind is None:
+        return None
+    try:
+        return msgspec.json.decode(sent.data, type=kind)
+    except msgspec.DecodeError as error:
+        raise ContractError(f"event {sent.name}: {error}") from error

@@ -1,0 +1,108 @@
+"""Fragmented MP4 as it arrives: whole boxes, and the media time of a fragment (ISO/IEC 14496-12)."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+MAX_BOX = 64_000_000  # bytes; a fragment of video has some thousand
+_HEADER = 8  # bytes: size and kind
+_LARGE_HEADER = 16  # bytes: with the size in 64 bits
+_LARGE = 1  # as the size: the real one follows in 64 bits
+
+
+class Mp4Error(ValueError):
+    """The bytes are not a fragmented MP4."""
+
+
+@dataclass(frozen=True, slots=True)
+class Mp4Box:
+    """A box: its four letters, all its bytes, and where in them its content begins."""
+
+    kind: bytes
+    data: bytes
+    header: int
+
+    @property
+    def content(self) -> bytes:
+        """The bytes after the header."""
+        return self.data[self.header :]
+
+
+class BoxReader:
+    """Cuts a stream into its top-level boxes."""
+
+    def __init__(self) -> None:
+        self._rest = bytearray()
+
+    def feed(self, data: bytes) -> Iterator[Mp4Box]:
+        """Give the boxes that ``data`` completes.
+
+        Raises:
+            Mp4Error: a size that no box can have.
+        """
+        self._rest += data
+        while (box := _first_box(self._rest)) is not None:
+            del self._rest[: len(box.data)]
+            yield box
+
+
+def timescale(moov: Mp4Box) -> int:
+    """Give the units per second of the first track's media time.
+
+    Raises:
+        Mp4Error: the box has no track, or one without a rate.
+    """
+    mdhd = _find(moov.content, b"trak", b"mdia", b"mdhd")
+    units = _field(mdhd, 12, 20, ">I")  # after the two times, of 32 or 64 bits by version
+    if units == 0:
+        raise Mp4Error("the track's timescale is 0")
+    return units
+
+
+def decode_time(moof: Mp4Box) -> int:
+    """Give the media time of the fragment's first frame, in units of the timescale.
+
+    Raises:
+        Mp4Error: the fragment does not say.
+    """
+    tfdt = _find(moof.content, b"traf", b"tfdt")
+    return _field(tfdt, 4, 4, ">Q" if tfdt[:1] == b"\x01" else ">I")
+
+
+def _field(content: bytes, at_version_0: int, at_version_1: int, code: str) -> int:
+    at = at_version_1 if content[:1] == b"\x01" else at_version_0
+    try:
+        (value,) = struct.unpack_from(code, content, at)
+    except struct.error as error:
+        raise Mp4Error("a box is too short") from error
+    return int(value)
+
+
+def _find(content: bytes, *path: bytes) -> bytes:
+    """Give the content of the first box along ``path``."""
+    for kind in path:
+        for box in BoxReader().feed(content):
+            if box.kind == kind:
+                content = box.content
+                break
+        else:
+            raise Mp4Error(f"there is no {kind.decode()} box")
+    return content
+
+
+def _first_box(data: bytes | bytearray) -> Mp4Box | None:
+    """Give the box that the bytes begin with; None if it is not whole yet."""
+    if len(data) < _HEADER:
+        return None
+    size, kind = struct.unpack_from(">I4s", data)
+    header = _HEADER
+    if size == _LARGE:
+        header = _LARGE_HEADER
+        if len(data) < header:
+            return None
+        (size,) = struct.unpack_from(">Q", data, _HEADER)
+    if not header <= size <= MAX_BOX:
+        raise Mp4Error(f"a box of {size} bytes")
+    return Mp4Box(kind, bytes(data[:size]), header) if len(data) >= size else None

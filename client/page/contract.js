@@ -1,0 +1,57 @@
+/**
+ * What the server says, as types: docs of the HTTP interface, checked by the editor. No code.
+ *
+ * A pulse is a frame number, the one time axis of a site; the media time of a frame is pulse / fps.
+ *
+ * @typedef {object} Site
+ * @property {string} name
+ * @property {number} fps frames per second
+ * @property {number} width pixels of the picture that boxes are measured in
+ * @property {number} height
+ * @property {number} gop frames between two moments at which the camera may change
+ * @property {number} lookahead_frames
+ * @property {string} codec RFC 6381, such as avc1.42C01F
+ * @property {number | null} pulse0 unix seconds at which pulse 0 was due; null before the first pulse
+ * @property {number} now unix seconds of the server's clock
+ * @property {string[]} cameras
+ *
+ * @typedef {object} Person an entry of /api/objects
+ * @property {number} object
+ * @property {number} first_seen pulse
+ * @property {number} last_seen pulse
+ * @property {boolean} visible
+ * @property {string | null} camera the present choice
+ * @property {string[]} cameras who sees the person now
+ * @property {string | null} thumbnail
+ *
+ * @typedef {object} Camera an entry of /api/cameras
+ * @property {string} camera
+ * @property {'live' | 'gone' | 'ended' | 'starting' | 'refused'} state
+ * @property {number} pulse
+ * @property {number} late
+ * @property {number} fps
+ * @property {string} message
+ *
+ * @typedef {object} Cut
+ * @property {number} object
+ * @property {string | null} from
+ * @property {string} to
+ * @property {number} pulse
+ *
+ * @typedef {[number, number, number, number, number]} Box object, left, top, right, bottom (pixels)
+ *
+ * @typedef {object} Gop what is decided for the frames [first, first + frames)
+ * @property {number} first pulse
+ * @property {number} frames
+ * @property {Record<string, string>} choices camera by object
+ * @property {Record<string, Box[][]>} boxes by camera, one list per frame
+ * @property {Cut[]} cuts
+ *
+ * @typedef {object} Choice /api/objects/{k}/choice
+ * @property {number} object
+ * @property {string | null} camera
+ * @property {number} since pulse
+ * @property {string} reason one plain sentence
+ */
+
+export {};

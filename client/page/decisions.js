@@ -1,0 +1,88 @@
+/** What the server decided, by pulse: cameras, cuts and boxes of the last minute and a bit. */
+
+/** @import {Box, Gop} from './contract.js' */
+
+const KEPT_SECONDS = 75;
+
+export class Decisions {
+  /** @type {Gop[]} sorted by first pulse */
+  #gops = [];
+
+  /** @param {number} fps */
+  constructor(fps) {
+    this.keptFrames = KEPT_SECONDS * fps;
+  }
+
+  /** @param {Gop} gop may repeat one that is known: the server sends the last few on connecting */
+  add(gop) {
+    if (this.#gops.length && gop.first < this.#gops[0].first) this.#gops = []; // pulses began anew
+    let at = this.#gops.length;
+    while (at > 0 && this.#gops[at - 1].first >= gop.first) at -= 1;
+    const known = this.#gops[at]?.first === gop.first;
+    this.#gops.splice(at, known ? 1 : 0, gop);
+    while (this.#gops[0].first < this.end - this.keptFrames) this.#gops.shift();
+  }
+
+  clear() {
+    this.#gops = [];
+  }
+
+  /** The first pulse that nothing is decided for yet; 0 when nothing is known. */
+  get end() {
+    const last = this.#gops.at(-1);
+    return last ? last.first + last.frames : 0;
+  }
+
+  /**
+   * @param {number} pulse
+   * @returns {Gop | undefined}
+   */
+  at(pulse) {
+    // From the end: what is asked for is nearly always among the newest.
+    for (let i = this.#gops.length - 1; i >= 0; i -= 1) {
+      const gop = this.#gops[i];
+      if (gop.first <= pulse) return pulse < gop.first + gop.frames ? gop : undefined;
+    }
+    return undefined;
+  }
+
+  /**
+   * @param {number} object
+   * @param {number} pulse
+   * @returns {string | null} the camera
+   */
+  camera(object, pulse) {
+    return this.at(pulse)?.choices[object] ?? null;
+  }
+
+  /**
+   * @param {string} camera
+   * @param {number} pulse
+   * @returns {Box[]}
+   */
+  boxes(camera, pulse) {
+    const gop = this.at(pulse);
+    return gop?.boxes[camera]?.[pulse - gop.first] ?? [];
+  }
+
+  /**
+   * The bands of the strip: neighbouring GOPs of the same camera are one run.
+   *
+   * @param {number} object
+   * @param {number} from pulse
+   * @returns {{camera: string, first: number, end: number}[]}
+   */
+  runs(object, from) {
+    /** @type {{camera: string, first: number, end: number}[]} */
+    const runs = [];
+    for (const gop of this.#gops) {
+      const end = gop.first + gop.frames;
+      const camera = gop.choices[object];
+      if (end <= from || !camera) continue;
+      const last = runs.at(-1);
+      if (last && last.camera === camera && last.end === gop.first) last.end = end;
+      else runs.push({ camera, first: Math.max(gop.first, from), end });
+    }
+    return runs;
+  }
+}

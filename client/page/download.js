@@ -1,0 +1,36 @@
+/** A live stream as whole MP4 segments, in bunches as they arrive. */
+
+import { SegmentSplitter } from './mp4.js';
+
+/** @import {Segment} from './mp4.js' */
+
+const SILENCE_MS = 6000; // a live stream that says nothing for this long is dead, whatever TCP thinks
+
+/**
+ * @param {string} address
+ * @param {AbortSignal} signal
+ * @returns {AsyncGenerator<Segment[], void>}
+ * @throws {Error} when there is no such stream, or it fails or falls silent; returns when it ends
+ */
+export async function* download(address, signal) {
+  const silence = new AbortController();
+  let timer = setTimeout(() => silence.abort(), SILENCE_MS);
+  const either = AbortSignal.any([signal, silence.signal]);
+  try {
+    const response = await fetch(address, { cache: 'no-store', signal: either });
+    if (!response.ok || !response.body) throw new Error(`${address}: ${response.status}`);
+    const reader = response.body.getReader();
+    const splitter = new SegmentSplitter();
+    for (;;) {
+      const { done, value } = await reader.read();
+      if (done) return;
+      clearTimeout(timer);
+      timer = setTimeout(() => silence.abort(), SILENCE_MS);
+      const segments = splitter.push(value);
+      if (segments.length) yield segments;
+    }
+  } finally {
+    clearTimeout(timer);
+    silence.abort(); // whoever leaves early leaves no connection open
+  }
+}

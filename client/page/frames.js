@@ -1,0 +1,70 @@
+/**
+ * Tells of every frame as it is shown: which one, and when; and takes it, to be painted with its boxes.
+ *
+ * requestVideoFrameCallback knows the very frame, but the browser may already show the next one by the
+ * time a canvas over it is painted: boxes would be a frame late now and then. A VideoFrame carries its
+ * own time, so a picture painted from it and the boxes of that time always belong together. Where a
+ * browser lacks one or the other, the next best is used: right to a frame or so.
+ */
+
+const SAME_PLAYBACK_S = 0.5; // a VideoFrame whose time is further off than this counts time otherwise
+
+/**
+ * @typedef {object} Frame
+ * @property {number} mediaTime seconds
+ * @property {number} shownAt milliseconds as of Date.now()
+ * @property {VideoFrame | null} image to be closed by who asked for it
+ */
+
+/**
+ * @param {HTMLVideoElement} video
+ * @param {() => boolean} wanted whether the image is
+ * @param {(frame: Frame) => void} tell
+ */
+export function watchFrames(video, wanted, tell) {
+  if (!('requestVideoFrameCallback' in video)) return watchTime(video, wanted, tell);
+  /** @type {VideoFrameRequestCallback} */
+  const shown = (now, { mediaTime, expectedDisplayTime }) => {
+    video.requestVideoFrameCallback(shown);
+    const shownAt = Date.now() + expectedDisplayTime - performance.now();
+    tell({ ...take(video, mediaTime, wanted()), shownAt });
+  };
+  video.requestVideoFrameCallback(shown);
+}
+
+/**
+ * @param {HTMLVideoElement} video
+ * @param {number} mediaTime of the frame that was last told of, seconds
+ * @param {boolean} wanted
+ * @returns {{mediaTime: number, image: VideoFrame | null}}
+ */
+export function take(video, mediaTime, wanted) {
+  if (!wanted || !globalThis.VideoFrame || video.readyState < HTMLMediaElement.HAVE_CURRENT_DATA) {
+    return { mediaTime, image: null };
+  }
+  try {
+    const image = new VideoFrame(video);
+    const time = image.timestamp / 1e6;
+    if (Math.abs(time - mediaTime) < SAME_PLAYBACK_S) return { mediaTime: time, image };
+    image.close();
+  } catch {
+    // No picture to take yet.
+  }
+  return { mediaTime, image: null };
+}
+
+/**
+ * @param {HTMLVideoElement} video
+ * @param {() => boolean} wanted
+ * @param {(frame: Frame) => void} tell
+ */
+function watchTime(video, wanted, tell) {
+  let last = -1;
+  const look = () => {
+    requestAnimationFrame(look);
+    if (video.currentTime === last || video.readyState < HTMLMediaElement.HAVE_CURRENT_DATA) return;
+    last = video.currentTime;
+    tell({ ...take(video, last, wanted()), shownAt: Date.now() });
+  };
+  requestAnimationFrame(look);
+}

@@ -1,0 +1,176 @@
+/** Puts the parts on the page. */
+
+import { Cameras } from './cameras.js';
+import { ServerClock } from './clock.js';
+import { ServerEvents } from './events.js';
+import { take, watchFrames } from './frames.js';
+import { getJson, pause } from './http.js';
+import { listenToKeys } from './keys.js';
+import { Overlay } from './overlay.js';
+import { People } from './people.js';
+import { Reason } from './reason.js';
+import { Strip } from './strip.js';
+import { Viewer } from './viewer.js';
+
+const READOUT_MS = 250;
+const CLOCK_EVERY_MS = 10_000;
+const CLOCK_SAMPLES = 4; // one after the other, at every connection
+const DELAY_FRAMES = 25; // whose median is shown
+const MISSING = '–';
+
+/**
+ * @template {HTMLElement} T
+ * @param {string} id
+ * @returns {T}
+ */
+function element(id) {
+  return /** @type {T} */ (document.getElementById(id));
+}
+
+const stage = element('stage');
+/** @type {HTMLVideoElement} */
+const video = element('video');
+/** @type {HTMLButtonElement} */
+const toggle = element('toggle-boxes');
+const [title, text] = /** @type {HTMLElement[]} */ ([...element('status').children]);
+
+const viewer = new Viewer(video, show);
+const people = new People(element('people'), element('earlier'), (object) => viewer.choose(object));
+const cameras = new Cameras(element('cameras'));
+const overlay = new Overlay(element('boxes'));
+const strip = new Strip(element('strip'));
+const reason = new Reason(element('reason'));
+const clock = new ServerClock();
+Object.assign(window, { myview: viewer.probe });
+
+/** Everything that does not change with every frame. */
+function show() {
+  const { site } = viewer;
+  if (site) {
+    element('site').textContent = site.name;
+    document.documentElement.style.setProperty('--picture', String(site.width / site.height));
+    document.body.classList.add('ready');
+    cameras.configure(site.cameras, viewer.palette);
+    cameras.show(viewer.cameras);
+  }
+  if (viewer.people) {
+    people.show(viewer.people, viewer.object, viewer.palette, (person) => viewer.isGone(person));
+    element('nobody').hidden = viewer.people.length > 0;
+  }
+  document.title = viewer.object === null ? 'MyView' : `Person ${viewer.object} · MyView`;
+  readOut();
+  repaint();
+}
+
+/** What changes with time alone. */
+function readOut() {
+  const status = viewer.status();
+  const { probe, site, palette, decisions } = viewer;
+  stage.dataset.state = status.state;
+  stage.classList.toggle('pictured', probe.pulse !== null && !['unknown', 'empty'].includes(status.state));
+  if (title.textContent !== status.title) title.textContent = status.title; // or it is read out again
+  if (text.textContent !== status.text) text.textContent = status.text;
+  const delay = median(probe.delays.slice(-DELAY_FRAMES).map(({ delayMs }) => delayMs ?? NaN));
+  element('delay').textContent = viewer.flowing && delay > 0 ? `${(delay / 1000).toFixed(1)} s` : MISSING;
+  if (!site || probe.pulse === null || viewer.object === null) return strip.clear();
+  strip.draw({ pulse: probe.pulse, fps: site.fps, object: viewer.object, decisions, palette });
+  void reason.about(viewer.object, probe.camera);
+}
+
+/** @param {number[]} values */
+function median(values) {
+  return values.sort((a, b) => a - b)[Math.floor(values.length / 2)] ?? NaN;
+}
+
+/** @param {VideoFrame | null} image of the frame now shown */
+function paint(image) {
+  if (viewer.boxesOn && viewer.site) overlay.draw(viewer.boxes, viewer.object, viewer.site, image);
+  else overlay.clear();
+  image?.close();
+}
+
+/** Between frames: another choice, boxes on or off, another size. */
+function repaint() {
+  if (viewer.probe.pulse === null || viewer.player.landing) return;
+  const frame = take(video, viewer.mediaTime, viewer.boxesOn);
+  if (frame.image) viewer.shown({ ...frame, shownAt: Date.now() });
+  paint(frame.image);
+}
+
+/** @type {string | null | undefined} */
+let marked;
+watchFrames(video, () => viewer.boxesOn, (frame) => {
+  if (viewer.player.landing) return frame.image?.close(); // told of again, when it is known whose it is
+  viewer.shown(frame);
+  paint(frame.image);
+  const { camera } = viewer.probe;
+  if (camera === marked) return;
+  marked = camera;
+  cameras.mark(camera);
+  element('camera').textContent = camera ?? '';
+  element('camera').style.setProperty('--camera', camera ? viewer.palette.colour(camera) : 'none');
+  if (viewer.probe.pulse !== null) readOut();
+});
+
+function toggleBoxes() {
+  viewer.boxesOn = !viewer.boxesOn;
+  toggle.setAttribute('aria-pressed', String(viewer.boxesOn));
+  repaint();
+}
+
+function fullScreen() {
+  if (document.fullscreenElement) void document.exitFullscreen();
+  else void stage.requestFullscreen?.();
+}
+
+/** @param {MouseEvent} event */
+function personAt(event) {
+  return viewer.site ? overlay.hit(viewer.boxes, viewer.site, event) : null;
+}
+
+toggle.addEventListener('click', toggleBoxes);
+element('full-screen').addEventListener('click', fullScreen);
+listenToKeys({ step: (by) => viewer.step(by), boxes: toggleBoxes, fullScreen });
+stage.addEventListener('mousemove', (event) => stage.classList.toggle('over-person', personAt(event) !== null));
+stage.addEventListener('click', (event) => {
+  if (video.paused) video.play().catch(() => undefined);
+  const object = personAt(event);
+  if (object !== null) viewer.choose(object);
+});
+
+async function setClock() {
+  try {
+    const sent = Date.now();
+    const site = await getJson('api/site');
+    clock.add(sent, Date.now(), site.now);
+    viewer.clockOffset = clock.offset;
+    viewer.setSite(site);
+  } catch {
+    // The events say when the server is away, and when it is back.
+  }
+}
+
+async function setClockWell() {
+  clock.clear();
+  for (let i = 0; i < CLOCK_SAMPLES; i += 1) {
+    await setClock();
+    await pause(READOUT_MS);
+  }
+}
+
+new ServerEvents({
+  opened: () => {
+    viewer.setConnected(true);
+    void setClockWell();
+  },
+  lost: () => viewer.setConnected(false),
+  heard: (name, data) => {
+    if (name === 'gop') viewer.addGop(data);
+    else if (name === 'site') viewer.setSite(data);
+    else if (name === 'objects') viewer.setPeople(data.objects);
+    else viewer.setCameras(data.cameras);
+  },
+});
+new ResizeObserver(repaint).observe(stage);
+setInterval(readOut, READOUT_MS);
+setInterval(setClock, CLOCK_EVERY_MS);

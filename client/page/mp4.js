@@ -1,0 +1,113 @@
+/**
+ * Cuts a progressive fragmented MP4 (ISO/IEC 14496-12) into whole segments.
+ *
+ * Only whole segments are ever appended to a SourceBuffer, so that a stream can be left at any byte
+ * and another continued in its place.
+ */
+
+const LARGEST_BOX = 64 * 1024 * 1024; // bytes; beyond any frame: such a size is damage, not video
+
+/**
+ * @typedef {object} Segment
+ * @property {'init' | 'media'} kind
+ * @property {Uint8Array} bytes
+ * @property {number} start seconds of media time of the first frame; 0 for an init segment
+ */
+
+export class SegmentSplitter {
+  /** @type {Uint8Array} bytes of a segment that is not whole yet */
+  #rest = new Uint8Array(0);
+  #timescale = 0;
+
+  /**
+   * @param {Uint8Array} chunk
+   * @returns {Segment[]} what has become whole
+   * @throws {Error} when the bytes are no MP4
+   */
+  push(chunk) {
+    this.#rest = join([this.#rest, chunk]);
+    const segments = [];
+    let from = 0;
+    for (const box of boxes(this.#rest)) {
+      if (box.type !== 'moov' && box.type !== 'mdat') continue;
+      segments.push(this.#segment(box.type, this.#rest.slice(from, box.end)));
+      from = box.end;
+    }
+    this.#rest = this.#rest.slice(from);
+    return segments;
+  }
+
+  /**
+   * @param {string} last type of the box that closes the segment
+   * @param {Uint8Array} bytes
+   * @returns {Segment}
+   */
+  #segment(last, bytes) {
+    if (last === 'moov') {
+      this.#timescale = timescale(find(bytes, ['moov', 'trak', 'mdia', 'mdhd']));
+      return { kind: 'init', bytes, start: 0 };
+    }
+    const ticks = decodeTime(find(bytes, ['moof', 'traf', 'tfdt']));
+    return { kind: 'media', bytes, start: ticks / this.#timescale };
+  }
+}
+
+/** @param {Uint8Array[]} parts */
+export function join(parts) {
+  const whole = new Uint8Array(parts.reduce((sum, part) => sum + part.length, 0));
+  let at = 0;
+  for (const part of parts) {
+    whole.set(part, at);
+    at += part.length;
+  }
+  return whole;
+}
+
+/**
+ * The whole boxes at the start of some bytes, in order.
+ *
+ * @param {Uint8Array} bytes
+ */
+function* boxes(bytes) {
+  const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
+  let at = 0;
+  while (at + 8 <= bytes.length) {
+    let size = view.getUint32(at);
+    let header = 8;
+    if (size === 1) {
+      if (at + 16 > bytes.length) return;
+      size = Number(view.getBigUint64(at + 8));
+      header = 16;
+    }
+    if (size < header || size > LARGEST_BOX) throw new Error(`not an MP4 box of ${size} bytes`);
+    if (at + size > bytes.length) return;
+    const type = String.fromCharCode(...bytes.subarray(at + 4, at + 8));
+    yield { type, body: bytes.subarray(at + header, at + size), end: at + size };
+    at += size;
+  }
+}
+
+/**
+ * @param {Uint8Array} bytes
+ * @param {string[]} path
+ * @returns {DataView} the body of the first box at that path
+ */
+function find(bytes, path) {
+  let body = bytes;
+  for (const type of path) {
+    const box = [...boxes(body)].find((candidate) => candidate.type === type);
+    if (!box) throw new Error(`no ${path.join('/')} in the MP4`);
+    body = box.body;
+  }
+  return new DataView(body.buffer, body.byteOffset, body.byteLength);
+}
+
+/** @param {DataView} mdhd */
+function timescale(mdhd) {
+  return mdhd.getUint32(mdhd.getUint8(0) === 1 ? 20 : 12);
+}
+
+/** @param {DataView} tfdt */
+function decodeTime(tfdt) {
+  return tfdt.getUint8(0) === 1 ? Number(tfdt.getBigUint64(4)) : tfdt.getUint32(4);
+}

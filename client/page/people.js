@@ -1,0 +1,163 @@
+/**
+ * The people to choose from, a card each: living thumbnail, number, who sees them.
+ *
+ * Cards are kept from one list to the next, so that focus stays where it is and pictures do not flash.
+ */
+
+import { relative } from './http.js';
+
+/** @import {Person} from './contract.js' */
+/** @import {Palette} from './palette.js' */
+
+export class People {
+  /** @type {Map<number, Card>} */
+  #cards = new Map();
+
+  /**
+   * @param {HTMLElement} here list element for those who are or were just in view
+   * @param {HTMLDetailsElement} earlier holds a list element for those who have not been for a while
+   * @param {(object: number) => void} choose
+   */
+  constructor(here, earlier, choose) {
+    this.here = here;
+    this.earlier = earlier;
+    this.gone = /** @type {HTMLElement} */ (earlier.querySelector('ul'));
+    this.choose = choose;
+  }
+
+  /**
+   * @param {Person[]} people
+   * @param {number | null} chosen
+   * @param {Palette} palette
+   * @param {(person: Person) => boolean} isGone not in view for a while
+   */
+  show(people, chosen, palette, isGone) {
+    const known = new Set(people.map((person) => person.object));
+    for (const [object, card] of this.#cards) {
+      if (known.has(object)) continue;
+      card.item.remove();
+      this.#cards.delete(object);
+    }
+    for (const person of [...people].sort((a, b) => a.object - b.object)) {
+      const card = this.#card(person.object);
+      card.update(person, person.object === chosen, palette);
+      const away = isGone(person) && person.object !== chosen;
+      this.#place(card.item, away ? this.gone : this.here, person.object);
+    }
+    this.earlier.hidden = this.gone.children.length === 0;
+  }
+
+  /** @param {number} object */
+  #card(object) {
+    let card = this.#cards.get(object);
+    if (!card) {
+      card = new Card(object, () => this.choose(object));
+      this.#cards.set(object, card);
+    }
+    return card;
+  }
+
+  /**
+   * In the order of the numbers; a card that is in its place is not touched, or it would lose the focus.
+   *
+   * @param {HTMLElement} item
+   * @param {HTMLElement} list
+   * @param {number} object
+   */
+  #place(item, list, object) {
+    if (item.parentElement === list) return;
+    const after = [...list.children].find((other) => Number(/** @type {HTMLElement} */ (other).dataset.object) > object);
+    list.insertBefore(item, after ?? null);
+  }
+}
+
+class Card {
+  #thumbnail = '';
+
+  /**
+   * @param {number} object
+   * @param {() => void} choose
+   */
+  constructor(object, choose) {
+    this.item = document.createElement('li');
+    this.item.dataset.object = String(object);
+    this.button = document.createElement('button');
+    this.button.type = 'button';
+    this.button.className = 'person';
+    this.button.addEventListener('click', choose);
+    this.image = document.createElement('img');
+    this.image.alt = '';
+    this.image.hidden = true;
+    this.seenBy = element('span', 'seen-by');
+    const picture = element('span', 'thumbnail');
+    const number = element('span', 'number');
+    number.textContent = String(object);
+    picture.append(this.image, number);
+    this.button.append(picture, this.seenBy);
+    this.item.append(this.button);
+  }
+
+  /**
+   * @param {Person} person
+   * @param {boolean} chosen
+   * @param {Palette} palette
+   */
+  update(person, chosen, palette) {
+    this.button.setAttribute('aria-current', String(chosen));
+    this.button.classList.toggle('away', !person.visible);
+    const seen = person.cameras.length ? `seen by ${person.cameras.join(', ')}` : 'not in view';
+    this.button.setAttribute('aria-label', `Person ${person.object}, ${seen}`);
+    this.button.title = `Person ${person.object}, ${seen}`;
+    this.#showCameras(person, palette);
+    if (person.thumbnail && person.thumbnail !== this.#thumbnail) void this.#load(person.thumbnail);
+  }
+
+  /**
+   * @param {Person} person
+   * @param {Palette} palette
+   */
+  #showCameras(person, palette) {
+    const text = person.cameras.join(' ');
+    if (this.seenBy.dataset.cameras === text) return;
+    this.seenBy.dataset.cameras = text;
+    const chips = person.cameras.map((camera) => {
+      const chip = element('span', 'chip');
+      chip.style.setProperty('--camera', palette.colour(camera));
+      chip.textContent = camera;
+      return chip;
+    });
+    if (!chips.length) chips.push(element('span', 'nobody'));
+    this.seenBy.replaceChildren(...chips);
+  }
+
+  /**
+   * Shown only when it is there, so that the old picture stays until then.
+   *
+   * @param {string} address
+   */
+  async #load(address) {
+    this.#thumbnail = address;
+    const next = new Image();
+    next.alt = '';
+    next.src = relative(address);
+    try {
+      await next.decode();
+    } catch {
+      this.#thumbnail = ''; // the next list tries again
+      return;
+    }
+    if (this.#thumbnail !== address) return;
+    this.image.replaceWith(next);
+    this.image = next;
+  }
+}
+
+/**
+ * @param {string} name
+ * @param {string} className
+ */
+function element(name, className) {
+  const made = document.createElement(name);
+  made.className = className;
+  return made;
+}

@@ -1,0 +1,229 @@
+/**
+ * The best view of one person after another, live, in one video element that is never reloaded.
+ *
+ * Media Source Extensions: switching person leaves the old download and continues with the new
+ * stream's init segment in the same SourceBuffer, over the same moments.
+ */
+
+import { Backoff } from './backoff.js';
+import { MediaBuffer } from './buffer.js';
+import { download } from './download.js';
+import { pause } from './http.js';
+import { join } from './mp4.js';
+import { Pace } from './pace.js';
+
+/** @import {Segment} from './mp4.js' */
+
+const TICK_MS = 100;
+const RESTARTED_S = 10; // a stream that begins this far back is of a site whose pulses began anew
+const LANDING_MS = 300; // how long a new stream may take to reach the moment now shown
+const PAUSED_S = 30; // of video that waits behind a paused picture; then the download stops
+const INSIDE_S = 0.001; // a seek to the very start of a range may round to just before it
+
+/**
+ * One download of one person's stream.
+ *
+ * @typedef {object} Run
+ * @property {number} object
+ * @property {AbortController} leave
+ * @property {number} start media time of its first frame; NaN before that came
+ * @property {number} since performance.now() of when its first frame was in the buffer; NaN before
+ * @property {boolean} landed whether the picture now comes from it
+ */
+
+/** @type {typeof MediaSource | undefined} iPhones have only the managed kind */
+const Source = /** @type {any} */ (globalThis).ManagedMediaSource ?? globalThis.MediaSource;
+
+export class Player {
+  /** @type {Run | null} */
+  #run = null;
+  /** @type {Promise<MediaBuffer> | null} */
+  #buffer = null;
+  /** @type {MediaBuffer | null} */
+  #opened = null;
+  /** @type {Run | null} whose first picture the element is about to show */
+  #landing = null;
+  #pace = new Pace();
+  #codec = '';
+  /** @type {number | null} whose picture the element shows */
+  shown = null;
+
+  /**
+   * @param {HTMLVideoElement} video
+   * @param {object} listener
+   * @param {(object: number) => void} listener.landed the picture is now of this person
+   */
+  constructor(video, listener) {
+    this.video = video;
+    this.listener = listener;
+    video.disableRemotePlayback = true; // or the managed kind does not open
+    video.addEventListener('waiting', () => {
+      if (!video.seeking && this.#run?.landed) this.#pace.stalled();
+    });
+    video.addEventListener('error', () => this.#reopen());
+    video.addEventListener('play', () => {
+      if (!this.#run && this.shown !== null) this.choose(this.shown);
+    });
+    setInterval(() => this.#tick(), TICK_MS);
+  }
+
+  /**
+   * @param {string} codec
+   * @returns {boolean} whether this browser can play such streams at all
+   */
+  configure(codec) {
+    if (!Source?.isTypeSupported(mime(codec))) return false;
+    if (codec !== this.#codec) {
+      this.#codec = codec;
+      this.#reopen();
+    }
+    return true;
+  }
+
+  /** @param {number} object whom to show from now on */
+  choose(object) {
+    if (this.#run?.object === object) return;
+    this.#run?.leave.abort();
+    this.#run = begin(object);
+    void this.#follow(this.#run);
+  }
+
+  #reopen() {
+    const object = this.#run?.object;
+    this.#run?.leave.abort();
+    this.#run = this.#landing = null;
+    this.#opened = null;
+    this.#buffer = this.#open();
+    if (object !== undefined) this.choose(object);
+  }
+
+  /** @returns {Promise<MediaBuffer>} */
+  async #open() {
+    const source = new /** @type {typeof MediaSource} */ (Source)();
+    const address = URL.createObjectURL(source);
+    this.video.src = address;
+    await new Promise((resolve) => source.addEventListener('sourceopen', resolve, { once: true }));
+    URL.revokeObjectURL(address);
+    this.#opened = new MediaBuffer(source.addSourceBuffer(mime(this.#codec)));
+    this.video.play().catch(() => undefined); // the page says that it is paused, and how to go on
+    return this.#opened;
+  }
+
+  /** @param {Run} run */
+  async #follow(run) {
+    const { signal } = run.leave;
+    const backoff = new Backoff();
+    while (!signal.aborted) {
+      try {
+        for await (const segments of download(`objects/${run.object}/best.mp4`, signal)) {
+          await this.#take(run, segments);
+          if (signal.aborted) return;
+          backoff.reset();
+        }
+      } catch (error) {
+        // Whatever it was (the server away, the person not known yet), the answer is to try again.
+        if (!signal.aborted) console.info(`the stream of ${run.object}: ${error}`);
+      }
+      if (signal.aborted) return;
+      run.start = run.since = NaN;
+      await pause(backoff.next(), signal);
+    }
+  }
+
+  /**
+   * @param {Run} run
+   * @param {Segment[]} segments
+   */
+  async #take(run, segments) {
+    const buffer = await /** @type {Promise<MediaBuffer>} */ (this.#buffer);
+    if (run.leave.signal.aborted) return;
+    const first = segments.find((segment) => segment.kind === 'media');
+    if (first && Number.isNaN(run.start)) {
+      run.start = first.start;
+      // Nothing of the old stream may be met again behind the edge of the new one.
+      const anew = run.start < this.video.currentTime - RESTARTED_S;
+      if (anew) run.landed = false;
+      await buffer.remove(anew ? 0 : run.start, Infinity);
+      if (run.leave.signal.aborted) return;
+    }
+    await buffer.append(join(segments.map((segment) => segment.bytes)), this.video.currentTime);
+    if (!first) return;
+    if (Number.isNaN(run.since)) run.since = performance.now();
+    this.#land(run, buffer);
+  }
+
+  /**
+   * Make the element show the new stream now: a seek drops the frames it has already decoded.
+   *
+   * @param {Run} run
+   * @param {MediaBuffer} buffer
+   */
+  #land(run, buffer) {
+    if (run.landed || run !== this.#run || Number.isNaN(run.since)) return;
+    const end = buffer.ranges.at(-1)?.[1] ?? 0;
+    const time = this.video.currentTime;
+    const within = run.start <= time && time < end;
+    const before = time < run.start || run.start < time - RESTARTED_S;
+    if (!within && !before && performance.now() - run.since < LANDING_MS) return;
+    run.landed = true;
+    this.#landing = run;
+    this.video.addEventListener('seeked', () => this.#showing(run), { once: true });
+    this.#seek(within ? time : run.start + INSIDE_S);
+    if (this.video.paused) this.video.play().catch(() => undefined);
+  }
+
+  /** @returns {boolean} whether it is open just now if the picture is still of who was shown before */
+  get landing() {
+    return this.#landing !== null;
+  }
+
+  /** @param {Run} run */
+  #showing(run) {
+    if (run !== this.#landing) return;
+    this.#landing = null;
+    this.shown = run.object;
+    this.listener.landed(run.object);
+  }
+
+  /** @param {number} time */
+  #seek(time) {
+    this.#pace.reset();
+    this.video.currentTime = time;
+  }
+
+  #tick() {
+    const { video } = this;
+    const run = this.#run;
+    const buffer = this.#opened;
+    if (!run || !buffer) return;
+    this.#land(run, buffer);
+    if (!run.landed) return;
+    const { ranges } = buffer;
+    if (video.paused) {
+      if ((ranges.at(-1)?.[1] ?? 0) - video.currentTime > PAUSED_S) this.stop();
+      return;
+    }
+    const step = this.#pace.step(performance.now() / 1000, video.currentTime, ranges);
+    if (step.seek !== null) this.#seek(step.seek);
+    if (video.playbackRate !== step.rate) video.playbackRate = step.rate;
+  }
+
+  /** Leave the stream; the last frame stays. */
+  stop() {
+    this.#run?.leave.abort();
+    this.#run = null;
+  }
+}
+
+/**
+ * @param {number} object
+ * @returns {Run}
+ */
+function begin(object) {
+  return { object, leave: new AbortController(), start: NaN, since: NaN, landed: false };
+}
+
+/** @param {string} codec */
+function mime(codec) {
+  return `video/mp4; codecs="${codec}"`;
+}

@@ -1,0 +1,79 @@
+/** The last minute as a band coloured by camera, and a little of what is already decided beyond. */
+
+import { Surface } from './surface.js';
+
+/** @import {Decisions} from './decisions.js' */
+/** @import {Palette} from './palette.js' */
+
+const PAST_S = 60;
+const AHEAD_S = 2;
+const GAP = 1; // CSS pixels cut out of the band at every cut
+const LETTERS = '600 11px system-ui, sans-serif';
+const DECIDED_ALPHA = 0.45; // decided, not yet shown
+
+/**
+ * @typedef {object} Moment what the strip shows
+ * @property {number} pulse now shown
+ * @property {number} fps
+ * @property {number} object
+ * @property {Decisions} decisions
+ * @property {Palette} palette
+ */
+
+export class Strip {
+  /** @param {HTMLCanvasElement} canvas */
+  constructor(canvas) {
+    this.surface = new Surface(canvas);
+  }
+
+  clear() {
+    this.surface.clear();
+  }
+
+  /** @param {Moment} moment */
+  draw({ pulse, fps, object, decisions, palette }) {
+    const context = this.surface.clear();
+    const { width, height } = this.surface;
+    const from = pulse - PAST_S * fps;
+    const perFrame = width / ((PAST_S + AHEAD_S) * fps);
+    /** @param {number} at */
+    const x = (at) => (at - from) * perFrame;
+    for (const run of decisions.runs(object, from)) {
+      const [left, right] = [x(run.first), Math.min(x(run.end), width) - GAP];
+      context.fillStyle = palette.colour(run.camera);
+      context.fillRect(left, 0, right - left, height);
+      writeName(context, run.camera, left, right, height);
+    }
+    shadeUndone(context, x(pulse), width, height);
+  }
+}
+
+/**
+ * The name in the band, where it fits: nobody has to tell colours apart.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {string} camera
+ * @param {number} left
+ * @param {number} right
+ * @param {number} height
+ */
+function writeName(context, camera, left, right, height) {
+  context.font = LETTERS;
+  if (context.measureText(camera).width + 10 > right - left) return;
+  context.textBaseline = 'middle';
+  context.fillStyle = 'rgba(0, 0, 0, 0.8)';
+  context.fillText(camera, left + 5, height / 2 + 0.5);
+}
+
+/**
+ * @param {CanvasRenderingContext2D} context
+ * @param {number} now where the frame now shown is
+ * @param {number} width
+ * @param {number} height
+ */
+function shadeUndone(context, now, width, height) {
+  context.fillStyle = `rgba(16, 17, 18, ${1 - DECIDED_ALPHA})`;
+  context.fillRect(now, 0, width - now, height);
+  context.fillStyle = '#fff';
+  context.fillRect(now - 1, 0, 2, height);
+}

@@ -1,0 +1,197 @@
+/** What the page knows and what follows from it: the one place where the parts meet. */
+
+import { onAddress, objectInAddress, writeAddress } from './address.js';
+import { Decisions } from './decisions.js';
+import { Palette } from './palette.js';
+import { Player } from './player.js';
+import { Probe } from './probe.js';
+import { describe } from './status.js';
+
+/** @import {Box, Camera, Gop, Person, Site} from './contract.js' */
+/** @import {Frame} from './frames.js' */
+/** @import {Status} from './status.js' */
+
+const STANDING_MS = 1500; // without a new frame the picture counts as standing
+const RECENT_S = 10; // after this out of view a person belongs to the earlier ones
+const RESTART_S = 1; // pulse 0 moved by more than this: the pulses began anew
+
+export class Viewer {
+  /** @type {Site | null} */
+  site = null;
+  /** @type {Person[] | null} */
+  people = null;
+  /** @type {Camera[]} */
+  cameras = [];
+  /** @type {number | null} */
+  object = objectInAddress();
+  palette = new Palette([]);
+  decisions = new Decisions(1);
+  probe = new Probe();
+  connected = false;
+  supported = true;
+  boxesOn = true;
+  mediaTime = 0; // seconds, of the frame now shown
+  /** @type {Box[]} of the frame now shown */
+  boxes = [];
+  #asked = this.object !== null; // by the viewer, not by default
+  #frameAt = -Infinity;
+  #chosenAt = -Infinity;
+
+  /**
+   * @param {HTMLVideoElement} video
+   * @param {() => void} changed something to show has changed
+   */
+  constructor(video, changed) {
+    this.changed = changed;
+    this.player = new Player(video, { landed: changed });
+    this.probe.object = this.object;
+    onAddress((object) => object !== null && this.#turnTo(object, true));
+  }
+
+  /** @param {Site} site */
+  setSite(site) {
+    const old = this.site;
+    const anew = !old || old.fps !== site.fps || Math.abs((old.pulse0 ?? 0) - (site.pulse0 ?? 0)) > RESTART_S;
+    if (anew) this.decisions = new Decisions(site.fps);
+    this.site = this.probe.site = site;
+    this.palette = new Palette(site.cameras);
+    this.supported = this.player.configure(site.codec);
+    this.#play();
+    this.changed();
+  }
+
+  /** @param {Person[]} people */
+  setPeople(people) {
+    this.people = people;
+    const lost = this.object !== null && !this.chosen;
+    if (this.object === null || (lost && !this.#asked)) this.#chooseDefault();
+    this.#play();
+    this.changed();
+  }
+
+  /** @param {Camera[]} cameras */
+  setCameras(cameras) {
+    this.cameras = cameras;
+    this.changed();
+  }
+
+  /** @param {Gop} gop */
+  addGop(gop) {
+    this.decisions.add(gop);
+  }
+
+  /** @param {boolean} connected */
+  setConnected(connected) {
+    this.connected = connected;
+    this.changed();
+  }
+
+  /** @returns {Person | undefined} */
+  get chosen() {
+    return this.people?.find((person) => person.object === this.object);
+  }
+
+  /** @param {number} object as the viewer wishes */
+  choose(object) {
+    this.#turnTo(object, true);
+    writeAddress(object, true);
+  }
+
+  /** @param {number} by steps through those in view, around the end */
+  step(by) {
+    const shown = (this.people ?? []).filter((person) => person.visible || person.object === this.object);
+    const numbers = shown.map((person) => person.object).sort((a, b) => a - b);
+    if (!numbers.length) return;
+    const at = numbers.indexOf(this.object ?? NaN);
+    this.choose(numbers.at((at + by) % numbers.length) ?? numbers[0]);
+  }
+
+  /** @param {Person} person */
+  isGone(person) {
+    const fps = this.site?.fps ?? 1;
+    return !person.visible && this.decisions.end - person.last_seen > RECENT_S * fps;
+  }
+
+  /** @param {Frame} frame */
+  shown({ mediaTime, shownAt }) {
+    const pulse = Math.round(mediaTime * (this.site?.fps ?? 1));
+    this.mediaTime = mediaTime;
+    // The same moment may be shown again, of somebody else.
+    if (pulse !== this.probe.pulse) {
+      this.#frameAt = performance.now();
+      this.probe.frame({ pulse, shownAt, delayMs: this.#delay(pulse, shownAt) });
+    }
+    const object = this.player.shown;
+    if (object !== null) {
+      const camera = this.decisions.camera(object, pulse);
+      this.probe.view(object, camera, shownAt);
+      this.boxes = camera === null ? [] : this.decisions.boxes(camera, pulse);
+    }
+  }
+
+  /** @returns {boolean} whether new frames are being shown */
+  get flowing() {
+    return performance.now() - this.#frameAt < STANDING_MS;
+  }
+
+  /** @returns {Status} */
+  status() {
+    const { flowing } = this;
+    const status = describe({
+      supported: this.supported,
+      connected: this.connected,
+      known: this.site !== null && this.people !== null,
+      people: this.people?.length ?? 0,
+      object: this.object,
+      listed: this.chosen !== undefined,
+      visible: this.chosen?.visible ?? false,
+      paused: this.player.video.paused && this.probe.pulse !== null,
+      moving: flowing && (this.player.shown === this.object || performance.now() - this.#chosenAt < STANDING_MS),
+    });
+    this.probe.state = status.state;
+    return status;
+  }
+
+  /** @type {number | null} milliseconds that the server's clock is ahead; set from outside */
+  clockOffset = null;
+
+  /**
+   * @param {number} pulse
+   * @param {number} shownAt
+   */
+  #delay(pulse, shownAt) {
+    const { site, clockOffset } = this;
+    if (!site || site.pulse0 === null || clockOffset === null) return null;
+    return shownAt + clockOffset - (site.pulse0 + pulse / site.fps) * 1000;
+  }
+
+  #chooseDefault() {
+    const first = this.people?.filter((person) => person.visible).sort((a, b) => a.object - b.object)[0];
+    if (first) {
+      this.#turnTo(first.object, false);
+      writeAddress(first.object, false);
+    } else if (!this.#asked) {
+      this.object = this.probe.object = null;
+    }
+  }
+
+  /**
+   * @param {number} object
+   * @param {boolean} asked
+   */
+  #turnTo(object, asked) {
+    this.#asked = asked;
+    if (object === this.object) return;
+    this.object = object;
+    this.#chosenAt = performance.now();
+    this.probe.choose(object);
+    this.#play();
+    this.changed();
+  }
+
+  #play() {
+    if (!this.site || !this.supported || !this.people) return;
+    if (this.object !== null && this.chosen) this.player.choose(this.object);
+    else this.player.stop();
+  }
+}

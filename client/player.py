@@ -1,0 +1,166 @@
+"""Watching the best view of one object: counted, or recorded to a file."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from yarl import URL
+
+from client.commentary import Commentary, following
+from client.fmp4 import BoxReader, Mp4Error
+from client.http import AwayError, ContractError, HttpSettings, NotFoundError, get, server_url
+from client.recording import Recording, StreamChangedError, recording
+
+_DEFAULT = HttpSettings()
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """How far a recording is."""
+
+    seconds: float
+    """Media seconds so far."""
+    bytes: int
+    camera: str | None
+    """Which camera is shown; None as long as it is not known."""
+    cuts: int
+    """Changes of the camera so far, as far as they are known."""
+    reconnections: int
+    """How many times the stream had to be opened again."""
+
+
+@dataclass(frozen=True, slots=True)
+class Watched:
+    """What came of it."""
+
+    out: Path | None
+    """The file; None if nothing was to be recorded."""
+    seconds: float
+    """Media seconds."""
+    bytes: int
+    fragments: int
+    cuts: int
+    reconnections: int
+    complete: bool
+    """All the seconds asked for are there; False if the server went away for good before."""
+
+
+Report = Callable[[Progress], None]
+
+
+async def watch(
+    url: str,
+    number: int,
+    out: Path | None = None,
+    seconds: float | None = None,
+    progress: Report | None = None,
+    *,
+    settings: HttpSettings = _DEFAULT,
+) -> Watched:
+    """Follow the best view of object ``number`` for ``seconds`` of media time (None: until cancelled).
+
+    The stream is the server's own fragmented MP4, unchanged; whole fragments only. With ``out`` it is
+    recorded in ``out.part``, renamed at the end. Cancelling keeps what is there. When the server goes away
+    it is sought again; if it does not come back, what was recorded is kept and ``complete`` is False.
+
+    Raises:
+        ValueError: ``url`` is no address.
+        NotFoundError: there is no such object.
+        AwayError: the server could not be reached at all, or never sent any media.
+        ContractError: what comes is not such a stream.
+        OSError: the file cannot be written.
+    """
+    server = server_url(url)
+    with recording(out, seconds) as record:
+        async with following(url, number, settings) as commentary:
+            session = _Session(record, commentary, progress)
+            complete = await session.run(server / f"objects/{number}/best.mp4", settings)
+    return Watched(
+        out,
+        record.seconds,
+        record.bytes,
+        record.fragments,
+        session.cuts,
+        session.reconnections,
+        complete,
+    )
+
+
+async def record(
+    url: str, number: int, out: Path, seconds: float | None = None, settings: HttpSettings = _DEFAULT
+) -> Watched:
+    """Record the best view of object ``number`` to ``out``: ``watch`` without a report."""
+    return await watch(url, number, out, seconds, settings=settings)
+
+
+class _Session:
+    """One recording over as many connections as it takes."""
+
+    def __init__(self, record: Recording, commentary: Commentary, report: Report | None) -> None:
+        self._record = record
+        self._commentary = commentary
+        self._report = report
+        self._camera: str | None = None
+        self.cuts = 0
+        self.reconnections = 0
+
+    async def run(self, address: URL, settings: HttpSettings) -> bool:
+        """Stream until full (True) or the server is gone for good (False)."""
+        failures = 0
+        while True:
+            before = self._record.fragments
+            try:
+                if await self._connection(address, settings):
+                    return True
+                problem = AwayError(f"{address.origin()}: the stream has ended")
+            except StreamChangedError:
+                return False
+            except (AwayError, NotFoundError) as error:
+                # A server that has just been restarted does not know its objects yet.
+                if isinstance(error, NotFoundError) and not self._record.fragments:
+                    raise
+                problem = AwayError(str(error))
+            failures = 1 if self._record.fragments > before else failures + 1
+            if failures > settings.retries:
+                if self._record.fragments:
+                    return False
+                raise problem
+            await asyncio.sleep(settings.backoff(failures))
+            self.reconnections += 1
+
+    async def _connection(self, address: URL, settings: HttpSettings) -> bool:
+        """Stream over one connection; True when full, False when it has ended."""
+        boxes = BoxReader()
+        self._record.reconnected()
+        async with get(address, settings, "video/mp4") as answer:
+            async for data in answer.content.iter_any():
+                try:
+                    if not self._take(boxes, data):
+                        return True
+                except StreamChangedError:
+                    raise
+                except Mp4Error as error:
+                    raise ContractError(f"{address} is not a fragmented MP4: {error}") from error
+        return False
+
+    def _take(self, boxes: BoxReader, data: bytes) -> bool:
+        before = self._record.fragments
+        more = all(self._record.take(box) for box in boxes.feed(data))
+        if self._record.fragments > before:
+            self._tell()
+        return more
+
+    def _tell(self) -> None:
+        camera = self._commentary.camera_at(self._record.media_time)
+        if camera is not None and camera != self._camera:
+            self.cuts += self._camera is not None
+            self._camera = camera
+        if self._report is not None:
+            self._report(
+                Progress(
+                    self._record.seconds, self._record.bytes, self._camera, self.cuts, self.reconnections
+                )
+            )

@@ -1,0 +1,135 @@
+"""A stream on its way into a file: whole fragments only, and the file appears when it is finished."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from io import BufferedWriter
+from pathlib import Path
+
+from client.fmp4 import MAX_BOX, Mp4Box, Mp4Error, decode_time, timescale
+
+
+class StreamChangedError(Mp4Error):
+    """The server's stream has another format than the recording began with."""
+
+
+class Recording:
+    """Takes the boxes of one or more connections; ``out`` None: only counts them.
+
+    The header of the first connection serves all; a later one must be equal to it.
+    """
+
+    def __init__(self, out: BufferedWriter | None, seconds: float | None) -> None:
+        self._out = out
+        self._limit = seconds
+        self._header = b""  # ftyp and moov, as in the file
+        self._arriving = b""  # the header of the present connection
+        self._timescale = 0
+        self._fragment: list[bytes] = []
+        self._time: int | None = None
+        self._first: int | None = None
+        self._last = 0
+        self.bytes = 0
+        self.fragments = 0
+
+    @property
+    def seconds(self) -> float:
+        """Media time from the first fragment to the beginning of the last."""
+        return 0.0 if self._first is None else (self._last - self._first) / self._timescale
+
+    @property
+    def media_time(self) -> float | None:
+        """Media time of the last fragment in seconds: pulse / fps; None before the first."""
+        return None if self._first is None else self._last / self._timescale
+
+    def reconnected(self) -> None:
+        """Begin with a new connection: what was not whole is dropped."""
+        self._arriving = b""
+        self._fragment = []
+        self._time = None
+
+    def take(self, box: Mp4Box) -> bool:
+        """Take the next box; False when ``seconds`` are full: the box is not taken.
+
+        Raises:
+            Mp4Error: not a fragmented MP4 with a time in each fragment.
+            StreamChangedError: the format has changed.
+        """
+        match box.kind:
+            case b"ftyp":
+                self._arriving = box.data
+            case b"moov":
+                self._take_header(box)
+            case b"moof":
+                self._time = decode_time(box)
+                if self._is_full(self._time):
+                    return False
+                self._fragment.append(box.data)
+            case b"mdat":
+                self._finish_fragment(box.data)
+            case _:  # styp, sidx, emsg, or what a later server adds: part of the fragment after it
+                self._fragment.append(box.data)
+                if sum(map(len, self._fragment)) > MAX_BOX:
+                    raise Mp4Error("boxes without media")
+        return True
+
+    def _take_header(self, moov: Mp4Box) -> None:
+        header = self._arriving + moov.data
+        if self._header and header != self._header:
+            raise StreamChangedError("the stream has changed its format; the recording ends before it")
+        if not self._header:
+            self._timescale = timescale(moov)
+            self._header = header
+            self._write(header)
+        self._fragment = []
+
+    def _is_full(self, time: int) -> bool:
+        if not self._timescale:
+            raise Mp4Error("a fragment before the header")
+        if self._limit is None:
+            return False
+        return self._first is not None and time - self._first >= self._limit * self._timescale
+
+    def _finish_fragment(self, mdat: bytes) -> None:
+        time, self._time = self._time, None
+        if time is None:
+            raise Mp4Error("media without a fragment header")
+        fragment, self._fragment = b"".join(self._fragment) + mdat, []
+        if self._first is None:
+            self._first = time
+        elif time <= self._last:
+            return  # sent again after a reconnection
+        self._last = time
+        self.fragments += 1
+        self._write(fragment)
+
+    def _write(self, data: bytes) -> None:
+        self.bytes += len(data)
+        if self._out is not None:
+            self._out.write(data)
+
+
+@contextmanager
+def recording(out: Path | None, seconds: float | None) -> Iterator[Recording]:
+    """Record into ``out.part``, which becomes ``out`` at the end, however it ends, if it has any media.
+
+    An interrupted recording is whole up to its last fragment, hence kept; an empty one leaves nothing.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    if out is None:
+        yield Recording(None, seconds)
+        return
+    part = out.with_name(out.name + ".part")
+    kept = None
+    try:
+        with part.open("wb") as file:
+            kept = Recording(file, seconds)
+            yield kept
+    finally:
+        if kept is not None and kept.fragments:
+            part.replace(out)
+        else:
+            part.unlink(missing_ok=True)

@@ -1,0 +1,32 @@
+"""Fixtures of the client's tests."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
+import pytest
+from aiohttp.test_utils import TestServer
+from site_by_hand import HandMadeSite
+
+
+@pytest.fixture
+def hand_made_site() -> HandMadeSite:
+    return HandMadeSite()
+
+
+@pytest.fixture
+async def site_url(hand_made_site: HandMadeSite) -> AsyncIterator[str]:
+    """Serve the hand-made site over real HTTP; give its address."""
+    async with _served(hand_made_site) as url:
+        yield url
+
+
+@asynccontextmanager
+async def _served(site: HandMadeSite) -> AsyncIterator[str]:
+    server = TestServer(site.app())
+    await server.start_server(shutdown_timeout=0.1)
+    try:
+        yield str(server.make_url("/"))
+    finally:
+        await server.close()

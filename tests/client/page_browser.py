@@ -1,0 +1,80 @@
+"""Debian's Chromium, without a screen, opened on a fake site."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+from collections.abc import AsyncIterator
+from dataclasses import dataclass
+from typing import Any
+
+import av
+import numpy as np
+import numpy.typing as npt
+import pytest
+from page_site import FakeSite, SiteServer, serving
+from playwright.async_api import Browser, Page, async_playwright
+
+from benchmarks.browser import CHROMIUM, FLAGS
+
+PATIENCE_MS = 15_000  # a slow core with other work
+
+needs_chromium = pytest.mark.skipif(not CHROMIUM.exists(), reason=f"needs a Chromium at {CHROMIUM}")
+
+
+@dataclass(frozen=True, slots=True)
+class Visit:
+    """A page that is open on a site."""
+
+    page: Page
+    server: SiteServer
+
+    async def until(self, condition: str) -> None:
+        """Wait until a JavaScript expression holds."""
+        await self.page.wait_for_function(condition, timeout=PATIENCE_MS)
+
+    async def playing(self, person: int) -> None:
+        """Wait until frames of a person are being shown."""
+        await self.until(
+            f"myview.state === 'playing' && myview.object === {person} && myview.camera !== null"
+            " && myview.switches.every((s) => s.object !== myview.object || s.shownAt !== null)"
+        )
+
+    async def get(self, expression: str) -> Any:
+        """Give the value of a JavaScript expression."""
+        return await self.page.evaluate(expression)
+
+    async def screenshot(self) -> npt.NDArray[np.int16]:
+        """Give what is on the stage now, shape (height, width, 3), red, green, blue."""
+        image = await self.page.locator("#stage").screenshot()
+        with av.open(io.BytesIO(image), "r") as container:
+            return next(container.decode(video=0)).to_ndarray(format="rgb24").astype(np.int16)
+
+
+@contextlib.asynccontextmanager
+async def launched() -> AsyncIterator[Browser]:
+    """Run a browser."""
+    async with async_playwright() as playwright:
+        browser = await playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        try:
+            yield browser
+        finally:
+            await browser.close()
+
+
+@contextlib.asynccontextmanager
+async def visiting(
+    browser: Browser, site: FakeSite | None = None, query: str = "", width: int = 800, height: int = 900
+) -> AsyncIterator[Visit]:
+    """Open the page on a site; an exception in the page fails the test."""
+    failures: list[str] = []
+    async with serving(site or FakeSite()) as server:
+        # The site's policy forbids eval, which the conditions of these tests are evaluated with.
+        page = await browser.new_page(viewport={"width": width, "height": height}, bypass_csp=True)
+        page.on("pageerror", lambda error: failures.append(str(error)))
+        try:
+            await page.goto(server.url + query)
+            yield Visit(page, server)
+        finally:
+            await page.close()
+    assert not failures

@@ -1,0 +1,256 @@
+"""A small site that speaks the HTTP contract, for the page to be tried against: three test patterns."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import io
+import json
+import time
+from collections.abc import AsyncIterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import av
+from aiohttp import web
+from page_pattern import CAMERAS, FPS, GOP, HEIGHT, SQUARE, WIDTH, pattern, picture, second, square
+
+PAGE = Path(__file__).resolve().parents[2] / "client" / "page"
+LOOKAHEAD = 10  # frames between the pulse and what is served
+HOLD = 3 * GOP  # frames for which person 1 is shown by one camera
+STARTS_AT = 12_345_678  # the pulse of the site's first moment: far from zero, as on a site up for days
+
+REASON = "Another camera sees this person a little better, but not by enough to be worth a cut so soon."
+# As strict as a server may be: nothing from elsewhere, no code or style inside the page.
+POLICY = "default-src 'self'; media-src 'self' blob:; img-src 'self' data: blob:"
+
+
+@dataclass(slots=True)
+class FakeSite:
+    """What the site says, and switches for what may go wrong.
+
+    Args:
+        bursts: Send whole GOPs at once instead of frame by frame.
+        people: Who is known, and whether they are in view.
+        first_pulse: Pulse of about the moment at which the site is made.
+        skipped: Pulses whose frames are missing from every stream.
+        opened: Whose stream was asked for, in order.
+        pulse0: Unix seconds at which pulse 0 was due.
+    """
+
+    bursts: bool = False
+    people: dict[int, bool] = field(default_factory=lambda: {1: True, 2: True})
+    first_pulse: int = STARTS_AT
+    skipped: range = range(0)
+    opened: list[int] = field(default_factory=list)
+    pulse0: float = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.pulse0 = time.time() - (self.first_pulse + LOOKAHEAD + 3 * GOP) / FPS
+
+    @property
+    def edge(self) -> int:
+        """Give the newest pulse that is decided and served."""
+        return int((time.time() - self.pulse0) * FPS) - LOOKAHEAD
+
+    def camera(self, person: int, pulse: int) -> int:
+        return (pulse // HOLD) % len(CAMERAS) if person == 1 else 2
+
+    def site(self) -> dict[str, Any]:
+        return {
+            "name": "Test patterns",
+            "fps": FPS,
+            "width": WIDTH,
+            "height": HEIGHT,
+            "gop": GOP,
+            "lookahead_frames": LOOKAHEAD,
+            "codec": "avc1.42C01F",
+            "pulse0": self.pulse0,
+            "now": time.time(),
+            "cameras": list(CAMERAS),
+        }
+
+    def objects(self) -> dict[str, Any]:
+        return {"objects": [self._object(person, seen) for person, seen in self.people.items()]}
+
+    def _object(self, person: int, seen: bool) -> dict[str, Any]:
+        return {
+            "object": person,
+            "first_seen": self.first_pulse,
+            "last_seen": self.edge if seen else self.first_pulse,
+            "visible": seen,
+            "camera": CAMERAS[self.camera(person, self.edge)] if seen else None,
+            "cameras": list(CAMERAS[: 1 + person % 3]) if seen else [],
+            "thumbnail": f"/objects/{person}/thumb.jpg?v=1",
+        }
+
+    def cameras(self) -> dict[str, Any]:
+        return {
+            "cameras": [
+                {"camera": c, "state": "live", "pulse": self.edge, "late": 0, "fps": FPS, "message": ""}
+                for c in CAMERAS
+            ]
+        }
+
+    def gop(self, first: int) -> dict[str, Any]:
+        """Give the `gop` event of the frames [first, first + GOP)."""
+        choices = {str(k): CAMERAS[self.camera(k, first)] for k in self.people}
+        cuts = []
+        old, new = self.camera(1, first - 1), self.camera(1, first)
+        if old != new:
+            cuts.append({"object": 1, "from": CAMERAS[old], "to": CAMERAS[new], "pulse": first})
+        boxes = {c: [self._boxes(m, n) for n in range(first, first + GOP)] for m, c in enumerate(CAMERAS)}
+        return {"first": first, "frames": GOP, "choices": choices, "boxes": boxes, "cuts": cuts}
+
+    def _boxes(self, camera: int, pulse: int) -> list[list[float]]:
+        corners = {1: square(camera, pulse), 2: second(camera, pulse)}
+        return [
+            [k, left, top, left + SQUARE, top + SQUARE]
+            for k, (left, top) in corners.items()
+            if self.people.get(k)
+        ]
+
+    async def released(self, first: int) -> AsyncIterator[int]:
+        """Yield the pulses from `first` on, each when it may be sent."""
+        pulse = first
+        while True:
+            until = pulse - pulse % GOP + GOP - 1 if self.bursts else pulse
+            await asyncio.sleep(max(0.0, self.pulse0 + (until + LOOKAHEAD) / FPS - time.time()))
+            yield pulse
+            pulse += 1
+
+    def boundary(self) -> int:
+        """Give the first pulse of the newest whole GOP (in bursts) or of the present one."""
+        edge = self.edge - (GOP - 1 if self.bursts else 0)
+        return edge - edge % GOP
+
+
+def thumbnail(person: int) -> bytes:
+    """Give a JPEG of the person's square."""
+    left, top = (square if person == 1 else second)(0, 10)
+    crop = picture(0, 10)[top - 10 : top + SQUARE + 10, left - 6 : left + SQUARE + 6]
+    file = io.BytesIO()
+    with av.open(file, "w", format="mjpeg") as container:
+        stream = container.add_stream("mjpeg", rate=1)
+        stream.height, stream.width = crop.shape[0] // 2 * 2, crop.shape[1] // 2 * 2
+        stream.pix_fmt = "yuvj420p"
+        frame = av.VideoFrame.from_ndarray(crop[: stream.height, : stream.width].copy(), format="rgb24")
+        container.mux(stream.encode(frame.reformat(format="yuvj420p")))
+        container.mux(stream.encode(None))
+    return file.getvalue()
+
+
+class SiteServer:
+    """Serves a FakeSite and the page on one port, and may go away and come back there."""
+
+    def __init__(self, site: FakeSite) -> None:
+        self.site = site
+        self.port = 0
+        self._runner: web.AppRunner | None = None
+        self._streams: set[asyncio.Transport] = set()
+
+    @property
+    def url(self) -> str:
+        return f"http://127.0.0.1:{self.port}/"
+
+    async def start(self) -> None:
+        app = web.Application()
+        app.router.add_get("/", _file)
+        app.router.add_get("/page/{name}", _file)
+        app.router.add_get("/api/site", self._site)
+        app.router.add_get("/api/events", self._events)
+        app.router.add_get("/api/objects/{k}/choice", self._choice)
+        app.router.add_get("/objects/{k}/best.mp4", self._best)
+        app.router.add_get("/objects/{k}/thumb.jpg", self._thumbnail)
+        app.router.add_get("/recording.mp4", self._recording)
+        self._runner = web.AppRunner(app, shutdown_timeout=0.05, handler_cancellation=True)
+        await self._runner.setup()
+        listener = web.TCPSite(self._runner, "127.0.0.1", self.port, reuse_address=True)
+        await listener.start()
+        self.port = self._runner.addresses[0][1]
+
+    async def stop(self) -> None:
+        if self._runner:
+            await self._runner.cleanup()
+            self._runner = None
+
+    async def restart_as(self, site: FakeSite) -> None:
+        """Come back as another site on the same port: what a page sees of a server restart."""
+        await self.stop()
+        self.site = site
+        await self.start()
+
+    async def break_streams(self) -> None:
+        """Break the connections of all videos, as a bad network does."""
+        for transport in self._streams:
+            transport.abort()
+
+    async def _site(self, _: web.Request) -> web.Response:
+        return web.json_response(self.site.site())
+
+    async def _choice(self, request: web.Request) -> web.Response:
+        k = int(request.match_info["k"])
+        camera = CAMERAS[self.site.camera(k, self.site.edge)]
+        return web.json_response({"object": k, "camera": camera, "reason": REASON})
+
+    async def _thumbnail(self, request: web.Request) -> web.Response:
+        return web.Response(body=thumbnail(int(request.match_info["k"])), content_type="image/jpeg")
+
+    async def _best(self, request: web.Request) -> web.StreamResponse:
+        site, k = self.site, int(request.match_info["k"])
+        site.opened.append(k)
+        if k not in site.people:
+            return web.json_response({"error": f"no object {k}"}, status=404)
+        response = web.StreamResponse(headers={"Content-Type": "video/mp4"})
+        await response.prepare(request)
+        transport = request.transport
+        assert isinstance(transport, asyncio.Transport)
+        self._streams.add(transport)
+        with contextlib.suppress(ConnectionError):
+            await response.write(pattern(0).init)
+            async for pulse in site.released(site.boundary()):
+                if pulse not in site.skipped:
+                    await response.write(pattern(site.camera(k, pulse)).fragment(pulse))
+        return response
+
+    async def _recording(self, request: web.Request) -> web.Response:
+        frames = range(int(request.query["first"]), int(request.query["end"]))
+        data = pattern(0).init + b"".join(pattern(0).fragment(pulse) for pulse in frames)
+        return web.Response(body=data, content_type="video/mp4")
+
+    async def _events(self, request: web.Request) -> web.StreamResponse:
+        site = self.site
+        response = web.StreamResponse(headers={"Content-Type": "text/event-stream"})
+        await response.prepare(request)
+        with contextlib.suppress(ConnectionError):
+            for name in ("site", "objects", "cameras"):
+                await response.write(_event(name, getattr(site, name)()))
+            said = dict(site.people)
+            async for pulse in site.released(site.boundary() - 2 * GOP):
+                if site.people != said:
+                    said = dict(site.people)
+                    await response.write(_event("objects", site.objects()))
+                if pulse % GOP == 0:
+                    await response.write(_event("gop", site.gop(pulse)))
+        return response
+
+
+def _event(name: str, data: dict[str, Any]) -> bytes:
+    return f"event: {name}\ndata: {json.dumps(data)}\n\n".encode()
+
+
+async def _file(request: web.Request) -> web.StreamResponse:
+    path = PAGE / Path(request.match_info.get("name", "index.html")).name
+    return web.FileResponse(path, headers={"Content-Security-Policy": POLICY})
+
+
+@contextlib.asynccontextmanager
+async def serving(site: FakeSite) -> AsyncIterator[SiteServer]:
+    """Serve a site on a port that the system chooses."""
+    server = SiteServer(site)
+    await server.start()
+    try:
+        yield server
+    finally:
+        await server.stop()

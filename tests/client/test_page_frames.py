@@ -1,0 +1,135 @@
+"""What is shown: every box on its own frame, every frame from the camera of the choice, little delay."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+import pytest_asyncio
+from page_browser import Visit, launched, needs_chromium, visiting
+from page_pattern import CAMERAS, FPS, GROUNDS, HEIGHT, SQUARE, WIDTH
+from page_site import HOLD, LOOKAHEAD, FakeSite
+from playwright.async_api import Browser
+
+pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="module")]
+
+ACCENT = np.array([0x3F, 0xDC, 0x7F], np.int16)
+GROUNDS_SEEN = f"""
+    const grounds = {[list(ground) for ground in GROUNDS]};
+    const small = new OffscreenCanvas({WIDTH}, {HEIGHT}).getContext('2d', {{ willReadFrequently: true }});
+    window.seen = [];
+    const look = () => {{
+      requestAnimationFrame(look);
+      small.drawImage(document.querySelector('#boxes'), 0, 0, {WIDTH}, {HEIGHT});
+      const [red, green, blue] = small.getImageData(2, 2, 1, 1).data;
+      const far = grounds.map(([r, g, b]) => Math.hypot(r - red, g - green, b - blue));
+      seen.push([myview.camera, myview.site.cameras[far.indexOf(Math.min(...far))]]);
+    }};
+    requestAnimationFrame(look);
+"""
+BUSY = "setInterval(() => { const t = performance.now() + 25; while (performance.now() < t); }, 40)"
+
+
+@pytest_asyncio.fixture(scope="module", loop_scope="module")
+async def browser() -> AsyncIterator[Browser]:
+    async with launched() as running:
+        yield running
+
+
+def middle(mask: npt.NDArray[np.bool_]) -> npt.NDArray[np.float64] | None:
+    """Give the middle (x, y) of what is set, or None: of its extent, but for stray pixels."""
+    rows, columns = np.nonzero(mask)
+    if len(rows) < 50:
+        return None
+    extent = [np.percentile(axis, [5, 95]).mean() for axis in (columns, rows)]
+    return np.array(extent)
+
+
+def off_by(screen: npt.NDArray[np.int16]) -> float | None:
+    """Give the distance in picture pixels of the green box from the bright square, None without a box."""
+    green = np.abs(screen - ACCENT).max(axis=2) < 30
+    left, top = np.nonzero(green.any(axis=0))[0], np.nonzero(green.any(axis=1))[0]
+    white = middle(screen.min(axis=2) > 235)
+    if white is None or not len(left):
+        return None
+    scale = screen.shape[1] / WIDTH
+    # The box's label is above the box and no wider, so the box ends at the right and at the bottom.
+    box = np.array([left.max(), top.max()]) - (SQUARE / 2) * scale
+    return float(np.abs(box - white).max() / scale)
+
+
+@pytest.mark.parametrize("busy", [False, True], ids=["idle", "busy"])
+async def test_every_box_is_on_the_very_frame_it_belongs_to(browser: Browser, *, busy: bool) -> None:
+    async with visiting(browser) as visit:
+        await visit.playing(1)
+        if busy:
+            await visit.get(BUSY)
+        distances = [off_by(await visit.screenshot()) for _ in range(25)]
+        boxed = [distance for distance in distances if distance is not None]
+        assert len(boxed) >= 23
+        assert max(boxed) < 3  # the pattern moves by 14 pixels from frame to frame
+
+
+async def test_cuts_are_shown_at_the_pulses_where_the_choice_changes(browser: Browser) -> None:
+    async with visiting(browser) as visit:
+        await visit.playing(1)
+        await visit.until("myview.cuts.length >= 2")
+        for cut in await visit.get("myview.cuts"):
+            assert cut["pulse"] % HOLD == 0
+            assert cut["to"] == CAMERAS[visit.server.site.camera(1, cut["pulse"])]
+            assert cut["from"] == CAMERAS[visit.server.site.camera(1, cut["pulse"] - 1)]
+        assert await visit.page.locator("#cameras [aria-current]").inner_text() in CAMERAS
+
+
+@pytest.mark.parametrize("bursts", [False, True], ids=["frames", "GOPs"])
+async def test_the_camera_that_is_named_is_the_one_shown_however_fast_people_are_switched(
+    browser: Browser, *, bursts: bool
+) -> None:
+    async with visiting(browser, FakeSite(bursts=bursts)) as visit:
+        await visit.playing(1)
+        await visit.get(f"(() => {{ {GROUNDS_SEEN} }})()")
+        for turn in range(16):
+            await visit.page.keyboard.press("ArrowRight")
+            await visit.playing(2 if turn % 2 == 0 else 1)
+            shown = await visit.get("myview.pulse")
+            await visit.until(f"myview.pulse > {shown + turn % 5}")
+        seen = await visit.get("seen.slice(1)")
+        assert len(seen) > 50
+        assert [(named, painted) for named, painted in seen if named != painted] == []
+
+
+async def test_boxes_can_be_hidden_and_shown_again(browser: Browser) -> None:
+    async with visiting(browser) as visit:
+        await visit.playing(1)
+        await visit.page.get_by_role("button", name="Boxes").click()
+        assert off_by(await visit.screenshot()) is None
+        await visit.page.keyboard.press("b")
+        assert off_by(await visit.screenshot()) is not None
+
+
+async def settled_delay(visit: Visit, frames: int) -> tuple[float, float]:
+    """Give the median and the largest delay, in seconds, of the last second after some frames."""
+    await visit.playing(1)
+    await visit.until(f"myview.delays.length > {frames}")
+    delays = await visit.get(f"myview.delays.slice(-{FPS}).map((d) => d.delayMs / 1000)")
+    return float(np.median(delays)), max(delays)
+
+
+@pytest.mark.parametrize("bursts", [False, True], ids=["frames", "GOPs"])
+async def test_the_delay_is_measured_and_stays_near_the_look_ahead(browser: Browser, *, bursts: bool) -> None:
+    async with visiting(browser, FakeSite(bursts=bursts)) as visit:
+        middle_delay, largest = await settled_delay(visit, 5 * FPS)
+        served = LOOKAHEAD / FPS  # when the server lets a frame go; a GOP at a time, its first frames later
+        assert served < middle_delay < served + 0.75
+        assert largest < middle_delay + 0.3
+
+
+async def test_far_behind_it_jumps_back_to_live(browser: Browser) -> None:
+    async with visiting(browser) as visit:
+        before, _ = await settled_delay(visit, FPS)
+        await visit.get("video.pause()")
+        await visit.page.wait_for_timeout(4000)  # the time that is to be caught up with
+        await visit.get("video.play()")
+        await visit.until(f"myview.delays.at(-1).delayMs < {1000 * before + 400}")

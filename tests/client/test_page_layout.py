@@ -1,0 +1,93 @@
+"""The page at the widths of a phone, a tablet and a desk: nothing overflows, nothing jumps."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+
+import pytest
+import pytest_asyncio
+from page_browser import launched, needs_chromium, visiting
+from page_pattern import HEIGHT, WIDTH
+from page_site import FakeSite, serving
+from playwright.async_api import Browser, expect
+
+pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="module")]
+
+MANY = {person: person % 4 != 0 for person in range(1, 24)}
+WATCH_SHIFTS = """
+    window.shifts = [];
+    new PerformanceObserver((list) => {
+      for (const entry of list.getEntries()) shifts.push(entry.value);
+    }).observe({ type: 'layout-shift', buffered: true });
+"""
+
+
+@pytest_asyncio.fixture(scope="module", loop_scope="module")
+async def browser() -> AsyncIterator[Browser]:
+    async with launched() as running:
+        yield running
+
+
+@pytest.mark.parametrize("people", [{}, MANY], ids=["nobody", "many"])
+@pytest.mark.parametrize(("width", "height"), [(360, 740), (740, 360), (800, 900), (1600, 900)])
+async def test_nothing_needs_scrolling_sideways(
+    browser: Browser, width: int, height: int, people: dict[int, bool]
+) -> None:
+    site = FakeSite(people=dict(people))
+    async with visiting(browser, site, width=width, height=height) as visit:
+        await visit.until(f"myview.state === '{'playing' if people else 'empty'}'")
+        if people:
+            await visit.until("document.querySelector('#reason').textContent.length > 60")
+        assert await visit.get("document.documentElement.scrollWidth") <= width
+        stage = await visit.page.locator("#stage").bounding_box()
+        assert stage is not None
+        assert stage["x"] >= 0
+        assert stage["x"] + stage["width"] <= width
+        assert stage["width"] / stage["height"] == pytest.approx(WIDTH / HEIGHT, rel=0.01)
+
+
+@pytest.mark.parametrize("width", [360, 1600])
+async def test_nothing_jumps_from_opening_to_switching(browser: Browser, width: int) -> None:
+    async with visiting(browser, width=width) as visit:
+        await visit.get(f"{{ {WATCH_SHIFTS} }}")
+        await visit.playing(1)
+        await visit.until("myview.cuts.length >= 1")
+        await visit.page.keyboard.press("ArrowRight")
+        await visit.playing(2)
+        shifts = await visit.get("shifts")
+        assert sum(shifts) < 0.01
+
+
+async def test_controls_are_large_enough_for_a_thumb(browser: Browser) -> None:
+    async with visiting(browser, width=360, height=740) as visit:
+        await visit.playing(1)
+        for button in await visit.page.get_by_role("button").all():
+            box = await button.bounding_box()
+            assert box is not None
+            assert min(box["width"], box["height"]) >= 44
+
+
+async def test_everything_that_can_be_pressed_has_a_name(browser: Browser) -> None:
+    async with visiting(browser) as visit:
+        await visit.playing(1)
+        snapshot = await visit.page.locator("body").aria_snapshot()
+        assert 'button "Person 1, seen by c0, c1"' in snapshot
+        assert 'button "Boxes" [pressed]' in snapshot
+        assert 'button "Full screen"' in snapshot
+        assert "- status" in snapshot
+        assert 'navigation "People"' in snapshot
+
+
+async def test_everything_comes_from_the_server_and_keeps_to_its_policy(browser: Browser) -> None:
+    async with serving(FakeSite()) as server:
+        page = await browser.new_page()
+        complaints: list[str] = []
+        asked: list[str] = []
+        page.on("console", lambda message: complaints.append(message.text))
+        page.on("request", lambda request: asked.append(request.url))
+        await page.goto(server.url)
+        await expect(page.locator("#stage")).to_have_attribute("data-state", "playing", timeout=15_000)
+        await expect(page.locator("#camera")).not_to_be_empty()
+        await page.close()
+    assert complaints == []
+    assert all(url.startswith((server.url, f"blob:{server.url}", "data:")) for url in asked)

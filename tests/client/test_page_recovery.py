@@ -1,0 +1,67 @@
+"""What goes wrong by itself comes right by itself."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+
+import pytest
+import pytest_asyncio
+from page_browser import launched, needs_chromium, visiting
+from page_pattern import FPS
+from page_site import STARTS_AT, FakeSite
+from playwright.async_api import Browser, expect
+
+pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="module")]
+
+
+@pytest_asyncio.fixture(scope="module", loop_scope="module")
+async def browser() -> AsyncIterator[Browser]:
+    async with launched() as running:
+        yield running
+
+
+async def test_a_lost_server_is_said_under_the_last_picture_and_found_again(browser: Browser) -> None:
+    async with visiting(browser) as visit:
+        await visit.playing(1)
+        await visit.get("window.visit = 'the same'")
+        site = visit.server.site
+        await visit.server.stop()
+        await visit.until("myview.state === 'lost'")
+        await expect(visit.page.get_by_role("status")).to_contain_text("Connection lost — trying again")
+        await expect(visit.page.locator("#stage")).to_have_class("stage pictured")
+        await visit.server.restart_as(site)
+        last = await visit.get("myview.pulse")
+        await visit.playing(1)
+        await visit.until(f"myview.pulse > {last + FPS}")
+        assert await visit.get("window.visit") == "the same"
+
+
+@pytest.mark.parametrize("first", [500, STARTS_AT + 900_000], ids=["earlier", "later"])
+async def test_a_site_whose_pulses_begin_anew_plays_on(browser: Browser, first: int) -> None:
+    async with visiting(browser) as visit:
+        await visit.playing(1)
+        await visit.server.restart_as(FakeSite(first_pulse=first))
+        await visit.until(f"Math.abs(myview.pulse - {first}) < 2000 && myview.state === 'playing'")
+        shown = await visit.get("myview.pulse")
+        await visit.until(f"myview.pulse > {shown + FPS} && myview.camera !== null")
+        delay = await visit.get("myview.delays.at(-1).delayMs")
+        assert 0 < delay < 3000
+
+
+async def test_a_hole_in_the_stream_is_jumped_over(browser: Browser) -> None:
+    site = FakeSite()
+    site.skipped = range(site.edge + 2 * FPS, site.edge + 2 * FPS + 8)
+    async with visiting(browser, site) as visit:
+        await visit.until(f"myview.pulse > {site.skipped.stop + FPS}")
+        seen = await visit.get("myview.delays.map((d) => d.pulse)")
+        assert not set(seen) & set(site.skipped)
+
+
+async def test_a_broken_stream_is_opened_again(browser: Browser) -> None:
+    async with visiting(browser) as visit:
+        await visit.playing(1)
+        await visit.server.break_streams()
+        shown = await visit.get("myview.pulse")
+        await visit.until(f"myview.pulse > {shown + 2 * FPS}")
+        assert visit.server.site.opened == [1, 1]
+        assert await visit.get("myview.state") == "playing"
