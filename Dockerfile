@@ -1,0 +1,35 @@
+# MyView in one image. Every process of a site is `myview` with another command: see docker-compose.yml.
+
+# The package as a wheel, in a stage of its own: neither the sources nor the build tools stay in the image.
+FROM python:3.11-slim-bookworm AS wheel
+WORKDIR /src
+COPY . .
+RUN pip wheel --no-cache-dir --no-deps --wheel-dir /wheel .
+
+FROM python:3.11-slim-bookworm
+
+# Not root. A number, so that Kubernetes can check it too; the group `video` may open /dev/video*.
+RUN useradd --uid 10001 --create-home --groups video myview
+
+# What MyView leans on, in the locked versions and without the development tools. The wheels of av and
+# opencv-python-headless bring their libraries, so that nothing comes from apt. This layer, nearly all of the
+# image, is made anew only when one of the two files changes.
+RUN --mount=type=bind,source=pyproject.toml,target=/src/pyproject.toml \
+    --mount=type=bind,source=requirements/lock.txt,target=/src/lock.txt \
+    python -c 'import sys, tomllib; \
+        print(*tomllib.load(sys.stdin.buffer)["project"]["dependencies"], sep="\n")' \
+        < /src/pyproject.toml > /tmp/dependencies.txt \
+    && pip install --no-cache-dir --root-user-action ignore --disable-pip-version-check \
+        --constraint /src/lock.txt --requirement /tmp/dependencies.txt \
+    && rm /tmp/dependencies.txt
+
+RUN --mount=type=bind,from=wheel,source=/wheel,target=/wheel \
+    pip install --no-cache-dir --root-user-action ignore --disable-pip-version-check --no-deps /wheel/*.whl
+
+# matplotlib (`myview render`) keeps its font list here; the root may be read-only.
+ENV MPLCONFIGDIR=/tmp/matplotlib PYTHONUNBUFFERED=1
+USER 10001
+WORKDIR /site
+EXPOSE 8080
+ENTRYPOINT ["myview"]
+CMD ["--help"]

@@ -1,0 +1,1 @@
+"""One script per table or figure; `python -m benchmarks` runs them all."""

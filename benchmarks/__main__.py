@@ -1,0 +1,83 @@
+"""Runs the benchmarks one after the other, all of them (`make bench`) or only some.
+
+    python -m benchmarks --only render --only delay
+
+Each is a command of its own, which is printed above what it prints; plots and tables go into a folder.
+"""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+from benchmarks.surroundings import ROOT, SKIPPED, one_thread_environment, parser
+
+
+@dataclass(frozen=True, slots=True)
+class Benchmark:
+    """One script."""
+
+    name: str
+    about: str
+    arguments: tuple[str, ...] = ()
+    shared: bool = True
+    """It has the options that all have, and says its own command."""
+
+    def command(self, options: argparse.Namespace) -> list[str]:
+        """Give the command that runs it."""
+        words = ["-m", f"benchmarks.{self.name}", "--out", str(options.out), *self.arguments]
+        return [*words, "--data", str(options.data)] if self.shared else words
+
+
+BENCHMARKS = (
+    Benchmark("render", "how fast recordings are rendered, and where the processor time goes"),
+    Benchmark(
+        "delay", "from the pulse to the browser, stage by stage; 2 minutes, part of it drawing the scene"
+    ),
+    Benchmark("solvers", "the solvers of the tracking program against each other", shared=False),
+)
+
+
+def run(benchmark: Benchmark, options: argparse.Namespace) -> int:
+    """Run one and give its exit code."""
+    words = benchmark.command(options)
+    print(f"\n== {benchmark.name}: {benchmark.about}\n", flush=True)
+    if not benchmark.shared:
+        print(f"$ OPENBLAS_NUM_THREADS=1 python {' '.join(words)}", flush=True)
+    return subprocess.run(
+        [sys.executable, *words], cwd=ROOT, env=one_thread_environment(), check=False
+    ).returncode
+
+
+def main() -> None:
+    """List the benchmarks, run them, and say how it went."""
+    options = parser("Run the benchmarks.", "__main__")
+    options.prog = "python -m benchmarks"
+    names = [benchmark.name for benchmark in BENCHMARKS]
+    options.add_argument("--only", action="append", choices=names, help="only this one; may be repeated")
+    options.add_argument("--list", action="store_true", help="only list them")
+    chosen = options.parse_args()
+    chosen.out, chosen.data = Path.absolute(chosen.out), Path.absolute(chosen.data)
+    for benchmark in BENCHMARKS:
+        print(f"{benchmark.name:10} {benchmark.about}")
+    if chosen.list:
+        return
+    codes = {it.name: run(it, chosen) for it in BENCHMARKS if not chosen.only or it.name in chosen.only}
+    print()
+    for name, code in codes.items():
+        print(f"{name:10} {_word(code)}")
+    print(f"plots and tables are in {chosen.out}")
+    sys.exit(any(code not in {0, SKIPPED} for code in codes.values()))
+
+
+def _word(code: int) -> str:
+    if code == SKIPPED:
+        return "left out: what it needs is not there"
+    return "done" if code == 0 else f"failed with exit code {code}"
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,93 @@
+"""A plain zenoh subscriber that notes when the site's messages came and what times they carry."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import msgspec
+import zenoh
+
+from server.wire.messages import CameraTracks, FrameHead, GopChoices, camera_of
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """One access unit of one camera. All times are unix seconds."""
+
+    due: float
+    taken: float
+    encoded: float
+    received: float
+
+
+@dataclass(frozen=True, slots=True)
+class Decision:
+    """One GOP's choices."""
+
+    first: int
+    frames: int
+    choices: dict[int, str]
+    """The camera of each object."""
+    received: float
+
+
+@dataclass(slots=True)
+class Marks:
+    """What was heard on the bus."""
+
+    frames: dict[tuple[str, int], Frame] = field(default_factory=dict)
+    """By camera and pulse."""
+    solved: dict[int, dict[str, float]] = field(default_factory=dict)
+    """By last pulse of the window: when each camera had solved it."""
+    decisions: list[Decision] = field(default_factory=list)
+    shed: int = 0
+    """Frames that were missed or not searched for people, all cameras together."""
+
+    def video(self, camera: str, head: FrameHead, received: float) -> None:
+        """Note a frame."""
+        self.frames[camera, head.pulse] = Frame(head.due, head.taken, head.encoded, received)
+
+    def tracks(self, message: CameraTracks) -> None:
+        """Note a window."""
+        self.solved.setdefault(message.last, {})[message.camera] = message.solved_at
+        self.shed += len(message.shed)
+
+    def choices(self, message: GopChoices, received: float) -> None:
+        """Note a decision."""
+        self.decisions.append(Decision(message.first, message.frames, message.choices, received))
+
+
+@contextlib.contextmanager
+def listening(address: str) -> Iterator[Marks]:
+    """Listen to the site whose router is at the address, as any outsider could."""
+    marks = Marks()
+    head, tracks = msgspec.json.Decoder(FrameHead), msgspec.json.Decoder(CameraTracks)
+    choices = msgspec.json.Decoder(GopChoices)
+
+    def on_video(sample: zenoh.Sample) -> None:
+        received = time.time()
+        if sample.attachment is not None:
+            marks.video(camera_of(str(sample.key_expr)), head.decode(sample.attachment.to_bytes()), received)
+
+    def on_tracks(sample: zenoh.Sample) -> None:
+        marks.tracks(tracks.decode(sample.payload.to_bytes()))
+
+    def on_choices(sample: zenoh.Sample) -> None:
+        marks.choices(choices.decode(sample.payload.to_bytes()), time.time())
+
+    config = zenoh.Config()
+    config.insert_json5("mode", '"client"')
+    config.insert_json5("connect/endpoints", json.dumps([address]))
+    config.insert_json5("scouting/multicast/enabled", "false")
+    with zenoh.open(config) as session:
+        heard = {"camera/*/video": on_video, "camera/*/tracks": on_tracks, "bestview/choices": on_choices}
+        subscribers = [session.declare_subscriber(f"myview/*/{key}", on) for key, on in heard.items()]
+        try:
+            yield marks
+        finally:
+            for subscriber in subscribers:
+                subscriber.undeclare()  # type: ignore[no-untyped-call]

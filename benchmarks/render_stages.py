@@ -1,0 +1,88 @@
+"""The classes of `myview render` in one process, timed stage by stage."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from benchmarks.stopwatch import Stopwatch
+from benchmarks.views import Views
+from server.camera.pipeline import CameraPipeline
+from server.run.offline import Batch, run_camera
+from server.run.render import Renderer
+from server.run.setup import config_for_videos
+from server.view.align import Aligner
+from server.view.decide import Decider
+from server.wire.config import Config
+from server.wire.loading import read_content
+from tracking import OnlineTracker, solver_named
+from tracking.detectors import BackgroundDetector
+
+STAGES = {
+    "decode": "the recording's H.264 to a picture of the site's size",
+    "encode": "the picture to H.264, once",
+    "detect": "background, box filters, histograms",
+    "track": "networks, births, templates",
+    "solve": "the network programs",
+    "publish": "tracks to messages",
+    "decide": "who is who, and the view of each person",
+    "write": "lining up, fragments, films, tracks, choices",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class StageTimes:
+    """Processor milliseconds per frame (one camera's picture) of each stage."""
+
+    ms: dict[str, float]
+
+
+def time_stages(views: Views, config_path: Path, folder: Path) -> StageTimes:
+    """Render the views in this process into a new folder and give each stage's time per frame."""
+    config = config_for_videos(
+        views.videos, base=read_content(config_path), folder=config_path.parent, ground=views.ground
+    )
+    folder.mkdir()
+    watch = Stopwatch()
+    with watch.watching(
+        (CameraPipeline, "take", "decode"),
+        (CameraPipeline, "encode", "encode"),
+        (BackgroundDetector, "detect", "detect"),
+        (OnlineTracker, "push", "track"),
+        (OnlineTracker, "flush", "track"),
+        (type(solver_named(config.track.solver)), "solve", "solve"),
+        (CameraPipeline, "track", "publish"),
+        (CameraPipeline, "finish", "publish"),
+        (Decider, "step", "decide"),
+        (Decider, "finish", "decide"),
+        (Aligner, "ready", "write"),
+        (Renderer, "take", "write"),
+    ):
+        frames = _render(config, folder)
+    return StageTimes({stage: 1e3 * watch.seconds[stage] / frames for stage in STAGES})
+
+
+def _render(config: Config, folder: Path) -> int:
+    """Do what the command does, without its workers; give the number of frames."""
+    renderer = Renderer(config, folder)
+    pipelines = {camera: CameraPipeline(config, camera) for camera in config.camera_ids}
+    try:
+        for batch in _in_turn([run_camera(pipeline, camera) for camera, pipeline in pipelines.items()]):
+            renderer.take(batch)
+        renderer.finish()
+    finally:
+        renderer.close()
+    return renderer.frames
+
+
+def _in_turn(cameras: list[Iterator[Batch]]) -> Iterator[Batch]:
+    """Give the cameras' batches in turn, so that all are at the same pulse."""
+    running = list(cameras)
+    while running:
+        for camera in list(running):
+            batch = next(camera, None)
+            if batch is None:
+                running.remove(camera)
+            else:
+                yield batch

@@ -1,0 +1,103 @@
+"""Windows to time solvers on: random observations, as in the paper's Fig. 21, and people who walk."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from tracking.detections import Detections
+from tracking.network import CostSettings, Network, Template, build_network
+
+BINS = 64
+PERSON = np.array([40.0, 100.0])
+CIF, VGA = np.array([352.0, 288.0]), np.array([640.0, 480.0])
+SEEN = 0.9
+
+
+@dataclass(frozen=True, slots=True)
+class Size:
+    """A window: `objects`, `places` in each frame, `frames`."""
+
+    objects: int
+    places: int
+    frames: int = 20
+
+
+def random_window(size: Size, settings: CostSettings, seed: int) -> Network:
+    """Random boxes and histograms in every frame (paper IV.A.5): nobody walks, conflicts bind."""
+    rng = np.random.default_rng(seed)
+
+    def seen(count: int) -> Detections:
+        corners = rng.uniform(0.0, CIF, (count, 2))
+        boxes = np.hstack([corners, corners + 0.7 * PERSON])
+        return Detections(boxes, np.ones(count), rng.dirichlet(np.ones(BINS), count))
+
+    first = seen(size.objects)
+    templates = [Template(n, first.histograms[n], first.boxes[n]) for n in range(size.objects)]
+    return build_network(templates, [seen(size.places) for _ in range(size.frames)], settings)
+
+
+class Walkers:
+    """People who walk among false positives that look like one of them or like nobody."""
+
+    def __init__(self, size: Size, seed: int) -> None:
+        self._size = size
+        self._rng = np.random.default_rng(seed)
+        self.looks = self._rng.dirichlet(np.full(BINS, 0.5), size.objects)
+        self.corners = self._rng.uniform(0.0, VGA, (size.objects, 2))
+        self._speed = self._rng.normal(0.0, 3.0, (size.objects, 2))
+
+    def templates(self) -> list[Template]:
+        """Give everybody where they are now."""
+        return [
+            Template(n, self.looks[n], np.concatenate([self.corners[n], self.corners[n] + PERSON]))
+            for n in range(self._size.objects)
+        ]
+
+    def step(self) -> Detections:
+        """Walk on by a frame, turning back at the edges; give what is seen."""
+        rng, size = self._rng, self._size
+        self._speed += rng.normal(0.0, 0.5, self._speed.shape)
+        self._speed = np.clip(self._speed, -6.0, 6.0)
+        out = ((self.corners < 0) & (self._speed < 0)) | ((self.corners > VGA) & (self._speed > 0))
+        self._speed[out] *= -1.0
+        self.corners += self._speed
+        visible = np.flatnonzero(rng.uniform(size=size.objects) < SEEN)[: size.places]
+        stray = size.places - len(visible)
+        corners = np.vstack(
+            [
+                self.corners[visible] + rng.normal(0.0, 2.0, (len(visible), 2)),
+                rng.uniform(0.0, VGA, (stray, 2)),
+            ]
+        )
+        alike = self.looks[rng.integers(size.objects, size=stray)] * 50.0
+        alike[rng.uniform(size=stray) < 0.5] = 0.5
+        weights = np.vstack([self.looks[visible] * 300.0, alike]) + 1e-3
+        looks = rng.standard_gamma(weights) + 1e-12
+        order = rng.permutation(size.places)
+        boxes = np.hstack([corners, corners + PERSON])
+        return Detections(
+            boxes[order], np.ones(size.places), (looks / looks.sum(axis=1, keepdims=True))[order]
+        )
+
+
+def walking_window(size: Size, settings: CostSettings, seed: int) -> Network:
+    """Give one window of people who walk."""
+    people = Walkers(size, seed)
+    templates = people.templates()
+    return build_network(templates, [people.step() for _ in range(size.frames)], settings)
+
+
+def moving_windows(size: Size, steps: int, seed: int) -> Iterator[tuple[list[Template], list[Detections]]]:
+    """Give the windows that a tracker with a stride of one frame solves one after the other."""
+    people = Walkers(size, seed)
+    past = [people.templates()]
+    frames: list[Detections] = []
+    for _ in range(size.frames + steps - 1):
+        frames.append(people.step())
+        past.append(people.templates())
+        if len(frames) == size.frames:
+            yield past.pop(0), list(frames)
+            frames.pop(0)

@@ -1,0 +1,164 @@
+"""A whole site, started as an operator starts it: `myview up` with real processes on ports that are free."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import re
+import signal
+import sys
+from collections.abc import AsyncIterator, Awaitable, Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from client import Cameras, Gop, Objects, events
+from server.run.setup import free_port
+
+PATIENCE_S = 90.0
+"""Until a test that awaits something has failed; a slow core has other work too."""
+
+MYVIEW = [sys.executable, "-m", "server.run.cli"]
+CAMERAS = ("c0", "c1", "c2")
+
+
+def configuration(folder: Path, recording: Path, **sections: Any) -> Path:
+    """Write the configuration of a site of three recorded views; ``sections`` are merged into it."""
+    bus = f"tcp/127.0.0.1:{free_port()}"
+    content: dict[str, Any] = {
+        "site": {"name": "e2e", "fps": 25, "width": 640, "height": 360},
+        "sync": {"port": free_port(), "start_timeout_s": 60},
+        "zenoh": {"connect": bus, "listen": bus},
+        "http": {"port": free_port()},
+        "ground": str(recording / "ground.json"),
+        "cameras": [{"id": name, "source": str(recording / f"{name}.mp4")} for name in CAMERAS],
+    }
+    for camera in content["cameras"]:
+        camera.update(sections.get("camera", {}))
+    content.update({name: value for name, value in sections.items() if name != "camera"})
+    path = folder / "site.yaml"
+    path.write_text(yaml.safe_dump(content), encoding="utf-8")
+    return path
+
+
+@dataclass(slots=True)
+class RunningSite:
+    """`myview up`, its output, and what its events said so far."""
+
+    process: asyncio.subprocess.Process
+    config: dict[str, Any]
+    lines: list[str] = field(default_factory=list)
+    gops: list[Gop] = field(default_factory=list)
+    cameras: Cameras | None = None
+    objects: Objects | None = None
+    heard: asyncio.Condition = field(default_factory=asyncio.Condition)
+
+    @property
+    def url(self) -> str:
+        return f"http://127.0.0.1:{self.config['http']['port']}/"
+
+    @property
+    def pulse(self) -> int:
+        """The last decided frame."""
+        return self.gops[-1].first + self.gops[-1].frames - 1 if self.gops else -1
+
+    def children(self) -> dict[str, int]:
+        """Give the pid of every process of the site by what it does: sync, bestview, c0 …"""
+        found = {}
+        for folder in Path("/proc").iterdir():
+            with contextlib.suppress(OSError, ValueError):
+                words = (folder / "cmdline").read_bytes().decode().split("\0")[:-1]
+                parent = int((folder / "stat").read_text().rpartition(")")[2].split()[1])
+                if parent == self.process.pid and "server.run.cli" in words:
+                    command = words[words.index("server.run.cli") + 1 :]
+                    found[command[2] if command[0] == "camera" else command[0]] = int(folder.name)
+        return found
+
+    def state(self, camera: str) -> str | None:
+        """Give a camera's state as the events said it last."""
+        known = self.cameras.cameras if self.cameras else ()
+        return next((it.state for it in known if it.camera == camera), None)
+
+    async def until(self, condition: Callable[[], bool], what: str) -> None:
+        """Wait until what the events say fulfils a condition."""
+        try:
+            async with asyncio.timeout(PATIENCE_S), self.heard:
+                await self.heard.wait_for(condition)
+        except TimeoutError:
+            raise AssertionError(
+                f"{what}: not within {PATIENCE_S} s\n" + "\n".join(self.lines[-40:])
+            ) from None
+
+    async def ended(self) -> int:
+        """Wait until everything has ended by itself; give the exit code."""
+        async with asyncio.timeout(PATIENCE_S):
+            return await self.process.wait()
+
+    async def listen(self) -> None:
+        """Take the events in, for as long as the site runs."""
+        async for event in events(self.url):
+            async with self.heard:
+                match event:
+                    case Gop():
+                        self.gops.append(event)
+                    case Cameras():
+                        self.cameras = event
+                    case Objects():
+                        self.objects = event
+                self.heard.notify_all()
+
+    async def read_log(self) -> None:
+        """Keep what the processes log."""
+        assert self.process.stderr is not None
+        async for line in self.process.stderr:
+            self.lines.append(line.decode().rstrip())
+
+
+@contextlib.asynccontextmanager
+async def running(config: Path, *arguments: str, listen: bool = True) -> AsyncIterator[RunningSite]:
+    """Run a site; in the end everything must end within 2 s of SIGTERM, with exit code 0."""
+    process = await asyncio.create_subprocess_exec(
+        *MYVIEW,
+        "up",
+        str(config),
+        *arguments,
+        stderr=asyncio.subprocess.PIPE,
+        stdout=asyncio.subprocess.DEVNULL,
+        env={**os.environ, "PYTHONUNBUFFERED": "1"},
+    )
+    site = RunningSite(process, yaml.safe_load(config.read_text(encoding="utf-8")))
+    tasks = [asyncio.create_task(site.read_log())]
+    try:
+        if listen:
+            await until_it_answers(site)
+            tasks.append(asyncio.create_task(site.listen()))
+        yield site
+    finally:
+        if process.returncode is None:
+            process.send_signal(signal.SIGTERM)
+        try:
+            await asyncio.wait_for(process.wait(), 20)
+        except TimeoutError:
+            process.kill()
+            await process.wait()
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+
+async def until_it_answers(site: RunningSite) -> None:
+    """Wait until the best-view service has said in its log that it listens."""
+    async with asyncio.timeout(PATIENCE_S):
+        while not any(re.search(r"page, streams and API on http", line) for line in site.lines):
+            if site.process.returncode is not None:
+                raise AssertionError("`myview up` ended:\n" + "\n".join(site.lines))
+            await asyncio.sleep(0.05)
+
+
+async def bounded(work: Awaitable[Any]) -> Any:
+    """Await something, but not for ever."""
+    async with asyncio.timeout(PATIENCE_S):
+        return await work

@@ -1,0 +1,45 @@
+"""What a stream shows, frame by frame: recorded from HTTP, decoded by PyAV."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import aiohttp
+import av
+import numpy as np
+from numpy.typing import NDArray
+
+FPS = 25
+
+
+async def record(session: aiohttp.ClientSession, url: str, until_pulse: int, out: Path) -> Path:
+    """Save a stream until it has passed a pulse."""
+    data = bytearray()
+    async with session.get(url) as answer:
+        assert answer.status == 200, await answer.text()
+        assert answer.content_type == "video/mp4"
+        async for piece, _ in answer.content.iter_chunks():
+            data += piece
+            if newest_pulse(data) >= until_pulse:
+                break
+    out.write_bytes(data)
+    return out
+
+
+def newest_pulse(data: bytearray) -> int:
+    """Give the pulse of the newest fragment that has begun, by its tfdt; -1 before the first."""
+    at = data.rfind(b"tfdt")
+    if at < 0 or len(data) < at + 16:
+        return -1
+    return round(int.from_bytes(data[at + 8 : at + 16], "big") * FPS / 90_000)
+
+
+def pictures(path: Path) -> dict[int, NDArray[np.uint8]]:
+    """Decode a stream: the picture of every pulse in YUV 4:2:0."""
+    data = path.read_bytes()
+    whole = data[: data.rfind(b"moof") - 4]  # the last fragment may be cut off
+    with av.open(io.BytesIO(whole)) as container:
+        return {
+            round(frame.time * FPS): frame.to_ndarray(format="yuv420p") for frame in container.decode(video=0)
+        }

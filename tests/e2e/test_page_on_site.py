@@ -1,0 +1,78 @@
+"""The page in a real browser on a real site: it plays across cuts, and the server may go and come back."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import pytest
+import pytest_asyncio
+from playwright.async_api import Page, async_playwright
+from running_site import PATIENCE_S, RunningSite, configuration, running
+
+from benchmarks.browser import CHROMIUM, FLAGS
+
+pytestmark = [
+    pytest.mark.asyncio(loop_scope="module"),
+    pytest.mark.timeout(300),
+    pytest.mark.skipif(not CHROMIUM.exists(), reason=f"needs a Chromium at {CHROMIUM}"),
+]
+
+
+@pytest_asyncio.fixture(scope="module", loop_scope="module")
+async def site(recording: Path, tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[RunningSite]:
+    """A site whose recordings begin again at their end, with people in sight."""
+    config = configuration(tmp_path_factory.mktemp("site"), recording, camera={"at_end": "loop"})
+    async with running(config) as site:
+        await site.until(lambda: bool(site.gops and site.gops[-1].choices), "somebody is shown")
+        yield site
+
+
+@pytest_asyncio.fixture(loop_scope="module")
+async def page(site: RunningSite) -> AsyncIterator[Page]:
+    """The page, opened; an error in it fails the test."""
+    errors: list[str] = []
+    async with async_playwright() as playwright:
+        browser = await playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        # Waiting for a condition in the page evaluates it as a string, which the page's policy forbids.
+        page = await browser.new_page(bypass_csp=True)
+        page.on("pageerror", lambda error: errors.append(str(error)))
+        page.set_default_timeout(1000 * PATIENCE_S)
+        await page.goto(site.url)
+        yield page
+        await browser.close()
+    assert errors == []
+
+
+async def test_the_best_view_plays_across_a_cut_and_the_frames_go_on(page: Page) -> None:
+    await page.wait_for_function("myview.state === 'playing'")
+    await page.wait_for_function("myview.cuts.length > 0")
+    cut = await page.evaluate("myview.cuts[0].pulse")
+    await page.wait_for_function(f"myview.pulse > {cut} + 25")
+    shown = await page.evaluate("myview.delays.map((it) => it.pulse)")
+    around = [pulse for pulse in shown if cut - 25 <= pulse <= cut + 25]
+    assert len(around) > 20, "a slow core may leave frames out, but not the seconds around a cut"
+    assert around == sorted(around)
+
+
+async def test_choosing_somebody_else_shows_them_without_another_player(page: Page) -> None:
+    await page.wait_for_function("myview.state === 'playing'")
+    await page.evaluate("document.querySelector('video').dataset.same = 'yes'")
+    first = await page.evaluate("myview.object")
+    other = page.locator("#people button[aria-current=false]")
+    await other.first.click()
+    await page.wait_for_function(f"myview.object !== {first} && myview.state === 'playing'")
+    assert await page.evaluate("document.querySelector('video').dataset.same") == "yes"
+
+
+async def test_the_page_plays_again_after_the_best_view_process_was_killed(
+    page: Page, site: RunningSite
+) -> None:
+    await page.wait_for_function("myview.state === 'playing'")
+    os.kill(site.children()["bestview"], signal.SIGKILL)
+    await page.wait_for_function("myview.state !== 'playing'")
+    await page.wait_for_function("myview.state === 'playing'")
+    pulse = await page.evaluate("myview.pulse")
+    await page.wait_for_function(f"myview.pulse > {pulse} + 10")

@@ -1,0 +1,41 @@
+"""The same recordings give the same tracks and the same cuts, byte for byte, live and offline."""
+
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+
+import pytest
+from running_site import CAMERAS, MYVIEW, bounded, configuration, running
+
+WRITTEN = ("choices.csv", "late.csv", *(f"tracks/{camera}.txt" for camera in CAMERAS))
+
+
+async def rendered(config: Path, recording: Path, out: Path) -> None:
+    process = await asyncio.create_subprocess_exec(
+        *MYVIEW,
+        "render",
+        *(str(recording / f"{camera}.mp4") for camera in CAMERAS),
+        "--config",
+        str(config),
+        "--out",
+        str(out),
+    )
+    assert await bounded(process.wait()) == 0
+
+
+@pytest.mark.timeout(300)
+async def test_live_equals_offline_to_the_byte(recording: Path, tmp_path: Path) -> None:
+    # However busy this machine is, no frame may be left out: that is what the comparison is about.
+    config = configuration(tmp_path, recording, track={"backlog_s": 60}, view={"late_after_s": 60})
+    await rendered(config, recording, tmp_path / "offline")
+    async with running(config, "--out", str(tmp_path / "live"), listen=False) as site:
+        assert await site.ended() == 0, "\n".join(site.lines)
+    for name in WRITTEN:
+        live, offline = (tmp_path / way / name for way in ("live", "offline"))
+        assert live.read_bytes() == offline.read_bytes(), f"{name} differs\n" + "\n".join(site.lines)
+    assert (tmp_path / "live" / "late.csv").read_text() == "frame,camera,what\n"
+    choices = (tmp_path / "live" / "choices.csv").read_text().splitlines()
+    assert len(choices) > 500, "people were seen"
+    assert {line.rsplit(",")[2] for line in choices[1:]} <= set(CAMERAS)
+    assert sorted(path.name for path in (tmp_path / "offline" / "best").iterdir()), "a film each"

@@ -1,0 +1,167 @@
+"""A running site of three cameras: what it is made of, what it sends, and how it heals."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import os
+import shutil
+import signal
+import time
+from collections.abc import AsyncIterator
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import aiohttp
+import numpy as np
+import pytest
+import pytest_asyncio
+import zenoh
+from running_site import CAMERAS, RunningSite, bounded, configuration, running
+from spliced import pictures, record
+
+pytestmark = [pytest.mark.asyncio(loop_scope="module"), pytest.mark.timeout(300)]
+
+
+@pytest_asyncio.fixture(scope="module", loop_scope="module")
+async def site(recording: Path, tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[RunningSite]:
+    """A site whose recordings begin again at their end, with people in sight."""
+    config = configuration(tmp_path_factory.mktemp("site"), recording, camera={"at_end": "loop"})
+    async with running(config) as site:
+        await site.until(lambda: bool(site.gops and site.gops[-1].choices), "somebody is shown")
+        yield site
+
+
+async def test_it_is_five_processes(site: RunningSite) -> None:
+    assert sorted(site.children()) == ["bestview", *CAMERAS, "sync"]
+
+
+async def test_pulses_are_readable_with_nc(site: RunningSite) -> None:
+    program = shutil.which("nc") or shutil.which("ncat")
+    port = str(site.config["sync"]["port"])
+    if program:
+        listener = await asyncio.create_subprocess_exec(
+            program, "127.0.0.1", port, stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE
+        )
+        assert listener.stdout is not None
+        lines = [(await bounded(listener.stdout.readline())).decode() for _ in range(6)]
+        listener.kill()
+        await listener.wait()
+    else:  # what nc does
+        reader, writer = await asyncio.open_connection("127.0.0.1", int(port))
+        lines = [(await bounded(reader.readline())).decode() for _ in range(6)]
+        writer.close()
+        await writer.wait_closed()
+    assert lines[0].startswith("MYVIEW-SYNC 1 ")
+    numbers = [int(line.split()[1]) for line in lines if line.startswith("PULSE ")]
+    assert len(numbers) >= 4
+    assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
+
+
+async def test_metadata_is_readable_by_a_plain_zenoh_subscriber(site: RunningSite) -> None:
+    loop, found = asyncio.get_running_loop(), asyncio.Queue[tuple[str, Any]]()
+
+    def receive(sample: zenoh.Sample) -> None:
+        content = json.loads(sample.payload.to_bytes())
+        loop.call_soon_threadsafe(found.put_nowait, (str(sample.key_expr), content))
+
+    config = zenoh.Config()
+    config.insert_json5("mode", '"client"')
+    config.insert_json5("connect/endpoints", json.dumps([site.config["zenoh"]["connect"]]))
+    config.insert_json5("scouting/multicast/enabled", "false")
+    session = await asyncio.to_thread(zenoh.open, config)
+    subscriber = session.declare_subscriber("myview/e2e/**/tracks", receive)
+    waiting = set(CAMERAS)
+    while waiting:
+        key, tracks = await bounded(found.get())
+        assert key == f"myview/e2e/camera/{tracks['camera']}/tracks"
+        assert all(len(track["boxes"]) == tracks["last"] - tracks["first"] + 1 for track in tracks["tracks"])
+        waiting.discard(tracks["camera"])
+    subscriber.undeclare()
+    await asyncio.to_thread(session.close)
+
+
+async def test_every_frame_is_the_chosen_cameras_own_pixel_for_pixel_across_cuts(
+    site: RunningSite, tmp_path: Path
+) -> None:
+    begin = len(site.gops)
+    numbers = sorted(site.gops[-1].choices)
+    end = site.pulse + 12 * 25
+    ways = {f"object-{number}": f"objects/{number}/best.mp4" for number in numbers}
+    ways |= {camera: f"cameras/{camera}/live.mp4" for camera in CAMERAS}
+    async with aiohttp.ClientSession() as session:
+        files = await bounded(
+            asyncio.gather(
+                *(record(session, site.url + way, end, tmp_path / name) for name, way in ways.items())
+            )
+        )
+    shown = {file.name: await asyncio.to_thread(pictures, file) for file in files}
+    chosen = {
+        (number, pulse): gop.choices.get(number)
+        for gop in site.gops
+        for number in numbers
+        for pulse in range(gop.first, gop.first + gop.frames)
+    }
+    compared, cuts = 0, sum(len(gop.cuts) for gop in site.gops[begin:])
+    for number in numbers:
+        for pulse, picture in shown[f"object-{number}"].items():
+            camera = chosen[number, pulse]
+            if camera is None:  # two numbers were one person: the stream goes on with the other's
+                assert number not in site.gops[-1].choices
+                continue
+            if pulse in shown[camera]:
+                np.testing.assert_array_equal(picture, shown[camera][pulse], f"{number} at {pulse}: {camera}")
+                compared += 1
+    assert compared > 100
+    assert cuts > 0, "a cut is what this is about"
+
+
+async def test_the_best_view_process_holds_no_codec(site: RunningSite) -> None:
+    mapped = {
+        name: Path(f"/proc/{pid}/maps").read_text(encoding="utf-8") for name, pid in site.children().items()
+    }
+    assert "libx264" in mapped["c0"], "this is how an encoder would be seen"
+    assert "libx264" not in mapped["bestview"]
+    assert "libavcodec" not in mapped["bestview"].replace("opencv_python_headless.libs/libavcodec", "")
+
+
+async def test_a_killed_camera_is_replaced_within_a_second_and_comes_back(
+    site: RunningSite, tmp_path: Path
+) -> None:
+    shown = lambda: [camera for camera in site.gops[-1].choices.values() if camera]  # noqa: E731
+    await site.until(lambda: bool(shown()), "somebody is shown")
+    victim = shown()[0]
+    number = next(number for number, camera in site.gops[-1].choices.items() if camera == victim)
+    async with aiohttp.ClientSession() as session:
+        viewer = asyncio.create_task(
+            record(session, f"{site.url}objects/{number}/best.mp4", site.pulse + 200, tmp_path / "viewer")
+        )
+        before = site.children()[victim]
+        killed_at, known = time.monotonic(), len(site.gops)
+        os.kill(before, signal.SIGKILL)
+        await site.until(
+            lambda: any(victim not in gop.choices.values() for gop in site.gops[known:]), "another view"
+        )
+        first_without = next(gop for gop in site.gops[known:] if victim not in gop.choices.values())
+        took = time.monotonic() - killed_at
+        await site.until(lambda: site.state(victim) == "gone", "the loss is seen")
+        await site.until(lambda: site.state(victim) == "live", "the camera is back")
+        assert site.children()[victim] != before
+        await site.until(
+            lambda: any(victim in gop.choices.values() for gop in site.gops[-3:]), "it takes part again"
+        )
+        await bounded(viewer)
+    # What was decided already, and the video that had come, is shown first: that is the declared look-ahead.
+    lookahead_s, gop_s = 25 / 25, 10 / 25
+    assert took < lookahead_s + gop_s + 1.0, f"{took:.2f} s until GOP {first_without.first}"
+    pulses = sorted(pictures(tmp_path / "viewer"))
+    gaps = [(a, b) for a, b in pairwise(pulses) if b != a + 1]
+    assert not gaps, f"the viewer's stream has holes: {gaps}"
+
+
+async def test_it_answers_where_machines_ask(site: RunningSite) -> None:
+    async with aiohttp.ClientSession() as session:
+        for path in ("healthz", "readyz", "metrics", "api/openapi.json", "api", ""):
+            async with session.get(site.url + path) as answer:
+                assert answer.status == 200, path

@@ -1,0 +1,192 @@
+"""What the benchmarks compute, without running anything that takes long."""
+
+from __future__ import annotations
+
+import io
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from benchmarks import render
+from benchmarks.delay_bus import Marks
+from benchmarks.delay_page import Shown
+from benchmarks.delay_stages import STAGES, split
+from benchmarks.picture import small_png
+from benchmarks.processes import OTHER, busy_now
+from benchmarks.stopwatch import Stopwatch
+from benchmarks.surroundings import SKIPPED, CannotRunError
+from benchmarks.views import find_views
+from server.wire.messages import CameraTracks, FrameHead, GopChoices
+
+FPS, GOP, LOOKAHEAD, STRIDE = 25.0, 10, 20, 5
+START = 1_000.0
+
+
+def due(pulse: int) -> float:
+    return START + pulse / FPS
+
+
+def head(pulse: int) -> FrameHead:
+    at = due(pulse)
+    return FrameHead(pulse=pulse, key=False, boot=1, due=at, taken=at + 0.01, encoded=at + 0.015)
+
+
+def window(camera: str, last: int, solved_at: float) -> CameraTracks:
+    return CameraTracks(
+        camera=camera,
+        boot=1,
+        size=(640, 360),
+        epoch=last // STRIDE,
+        first=0,
+        last=last,
+        final_to=0,
+        ended=False,
+        shed=[],
+        tracks=[],
+        solve=None,
+        solved_at=solved_at,
+    )
+
+
+def choices(first: int, camera: str) -> GopChoices:
+    return GopChoices(first=first, frames=GOP, choices={7: camera}, boxes={}, cuts=[])
+
+
+def live_marks() -> Marks:
+    """Two GOPs of two cameras: solved 30 ms (c1: 50 ms) after the last frame, decided 10 ms later."""
+    marks = Marks()
+    for pulse in range(40):
+        for camera in ("c0", "c1"):
+            marks.video(camera, head(pulse), due(pulse) + 0.02)
+    for last in range(STRIDE - 1, 40, STRIDE):
+        marks.tracks(window("c0", last, due(last) + 0.03))
+        marks.tracks(window("c1", last, due(last) + 0.05))
+    for first, camera in ((0, "c0"), (10, "c1")):
+        marks.choices(choices(first, camera), due(first + LOOKAHEAD - 1) + 0.06)
+    return marks
+
+
+def seen(at: dict[int, float]) -> Shown:
+    return Shown(object=7, at=at, lookahead=LOOKAHEAD, fps=FPS, cores={})
+
+
+def test_every_frame_of_a_gop_waits_equally_long_for_the_look_ahead() -> None:
+    delays = split(live_marks(), seen({pulse: due(pulse) + 0.95 for pulse in range(20)}))
+    expected = [0.01, 0.005, 0.005, 0.76 - 0.02, 0.05, 0.01, 0.95 - 0.82]
+    assert np.array_equal(delays.pulses, np.arange(20))
+    assert np.allclose(delays.stages, expected)
+
+
+def test_the_stages_add_up_to_the_whole() -> None:
+    at = {pulse: due(pulse) + 1.0 + 0.01 * (pulse % 3) for pulse in range(20)}
+    delays = split(live_marks(), seen(at))
+    assert delays.stages.shape == (20, len(STAGES))
+    assert np.allclose(delays.totals, [at[pulse] - due(pulse) for pulse in range(20)])
+
+
+def test_frames_that_were_not_shown_are_counted() -> None:
+    delays = split(live_marks(), seen({pulse: due(pulse) + 1.0 for pulse in range(20) if pulse % 4}))
+    assert delays.shown_share == pytest.approx(15 / 19)
+    assert len(delays.pulses) == 15
+
+
+def test_a_camera_that_is_late_counts_as_waiting_for_the_decision() -> None:
+    marks = live_marks()
+    marks.tracks(window("c1", LOOKAHEAD - 1, due(LOOKAHEAD - 1) + 0.4))
+    delays = split(marks, seen({pulse: due(pulse) + 1.0 for pulse in range(20)}))
+    assert delays.late == 1
+    assert np.allclose(delays.stages[:GOP, 4:6], [0.03, 0.03])
+    assert np.allclose(delays.stages[GOP:, 4:6], [0.05, 0.01])
+
+
+def test_a_decision_that_no_camera_was_in_time_for_is_all_waiting() -> None:
+    marks = live_marks()
+    for camera in ("c0", "c1"):
+        marks.tracks(window(camera, LOOKAHEAD - 1, due(LOOKAHEAD - 1) + 0.4))
+    delays = split(marks, seen({pulse: due(pulse) + 1.0 for pulse in range(10)}))
+    assert delays.late == 1
+    assert np.allclose(delays.stages[:, 4:6], [0.0, 0.06])
+
+
+def test_frames_whose_way_is_not_known_are_counted() -> None:
+    marks = live_marks()
+    del marks.frames["c0", 3]
+    delays = split(marks, seen({pulse: due(pulse) + 1.0 for pulse in range(20)}))
+    assert (delays.unknown, len(delays.pulses)) == (1, 19)
+
+
+def test_a_page_that_showed_nothing_is_an_error() -> None:
+    with pytest.raises(ValueError, match="no frame was shown"):
+        split(live_marks(), seen({}))
+
+
+def spin(seconds: float) -> None:
+    end = time.process_time() + seconds
+    while time.process_time() < end:
+        pass
+
+
+class Work:
+    def outer(self) -> str:
+        spin(0.02)
+        self.inner()
+        return "done"
+
+    def inner(self) -> None:
+        spin(0.06)
+
+
+def test_a_stage_inside_a_stage_counts_only_there() -> None:
+    watch = Stopwatch()
+    with watch.watching((Work, "outer", "outside"), (Work, "inner", "inside")):
+        assert Work().outer() == "done"
+    assert 0.02 <= watch.seconds["outside"] < 0.06 <= watch.seconds["inside"]
+
+
+def test_what_was_watched_is_itself_again_afterwards() -> None:
+    before = Work.inner
+    watch = Stopwatch()
+    with pytest.raises(ZeroDivisionError), watch.watching((Work, "inner", "inside")):
+        _ = 1 / 0
+    assert Work.inner is before
+
+
+def test_a_picture_with_too_many_colours_is_made_small_and_stays_itself() -> None:
+    across, down = np.meshgrid(np.arange(640), np.arange(400))
+    noise = np.random.default_rng(1).integers(0, 12, (400, 640, 3))
+    pixels = (np.stack([across / 3, down / 2, (across + down) / 5], axis=2) + noise).astype(np.uint8)
+    png = io.BytesIO()
+    Image.fromarray(pixels).save(png, "PNG")
+    small = small_png(png.getvalue())
+    assert len(small) < 300_000 < len(png.getvalue())
+    off = np.abs(np.asarray(Image.open(io.BytesIO(small)).convert("RGB")).astype(int) - pixels)
+    assert off.mean() < 12
+
+
+def test_recordings_that_are_not_there_are_named(tmp_path: Path) -> None:
+    with pytest.raises(CannotRunError, match="campus4"):
+        find_views(tmp_path, "campus4")
+
+
+@pytest.mark.skipif(not Path("/proc/stat").exists(), reason="needs Linux")
+def test_busy_cores_are_told_apart() -> None:
+    before = busy_now()
+    spin(0.2)
+    cores = busy_now().cores_since(before)
+    assert cores["measuring"] > 0.01
+    assert OTHER in cores
+
+
+def test_a_benchmark_without_its_recordings_is_left_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["render", "--data", str(tmp_path), "--out", str(tmp_path / "out")])
+    with pytest.raises(SystemExit) as ended:
+        render.main()
+    assert ended.value.code == SKIPPED
+    assert "render: left out: needs the recordings" in capsys.readouterr().out
+    assert not (tmp_path / "out").exists()

@@ -1,0 +1,173 @@
+"""What the documents show runs, and they name everything that there is to name."""
+
+from __future__ import annotations
+
+import asyncio
+import importlib
+import io
+import re
+from collections.abc import AsyncIterator, Iterator
+from contextlib import redirect_stdout
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pytest
+import typer.main
+from prometheus_client import CollectorRegistry
+
+from server.run.cli import app as command_line
+from server.view.service import BestViewService
+from server.web.app import make_app, serving
+from server.web.keys import METRICS
+from server.web.schema import CameraInfo, Choice, ObjectInfo, SiteInfo
+from server.wire import messages
+from server.wire.config import Http
+
+ROOT = Path(__file__).parents[1]
+DOCS = sorted((ROOT / "docs").glob("*.md"))
+INTERFACES = (ROOT / "docs" / "interfaces.md").read_text(encoding="utf-8")
+OPERATING = (ROOT / "docs" / "operating.md").read_text(encoding="utf-8")
+URL = "http://localhost:8080"
+PATIENCE = 30.0  # seconds that an example may take
+_BLOCK = re.compile(
+    r"^```python runnable\n(.*?)^```\n(?:\n```text output\n(.*?)^```\n)?", re.DOTALL | re.MULTILINE
+)
+
+
+@dataclass(frozen=True)
+class Example:
+    """A block of Python in a document, and what the document says that it prints."""
+
+    place: str
+    code: str
+    output: str | None
+
+
+def examples() -> Iterator[Example]:
+    for path in DOCS:
+        text = path.read_text(encoding="utf-8")
+        for found in _BLOCK.finditer(text):
+            line = text[: found.start()].count("\n") + 1
+            yield Example(f"{path.name}:{line}", found[1], found[2])
+
+
+EXAMPLES = list(examples())
+
+
+@pytest.fixture
+def by_hand(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """Give the server tests' cameras whose every word is decided by hand."""
+    monkeypatch.syspath_prepend(str(Path(__file__).parent / "server"))
+    return importlib.import_module("cameras_by_hand")
+
+
+@pytest.fixture
+async def site(by_hand: Any) -> AsyncIterator[str]:
+    """Serve a site in which two people have been seen; give its address."""
+    service = by_hand.FedService(by_hand.small_config())
+    service.decider.people._registry = by_hand.TrackNumbers()
+    async with serving(make_app(service), Http(port=0)) as port:
+        service.come(*by_hand.CAMERAS)
+        for epoch in range(3):
+            service.feed(epoch, {"c0": {1: by_hand.SMALL, 2: by_hand.SMALL}, "c1": {1: by_hand.LARGE}})
+        yield f"http://127.0.0.1:{port}"
+    service.close()
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=[example.place for example in EXAMPLES])
+async def test_an_example_runs_and_prints_what_the_document_says(example: Example, site: str) -> None:
+    code = compile(example.code.replace(URL, site), example.place, "exec")
+    printed = io.StringIO()
+
+    def run() -> None:
+        exec(code, {"__name__": "__main__"})  # noqa: S102 — the project's own text
+
+    with redirect_stdout(printed):
+        await asyncio.wait_for(asyncio.to_thread(run), PATIENCE)
+    assert printed.getvalue().strip()
+    if example.output is not None:
+        assert printed.getvalue() == example.output
+
+
+def test_there_are_examples_of_all_libraries() -> None:
+    code = "".join(example.code for example in EXAMPLES)
+    for room in ("tracking", "bestview", "camsync", "client"):
+        assert f"from {room} import" in code
+
+
+def test_links_between_the_documents_lead_somewhere() -> None:
+    for path in DOCS:
+        for target in re.findall(r"\]\(([^)#\s:]+)(?:#[^)]*)?\)", path.read_text(encoding="utf-8")):
+            assert (path.parent / target).exists(), f"{path.name} links to {target}"
+
+
+def test_links_to_headings_name_one() -> None:
+    for path in DOCS:
+        for target, heading in re.findall(r"\]\(([^)#\s:]*)#([^)]+)\)", path.read_text(encoding="utf-8")):
+            other = path.parent / target if target else path
+            assert heading in anchors(other.read_text(encoding="utf-8")), f"{path.name}: {target}#{heading}"
+
+
+def anchors(text: str) -> list[str]:
+    """Give the names that a document's headings and anchors can be linked to by."""
+    headings = re.findall(r"^#+ (.*)$", text, re.MULTILINE)
+    names = [re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings]
+    return [*names, *re.findall(r'<a id="([^"]+)">', text)]
+
+
+def test_every_command_and_option_is_described() -> None:
+    group: Any = typer.main.get_command(command_line)
+    for name, command in group.commands.items():
+        assert f"`myview {name}" in INTERFACES
+        rows = option_rows(name)
+        for option in (flag for it in command.params for flag in it.opts if flag.startswith("--")):
+            assert option == "--help" or f"`{option}`" in rows, f"myview {name} {option}"
+
+
+def option_rows(command: str) -> str:
+    """Give the rows of the table of options that belong to a command."""
+    rows, mine = [], False
+    for line in INTERFACES.splitlines():
+        cells = [cell.strip() for cell in line.split("|")]
+        if len(cells) == 6:  # a table of four columns
+            mine = command in cells[1].split(", ") if cells[1] else mine
+            if mine:
+                rows.append(line)
+    return "\n".join(rows)
+
+
+async def test_every_path_is_described(by_hand: Any) -> None:
+    app = make_app(BestViewService(by_hand.small_config()))
+    paths = {route.resource.canonical for route in app.router.routes() if route.resource is not None}
+    assert len(paths) > 10
+    for path in sorted(paths):
+        plain = re.sub(r"\{(\w+)(:[^/]*)?\}(?=[/.]|$)", r"{\1}", path)
+        assert f"`{plain}`" in INTERFACES, plain
+
+
+@pytest.mark.parametrize("kind", [SiteInfo, ObjectInfo, CameraInfo, Choice])
+def test_every_field_of_an_answer_is_described(kind: type[msgspec.Struct]) -> None:
+    http = INTERFACES.partition("## HTTP")[2].partition("## zenoh")[0]
+    for field in msgspec.structs.fields(kind):
+        assert f"`{field.encode_name}`" in http, field.encode_name
+
+
+def test_every_field_of_a_message_is_described() -> None:
+    zenoh = INTERFACES.partition("## zenoh")[2].partition("## Pulses")[0]
+    kinds = [it for it in vars(messages).values() if isinstance(it, type) and issubclass(it, msgspec.Struct)]
+    assert len(kinds) > 5
+    for kind in kinds:
+        part = zenoh.partition(f"**`{kind.__name__}`**")[2]
+        assert part, kind.__name__
+        for field in msgspec.structs.fields(kind):
+            assert f"`{field.encode_name}`" in part, f"{kind.__name__}.{field.encode_name}"
+
+
+async def test_every_metric_is_described(by_hand: Any) -> None:
+    service = BestViewService(by_hand.small_config())
+    metrics: CollectorRegistry = make_app(service)[METRICS]
+    names = [f"{it.name}_total" if it.type == "counter" else it.name for it in metrics.collect()]
+    for name in [name for name in names if name.startswith("myview_")]:
+        assert f"`{name}`" in OPERATING, name
