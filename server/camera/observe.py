@@ -5,20 +5,19 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Protocol
 
-import cv2
 import numpy as np
 
 from server.wire.config import Camera, Config
 from server.wire.errors import UserError
-from server.wire.fit import Fit, Floats, Image
-from tracking import Detections, histograms
+from server.wire.fit import Fit, Image
+from tracking import Detections
 from tracking.detectors import (
     BackgroundDetector,
     BackgroundSettings,
     Detector,
+    Looks,
     MotFileDetector,
     MotFileSettings,
-    colour_histograms,
 )
 
 _NO_PICTURE = np.empty((0, 0, 3), dtype=np.uint8)
@@ -58,25 +57,16 @@ class FittedDetections:
     """Detections from a file, which are in the camera's own pixels, moved into the site's picture."""
 
     def __init__(self, file: MotFileDetector, fit: Fit, settings: BackgroundSettings) -> None:
-        self._file, self._fit, self._settings = file, fit, settings
+        self._file, self._fit = file, fit
+        self._looks = Looks(settings.looks, settings.bins)
 
     @property
     def bins(self) -> int:
         """The length of a row of the histograms."""
-        settings = self._settings
-        return settings.looks.row if settings.looks.colour else settings.bins
+        return self._looks.bins
 
     def detect(self, image: Image, frame: int | None = None) -> Detections:
         """Give the detections of a frame, with the appearance that the site's picture shows."""
         own = self._file.detect(_NO_PICTURE, frame)
         boxes = self._fit.boxes_to_site(own.boxes)
-        return Detections(boxes, own.scores, self._looks(image, boxes))
-
-    def _looks(self, image: Image, boxes: Floats) -> Floats:
-        """Give what a box looks like, in the terms of the cameras that search for people themselves."""
-        settings = self._settings
-        if settings.looks.colour:
-            everywhere = np.full(image.shape[:2], 255, dtype=np.uint8)
-            return colour_histograms(image, boxes, settings.looks.colour_bins, everywhere)
-        grey = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
-        return histograms(grey, boxes, settings.bins)
+        return Detections(boxes, own.scores, self._looks.rows(image, boxes))

@@ -6,10 +6,12 @@ from tracking.detectors.boxfilter import BoxFilterSettings
 from tracking.detectors.explain import ExplainSettings
 from tracking.detectors.ghosts import GhostSettings
 from tracking.detectors.heightline import HeightLineSettings
-from tracking.detectors.looks import LooksSettings, colour_histograms
+from tracking.detectors.looks import Looks, LooksSettings, colour_histograms
 from tracking.detectors.median import MedianSettings
 from tracking.detectors.mog2 import Mog2Settings
 from tracking.detectors.motfile import MotFileDetector, MotFileSettings
+from tracking.detectors.subimage import SubimageSettings
+from tracking.detectors.template import TemplateDetector, TemplateSettings
 
 __all__ = [
     "BackgroundDetector",
@@ -20,10 +22,14 @@ __all__ = [
     "GhostSettings",
     "HeightLineSettings",
     "Image",
+    "Looks",
     "LooksSettings",
     "MedianSettings",
     "Mog2Settings",
     "MotFileDetector",
     "MotFileSettings",
+    "SubimageSettings",
+    "TemplateDetector",
+    "TemplateSettings",
     "colour_histograms",
 ]

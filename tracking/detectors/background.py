@@ -9,16 +9,16 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from tracking.appearance import histograms
 from tracking.detections import Detections
 from tracking.detectors.base import Image, Mask
 from tracking.detectors.boxfilter import Band, BoxFilterSettings, find_peaks, scan_heights
+from tracking.detectors.checked import checked_image
 from tracking.detectors.explain import ExplainSettings, Explanation, explain
 from tracking.detectors.fit import shrink
 from tracking.detectors.ghosts import GhostSettings
 from tracking.detectors.grid import Grid
 from tracking.detectors.heightline import HeightLineLearner, HeightLineSettings
-from tracking.detectors.looks import LooksSettings, colour_histograms
+from tracking.detectors.looks import Looks, LooksSettings
 from tracking.detectors.median import MedianBackground, MedianSettings
 from tracking.detectors.mog2 import Mog2Background, Mog2Settings
 from tracking.detectors.shadow import ShadowSettings
@@ -26,7 +26,6 @@ from tracking.detectors.split import Split
 
 # Pixels of the working picture per cell of the box filter, on each axis.
 CELL = 2
-_CHANNELS = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +58,7 @@ class BackgroundDetector:
 
     def __init__(self, settings: BackgroundSettings | None = None) -> None:
         self.settings = settings or BackgroundSettings()
+        self._looks = Looks(self.settings.looks, self.settings.bins)
         self._learner = HeightLineLearner(self.settings.heights)
         self._background: _Background = (
             MedianBackground(self.settings.median, self.settings.ghosts, self.settings.shadows)
@@ -84,18 +84,12 @@ class BackgroundDetector:
         found = self._hypotheses(mask, split.shadow & grid.visible & ~mask, grid)
         boxes = grid.to_work(found.boxes)
         self._background.learn(mask, _occupied(boxes[: found.people], mask.shape))
-        return Detections(grid.to_picture(boxes), found.scores, self._looks(small, boxes, mask))
-
-    def _looks(self, small: Image, boxes: npt.NDArray[np.float64], mask: Mask) -> npt.NDArray[np.float64]:
-        if self.settings.looks.colour:
-            return colour_histograms(small, boxes, self.settings.looks.colour_bins, mask)
-        grey = np.asarray(cv2.cvtColor(small, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
-        return histograms(grey, boxes, self.settings.bins, mask)
+        return Detections(grid.to_picture(boxes), found.scores, self._looks.rows(small, boxes, mask))
 
     @property
     def bins(self) -> int:
         """The length of a row of the histograms."""
-        return self.settings.looks.row if self.settings.looks.colour else self.settings.bins
+        return self._looks.bins
 
     def _hypotheses(self, mask: Mask, shadow: Mask, grid: Grid) -> Explanation:
         settings = self.settings
@@ -113,8 +107,7 @@ class BackgroundDetector:
         return Explanation(shrink(found.boxes, foreground, grid.weight), found.scores, found.people)
 
     def _grid_of(self, image: Image) -> Grid:
-        if image.ndim != _CHANNELS or image.shape[2] != _CHANNELS or image.dtype != np.uint8:
-            raise ValueError(f"a frame is (H, W, 3) uint8, not {image.shape} {image.dtype}")
+        checked_image(image)
         if self._grid is None:
             self._shape = image.shape
             self._grid = Grid(

@@ -9,12 +9,13 @@ not at all from another camera.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
+from tracking.appearance import histograms
 from tracking.boxes import Floats
 from tracking.detectors.base import Image, Mask
 
@@ -52,15 +53,40 @@ class LooksSettings:
         return len(_HALVES) * _CHANNELS * self.colour_bins
 
 
-def colour_histograms(image: Image, boxes: Floats, bins: int, mask: Mask) -> Floats:
+@dataclass(frozen=True, slots=True)
+class Looks:
+    """What a detector says that its boxes look like: colour histograms, or the paper's grey ones."""
+
+    settings: LooksSettings = field(default_factory=LooksSettings)
+    grey_bins: int = 64  # bins of the grey histograms
+
+    @property
+    def bins(self) -> int:
+        """The length of a row."""
+        return self.settings.row if self.settings.colour else self.grey_bins
+
+    def rows(self, image: Image, boxes: Floats, mask: Mask | None = None) -> Floats:
+        """Give the look of each box `(K, 4)` of a picture `(H, W, 3)`: `(K, bins)`, rows summing to 1.
+
+        Only the pixels count at which `mask` `(H, W)`, where there is one, is not 0.
+        """
+        if self.settings.colour:
+            return colour_histograms(image, boxes, self.settings.colour_bins, mask)
+        grey = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
+        return histograms(grey, boxes, self.grey_bins, mask)
+
+
+def colour_histograms(image: Image, boxes: Floats, bins: int, mask: Mask | None = None) -> Floats:
     """Give the six histograms of each box, `(K, 6 bins)`, rows summing to 1.
 
     Args:
         image: `(H, W, 3)`.
         boxes: `(K, 4)` in pixels of the image.
         bins: of each histogram.
-        mask: `(H, W)`, only its pixels that are not 0 count.
+        mask: `(H, W)`, only its pixels that are not 0 count; none: all do.
     """
+    if mask is None:
+        mask = np.full(image.shape[:2], 255, dtype=np.uint8)
     codes = _coded(image, bins)
     counts = np.zeros((len(boxes), len(_HALVES), _CHANNELS * bins))
     limits = np.array([image.shape[1], image.shape[0]] * 2, dtype=np.float64)

@@ -1,0 +1,113 @@
+"""Local peaks of template matching: where something that looked like this might be (paper IV.A.1)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from tracking.boxes import Floats
+from tracking.detections import Detections
+from tracking.detectors.base import Image
+from tracking.detectors.checked import checked_image
+from tracking.detectors.looks import Looks, LooksSettings
+from tracking.detectors.subimage import SubimageSettings, subimages
+
+_LEAST_SIDE = 4
+"""Pixels: a smaller template matches everywhere."""
+
+
+@dataclass(frozen=True, slots=True)
+class TemplateSettings:
+    """Searching for one object by what it looked like.
+
+    Raises:
+        ValueError: a setting makes no sense.
+    """
+
+    most_peaks: int = 80  # K: peaks handed on at most, best first
+    least_score: float = 0.0  # least correlation of a peak, 0 to 1
+    apart: float = 0.06  # no other peak within this share of the template's width and height
+    looks: Literal["subimage", "grey", "colour"] = "subimage"  # what an observation looks like
+    bins: int = 64  # looks grey: bins of the histogram
+    colour_bins: int = 16  # looks colour: bins of each of the six histograms
+    subimage: SubimageSettings = field(default_factory=SubimageSettings)
+
+    def __post_init__(self) -> None:
+        if self.most_peaks < 1:
+            raise ValueError(f"most_peaks must be at least 1, not {self.most_peaks}")
+        if not 0.0 <= self.least_score <= 1.0:
+            raise ValueError(f"least_score is a share between 0 and 1, not {self.least_score}")
+        if self.apart < 0.0:
+            raise ValueError(f"apart must not be negative, not {self.apart}")
+
+
+class TemplateDetector:
+    """Finds one object in every frame by normalised cross-correlation with a picture of it.
+
+    Each object has observations of its own, as many as there are peaks: `build_network_per_object` takes
+    them, `TemplateTracker` does it all. Nothing is remembered from one frame to the next.
+
+    Raises:
+        ValueError: the template is not `(h, w, 3)` uint8, or smaller than 4 pixels on a side.
+    """
+
+    def __init__(self, template: Image, settings: TemplateSettings | None = None) -> None:
+        self.settings = settings or TemplateSettings()
+        self._template = checked_image(template)
+        height, width = template.shape[:2]
+        if min(height, width) < _LEAST_SIDE:
+            raise ValueError(
+                f"a template is at least {_LEAST_SIDE} pixels wide and high, not {width}x{height}"
+            )
+        self._size = (width, height)
+        # Odd, so that a peak is in the middle of what it is compared with.
+        reach = [2 * max(1, round(self.settings.apart * side)) + 1 for side in (height, width)]
+        self._around = np.ones(reach, dtype=np.uint8)
+        self.histogram: Floats = self._looks(self._template, np.array([[0.0, 0.0, width, height]]))[0]
+        """`(B,)`, what the template itself looks like, in the terms of the observations."""
+
+    @property
+    def bins(self) -> int:
+        """The length of a row of the histograms."""
+        return len(self.histogram)
+
+    def detect(self, image: Image, frame: int | None = None) -> Detections:  # noqa: ARG002 — Detector
+        """Give the peaks of a frame, best first; boxes have the template's size, scores are correlations.
+
+        Raises:
+            ValueError: not an `(H, W, 3)` uint8 picture, or smaller than the template.
+        """
+        checked_image(image)
+        width, height = self._size
+        if image.shape[0] < height or image.shape[1] < width:
+            raise ValueError(
+                f"a {width}x{height} template does not fit into a picture of {image.shape[:2][::-1]}"
+            )
+        lefts, tops, scores = self._peaks(image)
+        boxes = np.stack([lefts, tops, lefts + width, tops + height], axis=1).astype(np.float64)
+        return Detections(boxes, scores, self._looks(image, boxes))
+
+    def _peaks(self, image: Image) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64], Floats]:
+        """Give left, top and score of the local maxima, best first."""
+        match = cv2.matchTemplate(image, self._template, cv2.TM_CCOEFF_NORMED)
+        # Where the picture is of one colour the correlation is not defined: nothing is there.
+        match = np.where(np.isfinite(match), np.clip(match, 0.0, 1.0), 0.0).astype(np.float32)
+        highest = cv2.dilate(match, self._around, borderType=cv2.BORDER_CONSTANT, borderValue=0.0)
+        peak = (match >= highest) & (match > 0.0) & (match >= self.settings.least_score)
+        tops, lefts = np.nonzero(peak)
+        scores = match[tops, lefts].astype(np.float64)
+        # Best first; equal ones by place, so that the order never depends on the sort.
+        order = np.lexsort((tops, lefts, -scores))[: self.settings.most_peaks]
+        return lefts[order], tops[order], scores[order]
+
+    def _looks(self, image: Image, boxes: Floats) -> Floats:
+        settings = self.settings
+        if settings.looks == "subimage":
+            return subimages(image, boxes, settings.subimage)
+        return Looks(LooksSettings(settings.looks == "colour", settings.colour_bins), settings.bins).rows(
+            image, boxes
+        )
