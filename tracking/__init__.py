@@ -14,6 +14,7 @@ from tracking.solvers.base import (
     solver_names,
 )
 from tracking.template import Template
+from tracking.template_tracker import TemplateTracker
 from tracking.tracker import OnlineTracker
 from tracking.window import WindowResult, WindowSettings, WindowTrack
 
@@ -28,6 +29,7 @@ __all__ = [
     "SolveReport",
     "Solver",
     "Template",
+    "TemplateTracker",
     "WindowResult",
     "WindowSettings",
     "WindowTrack",

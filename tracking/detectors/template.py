@@ -60,9 +60,7 @@ class TemplateDetector:
         self._template = checked_image(template)
         height, width = template.shape[:2]
         if min(height, width) < _LEAST_SIDE:
-            raise ValueError(
-                f"a template is at least {_LEAST_SIDE} pixels wide and high, not {width}x{height}"
-            )
+            raise ValueError(f"a template has at least {_LEAST_SIDE} pixels a side, not {width}x{height}")
         self._size = (width, height)
         # Odd, so that a peak is in the middle of what it is compared with.
         reach = [2 * max(1, round(self.settings.apart * side)) + 1 for side in (height, width)]

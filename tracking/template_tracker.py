@@ -1,0 +1,113 @@
+"""Tracking objects that are known by a picture of each: the paper's toys (IV.A.1)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from tracking.boxes import BOX_SIDES, Floats
+from tracking.costs import CostSettings
+from tracking.detections import Detections
+from tracking.detectors.base import Image
+from tracking.detectors.template import TemplateDetector, TemplateSettings
+from tracking.network import build_network_per_object
+from tracking.solvers.base import OCCLUDED, Solver, SolveReport
+from tracking.template import Template
+from tracking.window import WindowResult, WindowSettings, WindowTrack
+
+
+class TemplateTracker:
+    """Follows n given objects, which are numbered from 1. Nobody is born and nobody is forgotten.
+
+    Every object has its own observations in each frame, the peaks of the match with its picture in the
+    first frame. That picture stays its template; where it was in the last final frame is its source's
+    place. Windows end where `stride` divides n + 1, as `OnlineTracker`'s do. With a `window` of 19 and the
+    frame of the templates it is the paper's, segments of 20 frames.
+
+    Raises:
+        ValueError: boxes are not `(n, 4)`, there is none, or one of them holds too little of the image.
+    """
+
+    def __init__(
+        self,
+        image: Image,
+        boxes: Floats,
+        settings: TemplateSettings,
+        window: WindowSettings,
+        costs: CostSettings,
+        solver: Solver,
+        frame: int = 0,
+    ) -> None:
+        places = np.asarray(boxes, dtype=np.float64)
+        if places.ndim != 2 or places.shape[1] != BOX_SIDES or not len(places):  # noqa: PLR2004 — rows, sides
+            raise ValueError(f"templates are boxes (n, 4), at least one, not {places.shape}")
+        self._detectors = [TemplateDetector(_cut(image, box), settings) for box in places]
+        self._places: list[Floats | None] = list(places)
+        self._window, self._costs, self._solver = window, costs, solver
+        self._seen: list[list[Detections]] = [[] for _ in places]
+        self._first = frame + 1
+        self._last = frame
+
+    def push(self, image: Image) -> WindowResult | None:
+        """Take the next frame, first the one after the templates'; give a result where a window ends.
+
+        Raises:
+            ValueError: not an `(H, W, 3)` uint8 picture, or smaller than a template.
+        """
+        for seen, detector in zip(self._seen, self._detectors, strict=True):
+            seen.append(detector.detect(image))
+        self._last += 1
+        if (self._last + 1) % self._window.stride:
+            return None
+        return self._solve(self._last - self._window.lag)
+
+    def flush(self) -> WindowResult | None:
+        """End the recording: all frames become final. `None` where they were already."""
+        return self._solve(self._last) if self._last >= self._first else None
+
+    def _solve(self, final_to: int) -> WindowResult:
+        """Solve the window of all frames that are not final; make those up to `final_to` final."""
+        objects = zip(self._detectors, self._places, strict=True)
+        templates = [Template(n, one.histogram, place) for n, (one, place) in enumerate(objects, 1)]
+        network = build_network_per_object(templates, self._seen, self._costs)
+        solution = self._solver.solve(network)
+        rows = [_boxes_of(states, seen) for states, seen in zip(solution.states, self._seen, strict=True)]
+        tracks = tuple(
+            WindowTrack(item.id, boxes, item.histogram, _confidence(states, seen))
+            for item, boxes, states, seen in zip(templates, rows, solution.states, self._seen, strict=True)
+            if not np.isnan(boxes).all()
+        )
+        return self._finish(max(final_to, self._first - 1), rows, tracks, solution.report)
+
+    def _finish(
+        self, final_to: int, rows: list[Floats], tracks: tuple[WindowTrack, ...], report: SolveReport
+    ) -> WindowResult:
+        result = WindowResult(self._first, self._last, final_to, tracks, report)
+        final = final_to - self._first + 1
+        if final > 0:
+            last = [boxes[final - 1] for boxes in rows]
+            self._places = [None if np.isnan(box).any() else box for box in last]
+            self._seen = [seen[final:] for seen in self._seen]
+            self._first = final_to + 1
+        return result
+
+
+def _cut(image: Image, box: Floats) -> Image:
+    left, top, right, bottom = (max(round(float(side)), 0) for side in box)
+    return image[top:bottom, left:right].copy()
+
+
+def _boxes_of(states: npt.NDArray[np.int64], seen: Sequence[Detections]) -> Floats:
+    """Give the boxes of one object's states `(F,)`, `(F, 4)`, NaN where it is hidden."""
+    boxes = np.full((len(seen), BOX_SIDES), np.nan)
+    for m, state in enumerate(states):
+        if state != OCCLUDED:
+            boxes[m] = seen[m].boxes[state]
+    return boxes
+
+
+def _confidence(states: npt.NDArray[np.int64], seen: Sequence[Detections]) -> float:
+    scores = [float(seen[m].scores[state]) for m, state in enumerate(states) if state != OCCLUDED]
+    return sum(scores) / len(seen)
