@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
 
 from server.wire.config import Camera, Config
+from server.wire.detect import DetectSettings
 from server.wire.errors import UserError
 from server.wire.fit import Fit, Image
 from tracking import Detections
 from tracking.detectors import (
     BackgroundDetector,
-    BackgroundSettings,
     Detector,
+    HogDetector,
     Looks,
     MotFileDetector,
     MotFileSettings,
+    OnnxDetector,
+    paper_boxes,
 )
 
 _NO_PICTURE = np.empty((0, 0, 3), dtype=np.uint8)
@@ -36,27 +41,51 @@ def make_detector(config: Config, camera: Camera, fit: Fit) -> Observer:
     """Give the detector of a camera; its boxes are in the site's picture.
 
     Raises:
-        UserError: the detection file cannot be read.
+        UserError: the detection file or the network cannot be read, or the network cannot be run.
     """
     if camera.detections is not None:
-        try:
+        with _told(f"camera {camera.id}: detections"):
             file = MotFileDetector(camera.detections, MotFileSettings(first_frame=camera.offset))
             return FittedDetections(file, fit, config.detect)
-        except OSError as error:
-            raise UserError(
-                f"camera {camera.id}: detections: {camera.detections}: {error.strerror}"
-            ) from error
-        except ValueError as error:
-            raise UserError(f"camera {camera.id}: detections: {error}") from error
     polygons = [fit.to_site(np.asarray(polygon, dtype=np.float64)) for polygon in camera.ignore]
     ignore = tuple(tuple((float(x), float(y)) for x, y in polygon) for polygon in polygons)
-    return BackgroundDetector(replace(config.detect, ignore=(*config.detect.ignore, *ignore)))
+    with _told(f"camera {camera.id}: detect"):
+        return _of_kind(replace(config.detect, ignore=(*config.detect.ignore, *ignore)))
+
+
+def _of_kind(settings: DetectSettings) -> Observer:
+    """Give the detector that the settings name."""
+    looks = Looks(settings.looks, settings.bins)
+    match settings.kind:
+        case "hog":
+            return HogDetector(settings.hog, looks, settings.ignore)
+        case "onnx":
+            return OnnxDetector(settings.onnx, looks, settings.ignore)
+        case "boxes":
+            return BackgroundDetector(paper_boxes(settings))
+        case "background":
+            return BackgroundDetector(settings)
+
+
+@contextmanager
+def _told(where: str) -> Iterator[None]:
+    """Turn what goes wrong into one line that begins with ``where``.
+
+    Raises:
+        UserError: something went wrong.
+    """
+    try:
+        yield
+    except OSError as error:
+        raise UserError(f"{where}: {error.filename}: {error.strerror}") from error
+    except (ValueError, ImportError) as error:
+        raise UserError(f"{where}: {error}") from error
 
 
 class FittedDetections:
     """Detections from a file, which are in the camera's own pixels, moved into the site's picture."""
 
-    def __init__(self, file: MotFileDetector, fit: Fit, settings: BackgroundSettings) -> None:
+    def __init__(self, file: MotFileDetector, fit: Fit, settings: DetectSettings) -> None:
         self._file, self._fit = file, fit
         self._looks = Looks(settings.looks, settings.bins)
 

@@ -26,9 +26,9 @@ from pydantic import (
 from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, SettingsConfigDict
 
 from bestview import IdentitySettings, checked_homography
+from server.wire.detect import DetectSettings
 from server.wire.library import validated
 from tracking import DEFAULT_SOLVER, CostSettings, WindowSettings, solver_named
-from tracking.detectors import BackgroundSettings
 
 Polygon = Annotated[list[tuple[float, float]], Field(min_length=3)]
 """Corners in pixels of the camera's own picture."""
@@ -195,8 +195,8 @@ class Config(BaseSettings):
     cameras: Annotated[list[Camera], Field(min_length=1)]
     ground: Path | None = None
     """A JSON file with one homography per camera; a camera's own `ground` goes before it."""
-    detect: Annotated[BackgroundSettings, validated(BackgroundSettings)] = BackgroundSettings()
-    """Finding people in a picture: background subtraction and box filters (paper, IV.A.2)."""
+    detect: Annotated[DetectSettings, validated(DetectSettings)] = DetectSettings()
+    """Finding people in a picture; by default by background subtraction and box filters (paper, IV.A.2)."""
     track: Track = Track()
     view: View = View()
     http: Http = Http()

@@ -6,6 +6,7 @@ import difflib
 import json
 import os
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -66,7 +67,9 @@ def build_config(content: Mapping[str, Any], *, where: str, folder: Path) -> Con
         cameras = [_resolved(camera, homographies, folder) for camera in config.cameras]
     except ValueError as error:
         raise UserError(f"{where}: {error}") from error
-    return config.model_copy(update={"cameras": cameras})
+    onnx = replace(config.detect.onnx, model=config.detect.model_in(folder))
+    detect = replace(config.detect, onnx=onnx)
+    return config.model_copy(update={"cameras": cameras, "detect": detect})
 
 
 def _resolved(camera: Camera, homographies: Mapping[str, Any], folder: Path) -> Camera:

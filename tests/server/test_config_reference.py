@@ -51,10 +51,7 @@ def compare(shown: Any, real: Any, place: str) -> list[str]:
             wrong.append(f"{place}{key}: is missing; its default is {value!r}")
         elif is_section(value):
             wrong += compare(shown[key], value, f"{place}{key}.")
-        elif isinstance(value, (list, tuple, dict)):
-            if shown[key] or value:
-                wrong.append(f"{place}{key}: is not shown empty")
-        elif shown[key] != value:
+        elif shown[key] != (list(value) if isinstance(value, tuple) else value):
             wrong.append(f"{place}{key}: shows {shown[key]!r}, but its default is {value!r}")
     return wrong
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal, Protocol
 
 import cv2
@@ -45,6 +45,25 @@ class BackgroundSettings:
     boxes: BoxFilterSettings = field(default_factory=BoxFilterSettings)
     heights: HeightLineSettings = field(default_factory=HeightLineSettings)
     hypotheses: ExplainSettings = field(default_factory=ExplainSettings)
+
+
+def paper_boxes(settings: BackgroundSettings) -> BackgroundSettings:
+    """Give the settings with all off that is not in the paper (IV.A.2).
+
+    What is left are full boxes over place and height, each by itself, and grey histograms.
+    """
+    return replace(
+        settings,
+        looks=replace(settings.looks, colour=False),
+        shadows=replace(settings.shadows, use=False),
+        boxes=replace(settings.boxes, body="box"),
+        heights=replace(settings.heights, use=False),
+        hypotheses=replace(settings.hypotheses, use=False),
+    )
+
+
+PAPER_BOXES = paper_boxes(BackgroundSettings())
+"""The paper's box filters, as `PAPER_COSTS` are its costs."""
 
 
 class _Background(Protocol):

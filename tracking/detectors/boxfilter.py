@@ -10,13 +10,14 @@ import numpy.typing as npt
 
 from tracking.detectors.base import Plane
 from tracking.detectors.heightline import HeightLine
-from tracking.detectors.silhouette import BODY, WHOLE, Part, integral
+from tracking.detectors.silhouette import BODIES, WHOLE, Body, Part, integral
 
 
 @dataclass(frozen=True, slots=True)
 class BoxFilterSettings:
     """The scan for standing people."""
 
+    body: Body = "person"  # person: head, trunk and legs inside the box; box: all of it (the paper)
     aspect: float = 0.38  # width of a person's box over its height
     least_height: float = 0.14  # smallest person, in picture heights
     most_height: float = 0.95  # tallest person, in picture heights
@@ -35,11 +36,13 @@ class Peaks:
         boxes: `(P, 4)` in cells.
         gains: `(P,)`, best first.
         priors: `(P,)`, the factor by which the height lessens a gain, 1 where it is the expected one.
+        body: the parts of a box that a person fills.
     """
 
     boxes: npt.NDArray[np.float64]
     gains: npt.NDArray[np.float64]
     priors: npt.NDArray[np.float64]
+    body: tuple[Part, ...] = BODIES["person"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +91,7 @@ def find_peaks(
     priors = np.concatenate([peaks.priors for peaks in found])
     # Best first; equal ones by place, so that the order never depends on the sort.
     order = np.lexsort((boxes[:, 3], boxes[:, 1], boxes[:, 0], -gains))[: settings.most_peaks]
-    return Peaks(boxes[order], gains[order], priors[order])
+    return Peaks(boxes[order], gains[order], priors[order], BODIES[settings.body])
 
 
 def scan_heights(rows: int, settings: BoxFilterSettings) -> npt.NDArray[np.float64]:
@@ -134,9 +137,10 @@ def _scan(sums: _Sums, height: int, settings: BoxFilterSettings, band: Band | No
     if not (tops.size and lefts.size):
         return Peaks(np.empty((0, 4)), np.empty(0), np.empty(0))
     places = _Places(tops, lefts, step)
-    gains = sum(_part_sums(sums.gain, places, (width, height), part) for part in BODY) * priors[:, None]
+    parts = BODIES[settings.body]
+    gains = sum(_part_sums(sums.gain, places, (width, height), part) for part in parts) * priors[:, None]
     seen = _part_sums(sums.weight, places, (width, height), WHOLE[0])
-    body = sum((p.right - p.left) * (p.bottom - p.top) for p in BODY) * width * height
+    body = sum((p.right - p.left) * (p.bottom - p.top) for p in parts) * width * height
     gains = np.where(seen >= settings.least_seen * width * height, gains, -1.0)
     reach = (2 * max(height // (10 * step), 1) + 1, 2 * max(width // (4 * step), 1) + 1)
     tallest = cv2.dilate(gains, np.ones(reach, dtype=np.uint8), borderType=cv2.BORDER_REPLICATE)

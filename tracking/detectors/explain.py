@@ -10,13 +10,14 @@ import numpy.typing as npt
 from tracking.boxes import iou
 from tracking.detectors.base import Plane
 from tracking.detectors.boxfilter import Peaks
-from tracking.detectors.silhouette import BODY, covered, integral, sums_at
+from tracking.detectors.silhouette import covered, integral, sums_at
 
 
 @dataclass(frozen=True, slots=True)
 class ExplainSettings:
     """Which hypotheses of a frame are handed on."""
 
+    use: bool = True  # false: the boxes as the scan found them, each by itself (the paper)
     most_people: int = 10  # people that a frame's foreground is explained by at most
     least_share: float = (
         0.3  # least gain of a further person, in areas of the part of the body that nobody covers
@@ -27,7 +28,10 @@ class ExplainSettings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Explanation:
-    """Hypotheses `(K, 4)` in cells; scores `(K,)` in [0, 1]; the first `people` explain the foreground."""
+    """Hypotheses `(K, 4)` in cells; scores `(K,)` in [0, 1]; the first `people` explain the foreground.
+
+    Where nothing was explained, all of them may be people, and `people` is at least as many as there are.
+    """
 
     boxes: npt.NDArray[np.float64]
     scores: npt.NDArray[np.float64]
@@ -52,10 +56,10 @@ def explain(
         settings: how many.
     """
     search = _Search(peaks, foreground, cost, weight, settings)
-    chosen = search.people()
+    chosen = search.people() if settings.use else []
     shares = search.shares(chosen)
     scores = [float(search.shares([other for other in chosen if other != k])[k]) for k in chosen]
-    people = len(chosen)
+    people = len(chosen) if settings.use else settings.most_hypotheses
     for index in _runners_up(peaks.boxes, chosen, settings):
         chosen.append(index)
         scores.append(float(shares[index]))
@@ -85,7 +89,7 @@ class _Search:
         self._foreground = foreground
         self._cost = cost
         self._weight = weight
-        self._size = np.maximum(sums_at(integral(weight), peaks.boxes, BODY), 1.0)
+        self._size = np.maximum(sums_at(integral(weight), peaks.boxes, peaks.body), 1.0)
         self._settings = settings
 
     def people(self) -> list[int]:
@@ -111,11 +115,11 @@ class _Search:
         """Give each candidate's gain beside the chosen, in areas of its body, `(P,)`."""
         left, free = self._foreground - self._cost, self._weight.copy()
         for index in chosen:
-            hidden = covered(left.shape, self._peaks.boxes[index])
+            hidden = covered(left.shape, self._peaks.boxes[index], self._peaks.body)
             left[hidden] = np.minimum(left[hidden], 0.0)
             free[hidden] = 0.0
-        gains = sums_at(integral(left), self._peaks.boxes, BODY)
-        visible = sums_at(integral(free), self._peaks.boxes, BODY)
+        gains = sums_at(integral(left), self._peaks.boxes, self._peaks.body)
+        visible = sums_at(integral(free), self._peaks.boxes, self._peaks.body)
         return np.asarray(self._peaks.priors * gains / np.maximum(visible, _LEAST_VISIBLE * self._size))
 
     def _best(self, chosen: list[int]) -> int | None:

@@ -7,11 +7,15 @@ from typing import TypeAlias
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
+from tracking.boxes import Floats
 from tracking.detectors.base import Mask
 
 Polygon: TypeAlias = Sequence[tuple[float, float]]
 """Corners `(x, y)` in pixels of the camera's picture, in order; at least three."""
+Polygons: TypeAlias = Sequence[Polygon]
+"""What to ignore."""
 
 
 def visible_mask(height: int, width: int, polygons: Sequence[Polygon], scale: float = 1.0) -> Mask:
@@ -33,3 +37,28 @@ def visible_mask(height: int, width: int, polygons: Sequence[Polygon], scale: fl
             raise ValueError(f"an ignored polygon needs at least 3 corners, not {len(corners)}")
         cv2.fillPoly(mask, [np.rint(corners * scale).astype(np.int32)], (0,))
     return mask
+
+
+class Ignored:
+    """Tells which boxes of whole-picture detectors lie too far inside what is ignored."""
+
+    def __init__(self, polygons: Polygons) -> None:
+        self._polygons = polygons
+        self._sums: Floats | None = None
+
+    def leaves(self, shape: tuple[int, ...], boxes: Floats) -> npt.NDArray[np.bool_]:
+        """Say of each box `(N, 4)` in a picture of `shape` whether enough of it counts, `(N,)`."""
+        if not self._polygons:
+            return np.ones(len(boxes), dtype=np.bool_)
+        if self._sums is None or self._sums.shape != (shape[0] + 1, shape[1] + 1):
+            visible = visible_mask(shape[0], shape[1], self._polygons) > 0
+            self._sums = np.pad(visible.cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0))).astype(np.float64)
+        limits = np.array([shape[1], shape[0]] * 2, dtype=np.float64)
+        left, top, right, bottom = np.rint(np.clip(boxes, 0.0, limits)).astype(np.int64).T
+        seen = self._sums[bottom, right] - self._sums[top, right]
+        seen += self._sums[top, left] - self._sums[bottom, left]
+        return np.asarray(seen >= _LEAST_SEEN * np.maximum((right - left) * (bottom - top), 1))
+
+
+# Least share of a box that is not ignored.
+_LEAST_SEEN = 0.45

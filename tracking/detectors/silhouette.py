@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import cv2
 import numpy as np
@@ -28,6 +29,9 @@ BODY = (
 )
 WHOLE = (Part(0.0, 0.0, 1.0, 1.0),)
 
+Body = Literal["person", "box"]
+BODIES: dict[Body, tuple[Part, ...]] = {"person": BODY, "box": WHOLE}
+
 
 def integral(plane: Plane) -> npt.NDArray[np.float64]:
     """Give the sums over all rectangles that begin in the top left corner, `(H + 1, W + 1)`."""
@@ -44,10 +48,12 @@ def sums_at(
     return total
 
 
-def covered(shape: tuple[int, int], box: npt.NDArray[np.float64]) -> npt.NDArray[np.bool_]:
-    """Give the cells inside the body of one box `(4,)` in cells: `(H, W)` bool."""
+def covered(
+    shape: tuple[int, int], box: npt.NDArray[np.float64], parts: tuple[Part, ...]
+) -> npt.NDArray[np.bool_]:
+    """Give the cells inside the parts of one box `(4,)` in cells: `(H, W)` bool."""
     inside = np.zeros(shape, dtype=np.bool_)
-    for part in BODY:
+    for part in parts:
         edges = _cells(box[None], part, (shape[0] + 1, shape[1] + 1))
         left, top, right, bottom = (int(edge[0]) for edge in edges)
         inside[top:bottom, left:right] = True

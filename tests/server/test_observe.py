@@ -1,0 +1,79 @@
+"""The configuration chooses the detector, and what is wrong with it is said in one line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from server.camera.observe import make_detector
+from server.wire.errors import UserError
+from server.wire.fit import Fit
+from server.wire.loading import build_config
+from tracking.detectors import PAPER_BOXES, BackgroundDetector, HogDetector, MotFileDetector
+
+SIZE = (64, 48)
+
+
+def observer(folder: Path, detect: dict[str, Any], **camera: Any) -> Any:
+    site = {"width": SIZE[0], "height": SIZE[1]}
+    cameras = [{"id": "c0", "source": "none.mp4", **camera}]
+    config = build_config(
+        {"site": site, "cameras": cameras, "detect": detect}, where="site.yaml", folder=folder
+    )
+    return make_detector(config, config.cameras[0], Fit(SIZE, SIZE))
+
+
+def test_the_kind_says_which_detector(tmp_path: Path) -> None:
+    assert isinstance(observer(tmp_path, {}), BackgroundDetector)
+    hog = observer(tmp_path, {"kind": "hog", "hog": {"most": 3}, "looks": {"colour": False}, "bins": 16})
+    assert isinstance(hog, HogDetector)
+    assert (hog.settings.most, hog.bins) == (3, 16)
+
+
+def test_boxes_are_the_papers_whatever_else_is_set(tmp_path: Path) -> None:
+    boxes = observer(tmp_path, {"kind": "boxes", "heights": {"use": True}})
+    assert isinstance(boxes, BackgroundDetector)
+    for part in ("looks", "shadows", "boxes", "heights", "hypotheses"):
+        assert getattr(boxes.settings, part) == getattr(PAPER_BOXES, part)
+
+
+@pytest.mark.parametrize("kind", ["background", "boxes", "hog"])
+def test_frames_with_and_without_a_picture_have_histograms_of_one_length(tmp_path: Path, kind: str) -> None:
+    one = observer(tmp_path, {"kind": kind})
+    seen = one.detect(np.zeros((SIZE[1], SIZE[0], 3), dtype=np.uint8))
+    assert seen.histograms.shape == (0, one.bins)
+
+
+def test_a_detection_file_goes_before_the_kind(tmp_path: Path) -> None:
+    (tmp_path / "det.txt").write_text("1,-1,10,20,30,20,1,-1,-1,-1\n", encoding="utf-8")
+    one = observer(tmp_path, {"kind": "hog"}, detections="det.txt")
+    assert isinstance(one._file, MotFileDetector)
+    assert len(one.detect(np.zeros((SIZE[1], SIZE[0], 3), dtype=np.uint8))) == 1
+
+
+@pytest.mark.parametrize(
+    ("detect", "camera", "said"),
+    [
+        ({"kind": "onnx"}, {}, "detect: onnx.model: kind onnx needs the path"),
+        ({"kind": "onnx", "onnx": {"model": "none.onnx"}}, {}, "camera c0: detect: "),
+        ({"kind": "nobody"}, {}, "detect.kind: "),
+        ({"hog": {"step": 0.5}}, {}, "detect.hog: step must be above 1"),
+        ({"onnx": {"modle": "x"}}, {}, "did you mean 'model'?"),
+        ({}, {"detections": "none.txt"}, "camera c0: detections: "),
+    ],
+)
+def test_what_is_wrong_is_said_in_one_line(
+    tmp_path: Path, detect: dict[str, Any], camera: dict[str, Any], said: str
+) -> None:
+    with pytest.raises(UserError) as caught:
+        observer(tmp_path, detect, **camera)
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_networks_path_is_relative_to_the_configuration(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match=str(tmp_path / "none.onnx")):
+        observer(tmp_path, {"kind": "onnx", "onnx": {"model": "none.onnx"}})

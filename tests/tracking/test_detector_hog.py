@@ -1,0 +1,76 @@
+"""OpenCV's people detector behind the interface: boxes on people, best first, none twice."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from server.camera.scene import Scene
+from tracking.boxes import iou
+from tracking.detections import Detections
+from tracking.detectors import HogDetector, HogSettings, Looks, LooksSettings
+from tracking.detectors.suppress import best_apart
+
+SETTINGS = HogSettings(least_height=0.25)
+WHERE_SOMEBODY_IS = 110
+
+
+@cache
+def room() -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.float64]]:
+    """Give a picture of the synthetic room, and the boxes of those who are seen whole."""
+    scene = Scene("room", 3, 4, 1, 640, 360, 25)
+    seen = scene.truth(WHERE_SOMEBODY_IS)[0]
+    return scene.image(0, WHERE_SOMEBODY_IS), seen.boxes[seen.visible >= 0.8]
+
+
+def found(settings: HogSettings = SETTINGS) -> Detections:
+    return HogDetector(settings).detect(room()[0])
+
+
+def test_people_are_found_in_boxes_of_their_size() -> None:
+    overlaps = iou(found().boxes[:, None], room()[1][None]).max(axis=0)
+    assert np.count_nonzero(overlaps >= 0.6) >= 2, overlaps
+
+
+def test_scores_are_in_order_and_nobody_is_found_twice() -> None:
+    seen = found()
+    assert (np.diff(seen.scores) <= 0.0).all()
+    assert ((seen.scores >= 0.5) & (seen.scores <= 1.0)).all()
+    overlaps = iou(seen.boxes[:, None], seen.boxes[None])
+    assert (overlaps[~np.eye(len(seen), dtype=np.bool_)] <= SETTINGS.apart).all()
+
+
+def test_looks_are_those_asked_for() -> None:
+    detector = HogDetector(SETTINGS, Looks(LooksSettings(colour=False), 32))
+    seen = detector.detect(room()[0])
+    assert detector.bins == 32 == seen.histograms.shape[1]
+    np.testing.assert_allclose(seen.histograms.sum(axis=1), 1.0)
+
+
+def test_what_is_ignored_is_not_found() -> None:
+    everything = (((0.0, 0.0), (640.0, 0.0), (640.0, 360.0), (0.0, 360.0)),)
+    assert len(HogDetector(SETTINGS, ignore=everything).detect(room()[0])) == 0
+
+
+def test_the_same_picture_gives_the_same_boxes_to_the_byte() -> None:
+    assert found().boxes.tobytes() == found().boxes.tobytes()
+
+
+def test_of_equal_boxes_the_first_by_place_is_kept_whatever_their_order() -> None:
+    boxes = np.array([[10.0, 0, 20, 30], [11.0, 0, 21, 30], [50.0, 0, 60, 30], [9.0, 0, 19, 30]])
+    scores = np.array([0.5, 0.5, 0.9, 0.5])
+    for order in ([0, 1, 2, 3], [3, 2, 1, 0], [1, 3, 0, 2]):
+        kept = best_apart(boxes[order], scores[order], 0.5, 10)
+        np.testing.assert_array_equal(boxes[order][kept], [[50, 0, 60, 30], [9, 0, 19, 30]])
+    assert len(best_apart(boxes, scores, 0.5, 1)) == 1
+    assert len(best_apart(boxes[:0], scores[:0], 0.5, 1)) == 0
+
+
+def test_settings_that_make_no_sense_are_refused() -> None:
+    with pytest.raises(ValueError, match="least_height"):
+        HogSettings(least_height=0.0)
+    with pytest.raises(ValueError, match="step"):
+        HogSettings(step=1.0)

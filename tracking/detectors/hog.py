@@ -1,0 +1,102 @@
+"""OpenCV's people detector: oriented gradients and a linear SVM (Dalal and Triggs, CVPR 2005)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from tracking.boxes import Floats
+from tracking.detections import Detections
+from tracking.detectors.base import Image
+from tracking.detectors.checked import checked_image
+from tracking.detectors.ignore import Ignored, Polygons
+from tracking.detectors.looks import Looks
+from tracking.detectors.suppress import best_apart
+
+# The detector's window is 64x128 pixels, the person in its middle is 96 tall, with 16 above and below.
+_PERSON_ROWS = 96
+_MARGIN = 0.125
+_STRIDE = (8, 8)
+_PADDING = (16, 16)
+# Of a person's height: the window is much wider than most people are.
+_ASPECT = 0.38
+
+
+@dataclass(frozen=True, slots=True)
+class HogSettings:
+    """The HOG people detector.
+
+    Raises:
+        ValueError: a setting makes no sense.
+    """
+
+    least_height: float = 0.14  # smallest person, in picture heights: the smaller the slower
+    step: float = 1.08  # each size of the scan is this factor above the one before
+    least_margin: float = 0.0  # least distance from the SVM's border; below 0 gives more, and more false ones
+    apart: float = 0.5  # of two boxes that overlap (IoU) by more, the one of lower score is left out
+    most: int = 40  # boxes handed on at most
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.least_height <= 1.0:
+            raise ValueError(f"least_height is a share above 0 up to 1, not {self.least_height}")
+        if not self.step > 1.0:
+            raise ValueError(f"step must be above 1, not {self.step}")
+
+
+class HogDetector:
+    """Finds upright people in single pictures; remembers nothing. Scores are `1 / (1 + exp(-margin))`."""
+
+    def __init__(
+        self, settings: HogSettings | None = None, looks: Looks | None = None, ignore: Polygons = ()
+    ) -> None:
+        self.settings = settings or HogSettings()
+        self._looks = looks or Looks()
+        self._ignored = Ignored(ignore)
+        self._hog = cv2.HOGDescriptor()
+        self._hog.setSVMDetector(np.asarray(cv2.HOGDescriptor.getDefaultPeopleDetector(), dtype=np.float32))
+
+    @property
+    def bins(self) -> int:
+        """The length of a row of the histograms."""
+        return self._looks.bins
+
+    def detect(self, image: Image, frame: int | None = None) -> Detections:  # noqa: ARG002 — Detector
+        """Give the people of a frame, best first.
+
+        Raises:
+            ValueError: not an `(H, W, 3)` uint8 picture.
+        """
+        checked_image(image)
+        boxes, scores = self._found(image)
+        seen = self._ignored.leaves(image.shape, boxes)
+        boxes, scores = boxes[seen], scores[seen]
+        kept = best_apart(boxes, scores, self.settings.apart, self.settings.most)
+        boxes = boxes[kept]
+        return Detections(boxes, scores[kept], self._looks.rows(image, boxes))
+
+    def _found(self, image: Image) -> tuple[Floats, Floats]:
+        """Give all windows in which the SVM sees somebody, cut down to the person: boxes and scores."""
+        height, width = image.shape[:2]
+        factor = _PERSON_ROWS / (self.settings.least_height * height)
+        size = (max(round(width * factor), 64), max(round(height * factor), 128))
+        scaled = cv2.resize(image, size, interpolation=cv2.INTER_LINEAR)
+        windows, margins = self._hog.detectMultiScale(
+            scaled,
+            hitThreshold=self.settings.least_margin,
+            winStride=_STRIDE,
+            padding=_PADDING,
+            scale=self.settings.step,
+            groupThreshold=0,
+        )
+        sides = np.asarray(windows, dtype=np.float64).reshape(-1, 4)
+        per_pixel = np.array([width / size[0], height / size[1]])
+        corner, extent = sides[:, :2] * per_pixel, sides[:, 2:] * per_pixel
+        tall = (1.0 - 2.0 * _MARGIN) * extent[:, 1]
+        top = corner[:, 1] + _MARGIN * extent[:, 1]
+        middle, half = corner[:, 0] + extent[:, 0] / 2.0, _ASPECT * tall / 2.0
+        boxes = np.stack([middle - half, top, middle + half, top + tall], axis=1)
+        limits = np.array([width, height] * 2, dtype=np.float64)
+        scores = 1.0 / (1.0 + np.exp(-np.asarray(margins, dtype=np.float64).ravel()))
+        return np.clip(boxes, 0.0, limits), scores

@@ -1,0 +1,75 @@
+"""What YOLO networks write, in its three layouts, as boxes and scores."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from tracking.boxes import Floats
+
+Layout = Literal["auto", "yolov5", "yolov8", "end2end"]
+
+_BOX = 4
+_END_TO_END = 6
+_MOST_END_TO_END = 1000
+"""End-to-end networks give some 100 to 300 boxes; one-class YOLOv5 networks, as wide, thousands."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Found:
+    """Boxes `(N, 4)` in pixels of the network's input, scores `(N,)` in [0, 1]."""
+
+    boxes: Floats
+    scores: Floats
+
+
+def decoded(output: npt.NDArray[np.floating], layout: Layout, classes: Sequence[int]) -> Found:
+    """Read the output of a network; a box scores what the likeliest of the classes asked for does.
+
+    | layout | shape | a row |
+    | --- | --- | --- |
+    | `yolov5` (v5, v7) | (1, N, 5 + C) | middle x, y, width, height, objectness, C classes |
+    | `yolov8` (v8, v9, v11, v12) | (1, 4 + C, N) | middle x, y, width, height, C classes, as columns |
+    | `end2end` (v10, v26, exports with NMS) | (1, N, 6) | left, top, right, bottom, score, class |
+
+    `auto` goes by the shape.
+
+    Raises:
+        ValueError: the output has none of these shapes, or not so many classes.
+    """
+    if output.ndim != 3 or output.shape[0] != 1:  # noqa: PLR2004 — batch, rows, columns
+        raise ValueError(_unfit(output.shape))
+    table = output[0].astype(np.float64)
+    kind = _layout_of(table.shape) if layout == "auto" else layout
+    if kind == "yolov8":
+        table = table.T
+    if kind == "end2end":
+        if table.shape[1] != _END_TO_END:
+            raise ValueError(_unfit(output.shape))
+        wanted = np.isin(table[:, 5].astype(np.int64), list(classes))
+        return Found(table[wanted, :_BOX], np.clip(table[wanted, _BOX], 0.0, 1.0))
+    first = _BOX if kind == "yolov8" else _BOX + 1
+    if table.shape[1] <= first:
+        raise ValueError(_unfit(output.shape))
+    if max(classes) >= table.shape[1] - first:
+        raise ValueError(f"it knows {table.shape[1] - first} classes, and has no class {max(classes)}")
+    scores = table[:, [first + number for number in classes]].max(axis=1)
+    if kind == "yolov5":
+        scores = scores * table[:, _BOX]
+    middle, half = table[:, :2], table[:, 2:_BOX] / 2.0
+    return Found(np.concatenate([middle - half, middle + half], axis=1), np.clip(scores, 0.0, 1.0))
+
+
+def _layout_of(shape: tuple[int, ...]) -> Layout:
+    rows, columns = shape
+    if columns == _END_TO_END and rows <= _MOST_END_TO_END:
+        return "end2end"
+    return "yolov8" if rows < columns else "yolov5"
+
+
+def _unfit(shape: tuple[int, ...]) -> str:
+    return f"its output has the shape {shape}, not (1, N, 5 + C), (1, 4 + C, N) or (1, N, 6) as YOLO's"
