@@ -5,7 +5,9 @@ Frames count from 1 in the files and everywhere in this module; ids of detection
 
 from __future__ import annotations
 
+import gzip
 import math
+import zlib
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -46,14 +48,20 @@ class MotRow:
 
 
 def read_rows(path: Path) -> list[MotRow]:
-    """Read a MOTChallenge file, in the order of the file.
+    """Read a MOTChallenge file, in the order of the file; one whose name ends in `.gz` is unpacked.
 
     Raises:
         ValueError: the file is no such text; the message names file and line.
         OSError: the file cannot be read.
     """
+    data = path.read_bytes()
+    if path.suffix == ".gz":
+        try:
+            data = gzip.decompress(data)
+        except (gzip.BadGzipFile, EOFError, zlib.error) as error:
+            raise ValueError(f"{path}: not a whole gzip file: {error}") from None
     try:
-        text = path.read_text(encoding="ascii")
+        text = data.decode("ascii")
     except UnicodeDecodeError as error:
         raise ValueError(f"{path}: not a MOTChallenge text file (byte {error.start} is not ASCII)") from None
     return list(parse_rows(text.splitlines(), str(path)))

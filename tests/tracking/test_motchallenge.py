@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 from pathlib import Path
 
 import pytest
@@ -118,6 +119,22 @@ def test_a_file_is_written_whole(tmp_path: Path) -> None:
     write_rows(path, [MotRow(2, 1, 0, 0, 1, 1), MotRow(1, 1, 0, 0, 1, 1)])
     assert [row.frame for row in read_rows(path)] == [1, 2]
     assert [entry.name for entry in tmp_path.iterdir()] == ["out.txt"]
+
+
+def test_a_packed_file_is_read_like_its_text(tmp_path: Path) -> None:
+    path = tmp_path / "c0.txt.gz"
+    path.write_bytes(gzip.compress(b"1,2,3,4,5,6,1\n"))
+    assert read_rows(path) == [MotRow(1, 2, 3, 4, 5, 6)]
+
+
+@pytest.mark.parametrize("cut", [0, 5, -9])
+def test_a_packed_file_that_is_broken_is_refused_in_one_line(tmp_path: Path, cut: int) -> None:
+    path = tmp_path / "c0.txt.gz"
+    whole = gzip.compress(b"1,2,3,4,5,6,1\n" * 50)
+    path.write_bytes(b"1,2,3,4,5,6,1\n" if cut == 0 else whole[:cut])
+    with pytest.raises(ValueError, match="not a whole gzip file") as refused:
+        read_rows(path)
+    assert "\n" not in str(refused.value)
 
 
 def test_the_public_files_are_read(shared_data: Path) -> None:

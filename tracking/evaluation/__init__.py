@@ -1,0 +1,10 @@
+"""How good tracks are, against ground truth: HOTA, MOTA, IDF1, identity switches.
+
+Needs the extra `evaluate` (`pip install myview[evaluate]`); the tracker itself does not use it.
+"""
+
+from tracking.evaluation.cameras import CameraScores, Recording, evaluate_cameras
+from tracking.evaluation.perfect import perfect_association
+from tracking.evaluation.scores import Scores, evaluate
+
+__all__ = ["CameraScores", "Recording", "Scores", "evaluate", "evaluate_cameras", "perfect_association"]

@@ -1,0 +1,32 @@
+"""Who is taken for whom in one frame."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
+
+from tracking.boxes import Floats
+
+_ROUNDING = float(np.finfo(np.float64).eps)
+"""An overlap that is the least one but for its last digit is enough."""
+
+
+def best_pairs(
+    similarity: Floats, least: float, bonus: Floats | None = None
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Assign rows to columns so that the total similarity (and bonus) is largest.
+
+    Args:
+        similarity: `(T, R)`.
+        least: pairs that are less similar are no pairs.
+        bonus: `(T, R)`, added to the similarity of pairs.
+
+    Returns:
+        `(P,)` rows and `(P,)` columns of the pairs.
+    """
+    possible = similarity >= least - _ROUNDING
+    worth = np.where(possible, similarity if bonus is None else similarity + bonus, 0.0)
+    rows, columns = linear_sum_assignment(worth, maximize=True)
+    paired = possible[rows, columns]
+    return rows[paired], columns[paired]

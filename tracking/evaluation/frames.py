@@ -1,0 +1,75 @@
+"""Truth and tracks side by side, frame by frame."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracking.boxes import BOX_SIDES, Floats, iou
+from tracking.evaluation.assignment import best_pairs
+from tracking.motchallenge import MotRow
+
+Ids = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Frame:
+    """One frame of one camera.
+
+    Attributes:
+        truth: `(T,)` ids of the people who are there.
+        tracks: `(R,)` ids of the tracks that are there.
+        similarity: `(T, R)` overlap (IoU) of their boxes, in [0, 1].
+    """
+
+    truth: Ids
+    tracks: Ids
+    similarity: Floats
+
+
+def line_up(truth: Iterable[MotRow], tracks: Iterable[MotRow], least_iou: float) -> list[Frame]:
+    """Give the frames in which there is anybody, in order.
+
+    Truth of confidence 0 does not count: such a person need not be found, and a track that is at them
+    (and at nobody who counts) is left out rather than wrong, as MOTChallenge has it.
+
+    Raises:
+        ValueError: an id is twice in one frame.
+    """
+    there, found = _by_frame(truth, "ground truth"), _by_frame(tracks, "tracks")
+    return [
+        _frame(there.get(number, []), found.get(number, []), least_iou)
+        for number in sorted(there.keys() | found.keys())
+    ]
+
+
+def _by_frame(rows: Iterable[MotRow], what: str) -> dict[int, list[MotRow]]:
+    frames: dict[int, dict[int, MotRow]] = {}
+    for row in rows:
+        frame = frames.setdefault(row.frame, {})
+        if row.id in frame:
+            hint = "; these are detections, not tracks" if row.id == -1 else ""
+            raise ValueError(f"{what}: frame {row.frame} has id {row.id} twice{hint}")
+        frame[row.id] = row
+    return {number: list(frame.values()) for number, frame in frames.items()}
+
+
+def _frame(truth: Sequence[MotRow], tracks: Sequence[MotRow], least_iou: float) -> Frame:
+    counts = np.array([row.confidence != 0.0 for row in truth], dtype=bool)
+    similarity = iou(_boxes(truth)[:, None], _boxes(tracks)[None])
+    kept = np.ones(len(tracks), dtype=bool)
+    if not counts.all():
+        people, results = best_pairs(similarity, least_iou)
+        kept[results[~counts[people]]] = False
+    return Frame(_ids(truth)[counts], _ids(tracks)[kept], similarity[np.ix_(counts, kept)])
+
+
+def _ids(rows: Sequence[MotRow]) -> Ids:
+    return np.array([row.id for row in rows], dtype=np.int64)
+
+
+def _boxes(rows: Sequence[MotRow]) -> Floats:
+    return np.array([row.box for row in rows], dtype=np.float64).reshape(-1, BOX_SIDES)

@@ -1,0 +1,43 @@
+"""The ceiling: what perfect association would make of detections."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+
+from tracking.boxes import BOX_SIDES, iou
+from tracking.evaluation.assignment import best_pairs
+from tracking.evaluation.scores import DEFAULT_IOU
+from tracking.motchallenge import MotRow
+
+
+def perfect_association(
+    detections: Iterable[MotRow], truth: Iterable[MotRow], least_iou: float = DEFAULT_IOU
+) -> list[MotRow]:
+    """Give each detection the id of the person it is at, and leave out those that are at nobody.
+
+    In each frame people and detections are assigned to each other, for the largest total overlap, none
+    below `least_iou`. What the scores of these tracks lack, no tracker can find in the detections (but
+    one that adds boxes where nothing was detected).
+    """
+    people = _by_frame(row for row in truth if row.confidence != 0.0)
+    tracks: list[MotRow] = []
+    for number, found in _by_frame(detections).items():
+        there = people.get(number, [])
+        similarity = iou(_boxes(there)[:, None], _boxes(found)[None])
+        rows, columns = best_pairs(similarity, least_iou)
+        tracks += [replace(found[c], id=there[r].id) for r, c in zip(rows, columns, strict=True)]
+    return tracks
+
+
+def _by_frame(rows: Iterable[MotRow]) -> dict[int, list[MotRow]]:
+    frames: dict[int, list[MotRow]] = {}
+    for row in rows:
+        frames.setdefault(row.frame, []).append(row)
+    return frames
+
+
+def _boxes(rows: list[MotRow]) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+    return np.array([row.box for row in rows], dtype=np.float64).reshape(-1, BOX_SIDES)

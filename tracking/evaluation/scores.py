@@ -1,0 +1,93 @@
+"""The scores of tracks against ground truth."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import motrics
+
+from tracking.evaluation.frames import Frame, line_up
+from tracking.evaluation.matching import matched
+from tracking.motchallenge import MotRow
+
+DEFAULT_IOU = 0.5
+"""The overlap from which a box is taken to be at a person, as in MOTChallenge."""
+
+
+@dataclass(frozen=True, slots=True)
+class Scores:
+    """How good tracks are. Shares are in [0, 1], 1 is perfect; MOTA may be negative.
+
+    Attributes:
+        hota: higher order tracking accuracy: the mean over overlaps of .05 to .95 of the geometric mean
+            of `deta` and `assa` (Luiten et al., IJCV 2021).
+        deta: detection accuracy, the same mean.
+        assa: association accuracy, the same mean.
+        mota: 1 less misses, false positives and switches, per person and frame (CLEAR MOT, Bernardin and
+            Stiefelhagen, 2008).
+        idf1: share of boxes that are right when each track stands for one person and each person for one
+            track, the best way round for the whole recording (Ristani et al., 2016).
+        recall: share of people's boxes that are matched.
+        precision: share of tracks' boxes that are matched.
+        switches: times that a person is matched with another track than last.
+        fragments: times that a person is found again after a gap.
+        misses: people's boxes that are not matched.
+        false_positives: tracks' boxes that are not matched.
+        objects: people in the ground truth.
+        tracks: tracks.
+    """
+
+    hota: float
+    deta: float
+    assa: float
+    mota: float
+    idf1: float
+    recall: float
+    precision: float
+    switches: int
+    fragments: int
+    misses: int
+    false_positives: int
+    objects: int
+    tracks: int
+
+
+def evaluate(truth: Iterable[MotRow], tracks: Iterable[MotRow], least_iou: float = DEFAULT_IOU) -> Scores:
+    """Score the tracks of one camera.
+
+    Args:
+        truth: rows whose confidence is 0 do not count; see `line_up`.
+        tracks: what was found.
+        least_iou: the overlap from which a box is taken to be at a person, for all but HOTA.
+
+    Raises:
+        ValueError: an id is twice in one frame.
+    """
+    return score(line_up(truth, tracks, least_iou), least_iou)
+
+
+def score(frames: Sequence[Frame], least_iou: float) -> Scores:
+    """Score frames that are lined up."""
+    people = [frame.truth.tolist() for frame in frames]
+    found = [frame.tracks.tolist() for frame in frames]
+    overlaps = [frame.similarity.tolist() for frame in frames]
+    pairs = [matrix.astype(float).tolist() for matrix in matched(frames, least_iou)]
+    hota = motrics.compute_hota_from_similarity(people, found, overlaps)
+    identity = motrics.compute_identity_from_similarity(people, found, overlaps, least_iou)
+    clear = motrics.compute_clear_from_similarity(people, found, pairs)
+    return Scores(
+        hota=hota.hota,
+        deta=hota.deta,
+        assa=hota.assa,
+        mota=clear.mota,
+        idf1=identity.idf1,
+        recall=clear.clr_re,
+        precision=clear.clr_pr,
+        switches=clear.num_switches,
+        fragments=clear.frag,
+        misses=clear.num_misses,
+        false_positives=clear.num_false_positives,
+        objects=len({number for frame in people for number in frame}),
+        tracks=len({number for frame in found for number in frame}),
+    )
