@@ -9,6 +9,7 @@ passes prove the optimum.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,11 +20,25 @@ from tracking.solvers.arc_master import ArcMaster, ArcPoint, ArcSet, arcs_of_pat
 from tracking.solvers.conflict_finder import ConflictFinder, ConflictRow
 from tracking.solvers.layout_ascent import Guess, with_pulls
 from tracking.solvers.objective import Ints
+from tracking.solvers.priced_arcs import arcs_through
 from tracking.solvers.relaxed import CLOSE, Relaxed
-from tracking.solvers.viterbi import Trellis, backward, forward
+from tracking.solvers.viterbi import Marginals, Trellis
 
 _ENTERING = 150
-"""ArcSet per object and round: about the arcs of a dozen paths; more only swell the program."""
+"""Arcs per object and round: about those of a dozen paths; more only swell the program."""
+
+_STATES = 12
+"""States of a frame and object whose arcs are looked at first, the best: most rounds need no more."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Priced:
+    """The trellis at the prices of a point, both passes over it, and the bound that they prove."""
+
+    trellis: Trellis
+    passes: Marginals
+    worths: Floats
+    bound: float
 
 
 class ArcSearch:
@@ -49,19 +64,18 @@ class ArcSearch:
         """Let in the arcs that a guess at the duals of the layout term finds good."""
         self._master.add_arcs(arcs_of_paths(guess.owners, guess.paths))
         anything = np.full(self._network.objects, np.inf)
-        point = ArcPoint(0.0, np.empty(0), guess.pulls, anything, 0.0)
-        self._master.add_arcs(self._better_arcs(point)[1])
+        self._enter_better_arcs(self._priced_by(ArcPoint(0.0, np.empty(0), guess.pulls, anything, 0.0)))
 
     def run(self) -> Relaxed:
         """Find the optimum of the relaxation."""
-        rounds, bound = 0, -np.inf
+        rounds = 0
         while True:
             point = self._settled()
             rounds += 1
-            bound, arcs = self._better_arcs(point)
-            close = point.objective - bound <= CLOSE * max(1.0, abs(point.objective))
-            if close or not self._master.add_arcs(arcs):
-                return Relaxed(self._master.usage(), bound, self._priced(point), rounds)
+            priced = self._priced_by(point)
+            close = point.objective - priced.bound <= CLOSE * max(1.0, abs(point.objective))
+            if close or not self._enter_better_arcs(priced):
+                return Relaxed(self._master.usage(), priced.bound, priced.trellis.node, rounds)
 
     def _settled(self) -> ArcPoint:
         """Solve the program with all conflict rows that its solution breaks."""
@@ -71,22 +85,19 @@ class ArcSearch:
             point = self._master.solve()
         return point
 
-    def _better_arcs(self, point: ArcPoint) -> tuple[float, ArcSet]:
-        """Price all arcs; give the bound that proves, and the arcs whose best path betters the program."""
+    def _priced_by(self, point: ArcPoint) -> _Priced:
+        """Price all arcs."""
         trellis = self._trellis.with_node(self._priced(point))
-        ahead, behind = forward(trellis), backward(trellis)
-        least = (ahead[-1] + trellis.sink).min(axis=1)
-        bound = float(least.sum()) - point.charge
-        found = [_first_arcs(trellis, behind, point.worths)]
-        for m in range(1, self._network.frames):
-            rest = (trellis.node[:, m] + behind[m])[:, None]
-            through = ahead[m - 1][:, :, None] + trellis.pair[:, m - 1] + rest
-            n, i, j = np.nonzero(through < point.worths[:, None, None])
-            found.append((ArcSet(n, np.full(len(n), m), i, j), through[n, i, j]))
-        arcs, costs = found[0][0], np.concatenate([costs for _, costs in found])
-        for more, _ in found[1:]:
-            arcs = arcs.and_also(more)
-        return bound, arcs.only(_cheapest(arcs.owner, costs, self._network.objects))
+        passes = Marginals.of(trellis)
+        return _Priced(trellis, passes, point.worths, float(passes.least.sum()) - point.charge)
+
+    def _enter_better_arcs(self, priced: _Priced) -> bool:
+        """Let in arcs whose best path betters the program; say whether there are any."""
+        for most in (_STATES, self._network.places + 1):
+            arcs, costs = arcs_through(priced.trellis, priced.passes, priced.worths, most)
+            if self._master.add_arcs(arcs.only(_cheapest(arcs.owner, costs, self._network.objects))):
+                return True
+        return False
 
     def _priced(self, point: ArcPoint) -> Floats:
         """Give the node costs with the prices of conflict rows and what moves earn."""
@@ -96,13 +107,6 @@ class ArcSearch:
             if price > 0.0:
                 node[:, row.frame][row.members] += price
         return with_pulls(network, node, point.pulls) if network.layout else node
-
-
-def _first_arcs(trellis: Trellis, behind: Floats, worths: Floats) -> tuple[ArcSet, Floats]:
-    through = trellis.source + trellis.node[:, 0] + behind[0]
-    n, j = np.nonzero(through < worths[:, None])
-    zero = np.zeros(len(n), dtype=np.int64)
-    return ArcSet(n, zero, zero, j), through[n, j]
 
 
 def _cheapest(owner: Ints, costs: Floats, objects: int) -> Bools:

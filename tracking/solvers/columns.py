@@ -12,7 +12,6 @@ from tracking.solvers.conflict_finder import ConflictFinder
 from tracking.solvers.finish import finished, nothing
 from tracking.solvers.greedy_dp import greedy_paths
 from tracking.solvers.layout_ascent import guessed
-from tracking.solvers.objective import objective
 from tracking.solvers.path_search import PathSearch
 from tracking.solvers.relaxed import Relaxed
 
@@ -40,5 +39,5 @@ def relaxation_by_columns(network: Network) -> Relaxed:
     start = greedy_paths(network).nodes
     starts = arcs_of_paths(np.arange(network.objects), start)
     search = ArcSearch(network, starts, [], ConflictFinder(network))
-    search.enter_guess(guessed(network, objective(network, start)))
+    search.enter_guess(guessed(network))
     return search.run()

@@ -38,8 +38,12 @@ _DUAL, _AS_IT_STANDS = 1, 0
 """Simplex strategies: dual, best from nothing; or primal after new columns and dual after new rows."""
 
 
-def quiet_highs(*, growing: bool = False) -> highspy.Highs:
-    """Give a solver that is deterministic and says nothing; `growing`: for a program that gets columns."""
+def quiet_highs(*, growing: bool = False, presolve: bool = False) -> highspy.Highs:
+    """Give a solver that is deterministic and says nothing; `growing`: for a program that gets columns.
+
+    With `presolve` the program is made smaller before it is solved for the first time; after that it
+    goes on from its last basis.
+    """
     solver: highspy.Highs = highspy.Highs()  # type: ignore[no-untyped-call]
     options: dict[str, bool | int | float | str] = {
         "output_flag": False,
@@ -47,7 +51,7 @@ def quiet_highs(*, growing: bool = False) -> highspy.Highs:
         "parallel": "off",
         "solver": "simplex",
         "simplex_strategy": _AS_IT_STANDS if growing else _DUAL,
-        "presolve": "off",
+        "presolve": "on" if presolve else "off",
         "random_seed": 0,
         "primal_feasibility_tolerance": 1e-9,
         "dual_feasibility_tolerance": 1e-9,

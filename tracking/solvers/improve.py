@@ -7,11 +7,15 @@ import numpy as np
 from tracking.boxes import Floats
 from tracking.conflicts import Bools
 from tracking.network import Network
-from tracking.solvers.objective import Ints, block, locations_at, objective
-from tracking.solvers.viterbi import Trellis, best_paths
+from tracking.solvers.objective import Ints, locations_at, objective, path_costs
+from tracking.solvers.packed import Packed
+from tracking.solvers.viterbi import Marginals, Trellis, best_paths
 
 _ROUNDS = 20
 """Far above what it takes to settle; bounds the time whatever the window."""
+
+_NO_LESS = 1e-12
+"""Relative: what is cheaper by less is no cheaper."""
 
 
 def improved(network: Network, nodes: Ints, power: int = 1) -> Ints:
@@ -21,41 +25,90 @@ def improved(network: Network, nodes: Ints, power: int = 1) -> Ints:
     exist where arcs are gated, and jumps where the relaxation was split. `power` is that of the layout
     term.
     """
-    best, cost = nodes.copy(), objective(network, nodes, power)
-    exclusions = network.exclusions()
+    turns = _Turns(network, nodes, power)
+    cost = objective(network, nodes, power)
     for _ in range(_ROUNDS):
-        before = cost
-        for owner in range(network.objects):
-            trial = best.copy()
-            trial[owner] = _rerouted(network, exclusions, best, owner, power)
-            tried = objective(network, trial, power)
-            if tried < cost or not np.isfinite(cost):
-                best, cost = trial, tried
-        if not cost < before - 1e-12 * max(1.0, abs(cost)):
+        changed = [turns.take(owner) for owner in range(network.objects)]
+        before, cost = cost, objective(network, turns.nodes, power)
+        if not any(changed) or not cost < before - _NO_LESS * max(1.0, abs(cost)):
             break
-    return best
+    return turns.nodes
 
 
-def _rerouted(network: Network, exclusions: Bools, nodes: Ints, owner: int, power: int) -> Ints:
-    """Give the best path of one object while the others stay where they are."""
-    node = network.node.copy()
-    for other in range(network.objects):
-        if other != owner:
-            block(network, exclusions, node, (other, nodes[other]))
-    own = np.array([owner])
-    pair = network.pair[network.sets[own]]
-    if network.layout:
-        pair = pair + network.layout * _layout_of_arcs(network, nodes, owner, power)
-    trellis = Trellis(network.source[own], node[own], pair, network.sink[own])
-    return np.asarray(best_paths(trellis).nodes[0])
+class _Turns:
+    """Lets one object after the other choose; an object whose others have not moved has nothing to do."""
 
+    def __init__(self, network: Network, nodes: Ints, power: int) -> None:
+        self._network = network
+        self._power = power
+        self._exclusions = network.exclusions()
+        self._trellis = Trellis.of(network)
+        self._through = Marginals.of(self._trellis).through
+        self._settled = np.zeros(network.objects, dtype=np.bool_)
+        self.nodes = nodes.copy()
 
-def _layout_of_arcs(network: Network, nodes: Ints, owner: int, power: int) -> Floats:
-    """Give what each arc of one object adds to the layout term without μ, (1, M - 1, S, S)."""
-    where = network.locations[network.sets[owner]]
-    moves = where[1:, None, :, :] - where[:-1, :, None, :]
-    others = np.diff(np.delete(locations_at(network, nodes), owner, axis=0), axis=1)
-    apart = np.zeros(moves.shape[:3])
-    for other in others:
-        apart += (np.abs(moves - other[:, None, None, :]) ** power).sum(axis=3)
-    return apart[None]
+    def take(self, owner: int) -> bool:
+        """Give an object its best path around the others; say whether it moved."""
+        if self._settled[owner]:
+            return False
+        cost = self._own_cost(owner)
+        before = self.nodes[owner].copy()
+        self.nodes[owner] = self._rerouted(owner, cost)
+        moved = self._own_cost(owner) < cost
+        if moved:
+            self._settled[:] = False
+        else:
+            self.nodes[owner] = before
+        self._settled[owner] = True
+        return moved
+
+    def _own_cost(self, owner: int) -> float:
+        """Give the part of the objective that depends on one object's path."""
+        network = self._network
+        cost = float(path_costs(network, self.nodes)[owner])
+        if network.layout:
+            moves = np.diff(locations_at(network, self.nodes), axis=1)
+            cost += network.layout * float((np.abs(moves - moves[owner]) ** self._power).sum())
+        return cost
+
+    def _rerouted(self, owner: int, cost: float) -> Ints:
+        """Give the best path of one object while the others stay where they are; it has one at `cost`.
+
+        The layout term takes nothing off a path, so states through which every path costs more than that
+        can be left out before it is computed.
+        """
+        network = self._network
+        node = network.node[owner].copy()
+        node[:, :-1][self._barred(owner)] = np.inf
+        limit = cost + _NO_LESS * max(1.0, abs(cost)) if np.isfinite(cost) else np.inf
+        packed = Packed.of(((self._through[owner] <= limit) & np.isfinite(node))[None])
+        trellis = packed.trellis(self._trellis.only(np.array([owner])).with_node(node[None]))
+        if network.layout:
+            trellis.pair[0] += network.layout * self._layout_of_arcs(owner, packed)
+        return np.asarray(packed.named(best_paths(trellis).nodes)[0])
+
+    def _barred(self, owner: int) -> Bools:
+        """Say which places of one object the others bar, (M, K)."""
+        network = self._network
+        places, sets = network.places, network.sets
+        others = np.delete(np.arange(network.objects), owner)
+        taken = self.nodes[others]
+        visible = taken < places
+        at = np.where(visible, sets[others, None] * places + taken, 0)
+        own = slice(sets[owner] * places, (sets[owner] + 1) * places)
+        if not self._exclusions.size:
+            return np.zeros((network.frames, places), dtype=np.bool_)
+        barred = self._exclusions[np.arange(network.frames), at, own] & visible[:, :, None]
+        return np.asarray(barred.any(axis=0))
+
+    def _layout_of_arcs(self, owner: int, packed: Packed) -> Floats:
+        """Give what each arc between states kept adds to the layout term without μ, (M - 1, W, W)."""
+        network = self._network
+        where = packed.states(network.locations[network.sets[[owner]]], 0.0)[0]
+        others = np.diff(np.delete(locations_at(network, self.nodes), owner, axis=0), axis=1)
+        apart = np.zeros((network.frames - 1, where.shape[1], where.shape[1]))
+        for side in range(where.shape[2]):
+            moves = where[1:, None, :, side] - where[:-1, :, None, side]
+            for other in others[:, :, side]:
+                apart += np.abs(moves - other[:, None, None]) ** self._power
+        return apart

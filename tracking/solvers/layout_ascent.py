@@ -1,7 +1,8 @@
 """A quick first guess at the duals of the layout term, so that few arcs need enter later.
 
-Projected subgradient ascent of the bound: the forces between pairs of objects, within [-μ, μ], pull the
-cheapest paths into step. It proves nothing that counts; the search that starts from it does.
+Projected subgradient ascent of the bound, each force by steps of its own size (as Adam takes them): the
+forces between pairs of objects, within [-μ, μ], pull the cheapest paths into step. It proves nothing that
+counts; the search that starts from it does.
 """
 
 from __future__ import annotations
@@ -13,18 +14,25 @@ import numpy as np
 
 from tracking.boxes import BOX_SIDES, Floats
 from tracking.network import Network
-from tracking.solvers.objective import Ints, locations_at
-from tracking.solvers.viterbi import Paths, Trellis, best_paths
+from tracking.solvers.objective import Ints
+from tracking.solvers.packed import Packed
+from tracking.solvers.viterbi import Marginals, Trellis, best_paths
 
-_STEPS = 60
+_STEPS = 40
 _KEPT = 8
 """Of the last paths met: they are near those of the optimum."""
 
-_MEMORY = 0.6
-"""Share of the former direction in the next one."""
+_FIRST, _SHORTER = 0.2, 0.95
+"""Length of the first step as a share of μ, and of each step as a share of the one before."""
 
-_PATIENCE, _SHORTER = 5, 0.6
-"""After so many steps without a better bound, steps get shorter by this factor."""
+_MEMORY, _MEMORY_OF_SIZE = 0.6, 0.9
+"""Shares of the former direction, and of the former typical size of a slope, in the next one."""
+
+_STATES = 12
+"""States of a frame and object that the guess looks at: the cheapest without forces."""
+
+_STILL = 1e-3
+"""Pixels: forces between objects that move alike stay."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,35 +46,44 @@ class Guess:
 
 def with_pulls(network: Network, node: Floats, pulls: Floats) -> Floats:
     """Give the costs of nodes `node` (n, M, S) with what moves earn by `pulls` (n, M - 1, 4)."""
-    where = network.locations[network.sets]
-    pulled = node.copy()
-    pulled[:, 1:] -= np.einsum("nml,nmsl->nms", pulls, where[:, 1:])
-    pulled[:, :-1] += np.einsum("nml,nmsl->nms", pulls, where[:, :-1])
-    return pulled
+    return _pulled(node, network.locations[network.sets], pulls)
 
 
-def guessed(network: Network, attained: float) -> Guess:
-    """Guess the forces in a network with layout term; `attained` is the cost of some states."""
+def _pulled(node: Floats, where: Floats, pulls: Floats) -> Floats:
+    """Give node costs under pulls; `where` (n, M, S, 4) are the states' locations."""
+    inward = np.zeros((*node.shape[:2], BOX_SIDES))
+    inward[:, 1:] -= pulls
+    inward[:, :-1] += pulls
+    return np.asarray(node + (where @ inward[:, :, :, None])[:, :, :, 0])
+
+
+def guessed(network: Network) -> Guess:
+    """Guess the forces in a network with layout term."""
     pairs = np.array(list(combinations(range(network.objects), 2)), dtype=np.int64).reshape(-1, 2)
     forces = np.zeros((len(pairs), network.frames - 1, BOX_SIDES))
-    way, length, waited, best = np.zeros_like(forces), 1.0, 0, -np.inf
+    way, size, best = np.zeros_like(forces), np.zeros_like(forces), -np.inf
     trellis, best_pulls = Trellis.of(network), _pulls(network, pairs, forces)
+    packed = Packed.cheapest(Marginals.of(trellis).through, _STATES)
+    trellis, where = packed.trellis(trellis), packed.states(network.locations[network.sets], 0.0)
+    each, frames = np.indices((network.objects, network.frames))
     met: list[Ints] = []
-    for _ in range(_STEPS):
+    for step in range(_STEPS):
         pulls = _pulls(network, pairs, forces)
-        paths = best_paths(trellis.with_node(with_pulls(network, network.node, pulls)))
-        met = [*met, paths.nodes][-_KEPT:]
-        bound, waited = float(paths.costs.sum()), waited + 1
+        paths = best_paths(trellis.with_node(_pulled(trellis.node, where, pulls)))
+        met = [*met, packed.named(paths.nodes)][-_KEPT:]
+        bound = float(paths.costs.sum())
         if bound > best:
-            best, best_pulls, waited = bound, pulls, 0
-        elif waited > _PATIENCE:
-            length, waited = length * _SHORTER, 0
-        way = _MEMORY * way + (1.0 - _MEMORY) * _slope(network, pairs, paths)
-        steepness = float((way**2).sum())
-        if steepness == 0.0 or attained <= bound:
+            best, best_pulls = bound, pulls
+        slope = _slope(pairs, where[each, frames, paths.nodes])
+        if not slope.any():
             break
-        step = length * (attained - bound) / steepness
-        forces = np.clip(forces + step * way, -network.layout, network.layout)
+        way = _MEMORY * way + (1.0 - _MEMORY) * slope
+        size = _MEMORY_OF_SIZE * size + (1.0 - _MEMORY_OF_SIZE) * slope**2
+        direction = way / (1.0 - _MEMORY ** (step + 1))
+        typical = np.sqrt(size / (1.0 - _MEMORY_OF_SIZE ** (step + 1)))
+        length = network.layout * _FIRST * _SHORTER**step
+        forces += length * direction / (typical + _STILL)
+        np.clip(forces, -network.layout, network.layout, out=forces)
     owners = np.tile(np.arange(network.objects), len(met))
     return Guess(best_pulls, np.concatenate(met), owners)
 
@@ -78,7 +95,7 @@ def _pulls(network: Network, pairs: Ints, forces: Floats) -> Floats:
     return pulls
 
 
-def _slope(network: Network, pairs: Ints, paths: Paths) -> Floats:
+def _slope(pairs: Ints, where: Floats) -> Floats:
     """Give the subgradient of the bound: how much less the first of a pair moves than the second."""
-    moves = np.diff(locations_at(network, paths.nodes), axis=1)
+    moves = np.diff(where, axis=1)
     return np.asarray(moves[pairs[:, 1]] - moves[pairs[:, 0]])

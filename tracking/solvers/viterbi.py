@@ -102,6 +102,32 @@ def trace(trellis: Trellis, best: Floats) -> Paths:
     return Paths(nodes, ends[each, nodes[:, -1]])
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Marginals:
+    """Both passes over a trellis: what the best ways into and out of each state cost.
+
+    Attributes:
+        ahead: (M, n, S) from the source into each state, the state counted.
+        behind: (M, n, S) from each state to the sink, the state not counted.
+        least: (n,) the costs of the cheapest paths.
+    """
+
+    ahead: Floats
+    behind: Floats
+    least: Floats
+
+    @classmethod
+    def of(cls, trellis: Trellis) -> Marginals:
+        """Go over the trellis forward and backward."""
+        ahead = forward(trellis)
+        return cls(ahead, backward(trellis), (ahead[-1] + trellis.sink).min(axis=1))
+
+    @property
+    def through(self) -> Floats:
+        """The cost of the best path through each state, (n, M, S)."""
+        return np.swapaxes(self.ahead + self.behind, 0, 1)
+
+
 def best_paths(trellis: Trellis) -> Paths:
     """Give the cheapest path of each object on its own."""
     return trace(trellis, forward(trellis))
