@@ -37,6 +37,7 @@ BENCHMARKS = (
     Benchmark(
         "delay", "from the pulse to the browser, stage by stage; 2 minutes, part of it drawing the scene"
     ),
+    Benchmark("observations", "what detectors find, and what the tracker makes of it; 10 minutes"),
     Benchmark("solvers", "the solvers of the tracking program against each other", shared=False),
 )
 

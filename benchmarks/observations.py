@@ -1,0 +1,113 @@
+"""What finding people is worth: recall, precision and the ceiling of association, detector by detector.
+
+    OPENBLAS_NUM_THREADS=1 python -m benchmarks.observations --data ../shared/data --out out/bench
+
+On recordings with ground truth, at an overlap (IoU) of one half. *Oracle* is the joint IDF1 over the cameras
+of a scene when every box is given the true identity and boxes on nobody are left out: what association can
+reach at most. Below each detector stand the tracks that the network program makes of its hypotheses. Where
+there is no truth, pictures with the boxes drawn are saved. Times are processor time.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import cv2
+
+from benchmarks.observed import View, ViewScores, oracle, scores_of_boxes, scores_of_tracks, views_of
+from benchmarks.observed_pictures import save_pictures
+from benchmarks.observers import OBSERVERS, SURE, Observer, Seen, watch
+from benchmarks.report import Report
+from benchmarks.surroundings import CannotRunError, finish, parser
+from tracking.motchallenge import MotRow
+
+SCENES = ("terrace", "pets09")
+BY_EYE = "campus4"
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A row of the table: boxes of all views, scored."""
+
+    name: str
+    boxes: dict[str, list[MotRow]]
+    tracks: bool
+
+
+def rows_of(observer: Observer, seen: dict[str, Seen]) -> Iterator[Row]:
+    """Give the rows of one observer: its hypotheses, those it is sure of, and the tracks."""
+    hypotheses = {name: it.hypotheses for name, it in seen.items()}
+    yield Row(f"{observer.name}: hypotheses", hypotheses, tracks=False)
+    if observer is OBSERVERS[0]:
+        sure = {name: [row for row in rows if row.confidence >= SURE] for name, rows in hypotheses.items()}
+        yield Row(f"{observer.name}: score from {SURE:g}", sure, tracks=False)
+    yield Row(f"{observer.name}: tracks", {name: it.tracks for name, it in seen.items()}, tracks=True)
+
+
+def measure_scene(report: Report, scene: str, options: argparse.Namespace) -> None:
+    """Print the table of a scene."""
+    views = [view for view in views_of(options.data, scene) if view.truth]
+    truths = {view.name: view.people(options.frames) for view in views}
+    table: list[list[str]] = []
+    for observer in OBSERVERS:
+        if options.detector and not any(word in observer.name for word in options.detector):
+            continue
+        seen = {view.name: watch(observer, view, options.frames) for view in views}
+        table += [_cells(row, truths, list(seen.values())) for row in rows_of(observer, seen)]
+    names = [f"{what} {view.name}" for view in views for what in ("rec.", "prec.")]
+    columns = ["boxes", *names, "IDF1", "oracle", "ms", "frames/s"]
+    rows, width, _ = next(views[0].images(1)).shape
+    report.table(f"{scene}: {width}x{rows}, {_frames(views, options)} frames", columns, table)
+
+
+def _cells(row: Row, truths: dict[str, list[MotRow]], seen: list[Seen]) -> list[str]:
+    """Give the cells of a row; of hypotheses the time to find them, of tracks that to make them as well."""
+    scored: list[ViewScores] = [
+        (scores_of_tracks if row.tracks else scores_of_boxes)(truth, row.boxes[name])
+        for name, truth in truths.items()
+    ]
+    seconds = sum(it.detect_s + (it.track_s if row.tracks else 0.0) for it in seen)
+    frames = sum(it.frames for it in seen)
+    idf1 = f"{100 * sum(it.idf1 for it in scored) / len(scored):.0f}" if row.tracks else ""
+    shares = [f"{share:.2f}" for it in scored for share in (it.recall, it.precision)]
+    joint = f"{100 * oracle(truths, row.boxes):.0f}"
+    return [row.name, *shares, idf1, joint, f"{1e3 * seconds / frames:.1f}", f"{frames / seconds:.0f}"]
+
+
+def _frames(views: list[View], options: argparse.Namespace) -> str:
+    counts = [sum(1 for _ in view.images(options.frames)) for view in views]
+    return " and ".join(map(str, counts))
+
+
+def measure(options: argparse.Namespace) -> None:
+    """Run the comparison, print and save."""
+    cv2.setNumThreads(1)
+    report = Report()
+    for scene in options.scene or SCENES:
+        measure_scene(report, scene, options)
+    report.say("IDF1: mean over the views. ms, frames/s: processor time per frame of one view, one core.")
+    if not options.scene:
+        try:
+            for path in save_pictures(views_of(options.data, BY_EYE), options.out / "observations"):
+                report.say(f"by eye: {path}")
+        except CannotRunError as problem:
+            report.say(f"{BY_EYE}: left out: {problem}")
+    report.save(options.out / "observations.txt")
+
+
+def main() -> None:
+    """Run the benchmark."""
+    options = parser(__doc__, "observations")
+    options.add_argument("--scene", action="append", choices=SCENES, help="only this one; may be repeated")
+    options.add_argument("--detector", action="append", help="only those with this in their names")
+    options.add_argument("--frames", type=int, help="only so many frames of each view")
+    try:
+        measure(options.parse_args())
+    except CannotRunError as problem:
+        finish(problem, "observations")
+
+
+if __name__ == "__main__":
+    main()
