@@ -26,6 +26,7 @@ for command in (
     site_commands.bestview,
     file_commands.render,
     file_commands.track,
+    file_commands.evaluate,
     file_commands.scene,
     viewer_commands.watch,
 ):

@@ -73,6 +73,23 @@ def track(
     typer.echo(f"{out}: {count} people")
 
 
+def evaluate(
+    tracks: Annotated[Path, typer.Argument(metavar="TRACKS", help="A file, or a folder of one per camera.")],
+    truth: Annotated[Path, typer.Option("--truth", help="The ground truth: a file, or such a folder.")],
+    iou: Annotated[
+        float, typer.Option(min=0.01, max=1.0, help="Overlap from which a box is at a person.")
+    ] = 0.5,
+    json_file: Annotated[Path | None, typer.Option("--json", help="A file for the numbers, too.")] = None,
+) -> None:
+    """Score tracks against ground truth: HOTA, MOTA, IDF1, identity switches."""
+    from server.run.evaluate import evaluate_files, print_table, write_json
+
+    scores = evaluate_files(tracks, truth, iou)
+    if json_file is not None:
+        write_json(json_file, scores, iou)
+    print_table(scores)
+
+
 def scene(
     name: Annotated[str, typer.Argument(metavar="NAME", help="Which scene, e.g. room.")],
     out: OutFolder,

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from statistics import fmean
+from typing import Any
 
-from tracking.evaluation.frames import line_up
+from tracking.evaluation.frames import Frame, line_up
 from tracking.evaluation.scores import DEFAULT_IOU, Scores, score
 from tracking.motchallenge import MotRow
 
@@ -32,14 +34,28 @@ class CameraScores:
     cameras: dict[str, Scores]
     joint: Scores
 
+    @property
+    def mean(self) -> Scores:
+        """Shares are the mean over the cameras, each counting as much; counts are totals."""
+        columns: dict[str, Any] = {}
+        for field in fields(Scores):
+            values = [getattr(scores, field.name) for scores in self.cameras.values()]
+            columns[field.name] = sum(values) if isinstance(values[0], int) else fmean(values)
+        return Scores(**columns)
+
 
 def evaluate_cameras(cameras: Mapping[str, Recording], least_iou: float = DEFAULT_IOU) -> CameraScores:
     """Score the tracks of several cameras, each and together.
 
     Raises:
-        ValueError: an id is twice in one frame of one camera.
+        ValueError: an id is twice in one frame of a camera, which the message names.
     """
-    frames = {name: line_up(it.truth, it.tracks, least_iou) for name, it in cameras.items()}
+    frames: dict[str, list[Frame]] = {}
+    for name, it in cameras.items():
+        try:
+            frames[name] = line_up(it.truth, it.tracks, least_iou)
+        except ValueError as error:
+            raise ValueError(f"{name}: {error}") from None
     return CameraScores(
         cameras={name: score(found, least_iou) for name, found in frames.items()},
         joint=score([frame for found in frames.values() for frame in found], least_iou),

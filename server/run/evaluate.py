@@ -1,0 +1,112 @@
+"""``myview evaluate``: tracks against ground truth, each camera for itself and all as one."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from server.run.pairing import pair_up
+from server.wire.errors import UserError
+from server.wire.output import whole_file
+from tracking.motchallenge import MotRow, read_rows
+
+try:
+    from tracking.evaluation import CameraScores, Recording, Scores, evaluate_cameras
+except ModuleNotFoundError as missing:
+    if missing.name != "motrics":
+        raise
+    raise UserError("evaluate: needs a library for the scores: pip install 'myview[evaluate]'") from missing
+
+_COLUMNS = {
+    "hota": "HOTA",
+    "deta": "DetA",
+    "assa": "AssA",
+    "mota": "MOTA",
+    "idf1": "IDF1",
+    "recall": "Rcll",
+    "precision": "Prcn",
+    "switches": "IDSW",
+    "fragments": "Frag",
+    "objects": "GT",
+    "tracks": "IDs",
+}
+"""What the table shows, under the headings of MOTChallenge; shares are shown in percent."""
+
+
+def evaluate_files(tracks: Path, truth: Path, least_iou: float) -> CameraScores:
+    """Score the files, or the files of equal names in the folders.
+
+    Raises:
+        UserError: there is nothing to compare, or a file is missing or malformed.
+    """
+    recordings = {}
+    for pair in pair_up(tracks, truth):
+        recording = Recording(truth=_rows(pair.truth), tracks=_rows(pair.tracks))
+        _check(recording, pair.tracks, pair.truth)
+        recordings[pair.camera] = recording
+    try:
+        return evaluate_cameras(recordings, least_iou)
+    except ValueError as error:
+        raise UserError(str(error)) from error
+
+
+def print_table(scores: CameraScores) -> None:
+    """Print a row for each camera and, where there are several, one for their mean and one for all as one."""
+    # Without frame and colour, so that eighty columns are enough and a script can split it.
+    table = Table("camera", box=None, padding=(0, 1, 0, 0))
+    for heading in _COLUMNS.values():
+        table.add_column(heading, justify="right", no_wrap=True)
+    for camera, found in scores.cameras.items():
+        table.add_row(camera, *_cells(found))
+    if len(scores.cameras) > 1:
+        table.add_row("mean, total", *_cells(scores.mean))
+        table.add_row("joint", *_cells(scores.joint))
+    console = Console(highlight=False)
+    console.print(table, width=max(console.width, console.measure(table).maximum))
+
+
+def write_json(out: Path, scores: CameraScores, least_iou: float) -> None:
+    """Write all scores; shares are in [0, 1].
+
+    Raises:
+        UserError: the file cannot be written.
+    """
+    content = {
+        "iou": least_iou,
+        "cameras": {camera: asdict(found) for camera, found in scores.cameras.items()},
+        "mean": asdict(scores.mean),
+        "joint": asdict(scores.joint),
+    }
+    with whole_file(out) as draft:
+        draft.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+
+
+def _cells(scores: Scores) -> list[str]:
+    values = (getattr(scores, name) for name in _COLUMNS)
+    return [f"{value}" if isinstance(value, int) else f"{100.0 * value:.1f}" for value in values]
+
+
+def _rows(path: Path) -> list[MotRow]:
+    try:
+        return read_rows(path)
+    except OSError as error:
+        raise UserError(f"{path}: cannot be read: {error.strerror}") from error
+    except ValueError as error:
+        raise UserError(str(error)) from error
+
+
+def _check(recording: Recording, tracks: Path, truth: Path) -> None:
+    """Refuse truth that says nothing, and files of different frames."""
+    there = {row.frame for row in recording.truth if row.confidence != 0.0}
+    found = {row.frame for row in recording.tracks}
+    if not there:
+        raise UserError(f"{truth}: nobody is in it who counts (confidence, the seventh field, not 0)")
+    if found and not there & found:
+        raise UserError(
+            f"{tracks}: has no frame in common with {truth}: frames {min(found)} to {max(found)} here, "
+            f"{min(there)} to {max(there)} there (both count from 1)"
+        )

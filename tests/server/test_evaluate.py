@@ -1,0 +1,167 @@
+"""`myview evaluate`: tables and numbers from files, and one line for what cannot be compared."""
+
+from __future__ import annotations
+
+import gzip
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from server.run.cli import main
+from tracking.motchallenge import MotRow, format_rows
+
+BAD_INPUT = 2
+Run = Callable[..., str]
+
+
+@pytest.fixture
+def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Run:
+    """Give a function that runs `myview evaluate` and gives what it prints."""
+
+    def command(*arguments: object) -> str:
+        monkeypatch.setattr(sys, "argv", ["myview", "evaluate", *map(str, arguments)])
+        capsys.readouterr()
+        code = 0
+        try:
+            main()
+        except SystemExit as end:
+            code = int(end.code or 0)
+        told = capsys.readouterr()
+        assert code == 0, told.err
+        return told.out
+
+    return command
+
+
+@pytest.fixture
+def refused(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Run:
+    """Give a function that runs `myview evaluate` and gives the one line that says what is wrong."""
+
+    def command(*arguments: object) -> str:
+        monkeypatch.setattr(sys, "argv", ["myview", "evaluate", *map(str, arguments)])
+        capsys.readouterr()
+        with pytest.raises(SystemExit) as end:
+            main()
+        told = capsys.readouterr()
+        assert (end.value.code, told.out) == (BAD_INPUT, "")
+        (line,) = told.err.splitlines()
+        return line
+
+    return command
+
+
+def people(numbers: tuple[int, ...], frames: range = range(1, 6)) -> str:
+    return format_rows(
+        MotRow(frame, number, 100.0 * place, 0.0, 40.0, 100.0)
+        for frame in frames
+        for place, number in enumerate(numbers)
+    )
+
+
+def write(path: Path, text: str) -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(gzip.compress(text.encode()) if path.suffix == ".gz" else text.encode())
+    return path
+
+
+def rows(printed: str) -> dict[str, list[str]]:
+    """Give the table's rows by what stands first in them."""
+    return {line.split()[0]: line.split() for line in printed.splitlines() if line.strip()}
+
+
+def test_one_file_against_another(run: Run, tmp_path: Path) -> None:
+    tracks = write(tmp_path / "street.txt", people((1, 2)))
+    truth = write(tmp_path / "truth.txt", people((7, 8)))
+    table = rows(run(tracks, "--truth", truth))
+    assert table["camera"][1:6] == ["HOTA", "DetA", "AssA", "MOTA", "IDF1"]
+    assert table["street"][1:6] == ["100.0"] * 5
+    assert "joint" not in table
+
+
+def test_a_rendered_folder_against_packed_truth(run: Run, tmp_path: Path) -> None:
+    for camera, numbers in (("c0", (1, 2)), ("c1", (2, 1))):
+        write(tmp_path / "seen" / "tracks" / f"{camera}.txt", people(numbers))
+        write(tmp_path / "hall" / "gt" / f"{camera}.txt.gz", people((5, 6)))
+    write(tmp_path / "hall" / "gt" / "c2.txt", people((5, 6)))
+    out = tmp_path / "numbers.json"
+    table = rows(run(tmp_path / "seen", "--truth", tmp_path / "hall", "--json", out))
+    assert list(table) == ["camera", "c0", "c1", "mean,", "joint"]
+    assert table["mean,"][2:][4] == "100.0"
+    assert table["joint"][5] == "50.0"  # the two are taken for each other in the second camera
+    numbers = json.loads(out.read_text(encoding="utf-8"))
+    assert numbers["iou"] == 0.5
+    assert list(numbers["cameras"]) == ["c0", "c1"]
+    assert numbers["cameras"]["c0"]["idf1"] == numbers["mean"]["idf1"] == 1.0
+    assert numbers["joint"]["idf1"] == 0.5
+
+
+def test_nobody_found_is_a_score_too(run: Run, tmp_path: Path) -> None:
+    tracks = write(tmp_path / "c0.txt", "")
+    table = rows(run(tracks, "--truth", write(tmp_path / "gt.txt", people((1,)))))
+    assert table["c0"][4] == "0.0"
+
+
+def test_a_smaller_overlap_may_be_enough(run: Run, tmp_path: Path) -> None:
+    truth = write(tmp_path / "gt.txt", people((1,)))
+    moved = write(tmp_path / "c0.txt", people((1,)).replace(",1,0.00,0.00,", ",1,16.00,0.00,"))
+    assert rows(run(moved, "--truth", truth))["c0"][6] == "0.0"
+    assert rows(run(moved, "--truth", truth, "--iou", 0.4))["c0"][6] == "100.0"
+
+
+def test_what_is_not_there_is_named(refused: Run, tmp_path: Path) -> None:
+    tracks = write(tmp_path / "c0.txt", people((1,)))
+    assert refused(tracks, "--truth", "nowhere.txt") == "myview: nowhere.txt: is not there"
+
+
+def test_a_file_and_a_folder_do_not_compare(refused: Run, tmp_path: Path) -> None:
+    tracks = write(tmp_path / "c0.txt", people((1,)))
+    assert refused(tracks, "--truth", tmp_path).endswith("name two files, or two folders")
+
+
+def test_folders_without_common_names_are_refused(refused: Run, tmp_path: Path) -> None:
+    write(tmp_path / "a" / "c0.txt", people((1,)))
+    write(tmp_path / "b" / "view1.txt", people((1,)))
+    assert "c0.txt here, view1.txt there" in refused(tmp_path / "a", "--truth", tmp_path / "b")
+
+
+def test_a_folder_without_tracks_is_refused(refused: Run, tmp_path: Path) -> None:
+    (tmp_path / "empty").mkdir()
+    assert "no .txt or .txt.gz files" in refused(tmp_path / "empty", "--truth", tmp_path / "empty")
+
+
+def test_frames_that_never_meet_are_refused(refused: Run, tmp_path: Path) -> None:
+    tracks = write(tmp_path / "c0.txt", people((1,)))
+    truth = write(tmp_path / "gt.txt", people((1,), range(100, 121)))
+    assert "frames 1 to 5 here, 100 to 120 there" in refused(tracks, "--truth", truth)
+
+
+def test_truth_of_nobody_is_refused(refused: Run, tmp_path: Path) -> None:
+    tracks = write(tmp_path / "c0.txt", people((1,)))
+    truth = write(tmp_path / "gt.txt", people((1,)).replace(",1.00,-1,", ",0,-1,"))
+    assert "nobody is in it who counts" in refused(tracks, "--truth", truth)
+
+
+def test_a_malformed_row_is_named(refused: Run, tmp_path: Path) -> None:
+    tracks = write(tmp_path / "c0.txt", people((1,)) + "6,1,left\n")
+    truth = write(tmp_path / "gt.txt", people((1,)))
+    assert f"{tracks}:6: " in refused(tracks, "--truth", truth)
+
+
+def test_detections_are_not_tracks(refused: Run, tmp_path: Path) -> None:
+    tracks = write(tmp_path / "det.txt", people((-1, -1)))
+    truth = write(tmp_path / "gt.txt", people((1,)))
+    assert "these are detections, not tracks" in refused(tracks, "--truth", truth)
+
+
+def test_without_the_library_the_extra_is_named(
+    refused: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in [*sys.modules]:
+        if name.startswith(("tracking.evaluation", "server.run.evaluate", "motrics")):
+            monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "motrics", None)
+    tracks = write(tmp_path / "c0.txt", people((1,)))
+    assert refused(tracks, "--truth", tracks).endswith("pip install 'myview[evaluate]'")

@@ -1,0 +1,153 @@
+"""Scores of tiny random cases against all ways to match people with tracks, tried one by one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from itertools import permutations
+
+import numpy as np
+import pytest
+
+from tracking.evaluation import evaluate
+from tracking.evaluation.frames import Frame, line_up
+from tracking.motchallenge import MotRow
+
+CASES = 60
+LEAST = 0.5
+ALPHAS = np.arange(1, 20) / 20.0
+Pairs = list[tuple[int, int]]
+
+
+def random_rows(rng: np.random.Generator, objects: int) -> list[MotRow]:
+    """Draw up to `objects` people who crowd into a place two boxes wide, for five frames."""
+    return [
+        MotRow(frame, number, *(float(it) for it in rng.uniform(0, 60, 2)), 80.0, 160.0)
+        for frame in range(1, 6)
+        for number in range(1, objects + 1)
+        if rng.random() < 0.8
+    ]
+
+
+def matchings(frame: Frame) -> Iterator[Pairs]:
+    """Give all ways to match as many as there are."""
+    people, tracks = frame.similarity.shape
+    if people <= tracks:
+        for columns in permutations(range(tracks), people):
+            yield list(zip(range(people), columns, strict=True))
+    else:
+        for rows in permutations(range(people), tracks):
+            yield list(zip(rows, range(tracks), strict=True))
+
+
+def ids(frame: Frame, pairs: Iterable[tuple[int, int]]) -> list[tuple[int, int]]:
+    return [(int(frame.truth[row]), int(frame.tracks[column])) for row, column in pairs]
+
+
+def boxes_of(frames: list[Frame]) -> tuple[dict[int, int], dict[int, int]]:
+    """Count each person's and each track's boxes."""
+    people: dict[int, int] = {}
+    tracks: dict[int, int] = {}
+    for frame in frames:
+        for number in frame.truth.tolist():
+            people[number] = people.get(number, 0) + 1
+        for number in frame.tracks.tolist():
+            tracks[number] = tracks.get(number, 0) + 1
+    return people, tracks
+
+
+def clear(frames: list[Frame]) -> tuple[int, int]:
+    """Give matches and switches: pairs stay where they can, then the overlap is largest."""
+    matches = switches = 0
+    before: dict[int, int] = {}
+    last: dict[int, int] = {}
+    for frame in frames:
+        if not frame.similarity.size:
+            continue
+        best: tuple[float, ...] = (-1.0, 0.0)
+        chosen: Pairs = []
+        for pairs in matchings(frame):
+            kept = [pair for pair in pairs if frame.similarity[pair] >= LEAST]
+            stays = sum(before.get(person) == track for person, track in ids(frame, kept))
+            worth = (float(stays), float(sum(frame.similarity[pair] for pair in kept)))
+            if worth > best:
+                best, chosen = worth, kept
+        before = dict(ids(frame, chosen))
+        matches += len(chosen)
+        switches += sum(last.get(person, track) != track for person, track in before.items())
+        last |= before
+    return matches, switches
+
+
+def identity_f1(frames: list[Frame]) -> float:
+    """Give IDF1: the best way to say which track stands for which person."""
+    people, tracks = boxes_of(frames)
+    together = {
+        (person, track): sum(
+            frame.similarity[row, column] >= LEAST
+            for frame in frames
+            for row in np.flatnonzero(frame.truth == person)
+            for column in np.flatnonzero(frame.tracks == track)
+        )
+        for person in people
+        for track in tracks
+    }
+    names = [*tracks, *[None] * len(people)]
+    best = max(
+        sum(together.get((person, track), 0) for person, track in zip(people, chosen, strict=True))  # type: ignore[arg-type]
+        for chosen in permutations(names, len(people))
+    )
+    return float(2 * best / (sum(people.values()) + sum(tracks.values())))
+
+
+def hota(frames: list[Frame]) -> float:
+    """Give HOTA as its paper defines it: matched for the best alignment over the whole recording."""
+    people, tracks = boxes_of(frames)
+    shared = dict.fromkeys(((person, track) for person in people for track in tracks), 0.0)
+    for frame in frames:
+        overlap = frame.similarity
+        total = overlap.sum(axis=0)[None] + overlap.sum(axis=1)[:, None] - overlap
+        for row, column in np.argwhere(overlap > 0.0).tolist():
+            pair = ids(frame, [(row, column)])[0]
+            shared[pair] += float(overlap[row, column] / total[row, column])
+    aligned = {(p, t): both / (people[p] + tracks[t] - both) for (p, t), both in shared.items()}
+    chosen = [
+        max(
+            matchings(frame),
+            key=lambda pairs, frame=frame: sum(  # type: ignore[misc]
+                aligned[pair] * frame.similarity[cell]
+                for cell, pair in zip(pairs, ids(frame, pairs), strict=True)
+            ),
+        )
+        for frame in frames
+    ]
+    return float(np.mean([_hota_at(alpha, frames, chosen, people, tracks) for alpha in ALPHAS]))
+
+
+def _hota_at(
+    alpha: float, frames: list[Frame], chosen: list[Pairs], people: dict[int, int], tracks: dict[int, int]
+) -> float:
+    found = [
+        pair
+        for frame, pairs in zip(frames, chosen, strict=True)
+        for pair in ids(frame, (cell for cell in pairs if frame.similarity[cell] >= alpha))
+    ]
+    union = sum(people.values()) + sum(tracks.values()) - len(found)
+    alike = 0.0
+    for person, track in set(found):
+        count = found.count((person, track))
+        alike += count * count / (people[person] + tracks[track] - count)
+    return float(np.sqrt(alike / union))
+
+
+@pytest.mark.parametrize("seed", range(CASES))
+def test_the_scores_are_those_of_trying_everything(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    truth, tracks = random_rows(rng, 3), random_rows(rng, int(rng.integers(1, 5)))
+    frames = line_up(truth, tracks, LEAST)
+    scores = evaluate(truth, tracks)
+    matches, switches = clear(frames)
+    assert (scores.misses, scores.false_positives) == (len(truth) - matches, len(tracks) - matches)
+    assert scores.switches == switches
+    assert scores.mota == pytest.approx(1 - (len(truth) + len(tracks) - 2 * matches + switches) / len(truth))
+    assert scores.idf1 == pytest.approx(identity_f1(frames))
+    assert scores.hota == pytest.approx(hota(frames))
