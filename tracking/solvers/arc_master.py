@@ -87,9 +87,7 @@ class ArcMaster:
 
     def __init__(self, network: Network, *, squared: bool = False) -> None:
         self._network = network
-        # The moves of the layout term halve under presolve; the conflict rows alone do not.
-        moving = bool(network.layout) and network.frames > 1
-        self._highs = quiet_highs(growing=True, presolve=moving and not squared)
+        self._highs = quiet_highs(growing=True, presolve=not squared)
         objects, frames, states = network.node.shape
         none = np.empty(0, dtype=np.int64)
         self._arcs = ArcSet(none, none, none, none)
@@ -101,7 +99,7 @@ class ArcMaster:
         ones = np.ones(objects)
         self._empty_rows(ones, ones)
         self._layout = None
-        if moving:
+        if network.layout and frames > 1:
             self._layout = LayoutRows(network, self._highs, squared=squared)
         self._values = np.empty(0)
 

@@ -17,14 +17,17 @@ from tracking.boxes import Floats
 from tracking.conflicts import Bools
 from tracking.network import Network
 from tracking.solvers.arc_master import ArcMaster, ArcPoint, ArcSet, arcs_of_paths
+from tracking.solvers.ascent import Guess, guessed
 from tracking.solvers.conflict_finder import ConflictFinder, ConflictRow
-from tracking.solvers.layout_ascent import Guess, with_pulls
-from tracking.solvers.objective import Ints
+from tracking.solvers.greedy_dp import greedy_paths
+from tracking.solvers.layout_forces import with_pulls
+from tracking.solvers.objective import Ints, objective
 from tracking.solvers.priced_arcs import arcs_through
+from tracking.solvers.pricing import Pricing
 from tracking.solvers.relaxed import CLOSE, Relaxed
 from tracking.solvers.viterbi import Marginals, Trellis
 
-_ENTERING = 150
+_ENTERING = 300
 """Arcs per object and round: about those of a dozen paths; more only swell the program."""
 
 _STATES = 12
@@ -61,10 +64,12 @@ class ArcSearch:
         return ArcMaster(self._network)
 
     def enter_guess(self, guess: Guess) -> None:
-        """Let in the arcs that a guess at the duals of the layout term finds good."""
-        self._master.add_arcs(arcs_of_paths(guess.owners, guess.paths))
+        """Bind the program by the rows of a guess at the duals; let in the arcs that it finds good."""
+        self._master.add_rows(guess.rows)
+        owners = np.tile(np.arange(self._network.objects), len(guess.paths))
+        self._master.add_arcs(arcs_of_paths(owners, np.concatenate(guess.paths)))
         anything = np.full(self._network.objects, np.inf)
-        self._enter_better_arcs(self._priced_by(ArcPoint(0.0, np.empty(0), guess.pulls, anything, 0.0)))
+        self._enter_better_arcs(self._priced_by(ArcPoint(0.0, guess.prices, guess.pulls, anything, 0.0)))
 
     def run(self) -> Relaxed:
         """Find the optimum of the relaxation."""
@@ -106,7 +111,17 @@ class ArcSearch:
         for price, row in zip(point.prices, self._master.rows, strict=True):
             if price > 0.0:
                 node[:, row.frame][row.members] += price
-        return with_pulls(network, node, point.pulls) if network.layout else node
+        if not network.layout:
+            return node
+        return with_pulls(node, network.locations[network.sets], point.pulls)
+
+
+def arc_search(network: Network, pricing: Pricing, finder: ConflictFinder) -> ArcSearch:
+    """Give a search that starts from the greedy paths and a guess at the duals; the finder is a new one."""
+    nodes = greedy_paths(network, pricing.alone).nodes
+    search = ArcSearch(network, arcs_of_paths(np.arange(network.objects), nodes), [], finder)
+    search.enter_guess(guessed(network, pricing, finder, objective(network, nodes)))
+    return search
 
 
 def _cheapest(owner: Ints, costs: Floats, objects: int) -> Bools:

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from tracking.network import Network
-from tracking.solvers.arc_master import arcs_of_paths
-from tracking.solvers.arc_search import ArcSearch
+from tracking.solvers.arc_search import arc_search
 from tracking.solvers.base import Solution
 from tracking.solvers.conflict_finder import ConflictFinder
 from tracking.solvers.finish import finished, nothing
-from tracking.solvers.greedy_dp import greedy_paths
-from tracking.solvers.layout_ascent import guessed
 from tracking.solvers.path_search import PathSearch
+from tracking.solvers.pricing import Pricing
 from tracking.solvers.relaxed import Relaxed
+from tracking.solvers.viterbi import Trellis
 
 
 class Columns:
@@ -36,8 +33,4 @@ def relaxation_by_columns(network: Network) -> Relaxed:
     """
     if not network.layout:
         return PathSearch(network).run()
-    start = greedy_paths(network).nodes
-    starts = arcs_of_paths(np.arange(network.objects), start)
-    search = ArcSearch(network, starts, [], ConflictFinder(network))
-    search.enter_guess(guessed(network))
-    return search.run()
+    return arc_search(network, Pricing(Trellis.of(network)), ConflictFinder(network)).run()

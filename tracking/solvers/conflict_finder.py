@@ -9,6 +9,7 @@ import numpy as np
 from tracking.boxes import Floats
 from tracking.conflicts import Bools, clique_rows, connected
 from tracking.network import Network
+from tracking.solvers.objective import Ints
 
 _TOLERANCE = 1e-9
 """Rows are broken beyond the feasibility tolerance of the LP solver only."""
@@ -22,61 +23,78 @@ class ConflictRow:
     members: Bools
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Part:
+    """The rows of places of one frame that conflict with each other, directly or through others.
+
+    Attributes:
+        rows: (R, P K), or (R, n K) where the rows are stars: the entries of each row.
+    """
+
+    rows: Floats
+
+
 class ConflictFinder:
     """Finds the rows of a network that a point breaks; the rows are those of `Network.rows`."""
 
     def __init__(self, network: Network) -> None:
         self._network = network
+        self._stars = network.conflict_rows == "star"
         self._relation = network.conflicts.astype(np.float64)
-        self._rows: dict[tuple[int, int], Bools] = {}
+        self._parts: dict[tuple[int, int], _Part] = {}
         self._given: set[tuple[int, bytes]] = set()
 
     def broken(self, usage: Floats) -> list[ConflictRow]:
         """Give the rows that y = `usage` (n, M, S) breaks and that were not given before."""
-        network, found = self._network, []
-        for frame, place in self._suspects(usage):
-            rows = self._rows_at(frame, place)
-            sums = rows.reshape(len(rows), -1) @ usage[:, frame, :-1].ravel()
-            for row in rows[sums > 1.0 + _TOLERANCE]:
-                key = (frame, row.tobytes())
-                if key not in self._given:
-                    self._given.add(key)
-                    members = np.zeros((network.objects, network.places + 1), dtype=np.bool_)
-                    members[:, :-1] = row
-                    found.append(ConflictRow(frame, members))
+        found = []
+        visits = self._visits(usage)
+        around = (self._relation @ visits[:, :, None])[:, :, 0]
+        # More than one path in all that a place conflicts with; without such a place no row is broken.
+        suspects = around > 1.0 + _TOLERANCE
+        for frame in np.flatnonzero(suspects.any(axis=1)).tolist():
+            there = usage[:, frame, :-1].ravel() if self._stars else visits[frame]
+            for part in self._parts_at(frame, np.flatnonzero(suspects[frame])):
+                for row in part.rows[part.rows @ there > 1.0 + _TOLERANCE]:
+                    key = (frame, row.tobytes())
+                    if key not in self._given:
+                        self._given.add(key)
+                        found.append(self._row(frame, row))
         return found
 
-    def _suspects(self, usage: Floats) -> list[tuple[int, int]]:
-        """Give frames and places with more than one path in all they conflict with; no row else breaks."""
-        network = self._network
-        if network.shared:
-            visits = usage[:, :, :-1].sum(axis=0)
-        else:
-            visits = np.swapaxes(usage[:, :, :-1], 0, 1).reshape(network.frames, -1)
-        around = (self._relation @ visits[:, :, None])[:, :, 0]
-        return [(int(m), int(i)) for m, i in np.argwhere(around > 1.0 + _TOLERANCE)]
+    def _visits(self, usage: Floats) -> Floats:
+        """Give how much goes through each place, (M, P K)."""
+        if self._network.shared:
+            return np.asarray(usage[:, :, :-1].sum(axis=0))
+        return np.swapaxes(usage[:, :, :-1], 0, 1).reshape(self._network.frames, -1)
 
-    def _rows_at(self, frame: int, place: int) -> Bools:
-        """Give rows (R, n, K), all those that `place` of `frame` may be a reason to break."""
+    def _row(self, frame: int, row: Floats) -> ConflictRow:
         network = self._network
-        if network.conflict_rows == "star":
-            place = 0
-            if (frame, place) not in self._rows:
-                self._rows[frame, place] = network.rows(frame)
-            return self._rows[frame, place]
-        if (frame, place) not in self._rows:
-            self._cover(frame, place)
-        return self._rows[frame, place]
+        members = np.zeros((network.objects, network.places + 1), dtype=np.bool_)
+        members[:, :-1] = row.reshape(-1, network.places) > 0.0
+        return ConflictRow(frame, members)
+
+    def _parts_at(self, frame: int, places: Ints) -> list[_Part]:
+        """Give the parts that places of a frame are in, each once."""
+        if self._stars:
+            if (frame, 0) not in self._parts:
+                rows = self._network.rows(frame)
+                self._parts[frame, 0] = _Part(rows.reshape(len(rows), -1).astype(np.float64))
+            return [self._parts[frame, 0]]
+        parts = {}
+        for place in places.tolist():
+            if (frame, place) not in self._parts:
+                self._cover(frame, place)
+            part = self._parts[frame, place]
+            parts[id(part)] = part
+        return list(parts.values())
 
     def _cover(self, frame: int, place: int) -> None:
-        """Compute the rows of the connected part that a place is in."""
-        network = self._network
-        relation, owners = network.conflicts[frame], network.owners
-        part = connected(relation, place)
-        cliques = clique_rows(relation[np.ix_(part, part)], None if owners is None else owners[part])
-        flat = np.zeros((len(cliques), len(relation)), dtype=np.bool_)
-        flat[:, part] = cliques
-        rows = flat.reshape(len(flat), len(network.boxes), network.places)
-        rows = np.broadcast_to(rows, (len(rows), network.objects, network.places))
-        for member in part:
-            self._rows[frame, int(member)] = rows
+        """Compute the rows of the part that a place is in."""
+        relation, owners = self._network.conflicts[frame], self._network.owners
+        inside = connected(relation, place)
+        cliques = clique_rows(relation[np.ix_(inside, inside)], None if owners is None else owners[inside])
+        rows = np.zeros((len(cliques), len(relation)))
+        rows[:, inside] = cliques
+        part = _Part(rows)
+        for member in inside.tolist():
+            self._parts[frame, member] = part

@@ -9,7 +9,7 @@ import numpy as np
 from tracking.network import Network
 from tracking.solvers.base import Solution, SolveReport
 from tracking.solvers.objective import Ints, block, objective, states_of
-from tracking.solvers.viterbi import Trellis, best_paths
+from tracking.solvers.viterbi import Paths, Trellis, best_paths
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -20,25 +20,27 @@ class GreedyPaths:
     bound: float
 
 
-def greedy_paths(network: Network) -> GreedyPaths:
+def greedy_paths(network: Network, alone: Paths | None = None) -> GreedyPaths:
     """Fix the cheapest path, bar its places to the others, and go on; the layout term is ignored.
 
-    Of equal paths the one of the lowest object is fixed first.
+    Of equal paths the one of the lowest object is fixed first. `alone`, where known, are the cheapest
+    paths of all.
     """
     exclusions = network.exclusions()
     trellis = Trellis(network.source, network.node.copy(), network.pair, network.sink)
-    nodes = np.empty((network.objects, network.frames), dtype=np.int64)
-    left = np.arange(network.objects)
-    bound = 0.0
-    while len(left):
-        paths = best_paths(trellis.only(left))
-        if len(left) == network.objects:
-            bound = float(paths.costs.sum())
-        first = int(paths.costs.argmin())
-        owner = int(left[first])
-        nodes[owner] = paths.nodes[first]
+    each, frames = np.indices((network.objects, network.frames))
+    alone = best_paths(trellis) if alone is None else alone
+    nodes, costs, bound = alone.nodes.copy(), alone.costs.copy(), float(alone.costs.sum())
+    left = np.ones(network.objects, dtype=np.bool_)
+    while left.any():
+        owner = int(np.where(left, costs, np.inf).argmin())
+        left[owner] = False
         block(network, exclusions, trellis.node, (owner, nodes[owner]))
-        left = np.delete(left, first)
+        # A cheapest path of which nothing is barred is still the cheapest.
+        cut = np.flatnonzero(left & np.isinf(trellis.node[each, frames, nodes]).any(axis=1))
+        if len(cut):
+            again = best_paths(trellis.only(cut))
+            nodes[cut], costs[cut] = again.nodes, again.costs
     return GreedyPaths(nodes, bound)
 
 

@@ -34,6 +34,9 @@ class LinearSolution:
     iterations: int
 
 
+_DEVEX = 1
+"""Edge weights that need no start-up: a growing program is started from many bases."""
+
 _DUAL, _AS_IT_STANDS = 1, 0
 """Simplex strategies: dual, best from nothing; or primal after new columns and dual after new rows."""
 
@@ -56,6 +59,8 @@ def quiet_highs(*, growing: bool = False, presolve: bool = False) -> highspy.Hig
         "primal_feasibility_tolerance": 1e-9,
         "dual_feasibility_tolerance": 1e-9,
     }
+    if growing:
+        options["simplex_dual_edge_weight_strategy"] = _DEVEX
     for name, value in options.items():
         if solver.setOptionValue(name, value) != highspy.HighsStatus.kOk:
             raise RuntimeError(f"the LP solver does not take {name} = {value}")

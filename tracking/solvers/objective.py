@@ -71,9 +71,12 @@ def conflict_count(network: Network, nodes: Ints) -> int:
 def block(network: Network, exclusions: NDArray[np.bool_], node: Floats, taken: tuple[int, Ints]) -> None:
     """Make infinite in `node` (n, M, S) what others cannot take once `taken`, object and path, is fixed."""
     owner, path = taken
-    places = network.places
-    others = np.arange(network.objects) != owner
-    for m in np.flatnonzero(path < places):
-        barred = exclusions[m, network.sets[owner] * places + path[m]].reshape(-1, places)
-        barred = np.broadcast_to(barred, (network.objects, places)) & others[:, None]
-        node[:, m, :places][barred] = np.inf
+    if not exclusions.size:
+        return
+    places, frames = network.places, np.arange(network.frames)
+    visible = path < places
+    at = np.where(visible, network.sets[owner] * places + path, 0)
+    barred = (exclusions[frames, at] & visible[:, None]).reshape(network.frames, -1, places)
+    barred = np.broadcast_to(np.swapaxes(barred, 0, 1), (network.objects, network.frames, places)).copy()
+    barred[owner] = False
+    node[:, :, :places][barred] = np.inf

@@ -11,9 +11,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from tracking.conflicts import Bools
 from tracking.network import Network
 from tracking.solvers.arc_master import arcs_of_paths
-from tracking.solvers.arc_search import ArcSearch
+from tracking.solvers.arc_search import ArcSearch, arc_search
 from tracking.solvers.conflict_finder import ConflictFinder, ConflictRow
 from tracking.solvers.objective import Ints, path_costs
 from tracking.solvers.path_master import MasterPoint, PathMaster
@@ -47,9 +48,14 @@ class PathSearch:
 
     def run(self) -> Relaxed:
         """Find the optimum of the relaxation."""
-        self._keep_rows()
-        if not self._active.any():
+        rows = self._finder.broken(self._usage)
+        if not rows:
             return Relaxed(self._usage, float(self._alone.costs.sum()), self._priced, 0)
+        if np.count_nonzero(self._concerned(rows)) > _FEW_OBJECTS:
+            return arc_search(self._network, self._pricing, ConflictFinder(self._network)).run()
+        self._bind(rows)
+        self._solve()
+        self._keep_rows()
         rounds = 0
         while rounds < (_ROUNDS_OF_FEW if self._active.sum() <= _FEW_OBJECTS else _ROUNDS_OF_MANY):
             rounds += 1
@@ -79,11 +85,16 @@ class PathSearch:
             self._bind(rows)
             self._solve()
 
-    def _bind(self, rows: list[ConflictRow]) -> None:
-        """Let the objects that break the rows, and paths around all rows, into the program."""
+    def _concerned(self, rows: list[ConflictRow]) -> Bools:
+        """Say which objects are on the rows, (n,)."""
         concerned = np.zeros(self._network.objects, dtype=np.bool_)
         for row in rows:
             concerned |= (self._usage[:, row.frame] * row.members).any(axis=1)
+        return concerned
+
+    def _bind(self, rows: list[ConflictRow]) -> None:
+        """Let the objects that break the rows, and paths around all rows, into the program."""
+        concerned = self._concerned(rows)
         new = np.flatnonzero(concerned & ~self._active)
         self._active[new] = True
         if len(new):

@@ -11,13 +11,15 @@ class Pricing:
     """Answers for one trellis under many node costs.
 
     Attributes:
+        trellis: the trellis without prices.
+        ahead: its `forward` pass, (M, n, S).
         alone: the cheapest paths without prices.
     """
 
     def __init__(self, trellis: Trellis) -> None:
-        self._trellis = trellis
-        self._ahead = forward(trellis)
-        self.alone = trace(trellis, self._ahead)
+        self.trellis = trellis
+        self.ahead = forward(trellis)
+        self.alone = trace(trellis, self.ahead)
         self._node = trellis.node.copy()
         self._paths = Paths(self.alone.nodes.copy(), self.alone.costs.copy())
 
@@ -26,11 +28,11 @@ class Pricing:
         touched = objects[(node[objects] != self._node[objects]).any(axis=(1, 2))]
         if len(touched):
             self._node[touched] = node[touched]
-            trellis = self._trellis.with_node(node).only(touched)
+            trellis = self.trellis.with_node(node).only(touched)
             # Up to the first frame with a price the ways are those without prices.
-            priced = (trellis.node != self._trellis.node[touched]).any(axis=(0, 2))
+            priced = (trellis.node != self.trellis.node[touched]).any(axis=(0, 2))
             first = int(priced.argmax()) if priced.any() else len(priced)
-            paths = trace(trellis, forward(trellis, self._ahead[:first, touched]))
+            paths = trace(trellis, forward(trellis, self.ahead[:first, touched]))
             self._paths.nodes[touched] = paths.nodes
             self._paths.costs[touched] = paths.costs
         return self._paths.only(objects)

@@ -117,9 +117,9 @@ class Marginals:
     least: Floats
 
     @classmethod
-    def of(cls, trellis: Trellis) -> Marginals:
-        """Go over the trellis forward and backward."""
-        ahead = forward(trellis)
+    def of(cls, trellis: Trellis, ahead: Floats | None = None) -> Marginals:
+        """Go over the trellis forward and backward; `ahead`, where given, is the forward pass."""
+        ahead = forward(trellis) if ahead is None else ahead
         return cls(ahead, backward(trellis), (ahead[-1] + trellis.sink).min(axis=1))
 
     @property
