@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from tracking.detectors.base import Plane
 from tracking.detectors.heightline import HeightLine
-from tracking.detectors.silhouette import BODIES, WHOLE, Body, Part, integral
+from tracking.detectors.silhouette import BODIES, Body, Corners, Part, corners_of, integral
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,19 +30,21 @@ class BoxFilterSettings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Peaks:
-    """Local maxima of the scan over x, y and scale.
+    """Local maxima of the scan over x, y and scale, best first.
 
     Attributes:
         boxes: `(P, 4)` in cells.
-        gains: `(P,)`, best first.
+        gains: `(P,)`, what the cells of the body add up to.
+        sizes: `(P,)`, how many cells of the body count, at least 1.
         priors: `(P,)`, the factor by which the height lessens a gain, 1 where it is the expected one.
-        body: the parts of a box that a person fills.
+        corners: the bodies' parts.
     """
 
     boxes: npt.NDArray[np.float64]
     gains: npt.NDArray[np.float64]
+    sizes: npt.NDArray[np.float64]
     priors: npt.NDArray[np.float64]
-    body: tuple[Part, ...] = BODIES["person"]
+    corners: Corners
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +55,9 @@ class Band:
     tolerance: float  # share by which a height may differ from the line
     doubt: float  # standard deviations of the line by which it may differ besides
 
-    def priors(self, feet: npt.NDArray[np.float64], height: float) -> npt.NDArray[np.float64]:
+    def priors(
+        self, feet: npt.NDArray[np.float64], height: float | npt.NDArray[np.float64]
+    ) -> npt.NDArray[np.float64]:
         """Give the factor on the gain at each foot row: 1 on the line, 0 where the height is impossible.
 
         A height at the edge of what is possible counts for `1 - _EDGE` of one on the line.
@@ -88,10 +92,51 @@ def find_peaks(
     found = [_scan(sums, int(height), settings, band) for height in heights]
     boxes = np.concatenate([peaks.boxes for peaks in found])
     gains = np.concatenate([peaks.gains for peaks in found])
-    priors = np.concatenate([peaks.priors for peaks in found])
-    # Best first; equal ones by place, so that the order never depends on the sort.
-    order = np.lexsort((boxes[:, 3], boxes[:, 1], boxes[:, 0], -gains))[: settings.most_peaks]
-    return Peaks(boxes[order], gains[order], priors[order], BODIES[settings.body])
+    order = _best_first(boxes, gains)[: settings.most_peaks]
+    return _refined(boxes[order], sums, settings, band)
+
+
+def _best_first(boxes: npt.NDArray[np.float64], gains: npt.NDArray[np.float64]) -> npt.NDArray[np.int64]:
+    """Order by gain; equal ones by place, so that the order never depends on the sort."""
+    return np.lexsort((boxes[:, 3], boxes[:, 1], boxes[:, 0], -gains))
+
+
+def _refined(
+    boxes: npt.NDArray[np.float64], sums: _Sums, settings: BoxFilterSettings, band: Band | None
+) -> Peaks:
+    """Move each box to the best place between those of the scan, step by half a step."""
+    parts = BODIES[settings.body]
+    step = np.maximum((boxes[:, 3] - boxes[:, 1]) // _STEPS, 1.0)
+    while (step := step // 2).any():
+        moved = boxes[:, None] + step[:, None, None] * _MOVES
+        gains, priors = _measured(moved.reshape(-1, 4), sums, parts, band)
+        best = np.argmax((gains * priors).reshape(len(boxes), len(_MOVES)), axis=1)
+        boxes = moved[np.arange(len(boxes)), best]
+    gains, priors = _measured(boxes, sums, parts, band)
+    order = _best_first(boxes, gains * priors)
+    corners = corners_of(boxes[order], parts, _shape(sums))
+    sizes = np.maximum(corners.sums(sums.weight), 1.0)
+    return Peaks(boxes[order], gains[order], sizes, priors[order], corners)
+
+
+def _measured(
+    boxes: npt.NDArray[np.float64], sums: _Sums, parts: tuple[Part, ...], band: Band | None
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """Give the gains and priors of boxes."""
+    gains = corners_of(boxes, parts, _shape(sums)).sums(sums.gain)
+    if band is None:
+        return gains, np.ones(len(boxes))
+    return gains, band.priors(boxes[:, 3], boxes[:, 3] - boxes[:, 1])
+
+
+def _shape(sums: _Sums) -> tuple[int, int]:
+    return sums.gain.shape[0] - 1, sums.gain.shape[1] - 1
+
+
+# Steps of the scan in a box's height.
+_STEPS = 30
+# Where a box is looked for around a place of the scan; first where it is.
+_MOVES = np.array([(x, y, x, y) for y in (0, -1, 1) for x in (0, -1, 1)], dtype=np.float64)
 
 
 def scan_heights(rows: int, settings: BoxFilterSettings) -> npt.NDArray[np.float64]:
@@ -121,11 +166,11 @@ class _Places:
         return sums[rows, int(self.lefts[0]) + x : int(self.lefts[-1]) + x + 1 : self.step]
 
 
-def _scan(sums: _Sums, height: int, settings: BoxFilterSettings, band: Band | None) -> Peaks:
-    """Give the local maxima of the bodies of one height."""
+def _scan(sums: _Sums, height: int, settings: BoxFilterSettings, band: Band | None) -> _Found:
+    """Give the local maxima of the bodies of one height, gains with their priors."""
     width = max(round(settings.aspect * height), 2)
-    # Tall boxes need no finer grid than a thirtieth of their height.
-    step = max(1, height // 30)
+    # What a coarse grid misses `_refined` finds.
+    step = max(1, height // _STEPS)
     tops = np.arange(0, sums.gain.shape[0] - height, step)
     lefts = np.arange(0, sums.gain.shape[1] - width, step)
     priors = np.ones(len(tops))
@@ -135,18 +180,26 @@ def _scan(sums: _Sums, height: int, settings: BoxFilterSettings, band: Band | No
         kept = slice(int(possible[0]), int(possible[-1]) + 1) if possible.size else slice(0, 0)
         tops, priors = tops[kept], priors[kept]
     if not (tops.size and lefts.size):
-        return Peaks(np.empty((0, 4)), np.empty(0), np.empty(0))
+        return _Found(np.empty((0, 4)), np.empty(0))
     places = _Places(tops, lefts, step)
     parts = BODIES[settings.body]
-    gains = sum(_part_sums(sums.gain, places, (width, height), part) for part in parts) * priors[:, None]
-    seen = _part_sums(sums.weight, places, (width, height), WHOLE[0])
     body = sum((p.right - p.left) * (p.bottom - p.top) for p in parts) * width * height
-    gains = np.where(seen >= settings.least_seen * width * height, gains, -1.0)
+    gains = sum(_part_sums(sums.gain, places, (width, height), part) for part in parts) * priors[:, None]
     reach = (2 * max(height // (10 * step), 1) + 1, 2 * max(width // (4 * step), 1) + 1)
     tallest = cv2.dilate(gains, np.ones(reach, dtype=np.uint8), borderType=cv2.BORDER_REPLICATE)
     row, column = np.nonzero((gains >= tallest) & (gains >= settings.least_gain * body))
-    left, top = lefts[column].astype(np.float64), tops[row].astype(np.float64)
-    return Peaks(np.stack([left, top, left + width, top + height], axis=1), gains[row, column], priors[row])
+    left, top = lefts[column], tops[row]
+    seen = sums.weight[top + height, left + width] - sums.weight[top, left + width]
+    seen += sums.weight[top, left] - sums.weight[top + height, left]
+    kept = seen >= settings.least_seen * width * height
+    boxes = np.stack([left, top, left + width, top + height], axis=1)[kept].astype(np.float64)
+    return _Found(boxes, gains[row, column][kept])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Found:
+    boxes: npt.NDArray[np.float64]
+    gains: npt.NDArray[np.float64]
 
 
 def _part_sums(

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from tracking.boxes import iou
 from tracking.detectors.base import Plane
 from tracking.detectors.boxfilter import Peaks
-from tracking.detectors.silhouette import covered, integral, sums_at
+from tracking.detectors.silhouette import integral
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,8 +57,12 @@ def explain(
     """
     search = _Search(peaks, foreground, cost, weight, settings)
     chosen = search.people() if settings.use else []
-    shares = search.shares(chosen)
-    scores = [float(search.shares([other for other in chosen if other != k])[k]) for k in chosen]
+    shares = search.shares()
+    scores = []
+    for index in chosen:
+        search.remove(index)
+        scores.append(float(search.shares()[index]))
+        search.add(index)
     people = len(chosen) if settings.use else settings.most_hypotheses
     for index in _runners_up(peaks.boxes, chosen, settings):
         chosen.append(index)
@@ -75,22 +79,23 @@ _LEAST_VISIBLE = 0.6
 
 
 class _Search:
-    """Greedy choice, then moves and removals."""
+    """Greedy choice, then moves and removals.
+
+    Attributes:
+        gains: `(P,)`, what each candidate gains beside the chosen.
+        visible: `(P,)`, cells of it that none of them covers.
+    """
 
     def __init__(
-        self,
-        peaks: Peaks,
-        foreground: Plane,
-        cost: Plane,
-        weight: Plane,
-        settings: ExplainSettings,
+        self, peaks: Peaks, foreground: Plane, cost: Plane, weight: Plane, settings: ExplainSettings
     ) -> None:
         self._peaks = peaks
-        self._foreground = foreground
-        self._cost = cost
-        self._weight = weight
-        self._size = np.maximum(sums_at(integral(weight), peaks.boxes, peaks.body), 1.0)
         self._settings = settings
+        self.gains = peaks.gains.copy()
+        self.visible = peaks.sizes.copy()
+        # What a covered cell no longer adds to the gain of the others, and to what is visible of them.
+        self._lost = np.stack([np.maximum(foreground - cost, 0.0), weight], axis=-1)
+        self._covers = np.zeros(weight.shape, dtype=np.int32)
 
     def people(self) -> list[int]:
         """Give the indices of the chosen, in the order in which they were first chosen."""
@@ -100,34 +105,50 @@ class _Search:
             if best is None:
                 break
             chosen.append(best)
+            self.add(best)
         for _ in range(_MOVES):
             before = list(chosen)
             for index in before:
-                others = [other for other in chosen if other != index]
-                best = self._best(others)
+                self.remove(index)
+                best = self._best([other for other in chosen if other != index])
                 place = chosen.index(index)
                 chosen[place : place + 1] = [] if best is None else [best]
+                if best is not None:
+                    self.add(best)
             if chosen == before:
                 break
         return chosen
 
-    def shares(self, chosen: list[int]) -> npt.NDArray[np.float64]:
-        """Give each candidate's gain beside the chosen, in areas of its body, `(P,)`."""
-        left, free = self._foreground - self._cost, self._weight.copy()
-        for index in chosen:
-            hidden = covered(left.shape, self._peaks.boxes[index], self._peaks.body)
-            left[hidden] = np.minimum(left[hidden], 0.0)
-            free[hidden] = 0.0
-        gains = sums_at(integral(left), self._peaks.boxes, self._peaks.body)
-        visible = sums_at(integral(free), self._peaks.boxes, self._peaks.body)
-        return np.asarray(self._peaks.priors * gains / np.maximum(visible, _LEAST_VISIBLE * self._size))
+    def shares(self) -> npt.NDArray[np.float64]:
+        """Give each candidate's gain beside the chosen, in areas of what is visible of its body, `(P,)`."""
+        least = _LEAST_VISIBLE * self._peaks.sizes
+        return np.asarray(self._peaks.priors * self.gains / np.maximum(self.visible, least))
+
+    def add(self, index: int) -> None:
+        """Let a candidate cover its cells."""
+        place, inside = self._peaks.corners.around(index), self._peaks.corners.covered(index)
+        self._lose(place, inside & (self._covers[place] == 0), -1.0)
+        self._covers[place] += inside
+
+    def remove(self, index: int) -> None:
+        """Let it no longer do so."""
+        place, inside = self._peaks.corners.around(index), self._peaks.corners.covered(index)
+        self._covers[place] -= inside
+        self._lose(place, inside & (self._covers[place] == 0), 1.0)
+
+    def _lose(self, place: tuple[slice, slice], cells: npt.NDArray[np.bool_], sign: float) -> None:
+        """Change gains and visible parts by what the cells are worth; only this piece has to be summed."""
+        lost = integral(self._lost[place] * cells[..., None].astype(np.float32))
+        change = self._peaks.corners.within(place).sums(lost)
+        self.gains += sign * change[:, 0]
+        self.visible += sign * change[:, 1]
 
     def _best(self, chosen: list[int]) -> int | None:
         """Give the candidate that gains most beside the chosen; `None` where none gains enough."""
-        if not len(self._size):
+        if not len(self.gains):
             return None
-        shares = self.shares(chosen)
-        gains = np.where(shares >= self._settings.least_share, shares * self._size, -np.inf)
+        shares = self.shares()
+        gains = np.where(shares >= self._settings.least_share, shares * self._peaks.sizes, -np.inf)
         gains[chosen] = -np.inf
         best = int(np.argmax(gains))
         return best if np.isfinite(gains[best]) else None
@@ -135,12 +156,16 @@ class _Search:
 
 def _runners_up(boxes: npt.NDArray[np.float64], chosen: list[int], settings: ExplainSettings) -> list[int]:
     """Give the next best candidates that differ enough from each other and from the chosen."""
-    taken = list(chosen)
+    if not len(boxes):
+        return []
+    overlaps = iou(boxes[:, None], boxes[None])
+    nearest = overlaps[chosen].max(axis=0, initial=0.0)
+    nearest[chosen] = np.inf
     extra: list[int] = []
     for index in range(len(boxes)):
-        if len(taken) >= settings.most_hypotheses:
+        if len(chosen) + len(extra) >= settings.most_hypotheses:
             break
-        if index not in chosen and iou(boxes[taken], boxes[index]).max(initial=0.0) < settings.apart:
-            taken.append(index)
+        if nearest[index] < settings.apart:
             extra.append(index)
+            nearest = np.maximum(nearest, overlaps[index])
     return extra

@@ -26,13 +26,8 @@ def shrink(boxes: npt.NDArray[np.float64], foreground: Plane, weight: Plane) -> 
         inside = filled[top:bottom, left:right]
         if inside.size == 0:
             continue
-        trims = (
-            _trim(inside.mean(axis=0)),
-            _trim(inside.mean(axis=1)),
-            -_trim(inside.mean(axis=0)[::-1]),
-            -_trim(inside.mean(axis=1)[::-1]),
-        )
-        fitted[row] += trims
+        across, down = inside.mean(axis=0), inside.mean(axis=1)
+        fitted[row] += (_trim(across), _trim(down), -_trim(across[::-1]), -_trim(down[::-1]))
     return fitted
 
 

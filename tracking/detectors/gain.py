@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import numpy.typing as npt
 
@@ -32,9 +33,4 @@ def channel_gains(image: Image, reference: Image) -> npt.NDArray[np.float64]:
 
 def scaled(image: Image, factors: npt.NDArray[np.float64]) -> Image:
     """Multiply each channel by its factor, rounded and clipped to 0..255."""
-    result = np.empty_like(image)
-    values = np.arange(256)
-    for channel, factor in enumerate(factors):
-        table = np.clip(np.rint(values * factor), 0, 255).astype(np.uint8)
-        result[:, :, channel] = table[image[:, :, channel]]
-    return result
+    return np.asarray(cv2.multiply(image, np.array([*factors, 1.0])), dtype=np.uint8)

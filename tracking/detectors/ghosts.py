@@ -49,6 +49,11 @@ class GhostFinder:
         self._still: Mask | None = None
         self._agreed: Mask = np.zeros((1, 1), dtype=np.uint8)
 
+    def due(self) -> bool:
+        """Count a frame; say whether it is one to look for ghosts in."""
+        self._frames += 1
+        return self._frames % self._settings.check_every == 0
+
     def find(self, image: Image, background: Image, foreground: Mask) -> Mask | None:
         """Give a mask of the ghosts found in this frame, or `None` where there is none.
 
@@ -57,9 +62,6 @@ class GhostFinder:
             background: `(H, W, 3)`.
             foreground: `(H, W)`, 255 where the image differs from the background.
         """
-        self._frames += 1
-        if self._frames % self._settings.check_every:
-            return None
         grey = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
         still = self._count_still(grey, foreground)
         self._agreed = np.minimum(self._agreed, np.uint8(200)) + (foreground == 0).astype(np.uint8)

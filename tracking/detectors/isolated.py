@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import cv2
 import numpy as np
 import numpy.typing as npt
@@ -20,27 +22,34 @@ _MERGED_AREA = 0.05
 def isolated_people(foreground: Mask, visible: Mask) -> list[tuple[float, float]]:
     """Give foot row and height of every blob that looks like one whole standing person alone."""
     rows, columns = foreground.shape
-    count, _, stats, _ = cv2.connectedComponentsWithStats(foreground)
+    # Outlines instead of labelled pixels: a twentieth of the time.
+    outlines, _ = cv2.findContours(foreground, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
+    blobs = np.array([_blob(np.asarray(outline)) for outline in outlines], dtype=np.int64).reshape(-1, 5)
     found: list[tuple[float, float]] = []
-    for label in range(1, count):
-        left, top, width, height, area = (int(value) for value in stats[label])
+    for label, (left, top, width, height, area) in enumerate(blobs.tolist()):
         upright = _THINNEST * height <= width <= _WIDEST * height and area >= _LEAST_FILL * width * height
         inside = left >= _MARGIN and left + width <= columns - _MARGIN
         inside = inside and top >= _MARGIN and top + height <= rows - _MARGIN
         if not (upright and inside and height >= _LEAST_HEIGHT * rows):
             continue
         around = visible[top - _MARGIN : top + height + _MARGIN, left - _MARGIN : left + width + _MARGIN]
-        if around.all() and not _crowded(np.asarray(stats, dtype=np.int32), label):
+        if around.all() and not _crowded(blobs, label):
             found.append((float(top + height), float(height)))
     return found
 
 
-def _crowded(stats: npt.NDArray[np.int32], label: int) -> bool:
+def _blob(outline: npt.NDArray[Any]) -> tuple[int, ...]:
+    """Give left, top, width, height and area, holes included."""
+    around = cv2.arcLength(outline, True) / 2.0  # noqa: FBT003 — closed; half a pixel all around
+    return (*cv2.boundingRect(outline), round(cv2.contourArea(outline) + around) + 1)
+
+
+def _crowded(blobs: npt.NDArray[np.int64], label: int) -> bool:
     """Say whether another sizeable blob reaches into this one's surroundings: a person in pieces."""
-    left, top, width, height, area = (int(value) for value in stats[label])
+    left, top, width, height, area = blobs[label].tolist()
     reach = height // 8
-    others = np.delete(stats[1:], label - 1, axis=0)
-    others = others[others[:, cv2.CC_STAT_AREA] >= _MERGED_AREA * area]
+    others = np.delete(blobs, label, axis=0)
+    others = others[others[:, 4] >= _MERGED_AREA * area]
     beside = (others[:, 0] > left + width + reach) | (others[:, 0] + others[:, 2] < left - reach)
     apart = (others[:, 1] > top + height + reach) | (others[:, 1] + others[:, 3] < top - reach)
     return bool((~(beside | apart)).any())

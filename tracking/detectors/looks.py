@@ -87,7 +87,7 @@ def colour_histograms(image: Image, boxes: Floats, bins: int, mask: Mask | None 
     """
     if mask is None:
         mask = np.full(image.shape[:2], 255, dtype=np.uint8)
-    codes = _coded(image, bins)
+    codes = _coded(image, bins, mask)
     counts = np.zeros((len(boxes), len(_HALVES), _CHANNELS * bins))
     limits = np.array([image.shape[1], image.shape[0]] * 2, dtype=np.float64)
     for k, box in enumerate(np.clip(boxes, 0.0, limits)):
@@ -115,18 +115,28 @@ def _rows(counts: Floats) -> Floats:
     return np.asarray(shares.reshape(boxes, histograms * bins) / histograms)
 
 
-def _coded(image: Image, bins: int) -> npt.NDArray[np.uint8]:
+def _coded(image: Image, bins: int, mask: Mask) -> npt.NDArray[np.uint8]:
     """Give each pixel's bins of brightness (its square root), red and blue share, `(H, W, 3)`.
 
     Those of the second channel begin at `bins`, of the third at `2 bins`, so that one count does for all.
+    Only pixels of the mask are looked at; the others are 0.
     """
-    blue, green, red = (plane.astype(np.float32) + np.float32(_DARK) for plane in cv2.split(image))
+    where = np.flatnonzero(mask)
+    codes = np.zeros(image.shape, dtype=np.uint8)
+    if where.size:
+        codes.reshape(-1, _CHANNELS)[where] = _codes_of(image.reshape(-1, _CHANNELS)[where], bins)
+    return codes
+
+
+def _codes_of(pixels: npt.NDArray[np.uint8], bins: int) -> npt.NDArray[np.uint8]:
+    """Give the bins of pixels `(N, 3)`."""
+    blue, green, red = (plane.astype(np.float32) + np.float32(_DARK) for plane in pixels.T)
     per_total = np.float32(bins / (_MOST_SHARE - _LEAST_SHARE)) / (blue + green + red)
     first = np.float32(bins * _LEAST_SHARE / (_MOST_SHARE - _LEAST_SHARE))
     roots = np.sqrt(np.arange(_LEVELS) / (_LEVELS - 1.0))
     table = np.minimum(roots * bins, bins - 1).astype(np.uint8)
-    codes = np.empty_like(image)
-    codes[..., 0] = cv2.LUT(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), table)
+    codes = np.empty_like(pixels)
+    codes[:, 0] = table[cv2.cvtColor(pixels[:, None], cv2.COLOR_BGR2GRAY)[:, 0]]
     for channel, plane in enumerate((red, blue), 1):
-        codes[..., channel] = np.clip(plane * per_total - first, 0, bins - 1) + np.float32(channel * bins)
+        codes[:, channel] = np.clip(plane * per_total - first, 0, bins - 1) + np.float32(channel * bins)
     return codes

@@ -43,7 +43,8 @@ class MedianBackground:
         self._flooded = 0
         self._exact: npt.NDArray[np.float32] | None = None
         self._rounded: Image | None = None
-        self._level: Image | None = None
+        self._last: tuple[Image, npt.NDArray[np.float64]] | None = None
+        """The frame last seen, and its gains."""
 
     def split(self, image: Image) -> Split | None:
         """Tell foreground from shadow and background; `None` while the background is not known yet."""
@@ -52,8 +53,7 @@ class MedianBackground:
         if self._rounded is None:
             return None
         gains = channel_gains(image, self._rounded)
-        # The frame as it would look at the background's gain: what the background learns from.
-        self._level = scaled(image, 1.0 / gains)
+        self._last = image, gains
         expected = scaled(self._rounded, gains)
         blue, green, red = cv2.split(cv2.absdiff(image, expected))
         difference = cv2.max(cv2.max(blue, green), red)
@@ -70,14 +70,19 @@ class MedianBackground:
             foreground: `(H, W)`, the cleaned foreground of that frame.
             occupied: `(H, W)`, 255 where somebody is.
         """
-        if self._exact is None or self._rounded is None or self._level is None:
+        if self._exact is None or self._rounded is None or self._last is None:
             return
-        ghosts = self._ghosts.find(self._level, self._rounded, foreground)
+        looks, learns = self._ghosts.due(), self._frames % self._settings.learn_every == 0
+        if not (looks or learns):
+            return
+        # The frame as it would look at the background's gain.
+        level = scaled(self._last[0], 1.0 / self._last[1])
+        ghosts = self._ghosts.find(level, self._rounded, foreground) if looks else None
         if ghosts is not None:
-            self._exact[ghosts > 0] = self._level[ghosts > 0]
-        if self._frames % self._settings.learn_every == 0:
+            self._exact[ghosts > 0] = level[ghosts > 0]
+        if learns:
             free = cv2.bitwise_not(occupied)
-            cv2.accumulateWeighted(self._level, self._exact, self._settings.learn_rate, mask=free)
+            cv2.accumulateWeighted(level, self._exact, self._settings.learn_rate, mask=free)
         elif ghosts is None:
             return
         self._rounded = np.rint(self._exact).astype(np.uint8)

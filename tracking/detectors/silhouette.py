@@ -38,37 +38,56 @@ def integral(plane: Plane) -> npt.NDArray[np.float64]:
     return np.asarray(cv2.integral(plane, sdepth=cv2.CV_64F))
 
 
-def sums_at(
-    sums: npt.NDArray[np.float64], boxes: npt.NDArray[np.float64], parts: tuple[Part, ...]
-) -> npt.NDArray[np.float64]:
-    """Sum a plane over the parts of each box, `(K,)`; `boxes` `(K, 4)` in cells, cut at the borders."""
-    total = np.zeros(len(boxes))
-    for left, top, right, bottom in (_cells(boxes, part, sums.shape) for part in parts):
-        total += sums[bottom, right] - sums[top, right] - sums[bottom, left] + sums[top, left]
-    return total
-
-
-def covered(
-    shape: tuple[int, int], box: npt.NDArray[np.float64], parts: tuple[Part, ...]
-) -> npt.NDArray[np.bool_]:
-    """Give the cells inside the parts of one box `(4,)` in cells: `(H, W)` bool."""
-    inside = np.zeros(shape, dtype=np.bool_)
-    for part in parts:
-        edges = _cells(box[None], part, (shape[0] + 1, shape[1] + 1))
-        left, top, right, bottom = (int(edge[0]) for edge in edges)
-        inside[top:bottom, left:right] = True
-    return inside
-
-
-def _cells(
-    boxes: npt.NDArray[np.float64], part: Part, shape: tuple[int, ...]
-) -> tuple[npt.NDArray[np.int64], ...]:
-    width = boxes[:, 2] - boxes[:, 0]
-    height = boxes[:, 3] - boxes[:, 1]
-    edges = (
-        (boxes[:, 0] + part.left * width, shape[1]),
-        (boxes[:, 1] + part.top * height, shape[0]),
-        (boxes[:, 0] + part.right * width, shape[1]),
-        (boxes[:, 1] + part.bottom * height, shape[0]),
+def corners_of(boxes: npt.NDArray[np.float64], parts: tuple[Part, ...], shape: tuple[int, ...]) -> Corners:
+    """Give the whole cells of the parts of boxes `(K, 4)` in cells, cut at the borders of a plane."""
+    across = (boxes[:, 2] - boxes[:, 0])[:, None]
+    down = (boxes[:, 3] - boxes[:, 1])[:, None]
+    shares = np.array([(part.left, part.top, part.right, part.bottom) for part in parts])
+    columns, rows = (boxes[:, [0]], across, shape[1]), (boxes[:, [1]], down, shape[0])
+    left, top, right, bottom = (
+        np.clip(np.rint(begin + share * length), 0, size).astype(np.int64)
+        for share, (begin, length, size) in zip(shares.T, (columns, rows, columns, rows), strict=True)
     )
-    return tuple(np.clip(np.rint(edge), 0, size - 1).astype(np.int64) for edge, size in edges)
+    return Corners(left, top, right, bottom)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Corners:
+    """The parts of K bodies in whole cells, each `(K, P)`."""
+
+    left: npt.NDArray[np.int64]
+    top: npt.NDArray[np.int64]
+    right: npt.NDArray[np.int64]
+    bottom: npt.NDArray[np.int64]
+
+    def sums(self, integrals: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """Sum a plane, given by its integral, over each body: `(K,)`, or `(K, C)` for `C` planes in one."""
+        upper = integrals[self.top, self.right] - integrals[self.top, self.left]
+        lower = integrals[self.bottom, self.right] - integrals[self.bottom, self.left]
+        return np.asarray((lower - upper).sum(axis=1))
+
+    def within(self, place: tuple[slice, slice]) -> Corners:
+        """Give the corners in a piece of the plane, cut at its borders."""
+        rows, columns = place
+        width, height = columns.stop - columns.start, rows.stop - rows.start
+        return Corners(
+            np.clip(self.left - columns.start, 0, width),
+            np.clip(self.top - rows.start, 0, height),
+            np.clip(self.right - columns.start, 0, width),
+            np.clip(self.bottom - rows.start, 0, height),
+        )
+
+    def around(self, k: int) -> tuple[slice, slice]:
+        """Give the rows and columns that body `k` lies in."""
+        rows = slice(int(self.top[k].min()), int(self.bottom[k].max()))
+        return rows, slice(int(self.left[k].min()), int(self.right[k].max()))
+
+    def covered(self, k: int) -> npt.NDArray[np.bool_]:
+        """Give the cells inside body `k`, in the piece of the plane `around` it."""
+        rows, columns = self.around(k)
+        x, y = columns.start, rows.start
+        inside = np.zeros((rows.stop - y, columns.stop - x), dtype=np.bool_)
+        lefts, tops, rights, bottoms = self.left[k], self.top[k], self.right[k], self.bottom[k]
+        for left, top, right, bottom in zip(lefts, tops, rights, bottoms, strict=True):
+            inside[top - y : bottom - y, left - x : right - x] = True
+        return inside
