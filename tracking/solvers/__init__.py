@@ -11,10 +11,14 @@ from tracking.solvers.base import (
     solver_named,
     solver_names,
 )
+from tracking.solvers.hint import UNKNOWN, Hint, PricedRow
 
 __all__ = [
     "DEFAULT_SOLVER",
     "OCCLUDED",
+    "UNKNOWN",
+    "Hint",
+    "PricedRow",
     "Solution",
     "SolveReport",
     "Solver",

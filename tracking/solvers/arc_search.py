@@ -18,12 +18,13 @@ from tracking.conflicts import Bools
 from tracking.network import Network
 from tracking.solvers.arc_master import ArcMaster, ArcPoint, ArcSet, arcs_of_paths
 from tracking.solvers.ascent import Guess, guessed
-from tracking.solvers.conflict_finder import ConflictFinder, ConflictRow
+from tracking.solvers.conflict_finder import ConflictFinder, ConflictRow, priced_rows
 from tracking.solvers.greedy_dp import greedy_paths
 from tracking.solvers.layout_forces import with_pulls
 from tracking.solvers.objective import Ints, objective
 from tracking.solvers.priced_arcs import arcs_through
 from tracking.solvers.pricing import Pricing
+from tracking.solvers.recall import with_prices
 from tracking.solvers.relaxed import CLOSE, Relaxed
 from tracking.solvers.viterbi import Marginals, Trellis
 
@@ -80,7 +81,8 @@ class ArcSearch:
             priced = self._priced_by(point)
             close = point.objective - priced.bound <= CLOSE * max(1.0, abs(point.objective))
             if close or not self._enter_better_arcs(priced):
-                return Relaxed(self._master.usage(), priced.bound, priced.trellis.node, rounds)
+                prices = priced_rows(self._network, self._master.rows, point.prices)
+                return Relaxed(self._master.usage(), priced.bound, priced.trellis.node, rounds, prices)
 
     def _settled(self) -> ArcPoint:
         """Solve the program with all conflict rows that its solution breaks."""
@@ -107,10 +109,7 @@ class ArcSearch:
     def _priced(self, point: ArcPoint) -> Floats:
         """Give the node costs with the prices of conflict rows and what moves earn."""
         network = self._network
-        node = network.node.copy()
-        for price, row in zip(point.prices, self._master.rows, strict=True):
-            if price > 0.0:
-                node[:, row.frame][row.members] += price
+        node = with_prices(network, self._master.rows, point.prices)
         if not network.layout:
             return node
         return with_pulls(node, network.locations[network.sets], point.pulls)

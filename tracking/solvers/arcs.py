@@ -12,15 +12,17 @@ from tracking.solvers.arc_program import ArcProgram, arc_program
 from tracking.solvers.base import Solution
 from tracking.solvers.finish import finished, nothing
 from tracking.solvers.highs import LinearProgram, solve_program
+from tracking.solvers.hint import Hint
 from tracking.solvers.relaxed import Relaxed
+from tracking.solvers.timed import TimedSolver
 
 
-class Arcs:
+class Arcs(TimedSolver):
     """All arcs of the window in one program; slow, and simple enough to trust."""
 
     name = "arcs"
 
-    def solve(self, network: Network) -> Solution:
+    def _answer(self, network: Network, _hint: Hint | None) -> Solution:
         """Solve the relaxation and round it where it is not whole."""
         if not network.objects:
             return nothing(self.name, network)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib import import_module
 from typing import Protocol, cast
 
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracking.network import Network
+from tracking.solvers.hint import Hint, PricedRow
 
 OCCLUDED = -1
 """The state of an object that is on no observation of a frame."""
@@ -40,7 +41,9 @@ class SolveReport:
             global optimum.
         conflicts: pairs of objects and frames of the answer that conflict; only `separate-dp`, which
             does not look at conflicts, leaves any.
-        rounds: how often the linear program (or a dynamic program over all objects) was solved.
+        rounds: how often the linear program (or a dynamic program over all objects) was solved; 0 where
+            the answer was proven without.
+        seconds: how long it took; equal answers are equal however long they took.
     """
 
     solver: str
@@ -49,6 +52,7 @@ class SolveReport:
     integral: bool
     conflicts: int
     rounds: int
+    seconds: float = field(default=0.0, compare=False)
 
     @property
     def gap(self) -> float:
@@ -63,10 +67,17 @@ class Solution:
     Attributes:
         states: (n, M) int64, the index of the observation in its frame, or -1: occluded.
         report: what is proven about it.
+        prices: the conflict rows that bind, where the solver can tell.
     """
 
     states: NDArray[np.int64]
     report: SolveReport
+    prices: tuple[PricedRow, ...] = ()
+
+    @property
+    def hint(self) -> Hint:
+        """What this answer tells about a window with the same frames; see `Hint.later`."""
+        return Hint(self.prices, self.states)
 
 
 class Solver(Protocol):
@@ -76,8 +87,11 @@ class Solver(Protocol):
     def name(self) -> str:
         """The name in the registry."""
 
-    def solve(self, network: Network) -> Solution:
-        """Give the states of all objects in all frames; the same network gives the same answer."""
+    def solve(self, network: Network, hint: Hint | None = None) -> Solution:
+        """Give the states of all objects in all frames; the same network and hint give the same answer.
+
+        A hint, `Solution.hint.later(...)` of the window before, makes it quicker, whatever it says.
+        """
 
 
 def solver_names() -> tuple[str, ...]:

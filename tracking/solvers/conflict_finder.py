@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from tracking.boxes import Floats
 from tracking.conflicts import Bools, clique_rows, connected
 from tracking.network import Network
+from tracking.solvers.hint import PricedRow
 from tracking.solvers.objective import Ints
 
 _TOLERANCE = 1e-9
@@ -32,6 +34,17 @@ class _Part:
     """
 
     rows: Floats
+
+
+def priced_rows(network: Network, rows: Sequence[ConflictRow], prices: Floats) -> tuple[PricedRow, ...]:
+    """Give the rows with a price, if all objects share them."""
+    if not network.shared or network.conflict_rows == "star":
+        return ()
+    return tuple(
+        PricedRow(row.frame, tuple(np.flatnonzero(row.members[0]).tolist()), float(price))
+        for row, price in zip(rows, prices, strict=True)
+        if price > 0.0
+    )
 
 
 class ConflictFinder:
@@ -60,6 +73,35 @@ class ConflictFinder:
                         self._given.add(key)
                         found.append(self._row(frame, row))
         return found
+
+    def recalled(self, rows: Sequence[PricedRow]) -> tuple[list[ConflictRow], list[float]]:
+        """Give those rows, and their prices, that are rows of this network, given before or not."""
+        found: list[ConflictRow] = []
+        prices: list[float] = []
+        if not self._network.shared or self._stars:
+            return found, prices
+        for row in rows:
+            member = np.zeros(self._network.places)
+            known = [place for place in row.places if place < len(member)]
+            if not known or row.frame >= self._network.frames:
+                continue
+            member[known] = 1.0
+            for part in self._parts_at(row.frame, np.array(known[:1])):
+                if (part.rows == member).all(axis=1).any():
+                    found.append(self._row(row.frame, member))
+                    prices.append(row.price)
+        return found, prices
+
+    def fresh(self, rows: Sequence[ConflictRow]) -> list[ConflictRow]:
+        """Give those of the rows that were not given before; from now on they were."""
+        keys = [(row.frame, self._entries(row).tobytes()) for row in rows]
+        found = {key: row for key, row in zip(keys, rows, strict=True) if key not in self._given}
+        self._given.update(found)
+        return list(found.values())
+
+    def _entries(self, row: ConflictRow) -> Floats:
+        members = row.members[:, :-1] if not self._network.shared or self._stars else row.members[0, :-1]
+        return np.asarray(members, dtype=np.float64).ravel()
 
     def _visits(self, usage: Floats) -> Floats:
         """Give how much goes through each place, (M, P K)."""

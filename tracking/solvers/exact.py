@@ -12,16 +12,18 @@ from tracking.solvers.base import Solution
 from tracking.solvers.columns import relaxation_by_columns
 from tracking.solvers.finish import Proof, answered, nothing, whole_nodes
 from tracking.solvers.highs import solve_program
+from tracking.solvers.hint import Hint
 from tracking.solvers.objective import Ints, objective
 from tracking.solvers.relaxed import Relaxed
 from tracking.solvers.rounding import is_integral
+from tracking.solvers.timed import TimedSolver
 from tracking.solvers.viterbi import Trellis, backward, forward
 
 _SLACK = 1e-9
 """Relative: excesses are sums of some tens of costs, each with its rounding error."""
 
 
-class Exact:
+class Exact(TimedSolver):
     """Fixes what the relaxation proves needless, and branches and bounds over the little that is left.
 
     An arc whose best path, at the prices that prove the bound, costs more above its object's best than
@@ -30,7 +32,7 @@ class Exact:
 
     name = "exact"
 
-    def solve(self, network: Network) -> Solution:
+    def _answer(self, network: Network, _hint: Hint | None) -> Solution:
         """Give the cheapest states without conflicts; the bound is their cost."""
         if not network.objects:
             return nothing(self.name, network)

@@ -9,13 +9,15 @@ from tracking.conflicts import Bools
 from tracking.network import Network
 from tracking.solvers.base import Solution
 from tracking.solvers.finish import Proof, answered, nothing
+from tracking.solvers.hint import Hint
 from tracking.solvers.objective import Ints
+from tracking.solvers.timed import TimedSolver
 
 _LARGEST = 30_000_000
 """Numbers held at once, 240 MB: three objects with 70 places, say."""
 
 
-class ExtendedDp:
+class ExtendedDp(TimedSolver):
     """The integer optimum by trying all joint states; an oracle for up to three objects or so.
 
     Without the layout term the step from one frame to the next separates by object, and a window costs
@@ -24,7 +26,7 @@ class ExtendedDp:
 
     name = "extended-dp"
 
-    def solve(self, network: Network) -> Solution:
+    def _answer(self, network: Network, _hint: Hint | None) -> Solution:
         """Give the cheapest states without conflicts; the bound is their cost.
 
         Raises:

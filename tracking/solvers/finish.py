@@ -10,6 +10,7 @@ from tracking.boxes import Floats
 from tracking.network import Network
 from tracking.solvers.base import Solution, SolveReport
 from tracking.solvers.greedy_dp import greedy_paths
+from tracking.solvers.hint import PricedRow
 from tracking.solvers.improve import improved
 from tracking.solvers.objective import Ints, conflict_count, objective, states_of
 from tracking.solvers.relaxed import Relaxed
@@ -20,7 +21,7 @@ def finished(solver: str, network: Network, found: Relaxed, power: int = 1) -> S
     """Give the answer for the optimum of the relaxation; `power` is that of the layout term."""
     nodes = whole_nodes(network, found.usage, power)
     integral = is_integral(found.usage)
-    proof = Proof(solver, found.bound, integral, found.rounds)
+    proof = Proof(solver, found.bound, integral, found.rounds, found.prices)
     return answered(network, nodes, proof, power)
 
 
@@ -40,12 +41,13 @@ def whole_nodes(network: Network, usage: Floats, power: int = 1) -> Ints:
 
 @dataclass(frozen=True, slots=True)
 class Proof:
-    """What a solver knows of its answer: see `SolveReport`."""
+    """What a solver knows of its answer: see `SolveReport` and `Solution`."""
 
     solver: str
     bound: float
     integral: bool
     rounds: int
+    prices: tuple[PricedRow, ...] = ()
 
 
 def answered(network: Network, nodes: Ints, proof: Proof, power: int = 1) -> Solution:
@@ -62,7 +64,7 @@ def answered(network: Network, nodes: Ints, proof: Proof, power: int = 1) -> Sol
         conflicts=conflict_count(network, nodes),
         rounds=proof.rounds,
     )
-    return Solution(states_of(network, nodes), report)
+    return Solution(states_of(network, nodes), report, proof.prices)
 
 
 def nothing(solver: str, network: Network) -> Solution:

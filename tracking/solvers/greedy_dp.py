@@ -8,7 +8,9 @@ import numpy as np
 
 from tracking.network import Network
 from tracking.solvers.base import Solution, SolveReport
+from tracking.solvers.hint import Hint
 from tracking.solvers.objective import Ints, block, objective, states_of
+from tracking.solvers.timed import TimedSolver
 from tracking.solvers.viterbi import Paths, Trellis, best_paths
 
 
@@ -44,12 +46,12 @@ def greedy_paths(network: Network, alone: Paths | None = None) -> GreedyPaths:
     return GreedyPaths(nodes, bound)
 
 
-class GreedyDp:
+class GreedyDp(TimedSolver):
     """Best track first: quick, never in conflict, not always right. A baseline."""
 
     name = "greedy-dp"
 
-    def solve(self, network: Network) -> Solution:
+    def _answer(self, network: Network, _hint: Hint | None) -> Solution:
         """Give the greedy paths; the bound is the cost of all cheapest paths, conflicts ignored."""
         paths = greedy_paths(network)
         cost = objective(network, paths.nodes)

@@ -12,12 +12,14 @@ from tracking.solvers.columns import relaxation_by_columns
 from tracking.solvers.conflict_finder import ConflictFinder
 from tracking.solvers.finish import finished, nothing
 from tracking.solvers.greedy_dp import greedy_paths
+from tracking.solvers.hint import Hint
 from tracking.solvers.improve import improved
+from tracking.solvers.timed import TimedSolver
 
 _SQUARE = 2
 
 
-class L2:
+class L2(TimedSolver):
     """As `columns`, but a change of layout by d pixels costs μ d²: many small changes rather than a jump.
 
     Without layout term or a second object it is `columns`.
@@ -25,7 +27,7 @@ class L2:
 
     name = "l2"
 
-    def solve(self, network: Network) -> Solution:
+    def _answer(self, network: Network, _hint: Hint | None) -> Solution:
         """Solve the relaxation and round it where it is not whole."""
         if not network.objects:
             return nothing(self.name, network)

@@ -4,21 +4,26 @@ Every object starts on its cheapest path. Where these conflict, the objects conc
 enter a small program that mixes their paths so that the rows they broke hold. Its duals price the places
 of the rows; a Viterbi pass over the priced network finds each object's best path or proves that there is
 no better one. Objects that never meet never share a row, so the program falls into independent groups
-by itself; most objects of most windows never enter it.
+of objects, and a group whose prices stand still is not priced again; most objects of most windows never
+enter it.
 """
 
 from __future__ import annotations
 
 import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
 
 from tracking.conflicts import Bools
 from tracking.network import Network
 from tracking.solvers.arc_master import arcs_of_paths
 from tracking.solvers.arc_search import ArcSearch, arc_search
-from tracking.solvers.conflict_finder import ConflictFinder, ConflictRow
+from tracking.solvers.conflict_finder import ConflictFinder, ConflictRow, priced_rows
+from tracking.solvers.hint import Hint
 from tracking.solvers.objective import Ints, path_costs
 from tracking.solvers.path_master import MasterPoint, PathMaster
 from tracking.solvers.pricing import Pricing
+from tracking.solvers.recall import recall, with_prices
 from tracking.solvers.relaxed import CLOSE, Relaxed
 from tracking.solvers.viterbi import Paths, Trellis
 
@@ -41,26 +46,35 @@ class PathSearch:
         self._bound = -np.inf
         self._priced = network.node
         self._point = MasterPoint(0.0, np.empty(0), np.empty(0))
+        self._meets = np.zeros((network.objects, network.objects), dtype=np.bool_)
         self._active = np.zeros(network.objects, dtype=np.bool_)
         self._usage = np.zeros(network.node.shape)
         each, frames = np.indices(self._alone.nodes.shape)
         self._usage[each, frames, self._alone.nodes] = 1.0
 
-    def run(self) -> Relaxed:
+    def run(self, hint: Hint | None = None) -> Relaxed:
         """Find the optimum of the relaxation."""
         rows = self._finder.broken(self._usage)
         if not rows:
             return Relaxed(self._usage, float(self._alone.costs.sum()), self._priced, 0)
-        if np.count_nonzero(self._concerned(rows)) > _FEW_OBJECTS:
+        told = recall(self._network, self._pricing, self._finder, hint) if hint else None
+        if told is not None and told.proven is not None:
+            return told.proven
+        self._meet(rows)
+        if self._largest_group() > _FEW_OBJECTS:
             return arc_search(self._network, self._pricing, ConflictFinder(self._network)).run()
-        self._bind(rows)
+        self._bind([*rows, *self._finder.fresh(told.rows)] if told else rows)
+        for paths in told.paths if told else ():
+            active = np.flatnonzero(self._active)
+            self._master.add_paths(active, paths.only(active))
         self._solve()
         self._keep_rows()
         rounds = 0
-        while rounds < (_ROUNDS_OF_FEW if self._active.sum() <= _FEW_OBJECTS else _ROUNDS_OF_MANY):
+        while rounds < (_ROUNDS_OF_FEW if self._largest_group() <= _FEW_OBJECTS else _ROUNDS_OF_MANY):
             rounds += 1
             if not self._enter_better_paths():
-                return Relaxed(self._usage, self._bound, self._priced, rounds)
+                prices = priced_rows(self._network, self._master.rows, self._point.prices)
+                return Relaxed(self._usage, self._bound, self._priced, rounds, prices)
             self._solve()
             self._keep_rows()
         return self._by_arcs(rounds)
@@ -85,16 +99,23 @@ class PathSearch:
             self._bind(rows)
             self._solve()
 
-    def _concerned(self, rows: list[ConflictRow]) -> Bools:
-        """Say which objects are on the rows, (n,)."""
+    def _meet(self, rows: list[ConflictRow]) -> Bools:
+        """Note who meets whom on the rows; say which objects are on any, (n,)."""
         concerned = np.zeros(self._network.objects, dtype=np.bool_)
         for row in rows:
-            concerned |= (self._usage[:, row.frame] * row.members).any(axis=1)
+            there = np.asarray((self._usage[:, row.frame] * row.members).any(axis=1))
+            self._meets |= np.outer(there, there)
+            concerned |= there
         return concerned
+
+    def _largest_group(self) -> int:
+        """Give the size of the largest group of objects that meet, directly or through others."""
+        _, group = connected_components(csr_array(self._meets.astype(np.int8)), directed=False)
+        return int(np.bincount(group).max())
 
     def _bind(self, rows: list[ConflictRow]) -> None:
         """Let the objects that break the rows, and paths around all rows, into the program."""
-        concerned = self._concerned(rows)
+        concerned = self._meet(rows)
         new = np.flatnonzero(concerned & ~self._active)
         self._active[new] = True
         if len(new):
@@ -116,11 +137,7 @@ class PathSearch:
     def _enter_better_paths(self) -> bool:
         """Price all paths; let the better ones in; say whether there are any. Keeps the bound."""
         active, point = np.flatnonzero(self._active), self._point
-        node = self._network.node.copy()
-        for price, row in zip(point.prices, self._master.rows, strict=True):
-            if price > 0.0:
-                node[:, row.frame][row.members] += price
-        self._priced = node
+        node = self._priced = with_prices(self._network, self._master.rows, point.prices)
         paths = self._pricing.best_paths(node, active)
         others = float(self._alone.costs[~self._active].sum())
         cost = others + point.objective

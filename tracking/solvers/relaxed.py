@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from tracking.boxes import Floats
+from tracking.solvers.hint import PricedRow
 
 CLOSE = 1e-11
 """Relative distance of cost and bound at which the optimum is proven; far below the 1e-9 promised."""
@@ -20,9 +21,11 @@ class Relaxed:
         priced: (n, M, S) the costs of nodes with the prices of conflicts and of the layout on them, at
             which the cheapest paths prove the bound.
         rounds: how often paths or arcs were priced.
+        prices: the conflict rows that bind, where all objects share them.
     """
 
     usage: Floats
     bound: float
     priced: Floats
     rounds: int
+    prices: tuple[PricedRow, ...] = ()

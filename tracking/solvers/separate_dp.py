@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from tracking.network import Network
 from tracking.solvers.base import Solution, SolveReport
+from tracking.solvers.hint import Hint
 from tracking.solvers.objective import conflict_count, objective, states_of
+from tracking.solvers.timed import TimedSolver
 from tracking.solvers.viterbi import Trellis, best_paths
 
 
-class SeparateDp:
+class SeparateDp(TimedSolver):
     """The cheapest path of each object; two objects may take one place. A baseline, and a bound."""
 
     name = "separate-dp"
 
-    def solve(self, network: Network) -> Solution:
+    def _answer(self, network: Network, _hint: Hint | None) -> Solution:
         """Give the cheapest paths; the sum of their costs is the bound."""
         paths = best_paths(Trellis.of(network))
         conflicts = conflict_count(network, paths.nodes)
