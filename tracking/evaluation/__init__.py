@@ -3,8 +3,16 @@
 Needs the extra `evaluate` (`pip install myview[evaluate]`); the tracker itself does not use it.
 """
 
-from tracking.evaluation.cameras import CameraScores, Recording, evaluate_cameras
+from tracking.evaluation.cameras import CameraScores, Recording, average, evaluate_cameras
 from tracking.evaluation.perfect import perfect_association
 from tracking.evaluation.scores import Scores, evaluate
 
-__all__ = ["CameraScores", "Recording", "Scores", "evaluate", "evaluate_cameras", "perfect_association"]
+__all__ = [
+    "CameraScores",
+    "Recording",
+    "Scores",
+    "average",
+    "evaluate",
+    "evaluate_cameras",
+    "perfect_association",
+]

@@ -37,11 +37,22 @@ class CameraScores:
     @property
     def mean(self) -> Scores:
         """Shares are the mean over the cameras, each counting as much; counts are totals."""
-        columns: dict[str, Any] = {}
-        for field in fields(Scores):
-            values = [getattr(scores, field.name) for scores in self.cameras.values()]
-            columns[field.name] = sum(values) if isinstance(values[0], int) else fmean(values)
-        return Scores(**columns)
+        return average(list(self.cameras.values()))
+
+
+def average(scores: Sequence[Scores]) -> Scores:
+    """Give the mean of the shares and the total of the counts.
+
+    Raises:
+        ValueError: there are no scores.
+    """
+    if not scores:
+        raise ValueError("the average of no scores")
+    columns: dict[str, Any] = {}
+    for field in fields(Scores):
+        values = [getattr(it, field.name) for it in scores]
+        columns[field.name] = sum(values) if isinstance(values[0], int) else fmean(values)
+    return Scores(**columns)
 
 
 def evaluate_cameras(cameras: Mapping[str, Recording], least_iou: float = DEFAULT_IOU) -> CameraScores:

@@ -1,0 +1,140 @@
+"""What each term of the tracker brings: its scores without it, on the same public detections.
+
+    OPENBLAS_NUM_THREADS=1 python -m benchmarks.ablation --data ../shared/data --out out/bench --jobs 2
+
+A term is switched off by settings of the configuration's section `track`; to add one, add a row to TERMS.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict, dataclass, field
+from multiprocessing import get_context
+from pathlib import Path
+
+from benchmarks.recordings import Recording, TrackSettings, find_recordings, track
+from benchmarks.report import Report
+from benchmarks.surroundings import CannotRunError, finish, parser
+from tracking import PAPER_COSTS
+from tracking.evaluation import Scores, average
+
+
+@dataclass(frozen=True, slots=True)
+class Term:
+    """Something the tracker does, and the settings without it."""
+
+    name: str
+    off: TrackSettings = field(default_factory=dict)
+
+
+DEFAULT = Term("all of it")
+
+TERMS = (
+    Term("no confidence in the cost", {"costs": {"confidence": 0.0}}),
+    Term("no displacement", {"costs": {"displacement": 0.0}}),
+    Term("displacement in pixels", {"costs": {"displacement_unit": "pixels", "displacement": 0.01}}),
+    Term("no change of appearance", {"costs": {"appearance": 0.0}}),
+    Term("conflicts by corners", {"costs": {"conflict_rule": "corners"}}),
+    Term("conflict rows of II.D", {"costs": {"conflict_rows": "star"}}),
+    Term("anybody anywhere (no reach)", {"window": {"reach": 1e3, "reach_per_frame": 1e3, "grow": 1e3}}),
+    Term("boxes of one window: 5 frames", {"window": {"window": 5, "birth_window": 5}}),
+    Term("no return after long", {"window": {"same_distance": 0.0}}),
+    Term("templates stay as they were", {"window": {"template_rate": 0.0}}),
+    Term("the paper's costs", {"costs": asdict(PAPER_COSTS)}),
+)
+"""What is switched off, one at a time."""
+
+SCORES = ("idf1", "hota", "mota", "switches")
+_NAMES = {"idf1": "IDF1, %", "hota": "HOTA, %", "mota": "MOTA, %", "switches": "identity switches"}
+
+
+@dataclass(frozen=True, slots=True)
+class Input:
+    """A recording, with its pictures or without."""
+
+    recording: Recording
+    pictures: bool = False
+
+    @property
+    def name(self) -> str:
+        """What the table calls it."""
+        return f"{self.recording.name}, pictures" if self.pictures else self.recording.name
+
+
+def inputs(recordings: list[Recording]) -> list[Input]:
+    """Give every recording's detections alone, and with the pictures where there are any: looks need them."""
+    alone = [Input(it) for it in recordings]
+    return alone + [Input(it, pictures=True) for it in recordings if it.video and it.video.is_file()]
+
+
+def score(term: Term, given: Input) -> Scores:
+    """Track without the term, and score it."""
+    return given.recording.score(track(given.recording, term.off, pictures=given.pictures))
+
+
+def cell(name: str, without: Scores, default: Scores | None) -> str:
+    """Give a number, or its difference to the default's."""
+    value = getattr(without, name)
+    if default is not None:
+        value -= getattr(default, name)
+    sign = "" if default is None else "+"
+    return f"{value:{sign}d}" if isinstance(value, int) else f"{100 * value:{sign}.1f}"
+
+
+def tables(report: Report, names: list[str], found: dict[str, list[Scores]]) -> None:
+    """Print a table for each score: the default's, and what each term's absence changes."""
+    several = len(names) > 1
+    wide = {name: scores + [average(scores)] * several for name, scores in found.items()}
+    for name in SCORES:
+        rows = [
+            [term, *(cell(name, *pair) for pair in zip(scores, _beside(term, wide), strict=True))]
+            for term, scores in wide.items()
+        ]
+        last = ["total" if name == "switches" else "mean"] * several
+        report.table(f"{_NAMES[name]}, and what changes without", ["", *names, *last], rows)
+
+
+def _beside(term: str, wide: dict[str, list[Scores]]) -> Sequence[Scores | None]:
+    """Give what a row's scores are compared with: the default's are not."""
+    default = wide[DEFAULT.name]
+    return [None] * len(default) if term == DEFAULT.name else default
+
+
+def run(recordings: list[Recording], out: Path, jobs: int) -> None:
+    """Measure, print and save."""
+    given = inputs(recordings)
+    report = Report()
+    pairs = [(term, it) for term in (DEFAULT, *TERMS) for it in given]
+    with ProcessPoolExecutor(jobs) as pool:
+        scores = iter(list(pool.map(score, *zip(*pairs, strict=True))))
+    tables(
+        report,
+        [it.name for it in given],
+        {term.name: [next(scores) for _ in given] for term in (DEFAULT, *TERMS)},
+    )
+    report.save(out / "ablation.txt")
+
+
+def _all_scores(pairs: list[tuple[Term, Input]], jobs: int) -> list[Scores]:
+    if jobs == 1:
+        return [score(term, given) for term, given in pairs]
+    with ProcessPoolExecutor(jobs, get_context("spawn")) as pool:
+        return list(pool.map(score, *zip(*pairs, strict=True)))
+
+
+def main() -> None:
+    """Run it with the command line's options."""
+    options = parser(__doc__, "ablation")
+    options.add_argument("--sequence", action="append", help="only this one; may be repeated")
+    options.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes at once")
+    chosen = options.parse_args()
+    try:
+        run(find_recordings(chosen.data, chosen.sequence), chosen.out, chosen.jobs)
+    except CannotRunError as problem:
+        finish(problem, "ablation")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,130 @@
+"""The benchmarks of accuracy: what they compute and print, on a recording of a few frames."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from benchmarks import ablation, peer_environment, peers
+from benchmarks.ablation import DEFAULT, TERMS, Term, cell
+from benchmarks.peer_environment import PeersAwayError
+from benchmarks.recordings import Recording, find_recordings, track
+from benchmarks.surroundings import SKIPPED
+from server.run.track import track_one
+from server.wire.errors import UserError
+from tracking.evaluation import Scores
+from tracking.motchallenge import MotRow, read_rows, write_rows
+
+FRAMES = 30
+
+
+def scores(hota: float, idf1: float, switches: int) -> Scores:
+    return Scores(hota, hota, hota, hota, idf1, 1, 1, switches, 0, 0, 0, 2, 2)
+
+
+@pytest.fixture
+def data(tmp_path: Path) -> Path:
+    """Give a folder of recordings with one in it: two people walk past each other, far apart."""
+    people = [
+        MotRow(frame, number, left, 100.0 * number, 40.0, 90.0)
+        for frame in range(1, FRAMES + 1)
+        for number, left in ((1, 3.0 * frame), (2, 300.0 - 3.0 * frame))
+    ]
+    folder = tmp_path / "data" / "mot15" / "TUD-Campus"
+    folder.mkdir(parents=True)
+    write_rows(folder / "gt.txt", people)
+    write_rows(
+        folder / "det.txt",
+        [MotRow(it.frame, -1, it.left, it.top, it.width, it.height, 0.9) for it in people],
+    )
+    return tmp_path / "data"
+
+
+@pytest.fixture
+def recording(data: Path) -> Recording:
+    return find_recordings(data)[0]
+
+
+def test_what_is_measured_is_what_the_command_writes(recording: Recording, tmp_path: Path) -> None:
+    out = tmp_path / "tracks.txt"
+    track_one(None, recording.detections, out, None, None, lambda _: None)
+    assert track(recording) == read_rows(out)
+    assert recording.score(track(recording)).idf1 > 0.9
+
+
+@pytest.mark.parametrize("term", TERMS, ids=lambda term: term.name)
+def test_a_term_is_switched_off_by_settings_that_there_are(term: Term, recording: Recording) -> None:
+    track(recording, term.off)
+
+
+def test_a_setting_that_there_is_not_is_refused(recording: Recording) -> None:
+    with pytest.raises(UserError, match="luck"):
+        track(recording, {"costs": {"luck": 1.0}})
+
+
+def test_without_a_term_the_difference_is_told() -> None:
+    default, without = scores(0.5, 0.6, 7), scores(0.45, 0.62, 12)
+    assert [cell(name, default, None) for name in ("hota", "idf1", "switches")] == ["50.0", "60.0", "7"]
+    assert [cell(name, without, default) for name in ("hota", "idf1", "switches")] == ["-5.0", "+2.0", "+5"]
+
+
+def test_the_ablation_has_a_row_for_each_term(
+    data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(ablation, "TERMS", TERMS[:1])
+    ablation.run(find_recordings(data), tmp_path / "out", jobs=1)
+    printed = (tmp_path / "out" / "ablation.txt").read_text(encoding="utf-8")
+    assert printed.count(DEFAULT.name) == printed.count(TERMS[0].name) == len(ablation.SCORES)
+
+
+def test_myview_is_compared_with_the_best_peer_of_each_score() -> None:
+    table = {
+        "street": {
+            "MyView": scores(0.5, 0.6, 7),
+            "SORT": scores(0.4, 0.7, 9),
+            "C-BIoU": scores(0.3, 0.5, 6),
+            "perfect association": scores(1.0, 1.0, 0),
+        }
+    }
+    assert peers.lead(table) == [["street", "+10.0", "+10.0", "-10.0", "+1"]]
+
+
+def test_without_the_peers_myview_is_measured_all_the_same(
+    data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "executable", str(tmp_path / "no-python"))
+    peers.run(data, tmp_path / "out", tmp_path / "environment", None, pictures=True)
+    printed = (tmp_path / "out" / "peers.txt").read_text(encoding="utf-8")
+    assert "without the peers, which cannot be installed here: " in printed
+    assert "MyView" in printed
+    assert "perfect association" in printed
+    assert (tmp_path / "out" / "peers.png").stat().st_size > 1000
+
+
+def test_half_an_environment_is_made_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    left_over = tmp_path / "environment" / "bin"
+    left_over.mkdir(parents=True)
+    monkeypatch.setattr(sys, "executable", str(tmp_path / "no-python"))
+    with pytest.raises(PeersAwayError):
+        peer_environment.peer_environment(tmp_path / "environment")
+    assert not left_over.exists()
+
+
+def test_the_environment_is_used_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / ".done").touch()
+    monkeypatch.setattr(sys, "executable", str(tmp_path / "no-python"))
+    found = peer_environment.peer_environment(tmp_path)
+    assert found.python == tmp_path / "bin" / "python"
+
+
+def test_without_recordings_the_benchmarks_are_left_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for benchmark in (peers, ablation):
+        monkeypatch.setattr(sys, "argv", ["x", "--data", str(tmp_path), "--out", str(tmp_path / "out")])
+        with pytest.raises(SystemExit) as ended:
+            benchmark.main()
+        assert ended.value.code == SKIPPED
+        assert "left out: needs detections and ground truth" in capsys.readouterr().out
