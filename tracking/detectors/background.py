@@ -11,13 +11,13 @@ import numpy.typing as npt
 
 from tracking.detections import Detections
 from tracking.detectors.base import Image, Mask
-from tracking.detectors.boxfilter import Band, BoxFilterSettings, find_peaks, scan_heights
+from tracking.detectors.boxfilter import Band, BoxFilter, BoxFilterSettings
 from tracking.detectors.checked import checked_image
 from tracking.detectors.explain import ExplainSettings, Explanation, explain
 from tracking.detectors.fit import shrink
 from tracking.detectors.ghosts import GhostSettings
 from tracking.detectors.grid import Grid
-from tracking.detectors.heightline import HeightLineLearner, HeightLineSettings
+from tracking.detectors.heightline import HeightLine, HeightLineLearner, HeightLineSettings
 from tracking.detectors.looks import Looks, LooksSettings
 from tracking.detectors.median import MedianBackground, MedianSettings
 from tracking.detectors.mog2 import Mog2Background, Mog2Settings
@@ -86,6 +86,9 @@ class BackgroundDetector:
         )
         self._shape: tuple[int, ...] | None = None
         self._grid: Grid | None = None
+        self._filter: BoxFilter | None = None
+        self._line: HeightLine | None = None
+        self._band: Band | None = None
 
     def detect(self, image: Image, frame: int | None = None) -> Detections:  # noqa: ARG002 — Detector
         """Give the hypotheses of the next frame; none while the background is not known yet.
@@ -113,17 +116,23 @@ class BackgroundDetector:
     def _hypotheses(self, mask: Mask, shadow: Mask, grid: Grid) -> Explanation:
         settings = self.settings
         foreground = grid.cells(mask)
-        line = self._learner.line
-        band = None
-        if line is not None:
-            heights = settings.heights
-            band = Band(line.in_cells(CELL, grid.margin), heights.tolerance, heights.doubt)
         empty = np.maximum(grid.weight - foreground - grid.cells(shadow), 0.0)
         cost = np.asarray(settings.boxes.background_cost * empty, dtype=np.float32)
-        tall = scan_heights(mask.shape[0] // CELL, settings.boxes)
-        peaks = find_peaks(foreground - cost, grid.weight, settings.boxes, tall, band)
+        if self._filter is None:
+            self._filter = BoxFilter(grid.weight, mask.shape[0] // CELL, settings.boxes)
+        peaks = self._filter.peaks(foreground - cost, self._heights(grid))
         found = explain(peaks, foreground, cost, grid.weight, settings.hypotheses)
         return Explanation(shrink(found.boxes, foreground, grid.weight), found.scores, found.people)
+
+    def _heights(self, grid: Grid) -> Band | None:
+        """Give the heights that are possible, in cells; the same object for as long as the line stays."""
+        line, heights = self._learner.line, self.settings.heights
+        if line is not self._line:
+            self._line = line
+            self._band = None
+            if line is not None:
+                self._band = Band(line.in_cells(CELL, grid.margin), heights.tolerance, heights.doubt)
+        return self._band
 
     def _grid_of(self, image: Image) -> Grid:
         checked_image(image)

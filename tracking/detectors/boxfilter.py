@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 
+from tracking.boxes import Floats
 from tracking.detectors.base import Plane
 from tracking.detectors.heightline import HeightLine
-from tracking.detectors.silhouette import BODIES, Body, Corners, Part, corners_of, integral
+from tracking.detectors.scanplan import STEPS_A_HEIGHT, HeightPlan, plan_height
+from tracking.detectors.silhouette import BODIES, Body, Corners, corners_of, integral
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,10 +41,10 @@ class Peaks:
         corners: the bodies' parts.
     """
 
-    boxes: npt.NDArray[np.float64]
-    gains: npt.NDArray[np.float64]
-    sizes: npt.NDArray[np.float64]
-    priors: npt.NDArray[np.float64]
+    boxes: Floats
+    gains: Floats
+    sizes: Floats
+    priors: Floats
     corners: Corners
 
 
@@ -55,9 +56,7 @@ class Band:
     tolerance: float  # share by which a height may differ from the line
     doubt: float  # standard deviations of the line by which it may differ besides
 
-    def priors(
-        self, feet: npt.NDArray[np.float64], height: float | npt.NDArray[np.float64]
-    ) -> npt.NDArray[np.float64]:
+    def priors(self, feet: Floats, height: float | Floats) -> Floats:
         """Give the factor on the gain at each foot row: 1 on the line, 0 where the height is impossible.
 
         A height at the edge of what is possible counts for `1 - _EDGE` of one on the line.
@@ -70,146 +69,85 @@ class Band:
 
 # What a height at the edge of the band loses of its gain.
 _EDGE = 0.3
+# Where a box is looked for around a place of the scan, in steps; first where it is.
+_MOVES = np.array([(x, y, x, y) for y in (0, -1, 1) for x in (0, -1, 1)], dtype=np.float64)
 
 
-def find_peaks(
-    gain: Plane,
-    weight: Plane,
-    settings: BoxFilterSettings,
-    heights: npt.NDArray[np.float64],
-    band: Band | None,
-) -> Peaks:
-    """Scan all places and heights and keep the local maxima, best first.
+class BoxFilter:
+    """Finds the places and heights of bodies that gain most, in planes of one size.
 
-    Args:
-        gain: `(H, W)`, what each cell adds to a body that covers it.
-        weight: `(H, W)`, 1 where the picture counts.
-        settings: the scan.
-        heights: `(S,)` heights to try, in cells.
-        band: where it is known, which heights are possible at which foot.
+    A cell in a body adds its gain; the sum is lessened by the prior of the body's height at its foot.
     """
-    sums = _Sums(integral(gain), integral(weight))
-    found = [_scan(sums, int(height), settings, band) for height in heights]
-    boxes = np.concatenate([peaks.boxes for peaks in found])
-    gains = np.concatenate([peaks.gains for peaks in found])
-    order = _best_first(boxes, gains)[: settings.most_peaks]
-    return _refined(boxes[order], sums, settings, band)
+
+    def __init__(self, weight: Plane, rows: int, settings: BoxFilterSettings) -> None:
+        """Prepare for planes like `weight` `(H, W)`, 1 where the picture counts, itself `rows` cells high."""
+        self._settings = settings
+        self._parts = BODIES[settings.body]
+        self._weights = integral(weight)
+        self._shape = (weight.shape[0], weight.shape[1])
+        self._heights = scan_heights(rows, settings)
+        self._band: Band | None = None
+        self._plans: list[HeightPlan] | None = None
+
+    def peaks(self, gain: Plane, band: Band | None) -> Peaks:
+        """Scan all places and heights and give the local maxima, best first.
+
+        Args:
+            gain: `(H, W)`, what each cell adds to a body that covers it.
+            band: where it is known, which heights are possible at which foot.
+        """
+        if self._plans is None or band is not self._band:
+            self._band, self._plans = band, self._planned(band)
+        sums = integral(gain)
+        found = [plan.peaks(sums) for plan in self._plans]
+        boxes = np.concatenate([np.empty((0, 4)), *(places for places, _ in found)])
+        gains = np.concatenate([np.empty(0), *(values for _, values in found)])
+        order = _best_first(boxes, gains)[: self._settings.most_peaks]
+        return self._refined(boxes[order], sums)
+
+    def _planned(self, band: Band | None) -> list[HeightPlan]:
+        feet = np.arange(self._shape[0] + 1, dtype=np.float64)
+        plans: list[HeightPlan] = []
+        for height in self._heights.astype(np.int64).tolist():
+            size = max(round(self._settings.aspect * height), 2), height
+            priors = np.ones(len(feet)) if band is None else band.priors(feet, float(height))
+            plan = plan_height(self._shape, size, self._parts, priors, self._settings.least_gain)
+            if plan is not None:
+                plans.append(plan)
+        return plans
+
+    def _refined(self, boxes: Floats, sums: Floats) -> Peaks:
+        """Move each box to the best place between those of the scan, by half a step and half again."""
+        step = np.maximum((boxes[:, 3] - boxes[:, 1]) // STEPS_A_HEIGHT, 1.0)
+        while (step := step // 2).any():
+            moved = boxes[:, None] + step[:, None, None] * _MOVES
+            gains, priors, _ = self._measured(moved.reshape(-1, 4), sums)
+            best = np.argmax((gains * priors).reshape(len(boxes), len(_MOVES)), axis=1)
+            boxes = moved[np.arange(len(boxes)), best]
+        gains, priors, corners = self._measured(boxes, sums)
+        whole = corners_of(boxes, BODIES["box"], self._shape).sums(self._weights)
+        extent = (boxes[:, 2] - boxes[:, 0]) * (boxes[:, 3] - boxes[:, 1])
+        order = _best_first(boxes, gains * priors)
+        order = order[(whole >= self._settings.least_seen * extent)[order]]
+        sizes = np.maximum(corners.sums(self._weights), 1.0)
+        return Peaks(boxes[order], gains[order], sizes[order], priors[order], corners.only(order))
+
+    def _measured(self, boxes: Floats, sums: Floats) -> tuple[Floats, Floats, Corners]:
+        """Give the gains, priors and parts of boxes."""
+        corners = corners_of(boxes, self._parts, self._shape)
+        gains = corners.sums(sums)
+        if self._band is None:
+            return gains, np.ones(len(boxes)), corners
+        return gains, self._band.priors(boxes[:, 3], boxes[:, 3] - boxes[:, 1]), corners
 
 
-def _best_first(boxes: npt.NDArray[np.float64], gains: npt.NDArray[np.float64]) -> npt.NDArray[np.int64]:
+def _best_first(boxes: Floats, gains: Floats) -> npt.NDArray[np.int64]:
     """Order by gain; equal ones by place, so that the order never depends on the sort."""
     return np.lexsort((boxes[:, 3], boxes[:, 1], boxes[:, 0], -gains))
 
 
-def _refined(
-    boxes: npt.NDArray[np.float64], sums: _Sums, settings: BoxFilterSettings, band: Band | None
-) -> Peaks:
-    """Move each box to the best place between those of the scan, step by half a step."""
-    parts = BODIES[settings.body]
-    step = np.maximum((boxes[:, 3] - boxes[:, 1]) // _STEPS, 1.0)
-    while (step := step // 2).any():
-        moved = boxes[:, None] + step[:, None, None] * _MOVES
-        gains, priors = _measured(moved.reshape(-1, 4), sums, parts, band)
-        best = np.argmax((gains * priors).reshape(len(boxes), len(_MOVES)), axis=1)
-        boxes = moved[np.arange(len(boxes)), best]
-    gains, priors = _measured(boxes, sums, parts, band)
-    order = _best_first(boxes, gains * priors)
-    corners = corners_of(boxes[order], parts, _shape(sums))
-    sizes = np.maximum(corners.sums(sums.weight), 1.0)
-    return Peaks(boxes[order], gains[order], sizes, priors[order], corners)
-
-
-def _measured(
-    boxes: npt.NDArray[np.float64], sums: _Sums, parts: tuple[Part, ...], band: Band | None
-) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-    """Give the gains and priors of boxes."""
-    gains = corners_of(boxes, parts, _shape(sums)).sums(sums.gain)
-    if band is None:
-        return gains, np.ones(len(boxes))
-    return gains, band.priors(boxes[:, 3], boxes[:, 3] - boxes[:, 1])
-
-
-def _shape(sums: _Sums) -> tuple[int, int]:
-    return sums.gain.shape[0] - 1, sums.gain.shape[1] - 1
-
-
-# Steps of the scan in a box's height.
-_STEPS = 30
-# Where a box is looked for around a place of the scan; first where it is.
-_MOVES = np.array([(x, y, x, y) for y in (0, -1, 1) for x in (0, -1, 1)], dtype=np.float64)
-
-
-def scan_heights(rows: int, settings: BoxFilterSettings) -> npt.NDArray[np.float64]:
+def scan_heights(rows: int, settings: BoxFilterSettings) -> Floats:
     """Give the heights to try in a picture of so many rows of cells, `(S,)`, whole cells, ascending."""
     least, most = settings.least_height * rows, settings.most_height * rows
     steps = int(np.floor(np.log(most / least) / np.log(settings.height_step))) + 1
     return np.unique(np.rint(least * settings.height_step ** np.arange(steps)))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Sums:
-    gain: npt.NDArray[np.float64]
-    weight: npt.NDArray[np.float64]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Places:
-    """A regular grid of top left corners."""
-
-    tops: npt.NDArray[np.int64]
-    lefts: npt.NDArray[np.int64]
-    step: int
-
-    def of(self, sums: npt.NDArray[np.float64], x: int, y: int) -> npt.NDArray[np.float64]:
-        """Read an integral image `(x, y)` cells right of and below every place."""
-        rows = slice(int(self.tops[0]) + y, int(self.tops[-1]) + y + 1, self.step)
-        return sums[rows, int(self.lefts[0]) + x : int(self.lefts[-1]) + x + 1 : self.step]
-
-
-def _scan(sums: _Sums, height: int, settings: BoxFilterSettings, band: Band | None) -> _Found:
-    """Give the local maxima of the bodies of one height, gains with their priors."""
-    width = max(round(settings.aspect * height), 2)
-    # What a coarse grid misses `_refined` finds.
-    step = max(1, height // _STEPS)
-    tops = np.arange(0, sums.gain.shape[0] - height, step)
-    lefts = np.arange(0, sums.gain.shape[1] - width, step)
-    priors = np.ones(len(tops))
-    if band is not None:
-        priors = band.priors(tops + float(height), float(height))
-        possible = np.flatnonzero(priors)
-        kept = slice(int(possible[0]), int(possible[-1]) + 1) if possible.size else slice(0, 0)
-        tops, priors = tops[kept], priors[kept]
-    if not (tops.size and lefts.size):
-        return _Found(np.empty((0, 4)), np.empty(0))
-    places = _Places(tops, lefts, step)
-    parts = BODIES[settings.body]
-    body = sum((p.right - p.left) * (p.bottom - p.top) for p in parts) * width * height
-    gains = sum(_part_sums(sums.gain, places, (width, height), part) for part in parts) * priors[:, None]
-    reach = (2 * max(height // (10 * step), 1) + 1, 2 * max(width // (4 * step), 1) + 1)
-    tallest = cv2.dilate(gains, np.ones(reach, dtype=np.uint8), borderType=cv2.BORDER_REPLICATE)
-    row, column = np.nonzero((gains >= tallest) & (gains >= settings.least_gain * body))
-    left, top = lefts[column], tops[row]
-    seen = sums.weight[top + height, left + width] - sums.weight[top, left + width]
-    seen += sums.weight[top, left] - sums.weight[top + height, left]
-    kept = seen >= settings.least_seen * width * height
-    boxes = np.stack([left, top, left + width, top + height], axis=1)[kept].astype(np.float64)
-    return _Found(boxes, gains[row, column][kept])
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Found:
-    boxes: npt.NDArray[np.float64]
-    gains: npt.NDArray[np.float64]
-
-
-def _part_sums(
-    sums: npt.NDArray[np.float64], places: _Places, size: tuple[int, int], part: Part
-) -> npt.NDArray[np.float64]:
-    """Sum one part of a box of `size` (width, height) at every place of the grid, `(rows, columns)`."""
-    width, height = size
-
-    def at(along: float, down: float) -> npt.NDArray[np.float64]:
-        return places.of(sums, round(along * width), round(down * height))
-
-    upper = at(part.right, part.top) - at(part.left, part.top)
-    return at(part.right, part.bottom) - at(part.left, part.bottom) - upper

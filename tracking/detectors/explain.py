@@ -55,7 +55,7 @@ def explain(
         weight: 1 where the picture counts, `(H, W)`.
         settings: how many.
     """
-    search = _Search(peaks, foreground, cost, weight, settings)
+    search = Search(peaks, foreground, cost, weight, settings)
     chosen = search.people() if settings.use else []
     shares = search.shares()
     scores = []
@@ -78,7 +78,7 @@ _MOVES = 2
 _LEAST_VISIBLE = 0.6
 
 
-class _Search:
+class Search:
     """Greedy choice, then moves and removals.
 
     Attributes:

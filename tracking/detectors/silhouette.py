@@ -66,6 +66,10 @@ class Corners:
         lower = integrals[self.bottom, self.right] - integrals[self.bottom, self.left]
         return np.asarray((lower - upper).sum(axis=1))
 
+    def only(self, chosen: npt.NDArray[np.int64]) -> Corners:
+        """Give those of some of the bodies."""
+        return Corners(self.left[chosen], self.top[chosen], self.right[chosen], self.bottom[chosen])
+
     def within(self, place: tuple[slice, slice]) -> Corners:
         """Give the corners in a piece of the plane, cut at its borders."""
         rows, columns = place

@@ -1,0 +1,140 @@
+"""The box filter and the explanation against the same worked out cell by cell."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from tracking.detectors.boxfilter import Band, BoxFilter, BoxFilterSettings, Peaks
+from tracking.detectors.explain import ExplainSettings, Search, explain
+from tracking.detectors.heightline import HeightLine
+from tracking.detectors.silhouette import BODIES, Body, corners_of
+
+ROWS, COLUMNS = 90, 120
+Plane = npt.NDArray[np.float32]
+PEOPLE = ((20.0, 30.0, 34.0, 67.0), (30.0, 28.0, 45.0, 67.0), (80.0, 40.0, 92.0, 72.0))
+
+
+def body_of(box: npt.NDArray[np.float64], body: Body = "person") -> npt.NDArray[np.bool_]:
+    """Draw the body of a box, part by part."""
+    inside = np.zeros((ROWS, COLUMNS), dtype=np.bool_)
+    width, height = box[2] - box[0], box[3] - box[1]
+    for part in BODIES[body]:
+        left, right = (max(round(box[0] + share * width), 0) for share in (part.left, part.right))
+        top, bottom = (max(round(box[1] + share * height), 0) for share in (part.top, part.bottom))
+        inside[top:bottom, left:right] = True
+    return inside
+
+
+def scene(seed: int = 0) -> tuple[Plane, Plane, Plane]:
+    """Give foreground, cost and weight: three people, two of them overlapping, among noise."""
+    rng = np.random.default_rng(seed)
+    foreground = (rng.random((ROWS, COLUMNS)) < 0.03).astype(np.float32)
+    for box in PEOPLE:
+        foreground[body_of(np.array(box))] = 1.0
+    weight = np.ones((ROWS, COLUMNS), dtype=np.float32)
+    weight[:, :6] = 0.0
+    cost = (0.35 * np.maximum(weight - foreground, 0.0)).astype(np.float32)
+    return foreground * weight, cost, weight
+
+
+def found(body: Body = "person", band: Band | None = None) -> Peaks:
+    foreground, cost, weight = scene()
+    settings = BoxFilterSettings(body=body, least_height=0.3, most_height=0.6)
+    return BoxFilter(weight, ROWS, settings).peaks(foreground - cost, band)
+
+
+@pytest.mark.parametrize("body", ["person", "box"])
+def test_gains_and_sizes_are_what_the_cells_add_up_to(body: Body) -> None:
+    foreground, cost, weight = scene()
+    peaks = found(body)
+    assert len(peaks.boxes) > 3
+    for box, gain, size in zip(peaks.boxes, peaks.gains, peaks.sizes, strict=True):
+        inside = body_of(box, body)
+        assert gain == pytest.approx((foreground - cost)[inside].sum(), abs=1e-3)
+        assert size == pytest.approx(max(weight[inside].sum(), 1.0))
+    assert (np.diff(peaks.gains) <= 0.0).all()
+
+
+def test_everybody_is_found() -> None:
+    best = found().boxes
+    for box in PEOPLE:
+        assert (np.abs(best - box).max(axis=1) <= 3.0).any(), box
+
+
+def test_no_peak_is_worse_than_one_cell_beside_it() -> None:
+    foreground, cost, _ = scene()
+    gain = foreground - cost
+    for box, value in zip(found().boxes[:3], found().gains[:3], strict=True):
+        for x, y in ((1, 0), (-1, 0), (0, 1), (0, -1)):
+            assert gain[body_of(box + np.array([x, y, x, y]))].sum() <= value + 1e-3
+
+
+def test_heights_off_the_line_are_not_found() -> None:
+    line = HeightLine(slope=0.55, offset=0.0)
+    peaks = found(band=Band(line, tolerance=0.15, doubt=1.0))
+    heights, feet = peaks.boxes[:, 3] - peaks.boxes[:, 1], peaks.boxes[:, 3]
+    assert len(heights) > 3
+    assert (np.abs(heights - 0.55 * feet) <= np.maximum(0.15 * 0.55 * feet, 1.0)).all()
+    assert ((peaks.priors > 0.0) & (peaks.priors <= 1.0)).all()
+
+
+def test_a_new_line_replaces_the_one_before() -> None:
+    foreground, cost, weight = scene()
+    one = BoxFilter(weight, ROWS, BoxFilterSettings(least_height=0.3, most_height=0.6))
+    bands = [Band(HeightLine(slope, 0.0), 0.1, 1.0) for slope in (0.5, 0.6)]
+    alternating = [one.peaks(foreground - cost, band).boxes for band in (*bands, None, bands[0])]
+    np.testing.assert_array_equal(alternating[0], alternating[3])
+    assert alternating[0].shape != alternating[1].shape or (alternating[0] != alternating[1]).any()
+
+
+def test_gains_beside_the_chosen_are_as_if_summed_anew() -> None:
+    foreground, cost, weight = scene()
+    peaks = found()
+    search = Search(peaks, foreground, cost, weight, ExplainSettings())
+    chosen: set[int] = set()
+    rng = np.random.default_rng(1)
+    for index in rng.integers(0, min(len(peaks.boxes), 12), 40).tolist():
+        (search.remove if index in chosen else search.add)(index)
+        chosen ^= {index}
+        hidden = np.zeros((ROWS, COLUMNS), dtype=np.bool_)
+        for one in chosen:
+            hidden |= body_of(peaks.boxes[one])
+        left = np.where(hidden, np.minimum(foreground - cost, 0.0), foreground - cost)
+        free = np.where(hidden, 0.0, weight)
+        bodies = [body_of(box) for box in peaks.boxes]
+        np.testing.assert_allclose(search.gains, [left[body].sum() for body in bodies], atol=1e-2)
+        np.testing.assert_allclose(search.visible, [free[body].sum() for body in bodies], atol=1e-2)
+
+
+def test_a_small_set_explains_the_foreground_and_the_rest_scores_low() -> None:
+    foreground, cost, weight = scene()
+    explained = explain(found(), foreground, cost, weight, ExplainSettings())
+    assert explained.people == 3
+    assert (explained.scores[:3] > 0.6).all()
+    assert (explained.scores[3:] < 0.4).all()
+
+
+def test_without_explanation_boxes_score_by_themselves() -> None:
+    foreground, cost, weight = scene()
+    peaks = found()
+    explained = explain(peaks, foreground, cost, weight, ExplainSettings(use=False, most_hypotheses=5))
+    assert len(explained.boxes) == 5 == explained.people
+    np.testing.assert_array_equal(explained.boxes[0], peaks.boxes[0])
+    assert explained.scores[0] == pytest.approx(peaks.gains[0] / peaks.sizes[0])
+
+
+def test_nothing_is_found_in_nothing() -> None:
+    _, _, weight = scene()
+    nothing, cost = np.zeros_like(weight), 0.35 * weight
+    peaks = BoxFilter(weight, ROWS, BoxFilterSettings()).peaks(nothing - cost, None)
+    assert len(peaks.boxes) == 0
+    assert len(explain(peaks, nothing, cost, weight, ExplainSettings()).boxes) == 0
+
+
+def test_bodies_are_cut_at_the_borders() -> None:
+    boxes = np.array([[-10.0, -10.0, 10.0, 40.0], [110.0, 60.0, 130.0, 120.0]])
+    corners = corners_of(boxes, BODIES["box"], (ROWS, COLUMNS))
+    sums = np.arange(ROWS + 1)[:, None] * np.arange(COLUMNS + 1.0)[None]  # the integral of a plane of ones
+    np.testing.assert_allclose(corners.sums(sums), [10 * 40, 10 * 30])
