@@ -122,7 +122,7 @@ def peer_environment(folder: Path) -> PeerEnvironment:
                 subprocess.run(command, capture_output=True, text=True, timeout=_INSTALL_S, check=True)
             done.touch()
         except (OSError, subprocess.SubprocessError) as error:
-            raise PeersAwayError(f"{' '.join(PACKAGES)}: {_last_line(error)}") from error
+            raise PeersAwayError(_last_line(error)) from error
     return PeerEnvironment(python)
 
 
