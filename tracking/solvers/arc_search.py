@@ -81,8 +81,21 @@ class ArcSearch:
             priced = self._priced_by(point)
             close = point.objective - priced.bound <= CLOSE * max(1.0, abs(point.objective))
             if close or not self._enter_better_arcs(priced):
-                prices = priced_rows(self._network, self._master.rows, point.prices)
-                return Relaxed(self._master.usage(), priced.bound, priced.trellis.node, rounds, prices)
+                return self._relaxed(point, priced, rounds)
+
+    def _relaxed(self, point: ArcPoint, priced: _Priced, rounds: int) -> Relaxed:
+        charges = np.zeros(self._network.frames)
+        frames = np.array([row.frame for row in self._master.rows], dtype=np.int64)
+        np.add.at(charges, frames, point.prices)
+        return Relaxed(
+            usage=self._master.usage(),
+            bound=priced.bound,
+            priced=priced.trellis.node,
+            rounds=rounds,
+            prices=priced_rows(self._network, self._master.rows, point.prices),
+            pulls=point.pulls,
+            charges=charges,
+        )
 
     def _settled(self) -> ArcPoint:
         """Solve the program with all conflict rows that its solution breaks."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import numpy as np
 
 from tracking.boxes import Floats
@@ -13,6 +15,7 @@ from tracking.solvers.columns import relaxation_by_columns
 from tracking.solvers.finish import Proof, answered, nothing, whole_nodes
 from tracking.solvers.highs import solve_program
 from tracking.solvers.hint import Hint
+from tracking.solvers.joint_search import JointSearch, TooManyStatesError
 from tracking.solvers.objective import Ints, objective
 from tracking.solvers.relaxed import Relaxed
 from tracking.solvers.rounding import is_integral
@@ -24,10 +27,12 @@ _SLACK = 1e-9
 
 
 class Exact(TimedSolver):
-    """Fixes what the relaxation proves needless, and branches and bounds over the little that is left.
+    """Fixes what the relaxation proves needless, and tries the little that is left.
 
-    An arc whose best path, at the prices that prove the bound, costs more above its object's best than
-    the gap between the best states known and the bound is in no better states.
+    Under the layout term, joint states that the duals leave possible are tried by dynamic programming.
+    Without, or where they are too many, HiGHS branches and bounds over the arcs left: one whose best
+    path, at the prices that prove the bound, costs more above its object's best than the gap between the
+    best states known and the bound is in no better states.
     """
 
     name = "exact"
@@ -40,15 +45,23 @@ class Exact(TimedSolver):
         nodes = whole_nodes(network, found.usage)
         rounds = found.rounds
         if not is_integral(found.usage):
-            excess = arc_excess(network, found)
-            for limit in (_SLACK, None):
-                cost = objective(network, nodes)
-                slack = _SLACK * max(1.0, abs(cost))
-                gap = max(0.0, cost - found.bound) + slack if limit is None else slack
-                nodes = _cheaper(network, nodes, _best_among(network, nodes, excess <= gap))
-                rounds += 1
+            nodes = _optimum(network, found, nodes)
+            rounds += 1
         cost = objective(network, nodes)
         return answered(network, nodes, Proof(self.name, cost, integral=True, rounds=rounds))
+
+
+def _optimum(network: Network, found: Relaxed, nodes: Ints) -> Ints:
+    """Give the cheapest states; `nodes` are some without conflicts."""
+    if network.layout:
+        with suppress(TooManyStatesError):
+            better = JointSearch(network, found).cheaper_than(objective(network, nodes))
+            return nodes if better is None else better
+    excess = arc_excess(network, found)
+    tight = _SLACK * max(1.0, abs(objective(network, nodes)))
+    nodes = _cheaper(network, nodes, _best_among(network, nodes, excess <= tight))
+    gap = max(0.0, objective(network, nodes) - found.bound) + tight
+    return _cheaper(network, nodes, _best_among(network, nodes, excess <= gap))
 
 
 def arc_excess(network: Network, found: Relaxed) -> Floats:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+import numpy as np
 
 from tracking.boxes import Floats
 from tracking.solvers.hint import PricedRow
@@ -22,6 +24,8 @@ class Relaxed:
             which the cheapest paths prove the bound.
         rounds: how often paths or arcs were priced.
         prices: the conflict rows that bind, where all objects share them.
+        pulls: (n, M - 1, 4) what moves earn by the layout term; none without.
+        charges: (M,) what the prices of a frame's rows take off the bound; none without layout term.
     """
 
     usage: Floats
@@ -29,3 +33,5 @@ class Relaxed:
     priced: Floats
     rounds: int
     prices: tuple[PricedRow, ...] = ()
+    pulls: Floats = field(default_factory=lambda: np.empty(0))
+    charges: Floats = field(default_factory=lambda: np.empty(0))
