@@ -55,8 +55,15 @@ def track(
     det: Annotated[Path | None, typer.Option("--det", help="Detections, MOTChallenge text.")] = None,
     solver: Annotated[str | None, typer.Option(help="Which solver of the network program.")] = None,
     config: Annotated[Path | None, typer.Option("--config", help="Settings of detector and tracker.")] = None,
+    template: Annotated[
+        list[str] | None,
+        typer.Option(metavar="LEFT,TOP,WIDTH,HEIGHT", help="A box in the first picture: follow that."),
+    ] = None,
 ) -> None:
-    """Track everybody in one video, or in its detections alone."""
+    """Track everybody in one video, or in its detections alone, or what is shown with --template."""
+    if template:
+        _track_templates(out, video, det, solver, config, template)
+        return
     from server.run.progress import bar, total_frames
     from server.run.track import track_one
 
@@ -71,6 +78,23 @@ def track(
             lambda done: progress.update(task, completed=done),
         )
     typer.echo(f"{out}: {count} people")
+
+
+def _track_templates(
+    out: Path, video: Path | None, det: Path | None, solver: str | None, config: Path | None, boxes: list[str]
+) -> None:
+    from server.run.progress import bar, total_frames
+    from server.run.track_templates import boxes_from, track_templates
+
+    if video is None or det is not None:
+        raise UserError("--template: needs a video, and no --det")
+    found = boxes_from(boxes)
+    with bar("frames") as progress:
+        task = progress.add_task("tracking", total=total_frames([video]))
+        count = track_templates(
+            video, found, out, config, solver, lambda done: progress.update(task, completed=done)
+        )
+    typer.echo(f"{out}: {count} objects")
 
 
 def evaluate(

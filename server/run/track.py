@@ -16,7 +16,7 @@ from server.wire.errors import UserError
 from server.wire.fit import Fit
 from server.wire.loading import build_config, read_content
 from server.wire.output import whole_file
-from tracking import Detections, OnlineTracker, WindowResult, solver_named, solver_names
+from tracking import Detections, OnlineTracker, Solver, WindowResult, solver_named, solver_names
 from tracking.detectors import MotFileDetector
 from tracking.motchallenge import MotRow, write_rows
 
@@ -38,23 +38,32 @@ def track_one(
     """
     if video is None and det is None:
         raise UserError("track: name a video, or its detections with --det, or both")
-    if solver is not None and solver not in solver_names():
-        raise UserError(f"--solver: no solver is called {solver!r}; there are {', '.join(solver_names())}")
-    loaded = _loaded(video, det, config)
+    loaded = loaded_for(video, det, config)
     settings = loaded.track
     frames = _from_detections(det) if video is None and det is not None else _from_video(loaded)
-    tracker = OnlineTracker(settings.window, settings.costs, solver_named(solver or settings.solver))
+    tracker = OnlineTracker(settings.window, settings.costs, solver_for(loaded, solver))
     rows: list[MotRow] = []
     with whole_file(out) as draft:
         for number, detections in frames:
-            rows += _final_rows(tracker.push(number, detections))
+            rows += final_rows(tracker.push(number, detections))
             progress(number + 1)
-        rows += _final_rows(tracker.flush())
+        rows += final_rows(tracker.flush())
         write_rows(draft, rows)
     return len({row.id for row in rows})
 
 
-def _loaded(video: Path | None, det: Path | None, config: Path | None) -> Config:
+def solver_for(config: Config, name: str | None) -> Solver:
+    """Give the solver of that name, or the configuration's.
+
+    Raises:
+        UserError: there is none.
+    """
+    if name is not None and name not in solver_names():
+        raise UserError(f"--solver: no solver is called {name!r}; there are {', '.join(solver_names())}")
+    return solver_named(name or config.track.solver)
+
+
+def loaded_for(video: Path | None, det: Path | None, config: Path | None) -> Config:
     """Give the configuration, with the video as its only camera."""
     base = read_content(config) if config else {}
     where, folder = str(config or "myview track"), config.parent if config else Path()
@@ -96,7 +105,7 @@ def _from_detections(path: Path) -> Iterator[tuple[int, Detections]]:
         yield number, detector.detect(_NO_PICTURE, number)
 
 
-def _final_rows(result: WindowResult | None) -> Iterator[MotRow]:
+def final_rows(result: WindowResult | None) -> Iterator[MotRow]:
     """Give the rows of the frames that are final now."""
     if result is None:
         return

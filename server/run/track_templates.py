@@ -1,0 +1,97 @@
+"""``myview track --template``: objects that are known by a picture of each, to MOTChallenge text."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from server.camera.sources import SourceEnded, open_source
+from server.run.track import final_rows, loaded_for, solver_for
+from server.wire.errors import UserError
+from server.wire.output import whole_file
+from tracking import TemplateTracker
+from tracking.detectors import TemplateSettings
+from tracking.motchallenge import MotRow, write_rows
+
+_NUMBERS = 4
+
+
+def boxes_from(texts: Sequence[str]) -> NDArray[np.float64]:
+    """Read boxes given as ``LEFT,TOP,WIDTH,HEIGHT`` in pixels; give left, top, right, bottom, ``(n, 4)``.
+
+    Raises:
+        UserError: one of them is none.
+    """
+    boxes = []
+    for text in texts:
+        try:
+            numbers = [int(part) for part in text.split(",")]
+        except ValueError:
+            numbers = []
+        if len(numbers) != _NUMBERS or min(numbers[:2]) < 0 or min(numbers[2:]) < 1:
+            raise UserError(f"--template: {text!r} is not LEFT,TOP,WIDTH,HEIGHT in pixels")
+        left, top, width, height = numbers
+        boxes.append((left, top, left + width, top + height))
+    return np.array(boxes, dtype=np.float64).reshape(-1, _NUMBERS)
+
+
+def track_templates(
+    video: Path,
+    boxes: NDArray[np.float64],
+    out: Path,
+    config: Path | None,
+    solver: str | None,
+    progress: Callable[[int], None],
+) -> int:
+    """Follow what is in the boxes of the first picture and write; give the number of objects.
+
+    Raises:
+        UserError: a box is not in the picture, or something cannot be read or written.
+    """
+    loaded = loaded_for(video, None, config)
+    settings = loaded.track
+    source = open_source(loaded.cameras[0], loaded.site)
+    try:
+        image = source.take(0)
+        if image is None:
+            raise UserError(f"{video}: has no picture")
+        _check_inside(boxes, source.size)
+        tracker = TemplateTracker(
+            image, boxes, TemplateSettings(), settings.window, settings.costs, solver_for(loaded, solver)
+        )
+        rows = [
+            MotRow(1, number, left, top, right - left, bottom - top)
+            for number, (left, top, right, bottom) in enumerate(boxes.tolist(), 1)
+        ]
+        with whole_file(out) as draft:
+            for number in range(1, _FOR_EVER):
+                try:
+                    image = source.take(number)
+                except SourceEnded:
+                    break
+                if image is not None:
+                    rows += final_rows(tracker.push(image))
+                progress(number + 1)
+            rows += final_rows(tracker.flush())
+            write_rows(draft, sorted(rows, key=lambda row: (row.frame, row.id)))
+    except (SourceEnded, ValueError) as error:
+        raise UserError(f"{video}: {error}") from error
+    finally:
+        source.close()
+    return len(boxes)
+
+
+_FOR_EVER = 10_000_000
+
+
+def _check_inside(boxes: NDArray[np.float64], size: tuple[int, int]) -> None:
+    width, height = size
+    for left, top, right, bottom in boxes.tolist():
+        if right > width or bottom > height:
+            raise UserError(
+                f"--template: {left:g},{top:g},{right - left:g},{bottom - top:g} is not inside the "
+                f"{width}x{height} picture"
+            )
