@@ -6,23 +6,37 @@ On recordings with ground truth, at an overlap (IoU) of one half. *Oracle* is th
 of a scene when every box is given the true identity and boxes on nobody are left out: what association can
 reach at most. Below each detector stand the tracks that the network program makes of its hypotheses. Where
 there is no truth, pictures with the boxes drawn are saved. Times are processor time.
+
+Other trackers (from PyPI, in an environment of their own; see `benchmarks.peers`) get the same boxes: of
+MyView's those that it is sure of.
 """
 
 from __future__ import annotations
 
 import argparse
+import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 import cv2
 
 from benchmarks.observed import View, ViewScores, oracle, scores_of_boxes, scores_of_tracks, views_of
 from benchmarks.observed_pictures import save_pictures
 from benchmarks.observers import OBSERVERS, SURE, Observer, Seen, watch
+from benchmarks.peer_environment import (
+    PEERS,
+    Peer,
+    PeerEnvironment,
+    PeersAwayError,
+    default_folder,
+    peer_environment,
+)
 from benchmarks.report import Report
 from benchmarks.surroundings import CannotRunError, finish, parser
-from tracking.motchallenge import MotRow
+from tracking.motchallenge import MotRow, format_rows
 
+TRACKERS = ("SORT", "ByteTrack", "C-BIoU")
 SCENES = ("terrace", "pets09")
 BY_EYE = "campus4"
 
@@ -34,19 +48,44 @@ class Row:
     name: str
     boxes: dict[str, list[MotRow]]
     tracks: bool
+    ours: bool = True
+    """MyView's tracks: the time to make them is known."""
 
 
-def rows_of(observer: Observer, seen: dict[str, Seen]) -> Iterator[Row]:
-    """Give the rows of one observer: its hypotheses, those it is sure of, and the tracks."""
+def rows_of(observer: Observer, seen: dict[str, Seen], peers: PeerEnvironment | None) -> Iterator[Row]:
+    """Give the rows of one observer: its hypotheses, those it is sure of, and everybody's tracks of them.
+
+    Raises:
+        PeersAwayError: a peer failed.
+    """
     hypotheses = {name: it.hypotheses for name, it in seen.items()}
-    yield Row(f"{observer.name}: hypotheses", hypotheses, tracks=False)
+    yield Row(observer.name, hypotheses, tracks=False)
     if observer is OBSERVERS[0]:
         sure = {name: [row for row in rows if row.confidence >= SURE] for name, rows in hypotheses.items()}
-        yield Row(f"{observer.name}: score from {SURE:g}", sure, tracks=False)
-    yield Row(f"{observer.name}: tracks", {name: it.tracks for name, it in seen.items()}, tracks=True)
+        hypotheses = sure
+        yield Row(f"  score from {SURE:g}", sure, tracks=False)
+    yield Row("  MyView's tracks", {name: it.tracks for name, it in seen.items()}, tracks=True)
+    for peer in PEERS if peers is not None and observer.with_peers else ():
+        if peer.name in TRACKERS:
+            yield Row(f"  {peer.name}", peer_tracks(peers, peer, hypotheses), tracks=True, ours=False)
 
 
-def measure_scene(report: Report, scene: str, options: argparse.Namespace) -> None:
+def peer_tracks(
+    peers: PeerEnvironment, peer: Peer, boxes: dict[str, list[MotRow]]
+) -> dict[str, list[MotRow]]:
+    """Give a peer's tracks of the boxes of every view."""
+    tracks = {}
+    with tempfile.TemporaryDirectory() as folder:
+        for name, rows in boxes.items():
+            path = Path(folder) / f"{name}.txt"
+            path.write_text(format_rows(rows), encoding="ascii")
+            tracks[name] = peers.track(peer, path)
+    return tracks
+
+
+def measure_scene(
+    report: Report, scene: str, options: argparse.Namespace, peers: PeerEnvironment | None
+) -> None:
     """Print the table of a scene."""
     views = [view for view in views_of(options.data, scene) if view.truth]
     truths = {view.name: view.people(options.frames) for view in views}
@@ -55,7 +94,7 @@ def measure_scene(report: Report, scene: str, options: argparse.Namespace) -> No
         if options.detector and not any(word in observer.name for word in options.detector):
             continue
         seen = {view.name: watch(observer, view, options.frames) for view in views}
-        table += [_cells(row, truths, list(seen.values())) for row in rows_of(observer, seen)]
+        table += [_cells(row, truths, list(seen.values())) for row in rows_of(observer, seen, peers)]
     names = [f"{what} {view.name}" for view in views for what in ("rec.", "prec.")]
     columns = ["boxes", *names, "IDF1", "oracle", "ms", "frames/s"]
     rows, width, _ = next(views[0].images(1)).shape
@@ -73,7 +112,8 @@ def _cells(row: Row, truths: dict[str, list[MotRow]], seen: list[Seen]) -> list[
     idf1 = f"{100 * sum(it.idf1 for it in scored) / len(scored):.0f}" if row.tracks else ""
     shares = [f"{share:.2f}" for it in scored for share in (it.recall, it.precision)]
     joint = f"{100 * oracle(truths, row.boxes):.0f}"
-    return [row.name, *shares, idf1, joint, f"{1e3 * seconds / frames:.1f}", f"{frames / seconds:.0f}"]
+    times = [f"{1e3 * seconds / frames:.1f}", f"{frames / seconds:.0f}"] if row.ours else ["", ""]
+    return [row.name, *shares, idf1, joint, *times]
 
 
 def _frames(views: list[View], options: argparse.Namespace) -> str:
@@ -85,8 +125,14 @@ def measure(options: argparse.Namespace) -> None:
     """Run the comparison, print and save."""
     cv2.setNumThreads(1)
     report = Report()
+    peers = None
+    if not options.no_peers:
+        try:
+            peers = peer_environment(default_folder())
+        except PeersAwayError as problem:
+            report.say(f"without other trackers, which cannot be installed here: {problem}")
     for scene in options.scene or SCENES:
-        measure_scene(report, scene, options)
+        measure_scene(report, scene, options, peers)
     report.say("IDF1: mean over the views. ms, frames/s: processor time per frame of one view, one core.")
     if not options.scene:
         try:
@@ -102,6 +148,7 @@ def main() -> None:
     options = parser(__doc__, "observations")
     options.add_argument("--scene", action="append", choices=SCENES, help="only this one; may be repeated")
     options.add_argument("--detector", action="append", help="only those with this in their names")
+    options.add_argument("--no-peers", action="store_true", help="leave out the other trackers")
     options.add_argument("--frames", type=int, help="only so many frames of each view")
     try:
         measure(options.parse_args())

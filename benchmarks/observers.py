@@ -57,8 +57,8 @@ class Observer:
 
     name: str
     make: Callable[[View], Detector]
-    tracked: bool = True
-    """Its boxes go through the tracker, too."""
+    with_peers: bool = True
+    """Other trackers get its boxes, too."""
 
 
 def _background(view: View) -> BackgroundSettings:
@@ -67,7 +67,11 @@ def _background(view: View) -> BackgroundSettings:
 
 OBSERVERS = (
     Observer("MyView", lambda view: BackgroundDetector(_background(view))),
-    Observer("the paper's box filters", lambda view: BackgroundDetector(paper_boxes(_background(view)))),
+    Observer(
+        "the paper's box filters",
+        lambda view: BackgroundDetector(paper_boxes(_background(view))),
+        with_peers=False,
+    ),
     Observer("MOG2 + connected components", BlobDetector),
     Observer("OpenCV's HOG", lambda view: HogDetector(ignore=view.ignore)),
 )
@@ -96,13 +100,12 @@ def watch(observer: Observer, view: View, frames: int | None) -> Seen:
         start = time.process_time()
         found = detector.detect(image, number)
         middle = time.process_time()
-        result = tracker.push(number, found) if observer.tracked else None
+        result = tracker.push(number, found)
         detecting, following = detecting + middle - start, following + time.process_time() - middle
         boxes += rows_of(number, found)
         tracks += final_rows(result)
         count += 1
-    if observer.tracked:
-        tracks += final_rows(tracker.flush())
+    tracks += final_rows(tracker.flush())
     return Seen(boxes, tracks, count, detecting, following)
 
 
