@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -10,9 +12,15 @@ from random_networks import Case, best_by_trying, cases, network_of
 from tracking.detections import Detections
 from tracking.network import Template, build_network
 from tracking.presets import PAPER_COSTS
-from tracking.solvers import solver_named
+from tracking.solvers import joint_search, solver_named
+from tracking.solvers.columns import relaxation_by_columns
+from tracking.solvers.exact import by_branching
+from tracking.solvers.finish import whole_nodes
+from tracking.solvers.joint_search import JointSearch
+from tracking.solvers.objective import conflict_count, objective
 
 CLOSE = 1e-9
+PERSON = np.array([20.0, 50.0])
 LAYOUTS = (0.0, 0.0, 0.0005, 0.002)
 
 
@@ -49,3 +57,38 @@ def test_too_many_joint_states_are_refused() -> None:
     network = build_network([Template(n, np.ones(1), None) for n in range(5)], [seen], PAPER_COSTS)
     with pytest.raises(ValueError, match=r"5 objects in 30 places"):
         solver_named("extended-dp").solve(network)
+
+
+@settings(deadline=None, max_examples=40)
+@given(case=cases(objects=3, frames=4, places=4, layouts=(0.0005, 0.002, 0.01)))
+def test_joint_states_and_branching_find_the_same_optimum(case: Case) -> None:
+    network = network_of(case)
+    found = relaxation_by_columns(network)
+    start = whole_nodes(network, found.usage)
+    joint = JointSearch(network, found).cheaper_than(objective(network, start))
+    branched = by_branching(network, found, start)
+    best = start if joint is None else joint
+    assert conflict_count(network, best) == 0
+    assert objective(network, best) == pytest.approx(objective(network, branched), rel=CLOSE)
+
+
+def test_where_joint_states_are_too_many_branching_finds_the_optimum(monkeypatch: pytest.MonkeyPatch) -> None:
+    case = Case(3, 4, 4, shared=True, settings=replace(PAPER_COSTS, layout=0.002), seed=1)
+    network = network_of(case)
+    expected = solver_named("extended-dp").solve(network).report.objective
+    monkeypatch.setattr(joint_search, "_MOST_STATES", 1)
+    monkeypatch.setattr(joint_search, "_MOST_STEPS", 1)
+    assert solver_named("exact").solve(network).report.objective == pytest.approx(expected, rel=CLOSE)
+
+
+def test_two_people_in_step_among_others_are_where_all_joint_states_say() -> None:
+    rng = np.random.default_rng(3)
+    frames = []
+    for m in range(10):
+        corner = np.vstack([[20.0 * m, 30.0], [20.0 * m + 40, 35.0], rng.uniform(0.0, 200.0, (6, 2))])
+        looks = rng.dirichlet(np.full(4, 20.0), 8)
+        frames.append(Detections(np.hstack([corner, corner + PERSON]), np.ones(8), looks))
+    templates = [Template(n, frames[0].histograms[n], frames[0].boxes[n]) for n in range(2)]
+    network = build_network(templates, frames, replace(PAPER_COSTS, layout=0.002))
+    exact, joint = (solver_named(name).solve(network).report for name in ("exact", "extended-dp"))
+    assert exact.objective == pytest.approx(joint.objective, rel=CLOSE)

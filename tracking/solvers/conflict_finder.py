@@ -82,8 +82,11 @@ class ConflictFinder:
             return found, prices
         for row in rows:
             member = np.zeros(self._network.places)
-            known = [place for place in row.places if place < len(member)]
-            if not known or row.frame >= self._network.frames:
+            if row.frame >= self._network.frames:
+                continue
+            there = np.flatnonzero(self._network.present[0, row.frame])
+            known = [place for place in row.places if place in there]
+            if not known:
                 continue
             member[known] = 1.0
             for part in self._parts_at(row.frame, np.array(known[:1])):

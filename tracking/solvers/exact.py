@@ -57,6 +57,11 @@ def _optimum(network: Network, found: Relaxed, nodes: Ints) -> Ints:
         with suppress(TooManyStatesError):
             better = JointSearch(network, found).cheaper_than(objective(network, nodes))
             return nodes if better is None else better
+    return by_branching(network, found, nodes)
+
+
+def by_branching(network: Network, found: Relaxed, nodes: Ints) -> Ints:
+    """Give the cheapest states by branch and bound, first among the arcs that are tight, then the rest."""
     excess = arc_excess(network, found)
     tight = _SLACK * max(1.0, abs(objective(network, nodes)))
     nodes = _cheaper(network, nodes, _best_among(network, nodes, excess <= tight))
