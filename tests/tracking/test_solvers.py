@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
+from hypothesis import strategies as st
 from random_networks import Case, best_by_trying, cases, network_of
 
+from tracking.detections import Detections
+from tracking.network import Template, build_network
+from tracking.presets import PAPER_COSTS
 from tracking.solvers import OCCLUDED, Solution, solver_named
 from tracking.solvers.objective import conflict_count, nodes_of, objective
 
@@ -82,3 +88,28 @@ def test_the_same_window_gives_the_same_states(name: str, case: Case) -> None:
     first, second = solved(case, name), solved(case, name)
     np.testing.assert_array_equal(first.states, second.states)
     assert first.report == second.report
+
+
+@settings(deadline=None, max_examples=15)
+@given(case=cases(objects=20, frames=5, places=12), crowd=st.integers(13, 20))
+def test_columns_finds_the_optimum_of_crowds(case: Case, crowd: int) -> None:
+    crowded = replace(case, objects=crowd, places=12, shared=True)
+    columns, arcs = solved(crowded, "columns").report, solved(crowded, "arcs").report
+    assert columns.bound == pytest.approx(arcs.bound, rel=CLOSE, abs=CLOSE)
+
+
+def test_columns_finds_the_optimum_of_many_small_groups() -> None:
+    """Ten pairs far from each other; in the middle frame one box of each pair is missing."""
+    lefts = np.array([left for pair in range(10) for left in (500.0 * pair, 500.0 * pair + 60.0)])
+    boxes = np.column_stack([lefts, np.zeros(20), lefts + 20.0, np.full(20, 50.0)])
+
+    def seen(frame: int) -> Detections:
+        there = boxes[::2] if frame == 2 else boxes
+        return Detections(there, np.ones(len(there)), np.ones((len(there), 1)))
+
+    templates = [Template(n, np.ones(1), boxes[n]) for n in range(20)]
+    network = build_network(templates, [seen(m) for m in range(5)], replace(PAPER_COSTS, displacement=0.003))
+    columns, arcs = (solver_named(name).solve(network).report for name in RELAXING)
+    assert columns.rounds > 0
+    assert columns.bound == pytest.approx(arcs.bound, rel=CLOSE)
+    assert columns.integral
