@@ -10,6 +10,8 @@ enter it.
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
@@ -20,7 +22,7 @@ from tracking.solvers.arc_master import arcs_of_paths
 from tracking.solvers.arc_search import ArcSearch, arc_search
 from tracking.solvers.conflict_finder import ConflictFinder, ConflictRow, priced_rows
 from tracking.solvers.hint import Hint
-from tracking.solvers.objective import Ints, path_costs
+from tracking.solvers.objective import Ints, conflict_count, path_costs
 from tracking.solvers.path_master import MasterPoint, PathMaster
 from tracking.solvers.pricing import Pricing
 from tracking.solvers.recall import recall, with_prices
@@ -39,8 +41,6 @@ class PathSearch:
 
     def __init__(self, network: Network) -> None:
         self._network = network
-        self._finder = ConflictFinder(network)
-        self._master = PathMaster(network)
         self._pricing = Pricing(Trellis.of(network))
         self._alone = self._pricing.alone
         self._bound = -np.inf
@@ -54,9 +54,12 @@ class PathSearch:
 
     def run(self, hint: Hint | None = None) -> Relaxed:
         """Find the optimum of the relaxation."""
-        rows = self._finder.broken(self._usage)
-        if not rows:
+        if not conflict_count(self._network, self._alone.nodes):
             return Relaxed(self._usage, float(self._alone.costs.sum()), self._priced, 0)
+        return self._of_those_who_meet(hint)
+
+    def _of_those_who_meet(self, hint: Hint | None) -> Relaxed:
+        rows = self._finder.broken(self._usage)
         told = recall(self._network, self._pricing, self._finder, hint) if hint else None
         if told is not None and told.proven is not None:
             return told.proven
@@ -78,6 +81,14 @@ class PathSearch:
             self._solve()
             self._keep_rows()
         return self._by_arcs(rounds)
+
+    @cached_property
+    def _finder(self) -> ConflictFinder:
+        return ConflictFinder(self._network)
+
+    @cached_property
+    def _master(self) -> PathMaster:
+        return PathMaster(self._network)
 
     def _by_arcs(self, rounds: int) -> Relaxed:
         """Go on from the arcs of the paths in use: many objects that meet want parts of paths combined."""
@@ -109,7 +120,10 @@ class PathSearch:
         return concerned
 
     def _largest_group(self) -> int:
-        """Give the size of the largest group of objects that meet, directly or through others."""
+        """Give the size of the largest group of objects that meet, directly or through others, or more."""
+        met = int(self._meets.diagonal().sum())
+        if met <= _FEW_OBJECTS:
+            return met
         _, group = connected_components(csr_array(self._meets.astype(np.int8)), directed=False)
         return int(np.bincount(group).max())
 
