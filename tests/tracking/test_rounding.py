@@ -12,7 +12,7 @@ from tracking.detections import Detections
 from tracking.network import Network, Template, build_network
 from tracking.presets import PAPER_COSTS
 from tracking.solvers.greedy_dp import greedy_paths
-from tracking.solvers.improve import improved
+from tracking.solvers.improve import Improver
 from tracking.solvers.objective import conflict_count, objective
 from tracking.solvers.rounding import is_integral, rounded
 
@@ -53,7 +53,7 @@ def test_a_jump_that_gating_forbids_is_repaired() -> None:
     network = two_at_one_place(gate=50.0, frames=2)
     jump = np.array([[0, 1], [2, 2]])
     assert np.isinf(objective(network, jump))
-    better = improved(network, jump)
+    better = Improver(network).improved(jump)
     assert np.isfinite(objective(network, better))
     assert conflict_count(network, better) == 0
 
@@ -67,7 +67,7 @@ def test_any_shares_round_to_nodes_without_conflict_and_improving_never_costs(ca
     usage[:, :, :-1] *= network.present[network.sets]
     nodes = rounded(network, usage)
     assert conflict_count(network, nodes) == 0
-    better = improved(network, nodes)
+    better = Improver(network).improved(nodes)
     assert conflict_count(network, better) == 0
     assert objective(network, better) <= objective(network, nodes)
 

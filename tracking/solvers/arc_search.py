@@ -19,28 +19,27 @@ from tracking.network import Network
 from tracking.solvers.arc_master import ArcMaster, ArcPoint, ArcSet, arcs_of_paths
 from tracking.solvers.ascent import Guess, guessed
 from tracking.solvers.conflict_finder import ConflictFinder, ConflictRow, priced_rows
-from tracking.solvers.greedy_dp import greedy_paths
 from tracking.solvers.layout_forces import with_pulls
-from tracking.solvers.objective import Ints, objective
+from tracking.solvers.objective import Ints
 from tracking.solvers.priced_arcs import arcs_through
 from tracking.solvers.pricing import Pricing
 from tracking.solvers.recall import with_prices
 from tracking.solvers.relaxed import CLOSE, Relaxed
-from tracking.solvers.viterbi import Marginals, Trellis
+from tracking.solvers.viterbi import Marginals, Trellis, forward
 
-_ENTERING = 300
-"""Arcs per object and round: about those of a dozen paths; more only swell the program."""
+_ARCS_WITH_LAYOUT, _ARCS = 300, 100
+"""Arcs per object and round: about those of some paths; more only swell the program."""
 
-_STATES = 12
+_STATES_WITH_LAYOUT, _STATES = 12, 6
 """States of a frame and object whose arcs are looked at first, the best: most rounds need no more."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Priced:
-    """The trellis at the prices of a point, both passes over it, and the bound that they prove."""
+    """The trellis at the prices of a point, the forward pass over it, and the bound that they prove."""
 
     trellis: Trellis
-    passes: Marginals
+    ahead: Floats
     worths: Floats
     bound: float
 
@@ -108,14 +107,18 @@ class ArcSearch:
     def _priced_by(self, point: ArcPoint) -> _Priced:
         """Price all arcs."""
         trellis = self._trellis.with_node(self._priced(point))
-        passes = Marginals.of(trellis)
-        return _Priced(trellis, passes, point.worths, float(passes.least.sum()) - point.charge)
+        ahead = forward(trellis)
+        least = (ahead[-1] + trellis.sink).min(axis=1)
+        return _Priced(trellis, ahead, point.worths, float(least.sum()) - point.charge)
 
     def _enter_better_arcs(self, priced: _Priced) -> bool:
         """Let in arcs whose best path betters the program; say whether there are any."""
-        for most in (_STATES, self._network.places + 1):
-            arcs, costs = arcs_through(priced.trellis, priced.passes, priced.worths, most)
-            if self._master.add_arcs(arcs.only(_cheapest(arcs.owner, costs, self._network.objects))):
+        layout, objects = self._network.layout, self._network.objects
+        passes = Marginals.of(priced.trellis, priced.ahead)
+        for states in (_STATES_WITH_LAYOUT if layout else _STATES, self._network.places + 1):
+            arcs, costs = arcs_through(priced.trellis, passes, priced.worths, states)
+            chosen = _cheapest(arcs.owner, costs, objects, _ARCS_WITH_LAYOUT if layout else _ARCS)
+            if self._master.add_arcs(arcs.only(chosen)):
                 return True
         return False
 
@@ -129,18 +132,17 @@ class ArcSearch:
 
 
 def arc_search(network: Network, pricing: Pricing, finder: ConflictFinder) -> ArcSearch:
-    """Give a search that starts from the greedy paths and a guess at the duals; the finder is a new one."""
-    nodes = greedy_paths(network, pricing.alone).nodes
-    search = ArcSearch(network, arcs_of_paths(np.arange(network.objects), nodes), [], finder)
-    search.enter_guess(guessed(network, pricing, finder, objective(network, nodes)))
+    """Give a search that starts from a guess at the duals; the finder is a new one."""
+    search = ArcSearch(network, arcs_of_paths(np.arange(network.objects), pricing.alone.nodes), [], finder)
+    search.enter_guess(guessed(network, pricing, finder))
     return search
 
 
-def _cheapest(owner: Ints, costs: Floats, objects: int) -> Bools:
+def _cheapest(owner: Ints, costs: Floats, objects: int, most: int) -> Bools:
     """Say which arcs are among the cheapest of their object; whole paths, since equal costs go together."""
     kept = np.ones(len(owner), dtype=np.bool_)
     for n in range(objects):
         own = owner == n
-        if own.sum() > _ENTERING:
-            kept[own] = costs[own] <= np.partition(costs[own], _ENTERING)[_ENTERING] + 1e-12
+        if own.sum() > most:
+            kept[own] = costs[own] <= np.partition(costs[own], most)[most] + 1e-12
     return kept

@@ -20,17 +20,36 @@ from tracking.solvers.pricing import Pricing
 from tracking.solvers.row_prices import RowPrices
 from tracking.solvers.viterbi import Marginals, best_paths
 
-_STEPS = 30
+
+@dataclass(frozen=True, slots=True)
+class _Pace:
+    """How an ascent goes.
+
+    Attributes:
+        steps: how many it takes.
+        shorter: the length of each as a share of the one before.
+        states: how many states of a frame and object it looks at, the cheapest without prices.
+        price: length of the first step of prices, as a share of a typical one.
+    """
+
+    steps: int
+    shorter: float
+    states: int
+    price: float
+
+
+_WITH_LAYOUT = _Pace(steps=30, shorter=0.94, states=40, price=1.0)
+_BY_CONFLICTS = _Pace(steps=25, shorter=0.92, states=10, price=0.2)
+"""The layout term leads further off the cheapest paths than conflicts do."""
+
+_FORCE = 0.2
+"""Length of the first step of forces, as a share of the largest."""
+
 _KEPT = 8
 """Of the last paths met: they are near those of the optimum."""
 
-_FIRST, _SHORTER = 0.2, 0.94
-"""Length of the first step, of the largest force or of a typical price; and of each to the one before."""
-
-_STATES, _STATES_BY_CONFLICTS = 30, 10
-"""States of a frame and object that the guess looks at, the cheapest without prices; with layout term,
-or where only conflicts move objects off their cheapest paths.
-"""
+_EARLY, _NOW_AND_THEN = 10, 3
+"""Broken rows are looked for in each of the first steps, later in some: few are still to be found."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,32 +69,42 @@ class Guess:
     paths: Ints
 
 
-def guessed(network: Network, pricing: Pricing, finder: ConflictFinder, attained: float) -> Guess:
-    """Guess the duals of a network; `attained` is the cost of some states without conflicts."""
+def guessed(network: Network, pricing: Pricing, finder: ConflictFinder) -> Guess:
+    """Guess the duals of a network."""
     passes = Marginals.of(pricing.trellis, pricing.ahead)
-    packed = Packed.cheapest(passes.through, _STATES if network.layout else _STATES_BY_CONFLICTS)
+    pace = _WITH_LAYOUT if network.layout else _BY_CONFLICTS
+    packed = Packed.cheapest(passes.through, pace.states)
     trellis = packed.trellis(pricing.trellis)
     forces, prices = LayoutForces(network), RowPrices(packed)
     where = packed.states(network.locations[network.sets], 0.0) if network.layout else None
+    typical = _typical_price(packed.states(passes.through, np.inf), passes.least)
     each, frames = np.indices((network.objects, network.frames))
     best, best_prices, best_pulls = -np.inf, prices.prices, forces.pulls()
     met: list[Ints] = []
-    for step in range(_STEPS):
+    for step in range(pace.steps):
         node, pulls = prices.on(trellis.node), forces.pulls()
         paths = best_paths(trellis.with_node(node if where is None else with_pulls(node, where, pulls)))
         met = [*met, packed.named(paths.nodes)][-_KEPT:]
         bound = float(paths.costs.sum() - prices.prices.sum())
         if bound > best:
             best, best_prices, best_pulls = bound, prices.prices, pulls
-        usage = np.zeros(network.node.shape)
-        usage[each, frames, met[-1]] = 1.0
-        prices.join(finder.broken(usage))
-        typical = (attained - float(passes.least.sum())) / max(1, len(prices.rows))
-        length = _FIRST * _SHORTER**step
-        moved = prices.climb(paths.nodes, length * typical)
+        if step < _EARLY or step % _NOW_AND_THEN == 0:
+            usage = np.zeros(network.node.shape)
+            usage[each, frames, met[-1]] = 1.0
+            prices.join(finder.broken(usage))
+        length = pace.shorter**step
+        moved = prices.climb(paths.nodes, length * pace.price * typical)
         if where is not None:
-            moved |= forces.climb(where[each, frames, paths.nodes], length)
+            moved |= forces.climb(where[each, frames, paths.nodes], length * _FORCE)
         if not moved:
             break
     late = np.zeros(len(prices.prices) - len(best_prices))
     return Guess(prices.rows, np.concatenate([best_prices, late]), best_pulls, np.array(met))
+
+
+def _typical_price(through: Floats, least: Floats) -> float:
+    """Give what it costs on average to be in the second best state of a frame; (n, M, W) and (n,)."""
+    if through.shape[2] == 1:
+        return 0.0
+    regret = np.partition(through, 1, axis=2)[:, :, 1] - least[:, None]
+    return float(regret[np.isfinite(regret)].mean()) if np.isfinite(regret).any() else 0.0

@@ -11,7 +11,7 @@ from tracking.network import Network
 from tracking.solvers.base import Solution, SolveReport
 from tracking.solvers.greedy_dp import greedy_paths
 from tracking.solvers.hint import PricedRow
-from tracking.solvers.improve import improved
+from tracking.solvers.improve import Improver
 from tracking.solvers.objective import Ints, conflict_count, objective, states_of
 from tracking.solvers.relaxed import Relaxed
 from tracking.solvers.rounding import is_integral, rounded
@@ -34,8 +34,9 @@ def whole_nodes(network: Network, usage: Floats, power: int = 1) -> Ints:
     nodes = rounded(network, usage)
     if is_integral(usage):
         return nodes
-    nodes = improved(network, nodes, power)
-    greedy = improved(network, greedy_paths(network).nodes, power)
+    improver = Improver(network, power)
+    nodes = improver.improved(nodes)
+    greedy = improver.improved(greedy_paths(network, improver.alone).nodes)
     return greedy if objective(network, greedy, power) < objective(network, nodes, power) else nodes
 
 

@@ -7,9 +7,9 @@ import numpy as np
 from tracking.boxes import Floats
 from tracking.conflicts import Bools
 from tracking.network import Network
-from tracking.solvers.objective import Ints, locations_at, objective, path_costs
+from tracking.solvers.objective import Ints, locations_at, objective, path_cost
 from tracking.solvers.packed import Packed
-from tracking.solvers.viterbi import Marginals, Trellis, best_paths
+from tracking.solvers.viterbi import Marginals, Trellis, best_paths, trace
 
 _ROUNDS = 20
 """Far above what it takes to settle; bounds the time whatever the window."""
@@ -18,40 +18,56 @@ _NO_LESS = 1e-12
 """Relative: what is cheaper by less is no cheaper."""
 
 
-def improved(network: Network, nodes: Ints, power: int = 1) -> Ints:
-    """Give nodes (n, M) without conflicts that cost no more, from nodes without conflicts.
+class Improver:
+    """Improves states of one network; `power` is that of its layout term.
 
-    Repairs what the rounding of II.D may leave, since it looks at each frame by itself: arcs that do not
-    exist where arcs are gated, and jumps where the relaxation was split. `power` is that of the layout
-    term.
+    Attributes:
+        alone: the cheapest path of each object, the others ignored.
     """
-    turns = _Turns(network, nodes, power)
-    cost = objective(network, nodes, power)
-    for _ in range(_ROUNDS):
-        changed = [turns.take(owner) for owner in range(network.objects)]
-        before, cost = cost, objective(network, turns.nodes, power)
-        if not any(changed) or not cost < before - _NO_LESS * max(1.0, abs(cost)):
-            break
-    return turns.nodes
+
+    def __init__(self, network: Network, power: int = 1) -> None:
+        self._network = network
+        self._power = power
+        self._trellis = Trellis.of(network)
+        self._passes = Marginals.of(self._trellis)
+        self.alone = trace(self._trellis, self._passes.ahead)
+
+    def improved(self, nodes: Ints) -> Ints:
+        """Give nodes (n, M) without conflicts that cost no more, from nodes without conflicts.
+
+        Repairs what the rounding of II.D may leave, since it looks at each frame by itself: arcs that do
+        not exist where arcs are gated, and jumps where the relaxation was split.
+        """
+        turns = _Turns(self._network, self._trellis, self._passes, self._power)
+        turns.nodes = nodes.copy()
+        cost = objective(self._network, nodes, self._power)
+        for _ in range(_ROUNDS):
+            changed = [turns.take(owner) for owner in range(self._network.objects)]
+            before, cost = cost, objective(self._network, turns.nodes, self._power)
+            if not any(changed) or not cost < before - _NO_LESS * max(1.0, abs(cost)):
+                break
+        return turns.nodes
 
 
 class _Turns:
     """Lets one object after the other choose; an object whose others have not moved has nothing to do."""
 
-    def __init__(self, network: Network, nodes: Ints, power: int) -> None:
+    def __init__(self, network: Network, trellis: Trellis, passes: Marginals, power: int) -> None:
         self._network = network
         self._power = power
         self._exclusions = network.exclusions()
-        self._trellis = Trellis.of(network)
-        self._through = Marginals.of(self._trellis).through
+        self._trellis = trellis
+        self._through, self._least = passes.through, passes.least
         self._settled = np.zeros(network.objects, dtype=np.bool_)
-        self.nodes = nodes.copy()
+        self.nodes = np.empty((network.objects, network.frames), dtype=np.int64)
 
     def take(self, owner: int) -> bool:
         """Give an object its best path around the others; say whether it moved."""
         if self._settled[owner]:
             return False
         cost = self._own_cost(owner)
+        if np.isfinite(cost) and cost <= self._least[owner] + _NO_LESS * max(1.0, abs(cost)):
+            return False
         before = self.nodes[owner].copy()
         self.nodes[owner] = self._rerouted(owner, cost)
         moved = self._own_cost(owner) < cost
@@ -65,7 +81,7 @@ class _Turns:
     def _own_cost(self, owner: int) -> float:
         """Give the part of the objective that depends on one object's path."""
         network = self._network
-        cost = float(path_costs(network, self.nodes)[owner])
+        cost = path_cost(network, self.nodes[owner], owner)
         if network.layout:
             moves = np.diff(locations_at(network, self.nodes), axis=1)
             cost += network.layout * float((np.abs(moves - moves[owner]) ** self._power).sum())

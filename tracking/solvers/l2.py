@@ -13,7 +13,7 @@ from tracking.solvers.conflict_finder import ConflictFinder
 from tracking.solvers.finish import finished, nothing
 from tracking.solvers.greedy_dp import greedy_paths
 from tracking.solvers.hint import Hint
-from tracking.solvers.improve import improved
+from tracking.solvers.improve import Improver
 from tracking.solvers.timed import TimedSolver
 
 _SQUARE = 2
@@ -33,7 +33,7 @@ class L2(TimedSolver):
             return nothing(self.name, network)
         if not network.layout:
             return finished(self.name, network, relaxation_by_columns(network))
-        start = improved(network, greedy_paths(network).nodes, _SQUARE)
+        start = Improver(network, _SQUARE).improved(greedy_paths(network).nodes)
         starts = arcs_of_paths(np.arange(network.objects), start)
         found = _SquaredSearch(network, starts, [], ConflictFinder(network)).run()
         return finished(self.name, network, found, _SQUARE)

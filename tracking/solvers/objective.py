@@ -32,6 +32,14 @@ def path_costs(network: Network, nodes: Ints) -> Floats:
     return np.asarray(visited + between + ends)
 
 
+def path_cost(network: Network, nodes: Ints, owner: int) -> float:
+    """Give the cost of one object's path through `nodes` (M,); infinite where an arc is missing."""
+    frames = np.arange(network.frames)
+    visited = network.node[owner, frames, nodes].sum()
+    between = network.pair[network.sets[owner], frames[:-1], nodes[:-1], nodes[1:]].sum()
+    return float(visited + between + network.source[owner, nodes[0]] + network.sink[owner, nodes[-1]])
+
+
 def layout_cost(network: Network, nodes: Ints, power: int = 1) -> float:
     """Give the layout term of II.C without its weight μ, over all pairs of objects.
 

@@ -71,7 +71,7 @@ def forward(trellis: Trellis, known: Floats | None = None) -> Floats:
     ways = np.empty((objects, states, states))
     for m in range(first, frames):
         np.add(best[m - 1][:, :, None], trellis.pair[:, m - 1], out=ways)
-        ways.min(axis=1, out=best[m])
+        np.minimum.reduce(ways, axis=1, out=best[m])
         best[m] += trellis.node[:, m]
     return best
 
@@ -85,7 +85,7 @@ def backward(trellis: Trellis) -> Floats:
     for m in range(frames - 2, -1, -1):
         ahead = best[m + 1] + trellis.node[:, m + 1]
         np.add(trellis.pair[:, m], ahead[:, None], out=ways)
-        ways.min(axis=2, out=best[m])
+        np.minimum.reduce(ways, axis=2, out=best[m])
     return best
 
 
