@@ -1,0 +1,57 @@
+"""What an experiment is played on: the truth of every frame, and what a detector saw in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from tracking import Detections, Template
+from tracking.boxes import Floats
+
+WIDTH, HEIGHT = 352, 288
+"""CIF, as in the paper (IV.A)."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Truth:
+    """Where n objects are in T frames.
+
+    Attributes:
+        boxes: `(n, T, 4)` pixels, whole boxes, hidden or not; NaN while the object is out of the picture.
+        visible: `(n, T)`, share of the box that nobody nearer covers; 0 out of the picture.
+    """
+
+    boxes: Floats
+    visible: Floats
+
+    @property
+    def objects(self) -> int:
+        """The number n of objects."""
+        return int(self.boxes.shape[0])
+
+    @property
+    def frames(self) -> int:
+        """The number T of frames."""
+        return int(self.boxes.shape[1])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scene:
+    """One synthetic recording.
+
+    Attributes:
+        truth: where everybody is.
+        seen: `seen[p][t]` are the observations of frame t; one set p for all objects, or one for each.
+        templates: the objects in frame 0; empty where they have to be found.
+        kits: what each object wears, by number; those of one number look alike.
+    """
+
+    truth: Truth
+    seen: tuple[tuple[Detections, ...], ...]
+    templates: tuple[Template, ...]
+    kits: tuple[int, ...]
+
+    @property
+    def observations(self) -> float:
+        """The mean number of observations in a frame, of one object."""
+        counts = [len(frame) for frames in self.seen for frame in frames]
+        return sum(counts) / len(counts)
