@@ -18,6 +18,8 @@ from tracking.motchallenge import MotRow, read_rows
 WATERMARK = ((130.0, 232.0), (354.0, 232.0), (354.0, 282.0), (130.0, 282.0))
 """Half-transparent and in every frame: where it lies nobody can be told from the background."""
 
+_SMALLEST = {"pets09": 0.12}
+
 
 @dataclass(frozen=True, slots=True)
 class View:
@@ -27,6 +29,8 @@ class View:
     video: Path
     truth: Path | None
     watermark: bool
+    smallest: float
+    """Height of the smallest people, in picture heights, which HOG has to be told: its time hangs on it."""
 
     @property
     def ignore(self) -> tuple[tuple[tuple[float, float], ...], ...]:
@@ -56,8 +60,8 @@ def views_of(data: Path, scene: str) -> list[View]:
     views = []
     for video in sorted(folder.glob("*.mp4")):
         truth = folder / "gt" / f"{video.stem}.txt"
-        marked = scene in {"terrace", "campus4"}
-        views.append(View(video.stem, video, truth if truth.exists() else None, marked))
+        marked, smallest = scene in {"terrace", "campus4"}, _SMALLEST.get(scene, 0.25)
+        views.append(View(video.stem, video, truth if truth.exists() else None, marked, smallest))
     if not views:
         raise CannotRunError(f"needs the recordings {folder}/*.mp4; --data or MYVIEW_TEST_DATA say where")
     return views

@@ -16,6 +16,7 @@ from tracking.detectors import (
     BackgroundSettings,
     Detector,
     HogDetector,
+    HogSettings,
     Image,
     paper_boxes,
 )
@@ -73,7 +74,9 @@ OBSERVERS = (
         with_peers=False,
     ),
     Observer("MOG2 + connected components", BlobDetector),
-    Observer("OpenCV's HOG", lambda view: HogDetector(ignore=view.ignore)),
+    Observer(
+        "OpenCV's HOG", lambda view: HogDetector(HogSettings(least_height=view.smallest), ignore=view.ignore)
+    ),
 )
 
 

@@ -73,17 +73,30 @@ def test_no_peak_is_worse_than_one_cell_beside_it() -> None:
 
 def test_heights_off_the_line_are_not_found() -> None:
     line = HeightLine(slope=0.55, offset=0.0)
-    peaks = found(band=Band(line, tolerance=0.15, doubt=1.0))
+    peaks = found(band=Band(line, tolerance=0.15, doubt=1.0, least=0.08))
     heights, feet = peaks.boxes[:, 3] - peaks.boxes[:, 1], peaks.boxes[:, 3]
     assert len(heights) > 3
     assert (np.abs(heights - 0.55 * feet) <= np.maximum(0.15 * 0.55 * feet, 1.0)).all()
     assert ((peaks.priors > 0.0) & (peaks.priors <= 1.0)).all()
 
 
+def test_small_people_are_sought_where_as_small_ones_were_seen() -> None:
+    weight = np.ones((ROWS, COLUMNS), dtype=np.float32)
+    gain = np.full_like(weight, -0.35)
+    child = np.array([60.0, 30.0, 65.0, 42.0])
+    gain[body_of(child)] = 1.0
+    for smallest, sought in ((40.0, False), (11.0, True)):
+        line = HeightLine(0.3, 0.0, smallest=smallest)
+        one = BoxFilter(weight, ROWS, BoxFilterSettings(least_height=0.3))
+        boxes = one.peaks(gain, Band(line, 0.15, 1.0, least=0.08)).boxes
+        assert (len(boxes) > 0) == sought
+        assert not sought or np.abs(boxes[0] - child).max() <= 2.0
+
+
 def test_a_new_line_replaces_the_one_before() -> None:
     foreground, cost, weight = scene()
     one = BoxFilter(weight, ROWS, BoxFilterSettings(least_height=0.3, most_height=0.6))
-    bands = [Band(HeightLine(slope, 0.0), 0.1, 1.0) for slope in (0.5, 0.6)]
+    bands = [Band(HeightLine(slope, 0.0), 0.1, 1.0, 0.08) for slope in (0.5, 0.6)]
     alternating = [one.peaks(foreground - cost, band).boxes for band in (*bands, None, bands[0])]
     np.testing.assert_array_equal(alternating[0], alternating[3])
     assert alternating[0].shape != alternating[1].shape or (alternating[0] != alternating[1]).any()

@@ -131,7 +131,9 @@ class BackgroundDetector:
             self._line = line
             self._band = None
             if line is not None:
-                self._band = Band(line.in_cells(CELL, grid.margin), heights.tolerance, heights.doubt)
+                self._band = Band(
+                    line.in_cells(CELL, grid.margin), heights.tolerance, heights.doubt, heights.least_height
+                )
         return self._band
 
     def _grid_of(self, image: Image) -> Grid:

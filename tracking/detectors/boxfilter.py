@@ -20,7 +20,7 @@ class BoxFilterSettings:
 
     body: Body = "person"  # person: head, trunk and legs inside the box; box: all of it (the paper)
     aspect: float = 0.38  # width of a person's box over its height
-    least_height: float = 0.14  # smallest person, in picture heights
+    least_height: float = 0.14  # smallest person, in picture heights; see also `HeightLineSettings`
     most_height: float = 0.95  # tallest person, in picture heights
     height_step: float = 1.08  # each height of the scan is this factor above the one before
     background_cost: float = 0.35  # what a background pixel inside the body costs, a foreground one brings 1
@@ -55,6 +55,7 @@ class Band:
     line: HeightLine
     tolerance: float  # share by which a height may differ from the line
     doubt: float  # standard deviations of the line by which it may differ besides
+    least: float  # smallest person, in picture heights
 
     def priors(self, feet: Floats, height: float | Floats) -> Floats:
         """Give the factor on the gain at each foot row: 1 on the line, 0 where the height is impossible.
@@ -85,7 +86,7 @@ class BoxFilter:
         self._parts = BODIES[settings.body]
         self._weights = integral(weight)
         self._shape = (weight.shape[0], weight.shape[1])
-        self._heights = scan_heights(rows, settings)
+        self._rows = rows
         self._band: Band | None = None
         self._plans: list[HeightPlan] | None = None
 
@@ -108,7 +109,10 @@ class BoxFilter:
     def _planned(self, band: Band | None) -> list[HeightPlan]:
         feet = np.arange(self._shape[0] + 1, dtype=np.float64)
         plans: list[HeightPlan] = []
-        for height in self._heights.astype(np.int64).tolist():
+        least = self._settings.least_height * self._rows
+        if band is not None:
+            least = min(least, max(band.least * self._rows, band.line.smallest))
+        for height in scan_heights(self._rows, least, self._settings).astype(np.int64).tolist():
             size = max(round(self._settings.aspect * height), 2), height
             priors = np.ones(len(feet)) if band is None else band.priors(feet, float(height))
             plan = plan_height(self._shape, size, self._parts, priors, self._settings.least_gain)
@@ -146,8 +150,8 @@ def _best_first(boxes: Floats, gains: Floats) -> npt.NDArray[np.int64]:
     return np.lexsort((boxes[:, 3], boxes[:, 1], boxes[:, 0], -gains))
 
 
-def scan_heights(rows: int, settings: BoxFilterSettings) -> Floats:
-    """Give the heights to try in a picture of so many rows of cells, `(S,)`, whole cells, ascending."""
-    least, most = settings.least_height * rows, settings.most_height * rows
+def scan_heights(rows: int, least: float, settings: BoxFilterSettings) -> Floats:
+    """Give the heights from `least` on to try in a picture of so many rows, in cells, `(S,)`, ascending."""
+    most = settings.most_height * rows
     steps = int(np.floor(np.log(most / least) / np.log(settings.height_step))) + 1
     return np.unique(np.rint(least * settings.height_step ** np.arange(steps)))

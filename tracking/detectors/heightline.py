@@ -28,6 +28,7 @@ class HeightLineSettings:
     sample_every: int = 1  # frames between two looks for isolated people
     usual_slope: float = 0.65  # person's height over the camera's: what the slope is without evidence
     slope_spread: float = 0.18  # standard deviation of that
+    least_height: float = 0.08  # smallest person, in picture heights, where people as small were seen alone
     tolerance: float = 0.15  # a hypothesis may be this share taller or smaller than the line says
     doubt: float = 1.0  # standard deviations of the line by which it may be taller or smaller besides
     most_scatter: float = 0.13  # median deviation, in heights, above which there is no line (stairs)
@@ -46,6 +47,8 @@ class HeightLine:
     centre: float = 0.0
     spread: float = 0.0
     slope_spread: float = 0.0
+    smallest: float = 0.0
+    """Nobody much smaller was seen: far beyond the people seen, the line says nothing."""
 
     def at(self, foot: Floats) -> Floats:
         """Give the expected heights, in the unit of `foot`."""
@@ -63,6 +66,7 @@ class HeightLine:
             self.centre / cell + margin,
             self.spread / cell,
             self.slope_spread,
+            self.smallest / cell,
         )
 
 
@@ -98,6 +102,8 @@ _NOISE = 0.08
 # Deviation, in heights, from which a sample counts as no whole person, or two.
 _WILD = 0.16
 _ROUNDS = 5
+# People may be this much smaller than the low quantile of those that were seen alone.
+_SMALLER, _LOW = 0.8, 0.05
 _SLOPES = np.linspace(-2.0, 2.0, 17)
 _SAMPLES_A_SLOPE = 40
 
@@ -131,7 +137,8 @@ def fit_line(samples: Floats, settings: HeightLineSettings) -> HeightLine | None
         return None
     # Nearly uncorrelated, as the feet are counted from their weighted mean.
     level_spread, slope_spread = np.sqrt(np.diag(np.linalg.inv(evidence)))
-    return HeightLine(slope, offset, centre, float(level_spread), float(slope_spread))
+    smallest = _SMALLER * float(np.quantile(height[weight > 0.0], _LOW))
+    return HeightLine(slope, offset, centre, float(level_spread), float(slope_spread), smallest)
 
 
 def _best_of_grid(
