@@ -13,14 +13,13 @@ from __future__ import annotations
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components
 
 from tracking.conflicts import Bools
 from tracking.network import Network
 from tracking.solvers.arc_master import arcs_of_paths
 from tracking.solvers.arc_search import ArcSearch, arc_search
 from tracking.solvers.conflict_finder import ConflictFinder, ConflictRow, priced_rows
+from tracking.solvers.groups import groups_of
 from tracking.solvers.hint import Hint
 from tracking.solvers.objective import Ints, conflict_count, path_costs
 from tracking.solvers.path_master import MasterPoint, PathMaster
@@ -126,12 +125,8 @@ class PathSearch:
         return concerned
 
     def _largest_group(self) -> int:
-        """Give the size of the largest group of objects that meet, directly or through others, or more."""
-        met = int(self._meets.diagonal().sum())
-        if met <= _FEW_OBJECTS:
-            return met
-        _, group = connected_components(csr_array(self._meets.astype(np.int8)), directed=False)
-        return int(np.bincount(group).max())
+        """Give the size of the largest group of objects that meet, directly or through others."""
+        return int(np.bincount(groups_of(self._meets)).max())
 
     def _bind(self, rows: list[ConflictRow]) -> None:
         """Let the objects that break the rows, and paths around all rows, into the program."""
@@ -164,7 +159,7 @@ class PathSearch:
         active, prices = np.flatnonzero(self._active), self._point.prices
         others = float(self._alone.costs[~self._active].sum())
         cost = others + self._point.objective
-        entering = 0
+        met = []
         for _ in range(_STEPS):
             self._priced = with_prices(self._network, self._master.rows, prices)
             self._prices = prices
@@ -173,14 +168,14 @@ class PathSearch:
             missing = cost - self._bound
             if missing <= CLOSE * max(1.0, abs(cost)):
                 return False
+            met.append(paths.nodes)
             loads = [row.members[active, paths.nodes[:, row.frame]].sum() for row in self._master.rows]
             slope = np.array(loads) - 1.0
             slope[(slope < 0.0) & (prices == 0.0)] = 0.0
-            entering += self._enter(active, paths.nodes)
             if not slope.any():
                 break
             prices = np.maximum(0.0, prices + _BOLD * missing / float(slope @ slope) * slope)
-        return entering > 0
+        return sum([self._enter(active, nodes) for nodes in met]) > 0
 
     def _enter(self, objects: Ints, nodes: Ints) -> int:
         """Let paths of objects in; give how many are new."""
