@@ -55,7 +55,7 @@ def play(cast: Cast, seed: int) -> Scene:
     feet = walks(len(cast.kits), cast.frames, cast.walking, rng)
     boxes = inside(people_at(feet, cast.height))
     shares = np.array([visible(boxes[:, t]) for t in range(cast.frames)]).T
-    seen = tuple(_detect(cast, boxes[:, t], shares[:, t], clothes, rng) for t in range(cast.frames))
+    seen = tuple(detect(cast, boxes[:, t], shares[:, t], clothes, rng) for t in range(cast.frames))
     templates: tuple[Template, ...] = ()
     if cast.known:
         templates = tuple(
@@ -65,10 +65,13 @@ def play(cast: Cast, seed: int) -> Scene:
     return Scene(Truth(boxes, shares), (seen,), templates, cast.kits)
 
 
-def _detect(
+def detect(
     cast: Cast, people: Floats, shares: Floats, clothes: Wardrobe, rng: np.random.Generator
 ) -> Detections:
-    """Give what is found in one frame, in no order that tells who is who."""
+    """Give what is found in one frame, in no order that tells who is who.
+
+    `people` are boxes `(n, 4)`, NaN who is away; `shares` `(n,)` how much of each is visible.
+    """
     found: list[tuple[Floats, float]] = []
     for box, share in zip(people, shares, strict=True):
         if share < _LEAST_VISIBLE:

@@ -35,7 +35,7 @@ class Walking:
     side: float = 30.0
 
 
-class _Walker:
+class Walker:
     """Somebody on the way from one goal to the next."""
 
     def __init__(self, walking: Walking, start: Floats, rng: np.random.Generator) -> None:
@@ -93,7 +93,7 @@ def walks(people: int, frames: int, walking: Walking, rng: np.random.Generator) 
         np.array([walking.side + (k + 0.5) * apart, rng.uniform(_FAR_Y + 20, _NEAR_Y - 20)])
         for k in range(people)
     ]
-    walkers = [_Walker(walking, start, rng) for start in starts]
+    walkers = [Walker(walking, start, rng) for start in starts]
     return np.array([[walker.step() for _ in range(frames)] for walker in walkers])
 
 

@@ -1,0 +1,53 @@
+"""Memory over a long run: samples of what this process holds, and by how much that grows."""
+
+from __future__ import annotations
+
+import os
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+SPAN = 10_000
+"""Frames that growth is given for, as the tables count it."""
+_MEGABYTE = 1e6
+_STATM = Path("/proc/self/statm")
+_RESIDENT = 1
+"""Place of the resident pages (proc(5))."""
+
+
+def resident_megabytes() -> float:
+    """Give how much memory of this process is resident, megabytes (Linux)."""
+    pages = int(_STATM.read_text(encoding="ascii").split()[_RESIDENT])
+    return pages * os.sysconf("SC_PAGE_SIZE") / _MEGABYTE
+
+
+@dataclass(slots=True)
+class Samples:
+    """What was in use after so many frames."""
+
+    frames: list[int] = field(default_factory=list)
+    megabytes: list[float] = field(default_factory=list)
+    seconds: list[float] = field(default_factory=list)
+    """Processor time since the start."""
+
+    def take(self, frames: int) -> None:
+        """Note what is in use now."""
+        self.frames.append(frames)
+        self.megabytes.append(resident_megabytes())
+        self.seconds.append(time.process_time())
+
+    def between(self, start: int, stop: int) -> Samples:
+        """Give the samples after `start` frames and up to `stop`."""
+        kept = [n for n, frames in enumerate(self.frames) if start < frames <= stop]
+        return Samples(*([values[n] for n in kept] for values in (self.frames, self.megabytes, self.seconds)))
+
+    def milliseconds_per_frame(self) -> float:
+        """Give the processor time of a frame between the first and the last sample."""
+        return 1e3 * (self.seconds[-1] - self.seconds[0]) / (self.frames[-1] - self.frames[0])
+
+    def growth(self) -> float:
+        """Give by how many megabytes :data:`SPAN` frames add, by a straight line through the samples."""
+        slope = np.polyfit(self.frames, self.megabytes, 1)[0]
+        return float(SPAN * slope)
