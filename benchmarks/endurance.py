@@ -27,6 +27,8 @@ from tracking.solvers.base import DEFAULT_SOLVER
 
 _EVERY = 250
 """Frames between two samples."""
+_LEAST = 6 * _EVERY
+"""Frames of which spans and growth can be told: two samples in each third."""
 _PEOPLE = 5
 _SITE = {
     "site": {"name": "endurance", "fps": 25, "width": WIDTH, "height": HEIGHT},
@@ -127,16 +129,14 @@ def plot(runs: list[Run], path: Path) -> None:
 def main() -> None:
     """Run the benchmark."""
     options = parser(__doc__, "endurance")
-    options.add_argument("--frames", type=int, default=50_000, help="of the tracker; 0: leave it out")
-    options.add_argument(
-        "--pipeline-frames", type=int, default=15_000, help="of the pipeline; 0: leave it out"
-    )
+    options.add_argument("--frames", type=int, default=50_000, help="the tracker's; 0: without")
+    options.add_argument("--pipeline-frames", type=int, default=15_000, help="the pipeline's; 0: without")
     chosen = options.parse_args()
     report = Report()
     given = ((run_tracker, chosen.frames), (run_pipeline, chosen.pipeline_frames))
     runs = []
     for start, frames in given:
-        if frames >= 3 * _EVERY * 2:
+        if frames >= _LEAST:
             runs.append(start(frames))
             describe(report, runs[-1])
     plot(runs, chosen.out / "endurance.png")
