@@ -36,6 +36,9 @@ _STEPS, _BOLD = 8, 1.2
 its edge.
 """
 
+_PATIENCE, _WORTHWHILE = 2, 0.8
+"""After so many steps, those that leave more than this share of what is missing, each, are given up."""
+
 _ROUNDS_OF_FEW, _ROUNDS_OF_MANY = 50, 4
 """Rounds of paths before arcs take over."""
 
@@ -159,22 +162,25 @@ class PathSearch:
         active, prices = np.flatnonzero(self._active), self._point.prices
         others = float(self._alone.costs[~self._active].sum())
         cost = others + self._point.objective
-        met = []
-        for _ in range(_STEPS):
+        met: list[Ints] = []
+        missing: list[float] = []
+        for step in range(_STEPS):
             self._priced = with_prices(self._network, self._master.rows, prices)
             self._prices = prices
             paths = self._pricing.best_paths(self._priced, active)
             self._bound = others + float(paths.costs.sum() - prices.sum())
-            missing = cost - self._bound
-            if missing <= CLOSE * max(1.0, abs(cost)):
+            missing.append(cost - self._bound)
+            if missing[-1] <= CLOSE * max(1.0, abs(cost)):
                 return False
             met.append(paths.nodes)
+            if step >= _PATIENCE and missing[-1] > _WORTHWHILE**step * missing[0]:
+                break
             loads = [row.members[active, paths.nodes[:, row.frame]].sum() for row in self._master.rows]
             slope = np.array(loads) - 1.0
             slope[(slope < 0.0) & (prices == 0.0)] = 0.0
             if not slope.any():
                 break
-            prices = np.maximum(0.0, prices + _BOLD * missing / float(slope @ slope) * slope)
+            prices = np.maximum(0.0, prices + _BOLD * missing[-1] / float(slope @ slope) * slope)
         return sum([self._enter(active, nodes) for nodes in met]) > 0
 
     def _enter(self, objects: Ints, nodes: Ints) -> int:
