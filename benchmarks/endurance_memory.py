@@ -41,7 +41,11 @@ class Samples:
     def between(self, start: int, stop: int) -> Samples:
         """Give the samples after `start` frames and up to `stop`."""
         kept = [n for n, frames in enumerate(self.frames) if start < frames <= stop]
-        return Samples(*([values[n] for n in kept] for values in (self.frames, self.megabytes, self.seconds)))
+        return Samples(
+            [self.frames[n] for n in kept],
+            [self.megabytes[n] for n in kept],
+            [self.seconds[n] for n in kept],
+        )
 
     def milliseconds_per_frame(self) -> float:
         """Give the processor time of a frame between the first and the last sample."""
