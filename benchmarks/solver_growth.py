@@ -64,6 +64,13 @@ def grown(sweep: Sweep, solver: str, seeds: int) -> Growth:
     return Growth(sweep, solver, times, exponent(sweep.sizes, times))
 
 
+def exponent_of_all(growths: list[Growth], solver: str) -> float:
+    """Fit one exponent to all sweeps of a solver."""
+    own = [growth for growth in growths if growth.solver == solver]
+    sizes = tuple(size for growth in own for size in growth.sweep.sizes)
+    return exponent(sizes, tuple(time for growth in own for time in growth.times))
+
+
 def plot_growth(growths: list[Growth], path: Path) -> None:
     """Draw Fig. 21: time over observations, objects and frames."""
     from matplotlib.figure import Figure  # noqa: PLC0415 — loading it would count as a solver's time
