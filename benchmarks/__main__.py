@@ -41,6 +41,7 @@ BENCHMARKS = (
     Benchmark("peers", "MyView beside other trackers, which come from PyPI, on public detections; 5 minutes"),
     Benchmark("ablation", "what each term of the tracker brings; 15 minutes"),
     Benchmark("experiments", "the paper's experiments again, on synthetic scenes; 10 minutes"),
+    Benchmark("live", "four live cameras: whether tracking keeps up, and what each stage costs; 2 minutes"),
     Benchmark("endurance", "memory and time over 50 000 frames; 10 minutes"),
     Benchmark("solvers", "the solvers of the tracking program against each other; 3 minutes"),
 )

@@ -5,21 +5,37 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import sys
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, Protocol
 
 import aiohttp
 import yaml
 
 from benchmarks.surroundings import one_thread_environment
-from benchmarks.views import Views
 from server.run.setup import free_port
 
 LOG = "up.log"
 _POLL_S = 0.2
 _START_S = 60.0
 _END_S = 15.0
+
+
+class Played(Protocol):
+    """What the configuration of a site needs to know of the views that it plays."""
+
+    @property
+    def cameras(self) -> list[dict[str, Any]]:
+        """The configuration's cameras."""
+
+    @property
+    def site(self) -> dict[str, Any]:
+        """The configuration's site."""
+
+    @property
+    def ground(self) -> Path | None:
+        """Homographies to the ground plane."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,8 +49,10 @@ class Site:
 
 
 @contextlib.asynccontextmanager
-async def running_site(views: Views, folder: Path) -> AsyncIterator[Site]:
-    """Run `myview up` on the views, each played once; its log goes into the folder.
+async def running_site(
+    views: Played, folder: Path, environment: Mapping[str, str] | None = None
+) -> AsyncIterator[Site]:
+    """Run `myview up` on the views; its log goes into the folder. `environment` is set besides.
 
     Raises:
         RuntimeError: it did not start; why stands in the log.
@@ -55,7 +73,7 @@ async def running_site(views: Views, folder: Path) -> AsyncIterator[Site]:
     with (folder / LOG).open("w", encoding="utf-8") as log:
         process = await asyncio.create_subprocess_exec(
             *(sys.executable, "-m", "server.run.cli", "up", str(config)),
-            env=one_thread_environment(),
+            env={**one_thread_environment(), **(environment or {})},
             stdout=log,
             stderr=log,
         )

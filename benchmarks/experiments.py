@@ -65,8 +65,9 @@ def _spread(values: list[float]) -> str:
     return f"{np.mean(values):.3f} ± {np.std(values):.3f}"
 
 
-def run(experiment: Experiment, seeds: int, report: Report, out: Path) -> None:
+def run(experiment: Experiment, seeds: int | None, report: Report, out: Path) -> None:
     """Run one experiment, print its table and save its plot."""
+    seeds = seeds or experiment.scenes
     scenes = [experiment.play(seed) for seed in range(1, seeds + 1)]
     rows = []
     for setting in experiment.settings:
@@ -90,7 +91,7 @@ def main() -> None:
     options = parser(__doc__, "experiments")
     names = [experiment.name for experiment in EXPERIMENTS]
     options.add_argument("--experiment", action="append", choices=names, help="only this one; repeatable")
-    options.add_argument("--seeds", type=int, default=5, help="scenes of each experiment")
+    options.add_argument("--seeds", type=int, help="scenes of each experiment; otherwise 5, of the toys 3")
     chosen = options.parse_args()
     chosen.out.mkdir(parents=True, exist_ok=True)
     report = Report()

@@ -52,6 +52,7 @@ class Experiment:
         play: makes the scene of a seed.
         settings: how it is followed.
         paper: what the paper reports of its own recording.
+        scenes: how many scenes it is played on, each with a seed of its own.
     """
 
     name: str
@@ -60,6 +61,7 @@ class Experiment:
     play: Callable[[int], Scene]
     settings: tuple[Setting, ...]
     paper: str
+    scenes: int = 5
 
 
 def _settings(paper: CostSettings, default: CostSettings, *more: Setting) -> tuple[Setting, ...]:
@@ -123,6 +125,7 @@ EXPERIMENTS = (
         lambda seed: play_toys(_TOYS_FRAMES, seed),
         _settings(_TOYS, _TOYS_DEFAULT, _layout(_TOYS)),
         "LP right in all of 307 frames",
+        scenes=3,
     ),
     Experiment(
         "two",
