@@ -125,11 +125,8 @@ def describe(report: Report, name: str, watched: Watched) -> None:
     own = sum(used for who, used in cores.items() if who not in {OTHER, _OWN})
     report.say("cores in use: " + ", ".join(f"{who} {used:.2f}" for who, used in cores.items()))
     report.say(f"MyView's processes together: {own:.2f} cores of {os.cpu_count()}")
-    report.say(f"windows decided without a camera that was late: {counts.late}")
-    keeps_up = counts.dropped == 0 and counts.late == 0
-    report.say(
-        f"keeps up: {'yes' if keeps_up else 'NO'}; frames dropped: {counts.dropped}, windows late: {counts.late}"
-    )
+    keeps_up = "yes" if counts.dropped == 0 and counts.late == 0 else "NO"
+    report.say(f"keeps up: {keeps_up}; frames dropped: {counts.dropped}, windows late: {counts.late}")
 
 
 def _describe_stages(report: Report, used: Mapping[str, Mapping[str, float]]) -> None:

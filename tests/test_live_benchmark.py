@@ -1,0 +1,98 @@
+"""The live run's parts: what it reads from a site, and how it times a camera's stages."""
+
+from __future__ import annotations
+
+import json
+import time
+from pathlib import Path
+
+import pytest
+
+from benchmarks.live_counts import counts_in
+from benchmarks.live_stages import REST, STAGES, StageTimes, ThreadWatch, hooked_environment, read_stages
+from benchmarks.live_views import CROWD, FPS, Live, usual_views
+from benchmarks.views import ROOM, Views
+
+METRICS = """\
+# TYPE myview_late_epochs_total counter
+myview_late_epochs_total {late}
+# TYPE myview_camera_frames_total counter
+myview_camera_frames_total{{camera="c1"}} {frames}
+# TYPE myview_camera_missed_total counter
+myview_camera_missed_total{{camera="c1"}} {missed}
+# TYPE myview_camera_shed_total counter
+myview_camera_shed_total{{camera="c1"}} {shed}
+# TYPE myview_camera_live gauge
+myview_camera_live{{camera="c1"}} 1.0
+"""
+
+
+def test_counts_are_differences_between_two_moments() -> None:
+    before = counts_in(METRICS.format(late=1, frames=100, missed=2, shed=0))
+    after = counts_in(METRICS.format(late=1, frames=350, missed=3, shed=4))
+    since = after.since(before)
+    assert since.cameras["c1"]["frames"] == 250
+    assert since.dropped == 5
+    assert since.late == 0
+
+
+class Outer:
+    def work(self, inner: Inner) -> None:
+        spin(0.02)
+        inner.work()
+
+
+class Inner:
+    def work(self) -> None:
+        spin(0.04)
+
+
+def spin(seconds: float) -> None:
+    until = time.thread_time() + seconds
+    while time.thread_time() < until:
+        pass
+
+
+def test_a_stage_inside_a_stage_counts_only_there() -> None:
+    watch = ThreadWatch()
+    calls: list[int] = []
+    outer, inner = type("O", (Outer,), {}), type("I", (Inner,), {})
+    watch.wrap(outer, "work", "track", lambda: calls.append(1))
+    watch.wrap(inner, "work", "solve")
+    outer().work(inner())
+    assert watch.seconds["solve"] >= 0.04
+    assert 0.02 <= watch.seconds["track"] < watch.seconds["solve"]
+    assert calls == [1]
+
+
+def test_what_no_stage_explains_is_the_rest(tmp_path: Path) -> None:
+    seconds = dict.fromkeys(STAGES, 0.0)
+    (tmp_path / "c0.json").write_text(json.dumps({"frames": 10, "seconds": seconds, "process": 1.0}))
+    start = read_stages(tmp_path)["c0"]
+    later = StageTimes(20, {**seconds, "detect": 0.05}, 1.08)
+    used = later.milliseconds_since(start)
+    assert used["detect"] == pytest.approx(5.0)
+    assert used[REST] == pytest.approx(3.0)
+
+
+def test_only_camera_processes_are_hooked(tmp_path: Path) -> None:
+    path = hooked_environment(tmp_path)["PYTHONPATH"]
+    hook = Path(path.split(":")[0]) / "sitecustomize.py"
+    assert '"camera" in sys.orig_argv' in hook.read_text(encoding="utf-8")
+
+
+def test_four_cameras_of_two_scenes_never_end(tmp_path: Path) -> None:
+    views = tuple(
+        Views(name, tuple(tmp_path / name / f"c{n}.mp4" for n in range(count)), None)
+        for name, count in (("terrace", 2), ("campus4", 3))
+    )
+    live = Live(CROWD, views)
+    assert [camera["id"] for camera in live.cameras] == ["c0", "c1", "c2", "c3"]
+    assert all(camera["at_end"] == "loop" for camera in live.cameras)
+    assert live.ground is None
+    assert live.site["fps"] == FPS
+    assert (live.site["width"], live.site["height"]) == (352, 288)
+
+
+def test_the_scene_takes_the_place_of_recordings_that_are_not_there(tmp_path: Path) -> None:
+    assert usual_views(tmp_path) == ROOM
