@@ -1,4 +1,4 @@
-"""The outline of a standing person, in three rectangles, so that integral images can measure it."""
+"""The outline of a standing person, in five rectangles, so that integral images can measure it."""
 
 from __future__ import annotations
 
@@ -22,10 +22,13 @@ class Part:
     bottom: float
 
 
+# Where more than half of the people who stand alone are, on the mean over several recordings.
 BODY = (
-    Part(0.32, 0.0, 0.68, 0.14),  # head
-    Part(0.16, 0.14, 0.84, 0.52),  # trunk and arms
-    Part(0.22, 0.52, 0.78, 1.0),  # legs
+    Part(0.36, 0.0, 0.66, 0.1),  # head
+    Part(0.30, 0.1, 0.72, 0.2),  # neck and shoulders
+    Part(0.20, 0.2, 0.80, 0.5),  # trunk and arms
+    Part(0.25, 0.5, 0.75, 0.7),  # hips
+    Part(0.26, 0.7, 0.70, 1.0),  # legs
 )
 WHOLE = (Part(0.0, 0.0, 1.0, 1.0),)
 
