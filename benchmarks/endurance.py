@@ -20,8 +20,6 @@ from benchmarks.endurance_memory import SPAN, Samples
 from benchmarks.experiments_scene import HEIGHT, WIDTH
 from benchmarks.report import Report
 from benchmarks.surroundings import parser
-from server.camera.pipeline import CameraPipeline
-from server.wire.loading import build_config
 from tracking import CostSettings, OnlineTracker, WindowSettings, solver_named
 from tracking.solvers.base import DEFAULT_SOLVER
 
@@ -63,6 +61,10 @@ def run_tracker(frames: int) -> Run:
 
 def run_pipeline(frames: int) -> Run:
     """Put so many frames through a camera's source, encoder, detector and tracker."""
+    # Loaded only now: the tracker's memory is measured without the server's libraries.
+    from server.camera.pipeline import CameraPipeline  # noqa: PLC0415
+    from server.wire.loading import build_config  # noqa: PLC0415
+
     pipeline = CameraPipeline(build_config(_SITE, where="endurance", folder=Path()), "c0")
     run = Run("camera pipeline", Samples())
 
@@ -91,20 +93,24 @@ def describe(report: Report, run: Run) -> None:
     rows = []
     for start, stop in spans(run.samples.frames[-1]):
         part = run.samples.between(start, stop)
-        middle = sorted(part.megabytes)[len(part.megabytes) // 2]
+        middle = len(part.frames) // 2
         rows.append(
             [
                 f"{start} to {part.frames[-1]}",
-                f"{middle:.1f}",
+                f"{sorted(part.megabytes)[middle]:.1f}",
                 f"{max(part.megabytes):.1f}",
+                f"{sorted(part.blocks)[middle]}",
                 f"{part.milliseconds_per_frame():.2f}",
             ]
         )
-    columns = ["frames", "resident, median MB", "most, MB", "processor ms per frame"]
+    columns = ["frames", "resident, median MB", "most, MB", "Python blocks, median", "processor ms per frame"]
     report.table(f"{run.name}: {run.samples.frames[-1]} frames, {run.objects} objects", columns, rows)
     settled = run.samples.between(min(SPAN, run.samples.frames[-1] // 3), run.samples.frames[-1])
     start = settled.frames[0] - _EVERY
-    report.say(f"growth after the first {start} frames: {settled.growth():+.2f} MB in {SPAN} frames")
+    report.say(
+        f"growth after the first {start} frames, in {SPAN}: {settled.growth():+.2f} MB,"
+        f" {settled.block_growth():+.0f} blocks"
+    )
 
 
 def spans(frames: int) -> Iterator[tuple[int, int]]:

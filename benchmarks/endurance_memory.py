@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import sys
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -31,12 +33,15 @@ class Samples:
     megabytes: list[float] = field(default_factory=list)
     seconds: list[float] = field(default_factory=list)
     """Processor time since the start."""
+    blocks: list[int] = field(default_factory=list)
+    """Python's own memory blocks in use: they tell a leak from a heap in pieces."""
 
     def take(self, frames: int) -> None:
         """Note what is in use now."""
         self.frames.append(frames)
         self.megabytes.append(resident_megabytes())
         self.seconds.append(time.process_time())
+        self.blocks.append(sys.getallocatedblocks())
 
     def between(self, start: int, stop: int) -> Samples:
         """Give the samples after `start` frames and up to `stop`."""
@@ -45,6 +50,7 @@ class Samples:
             [self.frames[n] for n in kept],
             [self.megabytes[n] for n in kept],
             [self.seconds[n] for n in kept],
+            [self.blocks[n] for n in kept],
         )
 
     def milliseconds_per_frame(self) -> float:
@@ -53,5 +59,11 @@ class Samples:
 
     def growth(self) -> float:
         """Give by how many megabytes :data:`SPAN` frames add, by a straight line through the samples."""
-        slope = np.polyfit(self.frames, self.megabytes, 1)[0]
-        return float(SPAN * slope)
+        return self._per_span(self.megabytes)
+
+    def block_growth(self) -> float:
+        """Give by how many blocks :data:`SPAN` frames add, likewise."""
+        return self._per_span(self.blocks)
+
+    def _per_span(self, values: Sequence[float]) -> float:
+        return float(SPAN * np.polyfit(self.frames, values, 1)[0])
