@@ -49,7 +49,7 @@ def test_the_crowd_goes_on_and_changes() -> None:
 def test_growth_is_that_of_a_straight_line() -> None:
     samples = Samples([1000, 2000, 3000], [50.0, 50.5, 51.0], [1.0, 3.0, 5.0], [700, 700, 700])
     assert samples.growth() == pytest.approx(5.0)
-    assert samples.block_growth() == pytest.approx(0.0)
+    assert samples.block_growth() == pytest.approx(0.0, abs=1e-6)
     assert samples.milliseconds_per_frame() == pytest.approx(2.0)
     assert samples.between(1000, 3000).frames == [2000, 3000]
 
