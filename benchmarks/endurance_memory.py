@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 import time
@@ -37,7 +38,8 @@ class Samples:
     """Python's own memory blocks in use: they tell a leak from a heap in pieces."""
 
     def take(self, frames: int) -> None:
-        """Note what is in use now."""
+        """Note what is in use now, once Python has emptied its lists of free objects, which fill slowly."""
+        gc.collect()
         self.frames.append(frames)
         self.megabytes.append(resident_megabytes())
         self.seconds.append(time.process_time())

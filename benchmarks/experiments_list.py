@@ -87,6 +87,10 @@ def _whole(frames: int, costs: CostSettings = PAPER_COSTS) -> Setting:
 _TOYS = replace(PAPER_COSTS, measure="intersection", change=0.05, occlusion=0.12)
 _TOYS_DEFAULT = replace(CostSettings(), measure="intersection", change=0.1, occlusion=0.35)
 
+# The same for the three people, whose boxes are worse: 95 % of their own are nearer than 0.29, 95 % of the
+# others' further than 0.45. A larger c_b puts the label of who has left on the background.
+_THREE_COSTS = replace(PAPER_COSTS, occlusion=0.35)
+
 _EXAMPLE_FRAMES, _TOYS_FRAMES, _TWO_FRAMES, _THREE_FRAMES, _FOUR_FRAMES = 340, 307, 1351, 2431, 500
 """As long as the paper's recordings."""
 
@@ -140,7 +144,7 @@ EXPERIMENTS = (
         "three people leaving and returning",
         "Fig. 18",
         lambda seed: play(_THREE, seed),
-        _settings(PAPER_COSTS, CostSettings()),
+        _settings(_THREE_COSTS, CostSettings()),
         "LP 0.06 wrong per frame, greedy DP 0.17; 131 of 135 windows integral",
     ),
     Experiment(
