@@ -25,6 +25,8 @@ from tracking.solvers.base import DEFAULT_SOLVER
 
 _EVERY = 250
 """Frames between two samples."""
+_NUMBERS = 4
+"""Python objects that a sample is: how many frames, megabytes, seconds, blocks."""
 _LEAST = 6 * _EVERY
 """Frames of which spans and growth can be told: two samples in each third."""
 _PEOPLE = 5
@@ -109,7 +111,8 @@ def describe(report: Report, run: Run) -> None:
     start = settled.frames[0] - _EVERY
     report.say(
         f"growth after the first {start} frames, in {SPAN}: {settled.growth():+.2f} MB,"
-        f" {settled.block_growth():+.0f} blocks"
+        f" {settled.block_growth():+.0f} blocks,"
+        f" of which {_NUMBERS * SPAN // _EVERY} are these samples themselves"
     )
 
 
