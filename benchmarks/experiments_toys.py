@@ -33,8 +33,8 @@ _LIKE = 0.15
 """Share of a toy's own texture in such a patch."""
 _TURN_DEGREES = 4.0
 _LIGHT = 0.06
-_APART = 0.04
-"""Peaks are this share of a toy's size apart, so that there are about as many as in the paper."""
+_APART = 0.01
+"""Peaks are this share of a toy's size apart, so that there are nearly as many as in the paper."""
 _NOISE = 4.0
 """Grey levels, standard deviation of a pixel."""
 _MEETING = 55.0

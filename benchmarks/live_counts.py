@@ -1,4 +1,4 @@
-"""What the site says of itself on `/metrics`: frames that came, were missed, or were not searched."""
+"""What the site says of itself: frames that came, were missed or not searched, and windows that came late."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ import aiohttp
 from prometheus_client.parser import text_string_to_metric_families
 
 _COUNTED = ("frames", "missed", "shed", "bad_messages")
-LATE = "late windows"
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,7 +17,7 @@ class Counts:
 
     Attributes:
         cameras: by camera, then by what is counted.
-        late: windows decided without a camera that was there.
+        late: windows whose tracks came after they were decided, all cameras together.
     """
 
     cameras: Mapping[str, Mapping[str, int]]
@@ -40,23 +39,25 @@ class Counts:
         return sum(it["missed"] + it["shed"] for it in self.cameras.values())
 
 
-def counts_in(text: str) -> Counts:
+def counts_in(metrics: str, late: int) -> Counts:
     """Read the text of `/metrics`."""
     cameras: dict[str, dict[str, int]] = {}
-    late = 0
-    for family in text_string_to_metric_families(text):
+    for family in text_string_to_metric_families(metrics):
         for sample in family.samples:
             what = family.name.removeprefix("myview_camera_")
             if what in _COUNTED and "camera" in sample.labels and sample.name.endswith("_total"):
                 cameras.setdefault(sample.labels["camera"], dict.fromkeys(_COUNTED, 0))[what] = int(
                     sample.value
                 )
-            elif family.name == "myview_late_epochs" and sample.name.endswith("_total"):
-                late = int(sample.value)
     return Counts(dict(sorted(cameras.items())), late)
 
 
 async def read_counts(url: str) -> Counts:
     """Ask a running site."""
-    async with aiohttp.ClientSession() as session, session.get(f"{url}metrics") as answer:
-        return counts_in(await answer.text())
+    async with aiohttp.ClientSession() as session:
+        async with session.get(f"{url}metrics") as answer:
+            metrics = await answer.text()
+        # The metric of late windows leaves out cameras that are not waited for any more: they are late, too.
+        async with session.get(f"{url}api/cameras") as answer:
+            late = sum(camera["late"] for camera in (await answer.json())["cameras"])
+    return counts_in(metrics, late)
