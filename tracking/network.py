@@ -34,7 +34,7 @@ class Network:
     """One window of M frames and n objects; S = K + 1 states a frame, the last one occlusion.
 
     The cost of the arc from state i of frame m to state j of frame m + 1 of object n is
-    `pair[p, m, i, j] + node[n, m + 1, j]`, where p is `sets[n]`; infinite: there is no such arc.
+    `pair[q, m, i, j] + node[n, m + 1, j]`, where q is `pair_sets[n]`; infinite: there is no such arc.
 
     Attributes:
         boxes: (P, M, K, 4) pixels, zero on padding. P = 1: all objects share the observations;
@@ -42,7 +42,8 @@ class Network:
         present: (P, M, K) bool, False on padding.
         source: (n, S) cost of the arc from the source s_n to a state of the first frame, without `node`.
         node: (n, M, S) cost of being in a state, the same for all arcs into it.
-        pair: (P, M - 1, S, S) cost of going from one state to another.
+        pair: (Q, M - 1, S, S) cost of going from one state to another; Q = 1: the same for all objects,
+            else n.
         sink: (n, S) cost of the arc from a state of the last frame to the sink t_n.
         conflicts: (M, P K, P K) bool, places `p K + i` of a frame that occupy one region.
         conflict_rows: how conflicts become rows of the program.
@@ -87,6 +88,12 @@ class Network:
         return np.zeros(self.objects, dtype=np.int64) if self.shared else np.arange(self.objects)
 
     @property
+    def pair_sets(self) -> NDArray[np.int64]:
+        """The row of `pair` that each object's arcs cost, (n,)."""
+        alike = len(self.pair) == 1
+        return np.zeros(self.objects, dtype=np.int64) if alike else np.arange(self.objects)
+
+    @property
     def owners(self) -> NDArray[np.int64] | None:
         """The object that each of the places `p K + i` belongs to, (P K,); None: all share them."""
         return None if self.shared else np.repeat(np.arange(self.objects), self.places)
@@ -122,10 +129,10 @@ class Network:
         """Give the network of some of the objects, in the order given."""
         chosen = np.asarray(objects, dtype=np.int64)
         if self.shared:
-            boxes, present, pair = self.boxes, self.present, self.pair
+            boxes, present = self.boxes, self.present
             conflicts, locations = self.conflicts, self.locations
         else:
-            boxes, present, pair = self.boxes[chosen], self.present[chosen], self.pair[chosen]
+            boxes, present = self.boxes[chosen], self.present[chosen]
             places = (chosen[:, None] * self.places + np.arange(self.places)).ravel()
             conflicts = self.conflicts[:, places[:, None], places]
             locations = self.locations[chosen]
@@ -134,7 +141,7 @@ class Network:
             present=present,
             source=self.source[chosen],
             node=self.node[chosen],
-            pair=pair,
+            pair=self.pair if len(self.pair) == 1 else self.pair[chosen],
             sink=self.sink[chosen],
             conflicts=conflicts,
             conflict_rows=self.conflict_rows,
@@ -191,7 +198,7 @@ def _build(
         present=places.present,
         source=source_costs(templates, likeness, places, settings),
         node=node_costs(likeness, places, settings),
-        pair=pair_costs(places, settings),
+        pair=pair_costs(templates, likeness, places, settings),
         sink=sink_costs(len(templates), places, settings),
         conflicts=conflict_relation(places, settings),
         conflict_rows=settings.conflict_rows,

@@ -92,3 +92,12 @@ def test_two_people_in_step_among_others_are_where_all_joint_states_say() -> Non
     network = build_network(templates, frames, replace(PAPER_COSTS, layout=0.002))
     exact, joint = (solver_named(name).solve(network).report for name in ("exact", "extended-dp"))
     assert exact.objective == pytest.approx(joint.objective, rel=CLOSE)
+
+
+def test_a_program_that_presolve_wrongly_calls_infeasible_is_solved() -> None:
+    costs = replace(PAPER_COSTS, leave=1.0, conflict_distance=120.0, conflict_rows="star")
+    network = network_of(Case(6, 4, 8, shared=False, settings=costs, seed=304))
+    found = relaxation_by_columns(network)
+    rounded = whole_nodes(network, found.usage)
+    report = solver_named("exact").solve(network).report
+    assert found.bound <= report.objective <= objective(network, rounded)

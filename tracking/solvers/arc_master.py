@@ -143,7 +143,7 @@ class ArcMaster:
         costs = network.node[n, m, j]
         inner = m > 0
         costs[~inner] += network.source[n[~inner], j[~inner]]
-        costs[inner] += network.pair[network.sets[n[inner]], m[inner] - 1, i[inner], j[inner]]
+        costs[inner] += network.pair[network.pair_sets[n[inner]], m[inner] - 1, i[inner], j[inner]]
         last = m == network.frames - 1
         costs[last] += network.sink[n[last], j[last]]
         return costs

@@ -43,7 +43,7 @@ def arc_program(network: Network, allowed: NDArray[np.bool_] | None = None) -> A
     build = Assembly()
     exists = np.isfinite(network.node)
     # Arcs are the first columns, nodes the next: the flow rows join them.
-    pair = network.pair[network.sets] + network.node[:, 1:, None, :]
+    pair = network.pair[network.pair_sets] + network.node[:, 1:, None, :]
     usable = np.isfinite(pair) & exists[:, :-1, :, None]
     if allowed is not None:
         usable &= allowed

@@ -99,7 +99,7 @@ class _Joint:
         """Take the arcs of one object after the other."""
         network = self._network
         for n in range(network.objects):
-            pair = network.pair[network.sets[n], step]
+            pair = network.pair[network.pair_sets[n], step]
             ahead = np.moveaxis(costs, n, -1)[..., :, None] + pair
             costs = np.moveaxis(ahead.min(axis=-2), -1, n)
         return costs
@@ -115,7 +115,7 @@ class _Joint:
         """Give the costs of the arcs from every joint state into one, n axes."""
         network = self._network
         sets = network.sets
-        total = self._sum(network.pair[sets, step, :, target])
+        total = self._sum(network.pair[network.pair_sets, step, :, target])
         if not network.layout:
             return total
         moves = network.locations[sets, step + 1, target][:, None] - network.locations[sets, step]

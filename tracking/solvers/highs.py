@@ -94,8 +94,10 @@ def optimum(solver: highspy.Highs) -> LinearSolution:
     solver.run()
     status = solver.getModelStatus()
     if status != highspy.HighsModelStatus.kOptimal:
-        # A basis kept from before columns and rows came may be too ill-conditioned to go on from.
+        # A basis kept from before columns and rows came may be too ill-conditioned to go on from; and
+        # presolve has called whole-number programs infeasible that had answers.
         solver.clearSolver()
+        solver.setOptionValue("presolve", "off")
         solver.run()
         status = solver.getModelStatus()
     if status != highspy.HighsModelStatus.kOptimal:

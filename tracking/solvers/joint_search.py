@@ -122,7 +122,7 @@ class JointSearch:
             part = slice(first, first + size)
             ways = network.layout * cdist(leaving[part], entering, "cityblock")
             ways += before.costs[part, None]
-            for n, p in enumerate(network.sets):
+            for n, p in enumerate(network.pair_sets):
                 ways += network.pair[p, frame - 1][before.nodes[part, n][:, None], nodes[:, n]]
             least = ways.argmin(axis=0)
             costs = ways[least, np.arange(len(nodes))]

@@ -27,7 +27,7 @@ def path_costs(network: Network, nodes: Ints) -> Floats:
     each = np.arange(network.objects)
     frames = np.arange(network.frames)
     visited = network.node[each[:, None], frames, nodes].sum(axis=1)
-    between = network.pair[network.sets[:, None], frames[:-1], nodes[:, :-1], nodes[:, 1:]].sum(axis=1)
+    between = network.pair[network.pair_sets[:, None], frames[:-1], nodes[:, :-1], nodes[:, 1:]].sum(axis=1)
     ends = network.source[each, nodes[:, 0]] + network.sink[each, nodes[:, -1]]
     return np.asarray(visited + between + ends)
 
