@@ -33,8 +33,16 @@ DEFAULT = Term("all of it")
 
 TERMS = (
     Term("no confidence in the cost", {"costs": {"confidence": 0.0}}),
+    Term("leaving is free", {"costs": {"leave": 0.0}}),
+    Term("off course is free", {"costs": {"course": 0.0}}),
+    Term("out of hiding anywhere", {"costs": {"comeback": 0.0}}),
+    Term("steps of any length", {"costs": {"gate": None}}),
+    Term("hidden moments are left out", {"window": {"bridge": 0}}),
     Term("no displacement", {"costs": {"displacement": 0.0}}),
-    Term("displacement in pixels", {"costs": {"displacement_unit": "pixels", "displacement": 0.01}}),
+    Term(
+        "displacement in pixels",
+        {"costs": {"displacement_unit": "pixels", "displacement": 0.01, "gate": None}},
+    ),
     Term("no change of appearance", {"costs": {"appearance": 0.0}}),
     Term("conflicts by corners", {"costs": {"conflict_rule": "corners"}}),
     Term("conflict rows of II.D", {"costs": {"conflict_rows": "star"}}),

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from tracking.appearance import appearance_distance
 from tracking.boxes import BOX_SIDES, Floats, displacement, heights
 from tracking.costs import CostSettings
+from tracking.motion import Motion
 from tracking.places import Places
 from tracking.template import Template
 
@@ -31,16 +33,26 @@ def source_costs(
     width = places.present.shape[2]
     costs = np.full((len(templates), width + 1), settings.change)
     costs[:, width] = 0.0
-    first_boxes = np.broadcast_to(places.boxes[:, 0], (len(templates), width, BOX_SIDES))
+    first_boxes = np.broadcast_to(places.boxes[:, :1], (len(templates), 1, width, BOX_SIDES))
     for n, template in enumerate(templates):
         if template.box is not None:
-            moved = _moves(template.box[None], first_boxes[n], settings)[0]
+            moved = _moves(template.box[None], first_boxes[n, 0], settings)[0]
             costs[n, :width] = settings.appearance * likeness[n, 0] + moved
+            costs[n, width] = settings.leave
+        if template.motion is not None:
+            back = template.box is None
+            charges = _motion_costs(template.motion, first_boxes[n], likeness[n, :1], settings)
+            costs[n, :width] += charges.returned[0] if back else charges.off_course[0]
     return costs
 
 
-def pair_costs(places: Places, settings: CostSettings) -> Floats:
-    """Give what the arcs between two frames cost besides the node, (P, M - 1, S, S)."""
+def pair_costs(
+    templates: Sequence[Template], likeness: Floats, places: Places, settings: CostSettings
+) -> Floats:
+    """Give what the arcs between two frames cost besides the node, (Q, M - 1, S, S).
+
+    Q is the number of sets of observations, or n where somebody's motion is known.
+    """
     sets, frames, width = places.present.shape
     costs = np.zeros((sets, max(frames - 1, 0), width + 1, width + 1))
     before, after = places.histograms[:, :-1], places.histograms[:, 1:]
@@ -48,6 +60,16 @@ def pair_costs(places: Places, settings: CostSettings) -> Floats:
     seen += settings.appearance * appearance_distance(before, after, settings.measure)
     seen += _moves(places.boxes[:, :-1], places.boxes[:, 1:], settings)
     costs[:, :, width, :width] = settings.change
+    costs[:, :, :width, width] = settings.leave
+    if not (settings.course or settings.comeback) or not any(template.motion for template in templates):
+        return costs
+    costs = np.broadcast_to(costs, (len(templates), *costs.shape[1:])).copy()
+    boxes = np.broadcast_to(places.boxes, (len(templates), *places.boxes.shape[1:]))
+    for n, template in enumerate(templates):
+        if template.motion is not None:
+            charges = _motion_costs(template.motion, boxes[n], likeness[n], settings)
+            costs[n, :, :width, :width] += charges.off_course[1:, None]
+            costs[n, :, width, :width] += charges.returned[1:]
     return costs
 
 
@@ -72,7 +94,7 @@ def _moves(before: Floats, after: Floats, settings: CostSettings) -> Floats:
 def template_distances(templates: Sequence[Template], places: Places, settings: CostSettings) -> Floats:
     """Compare each template with each place: g(s_n, v), (n, M, K)."""
     sets, frames, width, bins = places.histograms.shape
-    distances = np.zeros((len(templates), frames, width))
+    distances = np.full((len(templates), frames, width), settings.unknown)
     known = [n for n, template in enumerate(templates) if template.histogram.size and bins]
     if not known:
         return distances
@@ -89,3 +111,28 @@ def template_distances(templates: Sequence[Template], places: Places, settings: 
         table = appearance_distance(looks[:, None], own, settings.measure)
         distances[known] = table.reshape(len(known), frames, width)
     return distances
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _MotionCosts:
+    """What it costs an object of known motion to be at boxes (M, K, 4); both (M, K).
+
+    Attributes:
+        off_course: coming from another box.
+        returned: coming out of hiding; infinite where nobody comes back so far off, or so unlike.
+    """
+
+    off_course: Floats
+    returned: Floats
+
+
+def _motion_costs(motion: Motion, boxes: Floats, likeness: Floats, settings: CostSettings) -> _MotionCosts:
+    away, moved = motion.deviations(boxes), motion.moved(len(boxes))[:, None]
+    share = np.minimum(away / (settings.slack + settings.course_drift * moved), 1.0)
+    off_course = settings.course * share
+    if not settings.comeback:
+        return _MotionCosts(off_course, off_course)
+    share = away / (settings.slack + settings.comeback_drift * moved)
+    returned = off_course + settings.comeback * share**2
+    returned[(share > 1.0) | (likeness > settings.alike)] = np.inf
+    return _MotionCosts(off_course, returned)

@@ -72,6 +72,18 @@ def displacement(first: Floats, second: Floats) -> Floats:
     return _MEAN_SIDES * _sides_apart(first, second)
 
 
+def strides(first: Floats, second: Floats) -> Floats:
+    """Give how far somebody goes from one box to another, in mean heights, shape (...).
+
+    The middle's way across, and the shorter of the ways of head and foot: one of them may be cut off by
+    the border, or hidden by somebody in front.
+    """
+    across = (first[..., 0] + first[..., 2] - second[..., 0] - second[..., 2]) / 2.0
+    down = np.minimum(np.abs(first[..., 3] - second[..., 3]), np.abs(first[..., 1] - second[..., 1]))
+    size = np.maximum((heights(first) + heights(second)) / 2.0, 1.0)
+    return np.asarray(np.hypot(across, down) / size)
+
+
 def _sides_apart(first: Floats, second: Floats) -> Floats:
     """Sum the distances of the four sides; side by side, which is faster than a sum over a short axis."""
     apart = np.abs(first[..., 0] - second[..., 0])

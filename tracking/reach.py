@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from tracking.boxes import Floats, heights
+from tracking.boxes import Floats, heights, strides
 from tracking.detections import Detections
 from tracking.network import Network
 from tracking.templates import RememberedObject
@@ -29,18 +29,13 @@ def reachable(
 def near(box: Floats, boxes: Floats, elapsed: int, window: WindowSettings) -> npt.NDArray[np.bool_]:
     """Say which boxes `(K, 4)` an object of `box` `(4,)` can have reached after `elapsed` frames, `(K,)`.
 
-    The foot's middle may have moved by `reach + reach_per_frame (elapsed - 1)` heights, and the height
+    It may have gone (`strides`) `reach + reach_per_frame (elapsed - 1)` heights, and the height
     changed by a factor.
     """
-    tall = float(heights(box))
-    other = heights(boxes)
-    size = np.maximum((tall + other) / 2.0, 1.0)
-    across = (boxes[:, 0] + boxes[:, 2] - box[0] - box[2]) / 2.0
-    # The nearer of head and foot: one of them may be cut off by the border or by somebody in front.
-    down = np.minimum(np.abs(boxes[:, 3] - box[3]), np.abs(boxes[:, 1] - box[1]))
+    tall, other = float(heights(box)), heights(boxes)
     far = window.reach + window.reach_per_frame * max(elapsed - 1, 0)
     alike = (other <= window.grow * max(tall, 1.0)) & (tall <= window.grow * np.maximum(other, 1.0))
-    return np.asarray((np.hypot(across, down) <= far * size) & (alike | (elapsed > window.window)))
+    return np.asarray((strides(box, boxes) <= far) & (alike | (elapsed > window.window)))
 
 
 def within_reach(network: Network, allowed: Sequence[Sequence[npt.NDArray[np.bool_]]]) -> Network:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from tracking.boxes import BOX_SIDES, Floats
+from tracking.motion import Motion
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -16,6 +17,7 @@ class Template:
         histogram: (B,) float64, summing to 1; B = 0: no appearance is known.
         box: (4,) pixels; None: hidden or away in that frame, so that arcs from the source cost what arcs
             from an occlusion node do.
+        motion: how it moved until it was last seen; None: not known.
 
     Raises:
         ValueError: the box has not 4 numbers, or the histogram is not one row.
@@ -24,6 +26,7 @@ class Template:
     id: int
     histogram: Floats
     box: Floats | None
+    motion: Motion | None = None
 
     def __post_init__(self) -> None:
         if self.histogram.ndim != 1:

@@ -75,7 +75,7 @@ class TemplateTracker:
         solution = self._solver.solve(network)
         rows = [_boxes_of(states, seen) for states, seen in zip(solution.states, self._seen, strict=True)]
         tracks = tuple(
-            WindowTrack(item.id, boxes, item.histogram, _confidence(states, seen))
+            WindowTrack(item.id, boxes, boxes, item.histogram, _confidence(states, seen))
             for item, boxes, states, seen in zip(templates, rows, solution.states, self._seen, strict=True)
             if not np.isnan(boxes).all()
         )

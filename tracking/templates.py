@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
 
 from tracking.boxes import Floats
+from tracking.motion import Motion
 from tracking.template import Template
+
+# Sightings that the velocity is taken from.
+_REMEMBERED = 12
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,19 +44,27 @@ class RememberedObject:
         present: it was seen in the last final frame.
     """
 
-    __slots__ = ("box", "confirmed", "frame", "histogram", "id", "present")
+    __slots__ = ("_past", "box", "confirmed", "frame", "histogram", "id", "present")
 
     def __init__(self, number: int, histogram: Floats, box: Floats, frame: int) -> None:
         self.id = number
         self.histogram = histogram
         self.box = box
         self.frame = frame
+        self._past: deque[tuple[int, Floats]] = deque(maxlen=_REMEMBERED)
         self.confirmed = False
         self.present = False
 
-    def template(self) -> Template:
-        """Give the source node: without a place where the object is hidden in the last final frame."""
-        return Template(self.id, self.histogram, self.box if self.present else None)
+    def template(self, first: int) -> Template:
+        """Give the source node of a window that begins with the frame `first`.
+
+        It has no place where the object is hidden in the last final frame.
+        """
+        motion = None
+        if self._past:
+            frames, boxes = zip(*self._past, strict=True)
+            motion = Motion.of(frames, np.stack(boxes), first)
+        return Template(self.id, self.histogram, self.box if self.present else None, motion)
 
     def see(self, sighting: Sighting, rate: float) -> None:
         """Take over what one final frame shows; `rate` is the template's share that it renews.
@@ -59,6 +72,7 @@ class RememberedObject:
         Where others are close, the box holds some of them: it does not enter the template.
         """
         self.box = sighting.box
+        self._past.append((sighting.frame, sighting.box))
         self.frame = sighting.frame
         self.confirmed = True
         if sighting.alone and self.histogram.size:

@@ -10,12 +10,14 @@ import numpy.typing as npt
 from tracking.appearance import appearance_distance
 from tracking.births import Birth, find_births
 from tracking.boxes import BOX_SIDES, Floats, iou
+from tracking.bridges import bridged
 from tracking.detections import Detections
 from tracking.duplicates import duplicates
 from tracking.network import CostSettings, build_network
 from tracking.reach import reachable, within_reach
 from tracking.solvers.base import OCCLUDED, Solver, SolveReport, solver_named
 from tracking.templates import RememberedObject, Sighting
+from tracking.told import Told
 from tracking.window import WindowResult, WindowSettings, WindowTrack, joined
 
 # Two boxes that overlap (IoU) by this much hold parts of each other's object.
@@ -41,6 +43,7 @@ class OnlineTracker:
         self._seen: dict[int, Detections] = {}
         self._objects: list[RememberedObject] = []
         self._next_id = 1
+        self._told: Told | None = None
         self._first: int | None = None
         self._last: int | None = None
 
@@ -80,6 +83,7 @@ class OnlineTracker:
         """
         result = self.flush()
         self._objects = []
+        self._told = None
         self._seen = {frame: detections}
         self._first = self._last = frame
         return result
@@ -106,7 +110,9 @@ class OnlineTracker:
         boxes = [_boxes_of(row, frames) for row in states]
         gone = self._gone(boxes)
         tracks = tuple(
-            WindowTrack(item.id, rows, item.histogram, _confidence(row, frames))
+            WindowTrack(
+                item.id, rows, self._bridged(item, first, rows), item.histogram, _confidence(row, frames)
+            )
             for item, row, rows in zip(self._objects, states, boxes, strict=True)
             if item.id not in gone and not np.isnan(rows).all()
         )
@@ -135,9 +141,11 @@ class OnlineTracker:
         if not inside:
             report = SolveReport(self._solver.name, 0.0, 0.0, integral=True, conflicts=0, rounds=0)
             return states, report
-        templates = [self._objects[n].template() for n in inside]
-        network = build_network(templates, frames, self._costs)
-        solution = self._solver.solve(within_reach(network, [allowed[n] for n in inside]))
+        templates = [self._objects[n].template(first) for n in inside]
+        network = within_reach(build_network(templates, frames, self._costs), [allowed[n] for n in inside])
+        ids = [template.id for template in templates]
+        solution = self._solver.solve(network, self._told.hint_for(first, ids) if self._told else None)
+        self._told = Told(first, ids, solution.hint)
         states[inside] = solution.states
         return states, solution.report
 
@@ -192,6 +200,10 @@ class OnlineTracker:
             if not item.confirmed and np.count_nonzero(~np.isnan(rows[:, 0])) < _LEAST_SEEN:
                 gone.add(item.id)
         return gone
+
+    def _bridged(self, item: RememberedObject, first: int, boxes: Floats) -> Floats:
+        last = (item.frame - first, item.box) if item.frame < first else None
+        return bridged(boxes, last, self._window.bridge)
 
     def _finish(
         self, first: int, final_to: int, frames: Sequence[Detections], states: npt.NDArray[np.int64]

@@ -21,7 +21,7 @@ class WindowSettings:
     window: int = 15  # M: frames of a window; a frame is final when this less the stride have followed it
     stride: int = 5  # s: frames between two windows, which end at the frames n where s divides n + 1
     birth_window: int = 15  # frames over which a new object is tested; at most the window
-    birth_visible: float = 0.75  # share of the test's frames in which a new object must be seen
+    birth_visible: float = 0.5  # share of the test's frames in which a new object must be seen
     birth_cost: float = 0.7  # mean cost per frame that its path may have: appearance, motion, confidence
     birth_score: float = 0.3  # least score of the detections that a new object may begin with
     birth_tests: int = 8  # tests per window at most, best detections first
@@ -31,9 +31,10 @@ class WindowSettings:
     most_objects: int = 24  # objects remembered at most; the longest hidden is forgotten first
     template_rate: float = 0.05  # share of an object's template renewed by each final frame it is seen in
     reach: float = 0.5  # box heights by which an object may jump between two frames
-    reach_per_frame: float = 0.045  # box heights added to that for each further frame since it was seen
+    reach_per_frame: float = 0.3  # box heights added to that for each further frame since it was seen
     grow: float = 1.5  # factor by which its height may change meanwhile
-    long_hidden: int = 50  # frames hidden after which an object only comes back the way new ones are born
+    bridge: int = 10  # frames hidden at most between two sightings for the track to say where
+    long_hidden: int = 100  # frames hidden after which an object only comes back the way new ones are born
     same_distance: float = 0.35  # largest appearance distance of somebody new who is one of those, 0..1
 
     def __post_init__(self) -> None:
@@ -61,12 +62,14 @@ class WindowTrack:
     Attributes:
         id: the object's number: from 1 in each tracker, never used again.
         boxes: `(F, 4)` pixels, one row per frame of the window, NaN where the object is hidden.
+        bridged: `(F, 4)` the same, with the gaps of up to `bridge` frames filled: where it probably is.
         histogram: `(B,)`, its template.
         confidence: mean score of its boxes over the window, 0 where hidden; in [0, 1].
     """
 
     id: int
     boxes: Floats
+    bridged: Floats
     histogram: Floats
     confidence: float
 
@@ -99,14 +102,16 @@ def joined(results: list[WindowResult]) -> WindowResult | None:
     if len(results) <= 1:
         return results[0] if results else None
     first, newest = results[0].first, results[-1]
-    rows: dict[int, WindowTrack] = {}
+    tracks: dict[int, WindowTrack] = {}
     for result in results:
         kept = result.last if result is newest else result.final_to
+        window = slice(result.first - first, kept - first + 1)
         for track in result.tracks:
-            boxes = np.full((newest.last - first + 1, BOX_SIDES), np.nan)
-            if track.id in rows:
-                boxes = rows[track.id].boxes
-            boxes[result.first - first : kept - first + 1] = track.boxes[: kept - result.first + 1]
-            rows[track.id] = replace(track, boxes=boxes)
-    seen = [rows[id_] for id_ in sorted(rows) if not np.isnan(rows[id_].boxes).all()]
+            nowhere = np.full((newest.last - first + 1, BOX_SIDES), np.nan)
+            known = tracks.get(track.id)
+            boxes, bridges = (known.boxes, known.bridged) if known else (nowhere, nowhere.copy())
+            boxes[window] = track.boxes[: kept - result.first + 1]
+            bridges[window] = track.bridged[: kept - result.first + 1]
+            tracks[track.id] = replace(track, boxes=boxes, bridged=bridges)
+    seen = [tracks[id_] for id_ in sorted(tracks) if not np.isnan(tracks[id_].boxes).all()]
     return replace(newest, first=first, tracks=tuple(seen))

@@ -106,11 +106,11 @@ def _from_detections(path: Path) -> Iterator[tuple[int, Detections]]:
 
 
 def final_rows(result: WindowResult | None) -> Iterator[MotRow]:
-    """Give the rows of the frames that are final now."""
+    """Give the rows of the frames that are final now, moments in hiding included."""
     if result is None:
         return
     for track in result.tracks:
         for number in range(result.first, result.final_to + 1):
-            left, top, right, bottom = (float(side) for side in track.boxes[number - result.first])
+            left, top, right, bottom = (float(side) for side in track.bridged[number - result.first])
             if not np.isnan(left):
                 yield MotRow(number + 1, track.id, left, top, right - left, bottom - top)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import numpy.typing as npt
 import pytest
 
-from tracking import CostSettings, TemplateTracker, WindowSettings, solver_named
+from tracking import PAPER_COSTS, CostSettings, TemplateTracker, WindowSettings, solver_named
 from tracking.boxes import iou
 from tracking.detectors import TemplateSettings
 from tracking.window import WindowResult
@@ -41,7 +43,7 @@ def picture(frame: int) -> Picture:
 
 
 def tracker(stride: int = 5) -> TemplateTracker:
-    costs = CostSettings(displacement_unit="pixels", displacement=0.01, confidence=1.0)
+    costs = replace(PAPER_COSTS, confidence=1.0)
     window = WindowSettings(window=15, stride=stride)
     settings = TemplateSettings(most_peaks=30)
     return TemplateTracker(picture(0), places(0), settings, window, costs, solver_named("columns"))

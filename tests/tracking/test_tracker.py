@@ -216,3 +216,27 @@ def test_flush_without_frames_and_twice_gives_nothing() -> None:
 def test_settings_that_make_no_sense_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(ValueError, match=next(iter(wrong))):
         WindowSettings(**wrong)  # type: ignore[arg-type]
+
+
+def test_two_who_cross_without_known_looks_keep_their_numbers() -> None:
+    """Nothing but the way they go tells them apart; for three frames one hides the other."""
+    tracked = tracker()
+    results = []
+    for frame in range(60):
+        lefts = [100.0 + 4.0 * frame, 340.0 - 4.0 * frame]
+        shown = lefts[:1] if 28 <= frame <= 31 else lefts
+        boxes = np.array([[left, 50.0, left + 40.0, 170.0] for left in shown])
+        results.append(tracked.push(frame, Detections(boxes, np.ones(len(boxes)), np.empty((len(boxes), 0)))))
+    results.append(tracked.flush())
+    found = final_boxes([result for result in results if result is not None])
+    assert _ids([result for result in results if result is not None]) == {1, 2}
+    first, last = found[20], found[59]
+    for number, box in first.items():
+        went_right = box[0] == pytest.approx(100.0 + 4.0 * 20)
+        assert (last[number][0] > box[0]) == went_right
+
+
+def test_somebody_new_does_not_get_the_number_of_who_left_elsewhere() -> None:
+    first, second = Stroll(20.0, 40.0, 0.0, 2, range(30)), Stroll(220.0, 40.0, 0.0, 2, range(45, 90))
+    results = follow([seen_at([first, second], n, 1.0) for n in range(90)], tracker())
+    assert _ids(results) == {1, 2}

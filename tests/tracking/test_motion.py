@@ -1,0 +1,108 @@
+"""Motion: where somebody should be by now, and what being elsewhere costs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tracking.bridges import bridged
+from tracking.costs import CostSettings
+from tracking.detections import Detections
+from tracking.motion import Motion
+from tracking.network import Network, build_network
+from tracking.template import Template
+
+BOX = np.array([100.0, 100.0, 140.0, 200.0])
+RIGHT = np.array([5.0, 0.0, 5.0, 0.0])
+LOOK, OTHER = np.array([1.0, 0.0]), np.array([0.0, 1.0])
+
+
+def walked(frames: int = 12) -> Motion:
+    boxes = np.stack([BOX + n * RIGHT for n in range(frames)])
+    return Motion.of(range(frames), boxes, frames)
+
+
+def window(
+    motion: Motion | None, settings: CostSettings, *boxes: np.ndarray, look: np.ndarray = LOOK
+) -> Network:
+    """Give a window of one hidden object and one box a frame."""
+    frames = [Detections(box[None], np.ones(1), look[None]) for box in boxes]
+    return build_network([Template(1, LOOK, None, motion)], frames, settings)
+
+
+def test_somebody_goes_on_as_they_went_and_slower_the_longer_they_are_away() -> None:
+    motion = walked()
+    steps = np.diff(motion.predicted(60)[:, 0])
+    assert 4.0 < steps[0] < 5.0
+    assert np.all(np.diff(steps) < 0.0)
+    assert np.all(motion.moved(1000) <= 20.0)
+    assert np.ptp(motion.predicted(60)[:, [1, 3]], axis=0) == pytest.approx([0.0, 0.0])
+
+
+def test_one_sighting_has_no_direction() -> None:
+    motion = Motion.of([7], BOX[None], 9)
+    assert motion.velocity == pytest.approx([0.0, 0.0])
+    assert motion.elapsed == 2
+    assert motion.predicted(3) == pytest.approx(np.stack([BOX] * 3))
+
+
+@given(st.lists(st.integers(1, 5), min_size=1, max_size=11), st.integers(1, 50))
+def test_a_velocity_is_never_overestimated_whatever_frames_it_is_seen_in(gaps: list[int], after: int) -> None:
+    frames = [int(n) for n in np.cumsum([0, *gaps])]
+    motion = Motion.of(frames, np.stack([BOX + n * RIGHT for n in frames]), frames[-1] + after)
+    assert 0.0 < motion.velocity[0] <= 5.0
+    assert motion.velocity[1] == pytest.approx(0.0)
+
+
+def test_nobody_comes_out_of_hiding_far_from_where_they_should_be_or_as_somebody_else() -> None:
+    settings, motion = CostSettings(), walked()
+    expected = motion.predicted(2)
+    near = window(motion, settings, *expected)
+    assert np.isfinite(near.source[0, 0])
+    assert np.isfinite(near.pair[0, 0, 1, 0])
+    far = window(motion, settings, *(expected + np.array([90.0, 0.0, 90.0, 0.0])))
+    assert np.isinf(far.source[0, 0])
+    assert np.isinf(far.pair[0, 0, 1, 0])
+    assert np.isfinite(far.pair[0, 0, 0, 0]), "who is seen may go anywhere within a step"
+    unlike = window(motion, settings, *expected, look=OTHER)
+    assert np.isinf(unlike.pair[0, 0, 1, 0])
+    paper = replace(settings, comeback=0.0, course=0.0)
+    assert np.isfinite(window(motion, paper, *(expected + 500.0)).pair[0, 0, 1, 0])
+
+
+def test_coming_back_costs_more_the_farther_off() -> None:
+    motion = walked()
+    costs = [
+        window(motion, CostSettings(), *(motion.predicted(2) + np.array([x, 0.0, x, 0.0]))).pair[0, 0, 1, 0]
+        for x in (0.0, 5.0, 10.0, 15.0)
+    ]
+    assert np.all(np.diff(costs) > 0.0)
+
+
+def test_who_never_was_seen_may_come_from_anywhere() -> None:
+    assert np.isfinite(window(None, CostSettings(), BOX, BOX + 400.0).pair).any(axis=None)
+    assert np.isfinite(window(None, CostSettings(), BOX, BOX + 400.0).pair[0, 0, 1, 0])
+
+
+def test_short_gaps_are_bridged_and_long_ones_are_not() -> None:
+    seen = {0: BOX, 3: BOX + 3 * RIGHT, 9: BOX}
+    boxes = np.full((12, 4), np.nan)
+    for frame, box in seen.items():
+        boxes[frame] = box
+    filled = bridged(boxes, None, 3)
+    assert filled[:4] == pytest.approx(np.stack([BOX + n * RIGHT for n in range(4)]))
+    assert np.isnan(filled[4:9]).all()
+    assert np.isnan(filled[10:]).all(), "nobody knows where they go next"
+    assert np.isnan(boxes[1]).all(), "what was given stays"
+
+
+def test_a_gap_that_began_before_the_window_is_bridged_from_there() -> None:
+    boxes = np.full((4, 4), np.nan)
+    boxes[2] = BOX + 2 * RIGHT
+    filled = bridged(boxes, (-2, BOX - 2 * RIGHT), 5)
+    assert filled[:3] == pytest.approx(np.stack([BOX + n * RIGHT for n in range(3)]))
+    assert np.isnan(bridged(boxes, (-20, BOX), 5)[:2]).all()

@@ -1,0 +1,60 @@
+"""Where an object should be by now: it goes on as it went, slower and slower, since it was last seen."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tracking.boxes import Floats, strides
+
+# Frames over which somebody out of sight keeps their velocity: people turn and stop.
+_KEEPS = 20.0
+# Sum of squared times, frames², at which the sightings count as much as the belief that nobody moves:
+# that of three sightings in a row, whose boxes tremble by more than a step.
+_TREMBLE = 3.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Motion:
+    """How an object moved before the window.
+
+    Attributes:
+        box: (4,) pixels, where it was last seen.
+        velocity: (2,) pixels a frame, right and down.
+        elapsed: frames from there to the window's first frame, at least 1.
+    """
+
+    box: Floats
+    velocity: Floats
+    elapsed: int
+
+    @classmethod
+    def of(cls, frames: Sequence[int], boxes: Floats, first: int) -> Motion:
+        """Give the motion of an object seen at `boxes` (F, 4) in `frames` (F,), for a window from `first`.
+
+        The velocity is the slope of the least-squares line through the middles, drawn towards zero by
+        V / (V + 3), V the sum of the squared times: a ridge regression.
+        """
+        times = np.asarray(frames, dtype=np.float64)
+        times -= times.mean()
+        middles = boxes.reshape(-1, 2, 2).mean(axis=1)
+        velocity = times @ middles / (times @ times + _TREMBLE)
+        return cls(boxes[-1], velocity, first - frames[-1])
+
+    def moved(self, frames: int) -> Floats:
+        """Give for how many frames it has moved on in each of the window's frames, (M,): 20 at most.
+
+        Every frame counts less than the one before, since people turn and stop: 20 (1 - exp(-t / 20)).
+        """
+        elapsed = self.elapsed + np.arange(frames, dtype=np.float64)
+        return np.asarray(_KEEPS * (1.0 - np.exp(-elapsed / _KEEPS)))
+
+    def predicted(self, frames: int) -> Floats:
+        """Give where it is expected in each of the window's frames, (M, 4)."""
+        return np.asarray(self.box + self.moved(frames)[:, None] * np.tile(self.velocity, 2))
+
+    def deviations(self, boxes: Floats) -> Floats:
+        """Give how far boxes (M, K, 4) are from where it is expected, in heights, (M, K)."""
+        return strides(self.predicted(len(boxes))[:, None], boxes)
