@@ -61,8 +61,8 @@ async def test_choosing_somebody_else_shows_them_without_another_player(page: Pa
     await page.wait_for_function("myview.state === 'playing'")
     await page.evaluate("document.querySelector('video').dataset.same = 'yes'")
     first = await page.evaluate("myview.object")
-    other = page.locator("#people button[aria-current=false]")
-    await other.first.click()
+    in_view = page.locator("#people button.person:not(.away)[aria-current=false]")
+    await in_view.first.click()
     await page.wait_for_function(f"myview.object !== {first} && myview.state === 'playing'")
     assert await page.evaluate("document.querySelector('video').dataset.same") == "yes"
 
