@@ -38,7 +38,7 @@ BENCHMARKS = (
         "delay", "from the pulse to the browser, stage by stage; 2 minutes, part of it drawing the scene"
     ),
     Benchmark("observations", "what detectors find, and what the tracker makes of it; 10 minutes"),
-    Benchmark("peers", "MyView beside other trackers, which come from PyPI, on public detections; 5 minutes"),
+    Benchmark("peers", "MyView beside other trackers, which pip installs, on public detections; 5 minutes"),
     Benchmark("ablation", "what each term of the tracker brings; 15 minutes"),
     Benchmark("experiments", "the paper's experiments again, on synthetic scenes; 10 minutes"),
     Benchmark("live", "four live cameras: whether tracking keeps up, and what each stage costs; 2 minutes"),

@@ -7,7 +7,7 @@ of a scene when every box is given the true identity and boxes on nobody are lef
 reach at most. Below each detector stand the tracks that the network program makes of its hypotheses. Where
 there is no truth, pictures with the boxes drawn are saved. Times are processor time.
 
-Other trackers (from PyPI, in an environment of their own; see `benchmarks.peers`) get the same boxes: of
+Other trackers (installed by pip, in an environment of their own; see `benchmarks.peers`) get the same boxes: of
 MyView's those that it is sure of.
 """
 

@@ -1,4 +1,4 @@
-"""The other trackers, from PyPI, in an environment of their own."""
+"""The other trackers, installed by pip in an environment of their own."""
 
 from __future__ import annotations
 

@@ -2,7 +2,7 @@
 
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.peers --data ../shared/data --out out/bench
 
-All with their own defaults, MyView too: what `myview track --det` gives. The peers come from PyPI into
+All with their own defaults, MyView too: what `myview track --det` gives. The peers are installed by pip into
 an environment of their own, which is kept in the user's cache; where that cannot be, only MyView is
 measured. Perfect association is the ceiling: every detection joined to the person it is at.
 """
