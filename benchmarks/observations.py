@@ -7,8 +7,8 @@ of a scene when every box is given the true identity and boxes on nobody are lef
 reach at most. Below each detector stand the tracks that the network program makes of its hypotheses. Where
 there is no truth, pictures with the boxes drawn are saved. Times are processor time.
 
-Other trackers (installed by pip, in an environment of their own; see `benchmarks.peers`) get the same boxes: of
-MyView's those that it is sure of.
+Other trackers (in an environment of their own; see `benchmarks.peers`) get the same boxes: of MyView's those
+that it is sure of.
 """
 
 from __future__ import annotations

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
-import numpy.typing as npt
 
 from tracking.boxes import BOX_SIDES, Floats
 from tracking.costs import CostSettings
@@ -13,7 +10,8 @@ from tracking.detections import Detections
 from tracking.detectors.base import Image
 from tracking.detectors.template import TemplateDetector, TemplateSettings
 from tracking.network import build_network_per_object
-from tracking.solvers.base import OCCLUDED, Solver, SolveReport
+from tracking.solvers.base import Solver, SolveReport
+from tracking.states import boxes_of, confidence_of
 from tracking.template import Template
 from tracking.window import WindowResult, WindowSettings, WindowTrack
 
@@ -73,9 +71,9 @@ class TemplateTracker:
         templates = [Template(n, one.histogram, place) for n, (one, place) in enumerate(objects, 1)]
         network = build_network_per_object(templates, self._seen, self._costs)
         solution = self._solver.solve(network)
-        rows = [_boxes_of(states, seen) for states, seen in zip(solution.states, self._seen, strict=True)]
+        rows = [boxes_of(states, seen) for states, seen in zip(solution.states, self._seen, strict=True)]
         tracks = tuple(
-            WindowTrack(item.id, boxes, boxes, item.histogram, _confidence(states, seen))
+            WindowTrack(item.id, boxes, boxes, item.histogram, confidence_of(states, seen))
             for item, boxes, states, seen in zip(templates, rows, solution.states, self._seen, strict=True)
             if not np.isnan(boxes).all()
         )
@@ -97,17 +95,3 @@ class TemplateTracker:
 def _cut(image: Image, box: Floats) -> Image:
     left, top, right, bottom = (max(round(float(side)), 0) for side in box)
     return image[top:bottom, left:right].copy()
-
-
-def _boxes_of(states: npt.NDArray[np.int64], seen: Sequence[Detections]) -> Floats:
-    """Give the boxes of one object's states `(F,)`, `(F, 4)`, NaN where it is hidden."""
-    boxes = np.full((len(seen), BOX_SIDES), np.nan)
-    for m, state in enumerate(states):
-        if state != OCCLUDED:
-            boxes[m] = seen[m].boxes[state]
-    return boxes
-
-
-def _confidence(states: npt.NDArray[np.int64], seen: Sequence[Detections]) -> float:
-    scores = [float(seen[m].scores[state]) for m, state in enumerate(states) if state != OCCLUDED]
-    return sum(scores) / len(seen)

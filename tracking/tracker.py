@@ -9,13 +9,14 @@ import numpy.typing as npt
 
 from tracking.appearance import appearance_distance
 from tracking.births import Birth, find_births
-from tracking.boxes import BOX_SIDES, Floats, iou
+from tracking.boxes import Floats, iou
 from tracking.bridges import bridged
 from tracking.detections import Detections
 from tracking.duplicates import duplicates
 from tracking.network import CostSettings, build_network
 from tracking.reach import reachable, within_reach
 from tracking.solvers.base import OCCLUDED, Solver, SolveReport, solver_named
+from tracking.states import boxes_of, confidence_of
 from tracking.templates import RememberedObject, Sighting
 from tracking.told import Told
 from tracking.window import WindowResult, WindowSettings, WindowTrack, joined
@@ -107,11 +108,11 @@ class OnlineTracker:
         born = self._give_birth(first, frames, states)
         if born:
             states, report = self._assign(first, frames)
-        boxes = [_boxes_of(row, frames) for row in states]
+        boxes = [boxes_of(row, frames) for row in states]
         gone = self._gone(boxes)
         tracks = tuple(
             WindowTrack(
-                item.id, rows, self._bridged(item, first, rows), item.histogram, _confidence(row, frames)
+                item.id, rows, self._bridged(item, first, rows), item.histogram, confidence_of(row, frames)
             )
             for item, row, rows in zip(self._objects, states, boxes, strict=True)
             if item.id not in gone and not np.isnan(rows).all()
@@ -224,17 +225,3 @@ class OnlineTracker:
         self._objects = [item for item in self._objects if item.hidden_for(final_to) <= forget_after]
         self._seen = {number: seen for number, seen in self._seen.items() if number > final_to}
         self._first = final_to + 1
-
-
-def _boxes_of(row: npt.NDArray[np.int64], frames: Sequence[Detections]) -> Floats:
-    """Give the boxes of one object's states `(F,)`, `(F, 4)`, NaN where it is hidden."""
-    boxes = np.full((len(frames), BOX_SIDES), np.nan)
-    for m, state in enumerate(row):
-        if state != OCCLUDED:
-            boxes[m] = frames[m].boxes[state]
-    return boxes
-
-
-def _confidence(row: npt.NDArray[np.int64], frames: Sequence[Detections]) -> float:
-    scores = [float(frames[m].scores[state]) for m, state in enumerate(row) if state != OCCLUDED]
-    return sum(scores) / len(frames)
