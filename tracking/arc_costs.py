@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from tracking.appearance import appearance_distance
 from tracking.boxes import BOX_SIDES, Floats, displacement, heights
 from tracking.costs import CostSettings
-from tracking.motion import Motion
+from tracking.motion_costs import MotionCharges
 from tracking.places import Places
 from tracking.template import Template
 
@@ -27,28 +26,29 @@ def node_costs(likeness: Floats, places: Places, settings: CostSettings) -> Floa
 
 
 def source_costs(
-    templates: Sequence[Template], likeness: Floats, places: Places, settings: CostSettings
+    templates: Sequence[Template],
+    likeness: Floats,
+    charges: MotionCharges | None,
+    places: Places,
+    settings: CostSettings,
 ) -> Floats:
     """Give what the arcs from the source cost besides the node, (n, S); `likeness` is (n, M, K)."""
     width = places.present.shape[2]
     costs = np.full((len(templates), width + 1), settings.change)
     costs[:, width] = 0.0
-    first_boxes = np.broadcast_to(places.boxes[:, :1], (len(templates), 1, width, BOX_SIDES))
+    first_boxes = np.broadcast_to(places.boxes[:, 0], (len(templates), width, BOX_SIDES))
     for n, template in enumerate(templates):
         if template.box is not None:
-            moved = _moves(template.box[None], first_boxes[n, 0], settings)[0]
+            moved = _moves(template.box[None], first_boxes[n], settings)[0]
             costs[n, :width] = settings.appearance * likeness[n, 0] + moved
             costs[n, width] = settings.leave
-        if template.motion is not None:
-            back = template.box is None
-            charges = _motion_costs(template.motion, first_boxes[n], likeness[n, :1], settings)
-            costs[n, :width] += charges.returned[0] if back else charges.off_course[0]
+        if charges is not None:
+            first = charges.returned if template.box is None else charges.off_course
+            costs[n, :width] += first[n, 0]
     return costs
 
 
-def pair_costs(
-    templates: Sequence[Template], likeness: Floats, places: Places, settings: CostSettings
-) -> Floats:
+def pair_costs(charges: MotionCharges | None, places: Places, settings: CostSettings) -> Floats:
     """Give what the arcs between two frames cost besides the node, (Q, M - 1, S, S).
 
     Q is the number of sets of observations, or n where somebody's motion is known.
@@ -61,15 +61,11 @@ def pair_costs(
     seen += _moves(places.boxes[:, :-1], places.boxes[:, 1:], settings)
     costs[:, :, width, :width] = settings.change
     costs[:, :, :width, width] = settings.leave
-    if not (settings.course or settings.comeback) or not any(template.motion for template in templates):
+    if charges is None:
         return costs
-    costs = np.broadcast_to(costs, (len(templates), *costs.shape[1:])).copy()
-    boxes = np.broadcast_to(places.boxes, (len(templates), *places.boxes.shape[1:]))
-    for n, template in enumerate(templates):
-        if template.motion is not None:
-            charges = _motion_costs(template.motion, boxes[n], likeness[n], settings)
-            costs[n, :, :width, :width] += charges.off_course[1:, None]
-            costs[n, :, width, :width] += charges.returned[1:]
+    costs = np.broadcast_to(costs, (len(charges.returned), *costs.shape[1:])).copy()
+    costs[:, :, :width, :width] += charges.off_course[:, 1:, None]
+    costs[:, :, width, :width] += charges.returned[:, 1:]
     return costs
 
 
@@ -111,28 +107,3 @@ def template_distances(templates: Sequence[Template], places: Places, settings: 
         table = appearance_distance(looks[:, None], own, settings.measure)
         distances[known] = table.reshape(len(known), frames, width)
     return distances
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _MotionCosts:
-    """What it costs an object of known motion to be at boxes (M, K, 4); both (M, K).
-
-    Attributes:
-        off_course: coming from another box.
-        returned: coming out of hiding; infinite where nobody comes back so far off, or so unlike.
-    """
-
-    off_course: Floats
-    returned: Floats
-
-
-def _motion_costs(motion: Motion, boxes: Floats, likeness: Floats, settings: CostSettings) -> _MotionCosts:
-    away, moved = motion.deviations(boxes), motion.moved(len(boxes))[:, None]
-    share = np.minimum(away / (settings.slack + settings.course_drift * moved), 1.0)
-    off_course = settings.course * share
-    if not settings.comeback:
-        return _MotionCosts(off_course, off_course)
-    share = away / (settings.slack + settings.comeback_drift * moved)
-    returned = off_course + settings.comeback * share**2
-    returned[(share > 1.0) | (likeness > settings.alike)] = np.inf
-    return _MotionCosts(off_course, returned)

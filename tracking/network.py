@@ -17,6 +17,7 @@ from tracking.boxes import BOX_SIDES, Floats
 from tracking.conflicts import Bools, clique_rows, conflict_relation, star_exclusions
 from tracking.costs import ConflictRows, CostSettings
 from tracking.detections import Detections
+from tracking.motion_costs import motion_charges
 from tracking.places import Places, stack_places
 from tracking.template import Template
 
@@ -193,12 +194,13 @@ def _build(
     centre: tuple[float, float] | None,
 ) -> Network:
     likeness = template_distances(templates, places, settings)
+    charges = motion_charges(templates, likeness, places, settings)
     return Network(
         boxes=places.boxes,
         present=places.present,
-        source=source_costs(templates, likeness, places, settings),
+        source=source_costs(templates, likeness, charges, places, settings),
         node=node_costs(likeness, places, settings),
-        pair=pair_costs(templates, likeness, places, settings),
+        pair=pair_costs(charges, places, settings),
         sink=sink_costs(len(templates), places, settings),
         conflicts=conflict_relation(places, settings),
         conflict_rows=settings.conflict_rows,
