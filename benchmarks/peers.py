@@ -26,10 +26,23 @@ from benchmarks.peer_environment import (
 from benchmarks.peer_plot import plot
 from benchmarks.recordings import Recording, find_recordings, track
 from benchmarks.report import Report
-from benchmarks.score_table import HEADINGS, cells
 from benchmarks.surroundings import CannotRunError, finish, parser
-from tracking.evaluation import Scores, average, perfect_association
+from tracking.evaluation import HEADINGS, Scores, average, cells, perfect_association
 from tracking.motchallenge import MotRow, read_rows
+
+_SHOWN = (
+    "hota",
+    "deta",
+    "assa",
+    "mota",
+    "idf1",
+    "recall",
+    "precision",
+    "switches",
+    "tracks",
+    "objects",
+)
+_HEADINGS = [HEADINGS[score] for score in _SHOWN]
 
 OURS, PICTURES, CEILING = "MyView", "MyView, pictures", "perfect association"
 
@@ -98,12 +111,16 @@ def run(options_data: Path, out: Path, folder: Path, names: list[str] | None, *,
             if peers is not None:
                 worst = max(worst, difference(peers, sequence, tracks, scores))
         report.table(
-            sequence.name, ["", *HEADINGS], [[name, *cells(scores)] for name, scores in found.items()]
+            sequence.name,
+            ["", *_HEADINGS],
+            [[name, *cells(scores, _SHOWN)] for name, scores in found.items()],
         )
     if len(table) > 1:
         everywhere = [name for name in table[sequences[0].name] if all(name in it for it in table.values())]
-        averages = [[name, *cells(average([it[name] for it in table.values()]))] for name in everywhere]
-        report.table("mean of the sequences; counts are totals", ["", *HEADINGS], averages)
+        averages = [
+            [name, *cells(average([it[name] for it in table.values()]), _SHOWN)] for name in everywhere
+        ]
+        report.table("mean of the sequences; counts are totals", ["", *_HEADINGS], averages)
     ahead = lead(table)
     if ahead:
         report.table("MyView less the best peer of each score", ["", "HOTA", "MOTA", "IDF1", "IDSW"], ahead)

@@ -15,26 +15,11 @@ from server.wire.output import whole_file
 from tracking.motchallenge import MotRow, read_rows
 
 try:
-    from tracking.evaluation import CameraScores, Recording, Scores, evaluate_cameras
+    from tracking.evaluation import HEADINGS, CameraScores, Recording, cells, evaluate_cameras
 except ModuleNotFoundError as missing:
     if missing.name != "motrics":
         raise
     raise UserError("evaluate: needs a library for the scores: pip install 'myview[evaluate]'") from missing
-
-_COLUMNS = {
-    "hota": "HOTA",
-    "deta": "DetA",
-    "assa": "AssA",
-    "mota": "MOTA",
-    "idf1": "IDF1",
-    "recall": "Rcll",
-    "precision": "Prcn",
-    "switches": "IDSW",
-    "fragments": "Frag",
-    "objects": "GT",
-    "tracks": "IDs",
-}
-"""What the table shows, under the headings of MOTChallenge; shares are shown in percent."""
 
 
 def evaluate_files(tracks: Path, truth: Path, least_iou: float) -> CameraScores:
@@ -58,13 +43,13 @@ def print_table(scores: CameraScores) -> None:
     """Print a row for each camera and, where there are several, one for their mean and one for all as one."""
     # Without frame and colour, so that eighty columns are enough and a script can split it.
     table = Table("camera", box=None, padding=(0, 1, 0, 0))
-    for heading in _COLUMNS.values():
+    for heading in HEADINGS.values():
         table.add_column(heading, justify="right", no_wrap=True)
     for camera, found in scores.cameras.items():
-        table.add_row(camera, *_cells(found))
+        table.add_row(camera, *cells(found, HEADINGS))
     if len(scores.cameras) > 1:
-        table.add_row("mean, total", *_cells(scores.mean))
-        table.add_row("joint", *_cells(scores.joint))
+        table.add_row("mean, total", *cells(scores.mean, HEADINGS))
+        table.add_row("joint", *cells(scores.joint, HEADINGS))
     console = Console(highlight=False)
     console.print(table, width=max(console.width, console.measure(table).maximum))
 
@@ -83,11 +68,6 @@ def write_json(out: Path, scores: CameraScores, least_iou: float) -> None:
     }
     with whole_file(out) as draft:
         draft.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
-
-
-def _cells(scores: Scores) -> list[str]:
-    values = (getattr(scores, name) for name in _COLUMNS)
-    return [f"{value}" if isinstance(value, int) else f"{100.0 * value:.1f}" for value in values]
 
 
 def _rows(path: Path) -> list[MotRow]:
