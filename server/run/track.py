@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from itertools import count
 from pathlib import Path
 
 import numpy as np
 
 from server.camera.observe import make_detector
-from server.camera.sources import SourceEnded, open_source
+from server.camera.sources import Image, Source, SourceEnded, open_source
 from server.run.setup import config_for_videos
 from server.wire.config import Config
 from server.wire.errors import UserError
@@ -81,17 +82,21 @@ def _from_video(config: Config) -> Iterator[tuple[int, Detections]]:
     source = open_source(camera, config.site)
     fit = Fit(source.size, (config.site.width, config.site.height))
     detector = make_detector(config, camera, fit)
-    number = 0
-    while True:
-        try:
-            image = source.take(number)
-        except SourceEnded:
-            source.close()
-            return
+    for number, image in pictures(source):
         if image is not None:
             found = detector.detect(fit.image(image), number)
             yield number, replace(found, boxes=fit.boxes_to_own(found.boxes))
-        number += 1
+    source.close()
+
+
+def pictures(source: Source, first: int = 0) -> Iterator[tuple[int, Image | None]]:
+    """Give the frames of a recording from `first` to its end; `None` where one has no picture."""
+    for number in count(first):
+        try:
+            image = source.take(number)
+        except SourceEnded:
+            return
+        yield number, image
 
 
 def _from_detections(path: Path) -> Iterator[tuple[int, Detections]]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from server.camera.sources import SourceEnded, open_source
-from server.run.track import final_rows, loaded_for, solver_for
+from server.run.track import final_rows, loaded_for, pictures, solver_for
 from server.wire.errors import UserError
 from server.wire.output import whole_file
 from tracking import TemplateTracker
@@ -67,24 +67,17 @@ def track_templates(
             for number, (left, top, right, bottom) in enumerate(boxes.tolist(), 1)
         ]
         with whole_file(out) as draft:
-            for number in range(1, _FOR_EVER):
-                try:
-                    image = source.take(number)
-                except SourceEnded:
-                    break
-                if image is not None:
-                    rows += final_rows(tracker.push(image))
+            for number, picture in pictures(source, 1):
+                if picture is not None:
+                    rows += final_rows(tracker.push(picture))
                 progress(number + 1)
             rows += final_rows(tracker.flush())
-            write_rows(draft, sorted(rows, key=lambda row: (row.frame, row.id)))
+            write_rows(draft, rows)
     except (SourceEnded, ValueError) as error:
         raise UserError(f"{video}: {error}") from error
     finally:
         source.close()
     return len(boxes)
-
-
-_FOR_EVER = 10_000_000
 
 
 def _check_inside(boxes: NDArray[np.float64], size: tuple[int, int]) -> None:
