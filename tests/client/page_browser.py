@@ -13,9 +13,9 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from page_site import FakeSite, SiteServer, serving
-from playwright.async_api import Browser, Page, async_playwright
+from playwright.async_api import Browser, Page
 
-from benchmarks.browser import CHROMIUM, FLAGS
+from benchmarks.browser import CHROMIUM
 
 PATIENCE_MS = 15_000  # a slow core with other work
 
@@ -49,17 +49,6 @@ class Visit:
         image = await self.page.locator("#stage").screenshot()
         with av.open(io.BytesIO(image), "r") as container:
             return next(container.decode(video=0)).to_ndarray(format="rgb24").astype(np.int16)
-
-
-@contextlib.asynccontextmanager
-async def launched() -> AsyncIterator[Browser]:
-    """Run a browser."""
-    async with async_playwright() as playwright:
-        browser = await playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        try:
-            yield browser
-        finally:
-            await browser.close()
 
 
 @contextlib.asynccontextmanager

@@ -6,17 +6,19 @@ from collections.abc import AsyncIterator
 
 import pytest
 import pytest_asyncio
-from page_browser import launched, needs_chromium, visiting
+from page_browser import needs_chromium, visiting
 from page_pattern import CAMERAS, HEIGHT, SQUARE, WIDTH
 from page_site import FakeSite
 from playwright.async_api import Browser, expect
+
+from benchmarks.browser import chromium
 
 pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="module")]
 
 
 @pytest_asyncio.fixture(scope="module", loop_scope="module")
 async def browser() -> AsyncIterator[Browser]:
-    async with launched() as running:
+    async with chromium() as running:
         yield running
 
 

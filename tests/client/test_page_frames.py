@@ -8,10 +8,12 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 import pytest_asyncio
-from page_browser import Visit, launched, needs_chromium, visiting
+from page_browser import Visit, needs_chromium, visiting
 from page_pattern import CAMERAS, FPS, GROUNDS, HEIGHT, SQUARE, WIDTH
 from page_site import HOLD, LOOKAHEAD, FakeSite
 from playwright.async_api import Browser
+
+from benchmarks.browser import chromium
 
 pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="module")]
 
@@ -34,7 +36,7 @@ BUSY = "setInterval(() => { const t = performance.now() + 25; while (performance
 
 @pytest_asyncio.fixture(scope="module", loop_scope="module")
 async def browser() -> AsyncIterator[Browser]:
-    async with launched() as running:
+    async with chromium() as running:
         yield running
 
 

@@ -7,10 +7,12 @@ from typing import Any
 
 import pytest
 import pytest_asyncio
-from page_browser import launched, needs_chromium
+from page_browser import needs_chromium
 from page_pattern import FPS, GOP
 from page_site import STARTS_AT, FakeSite, SiteServer, serving
 from playwright.async_api import Browser, Page
+
+from benchmarks.browser import chromium
 
 pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="module")]
 
@@ -19,7 +21,7 @@ FIRST = STARTS_AT - STARTS_AT % GOP
 
 @pytest_asyncio.fixture(scope="module", loop_scope="module")
 async def browser() -> AsyncIterator[Browser]:
-    async with launched() as running:
+    async with chromium() as running:
         yield running
 
 

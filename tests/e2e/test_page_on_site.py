@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 import pytest_asyncio
-from playwright.async_api import Page, async_playwright
+from playwright.async_api import Page
 from running_site import PATIENCE_S, RunningSite, configuration, running
 
-from benchmarks.browser import CHROMIUM, FLAGS
+from benchmarks.browser import CHROMIUM, chromium
 
 pytestmark = [
     pytest.mark.asyncio(loop_scope="module"),
@@ -34,15 +34,13 @@ async def site(recording: Path, tmp_path_factory: pytest.TempPathFactory) -> Asy
 async def page(site: RunningSite) -> AsyncIterator[Page]:
     """The page, opened; an error in it fails the test."""
     errors: list[str] = []
-    async with async_playwright() as playwright:
-        browser = await playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+    async with chromium() as browser:
         # Waiting for a condition in the page evaluates it as a string, which the page's policy forbids.
         page = await browser.new_page(bypass_csp=True)
         page.on("pageerror", lambda error: errors.append(str(error)))
         page.set_default_timeout(1000 * PATIENCE_S)
         await page.goto(site.url)
         yield page
-        await browser.close()
     assert errors == []
 
 
