@@ -78,6 +78,12 @@ class RememberedObject:
         if sighting.alone and self.histogram.size:
             self.histogram = (1.0 - rate) * self.histogram + rate * sighting.histogram
 
+    def return_at(self, box: Floats, frame: int) -> None:
+        """Begin anew at a place where it was recognised: how it went long ago says nothing there."""
+        self.box = box
+        self.frame = frame
+        self._past.clear()
+
     def hidden_for(self, frame: int) -> int:
         """Give for how many frames it has not been seen at `frame`."""
         return max(frame - self.frame, 0)

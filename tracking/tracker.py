@@ -179,7 +179,7 @@ class OnlineTracker:
         best = int(np.argmin(distances))
         if distances[best] > self._window.same_distance:
             return False
-        away[best].box, away[best].frame = birth.box, frame
+        away[best].return_at(birth.box, frame)
         return True
 
     def _make_room(self, frame: int, states: npt.NDArray[np.int64]) -> bool:

@@ -240,3 +240,12 @@ def test_somebody_new_does_not_get_the_number_of_who_left_elsewhere() -> None:
     first, second = Stroll(20.0, 40.0, 0.0, 2, range(30)), Stroll(220.0, 40.0, 0.0, 2, range(45, 90))
     results = follow([seen_at([first, second], n, 1.0) for n in range(90)], tracker())
     assert _ids(results) == {1, 2}
+
+
+def test_who_comes_back_elsewhere_long_after_gets_their_number_by_their_looks() -> None:
+    away = 120
+    there = Stroll(20.0, 40.0, 0.0, 2, range(40))
+    back = Stroll(260.0, 60.0, 0.0, 2, range(40 + away, 100 + away))
+    results = follow([seen_at([there, back], n, 1.0) for n in range(100 + away)], tracker())
+    assert _ids(results) == {1}
+    assert set(final_boxes(results)[90 + away]) == {1}
