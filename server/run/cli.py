@@ -10,6 +10,7 @@ import typer
 
 from server.run import file_commands, site_commands, viewer_commands
 from server.run.ending import end_with_parent
+from server.run.several import one_value_per_flag
 from server.wire.errors import UserError
 
 app = typer.Typer(
@@ -43,7 +44,7 @@ def main() -> None:
     # So that what is half-written is tidied away; what runs until it is told to end has its own handler.
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(_TERMINATED))
     try:
-        app()
+        app(args=one_value_per_flag(sys.argv[1:], file_commands.SEVERAL))
     except UserError as error:
         typer.echo(f"myview: {error}", err=True)
         sys.exit(error.code)

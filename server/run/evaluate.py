@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
@@ -22,8 +23,8 @@ except ModuleNotFoundError as missing:
     raise UserError("evaluate: needs a library for the scores: pip install 'myview[evaluate]'") from missing
 
 
-def evaluate_files(tracks: Path, truth: Path, least_iou: float) -> CameraScores:
-    """Score the files, or the files of equal names in the folders.
+def evaluate_files(tracks: Sequence[Path], truth: Sequence[Path], least_iou: float) -> CameraScores:
+    """Score files, or those of folders, in the pairs that :func:`pair_up` makes of them.
 
     Raises:
         UserError: there is nothing to compare, or a file is missing or malformed.

@@ -15,6 +15,9 @@ from server.wire.errors import UserError
 from server.wire.loading import read_content
 from server.wire.output import whole_folder
 
+SEVERAL = {"render": ("--det",), "evaluate": ("--gt", "--tracks")}
+"""Options by command that take several values after one flag (`server/run/several.py`)."""
+
 OutFolder = Annotated[Path, typer.Option("--out", help="A new folder to write into.")]
 
 
@@ -23,7 +26,8 @@ def render(
     out: OutFolder,
     config: Annotated[Path | None, typer.Option("--config", help="Settings, and cameras by name.")] = None,
     det: Annotated[
-        list[Path] | None, typer.Option("--det", help="Detections (MOTChallenge) instead, one per view.")
+        list[Path] | None,
+        typer.Option("--det", metavar="FILE…", help="Detections (MOTChallenge) instead, one file per view."),
     ] = None,
     ground: Annotated[Path | None, typer.Option("--ground", help="Homographies (JSON) per view.")] = None,
 ) -> None:
@@ -98,8 +102,13 @@ def _track_templates(
 
 
 def evaluate(
-    tracks: Annotated[Path, typer.Argument(metavar="TRACKS", help="A file, or a folder of one per camera.")],
-    truth: Annotated[Path, typer.Option("--truth", help="The ground truth: a file, or such a folder.")],
+    truth: Annotated[
+        list[Path],
+        typer.Option("--gt", metavar="FILE…", help="Ground truth: files, or a folder of one per camera."),
+    ],
+    tracks: Annotated[
+        list[Path], typer.Option("--tracks", metavar="FILE…", help="Tracks: as many files, or such a folder.")
+    ],
     iou: Annotated[
         float, typer.Option(min=0.01, max=1.0, help="Overlap from which a box is at a person.")
     ] = 0.5,

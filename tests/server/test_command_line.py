@@ -243,6 +243,8 @@ def test_watch_says_in_one_line_that_nobody_is_there(run: Run) -> None:
         (["c0.mp4", "empty.mp4"], "empty.mp4"),
         (["c0.mp4", "sub/c0.mp4"], "two cameras are called 'c0'"),
         (["c0.mp4", "--det", "a.txt", "--det", "b.txt"], "--det: 2 detection files for 1 views"),
+        (["c0.mp4", "--det", "a.txt", "b.txt"], "--det: 2 detection files for 1 views"),
+        (["--det", "a.txt", "b.txt", "--", "c0.mp4"], "--det: 2 detection files for 1 views"),
         (["c0.mp4", "--det", "a.txt"], "a.txt"),
         (["c0.mp4", "--ground", "none.json"], "none.json"),
         (["c0.mp4", "--config", "none.yaml"], "none.yaml: cannot read the configuration"),
@@ -257,7 +259,7 @@ def test_render_refuses_and_leaves_nothing(run: Run, tmp_path: Path, arguments: 
     (tmp_path / "empty.mp4").write_bytes(b"")
     (tmp_path / "wrong.yaml").write_text("sight: {}\n")
     before = written(tmp_path)
-    assert why in refusal(run("render", *arguments, "--out", "out"))
+    assert why in refusal(run("render", "--out", "out", *arguments))
     assert written(tmp_path) == before
 
 
