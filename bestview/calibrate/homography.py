@@ -1,0 +1,107 @@
+"""Homographies by least squares (Hartley and Zisserman, Multiple View Geometry, 4.1 to 4.4)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+LEAST_POINTS = 4
+_STEPS = 20
+_STILL = 1e-12
+_LEAST_RANK = 1e-5
+"""Below this share of the largest, the eighth singular value says that the points fix no homography."""
+
+Floats = NDArray[np.float64]
+
+
+def fit_homography(source: Floats, target: Floats) -> Floats:
+    """Fit the homography that takes source to target points with the least squared error at the target.
+
+    The direct linear transform on normalised points, bettered by Gauss and Newton's steps.
+
+    Args:
+        source: points, (N, 2), four at least.
+        target: where they go, (N, 2).
+
+    Returns:
+        The (3, 3) matrix; its last entry is 1 where that can be.
+
+    Raises:
+        ValueError: the points fix none: too few, or (all but one of) them on a line.
+    """
+    if len(source) < LEAST_POINTS:
+        raise ValueError(f"{len(source)} points: a homography takes {LEAST_POINTS}")
+    to_source, from_target = _normaliser(source), _normaliser(target)
+    x, y = _apply(to_source, source), _apply(from_target, target)
+    _, sizes, rows = np.linalg.svd(_equations(x, y))
+    if not sizes[7] > _LEAST_RANK * sizes[0]:
+        raise ValueError("the points, or all but one of them, are on a line")
+    found = _bettered(rows[-1].reshape(3, 3), x, y)
+    found = np.linalg.inv(from_target) @ found @ to_source
+    size = np.abs(found).max()
+    last = found[2, 2]
+    return np.asarray(found / (last if abs(last) > 1e-9 * size else size))
+
+
+def mapped(homography: Floats, points: Floats) -> Floats:
+    """Take points through a homography: (..., 2) -> (..., 2); no horizon is looked for."""
+    through = points @ homography[:, :2].T + homography[:, 2]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(through[..., :2] / through[..., 2:])
+
+
+def _normaliser(points: Floats) -> Floats:
+    """Give the similarity that moves the points around 0 at a mean distance of the square root of 2."""
+    middle = points.mean(axis=0)
+    far = float(np.hypot(*(points - middle).T).mean())
+    if not far > 0:
+        raise ValueError("all points are at one place")
+    scale = np.sqrt(2.0) / far
+    return np.array([[scale, 0, -scale * middle[0]], [0, scale, -scale * middle[1]], [0, 0, 1]])
+
+
+def _apply(similarity: Floats, points: Floats) -> Floats:
+    return np.asarray(points * similarity[0, 0] + similarity[:2, 2])
+
+
+def _equations(x: Floats, y: Floats) -> Floats:
+    """Two linear equations in the nine entries for each pair, (2 N or 9, 9)."""
+    ones = np.column_stack([x, np.ones(len(x))])
+    none = np.zeros_like(ones)
+    above = np.column_stack([ones, none, -y[:, :1] * ones])
+    below = np.column_stack([none, ones, -y[:, 1:] * ones])
+    equations = np.concatenate([above, below])
+    return np.concatenate([equations, np.zeros((max(0, 9 - len(equations)), 9))])
+
+
+def _bettered(homography: Floats, x: Floats, y: Floats) -> Floats:
+    """Take Gauss and Newton's steps, as long as they better the error at the target."""
+    best = homography / np.linalg.norm(homography)
+    least = _error(best, x, y)
+    for _ in range(_STEPS):
+        w = (x @ best[2, :2] + best[2, 2])[:, None]
+        if not (np.abs(w) > _STILL).all():
+            return best
+        ones = np.column_stack([x, np.ones(len(x))]) / w
+        none, at = np.zeros_like(ones), mapped(best, x)
+        slopes = np.concatenate(
+            [
+                np.column_stack([ones, none, -at[:, :1] * ones]),
+                np.column_stack([none, ones, -at[:, 1:] * ones]),
+            ]
+        )
+        step = np.linalg.lstsq(slopes, (y - at).T.ravel(), rcond=1e-10)[0]
+        tried = best + step.reshape(3, 3)
+        tried = tried / np.linalg.norm(tried)
+        error = _error(tried, x, y)
+        if not error < least:
+            return best
+        settled = least - error <= _STILL * least
+        best, least = tried, error
+        if settled:
+            break
+    return best
+
+
+def _error(homography: Floats, x: Floats, y: Floats) -> float:
+    return float(((mapped(homography, x) - y) ** 2).sum())

@@ -1,0 +1,65 @@
+"""``myview calibrate`` from marked points: one homography per camera, and how far each is off."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+
+from bestview.calibrate import CalibrationError, MarkedPoints, PointFit, fit_cameras
+from server.run.calibrate_file import write_ground
+from server.run.calibrate_plan import PlanView, plot_plan
+from server.run.calibrate_points import read_points
+from server.wire.errors import UserError
+from server.wire.output import whole_file
+
+_UNNAMED = "unit"
+
+
+def calibrate_points(points: Path, out: Path, plan: Path, unit: str | None) -> list[str]:
+    """Read the points, fit, and write the file and the plan; give the lines to say.
+
+    Raises:
+        UserError: the file is no such file, its points contradict each other, or it cannot be written.
+    """
+    given = read_points(points)
+    unit = unit or given.unit or _UNNAMED
+    with refusing(points):
+        fits = fit_cameras(given.cameras)
+    views = [PlanView(it.camera, fits[it.camera].homography, it.image, it.floor) for it in given.cameras]
+    with whole_file(plan) as draft:
+        plot_plan(views, unit, draft)
+        write_ground(
+            out,
+            unit,
+            {camera: fit.homography for camera, fit in fits.items()},
+            {"residuals": {camera: _rounded(fit) for camera, fit in fits.items()}},
+        )
+    return [_line(it, fits[it.camera], unit) for it in given.cameras]
+
+
+@contextmanager
+def refusing(source: Path | str) -> Iterator[None]:
+    """Say what was given in front of what is wrong with it."""
+    try:
+        yield
+    except CalibrationError as error:
+        raise UserError(f"{source}: {error}") from error
+
+
+def _rounded(fit: PointFit) -> list[float]:
+    return [float(f"{error:.4g}") for error in fit.floor_error]
+
+
+def _line(points: MarkedPoints, fit: PointFit, unit: str) -> str:
+    count = len(points.image)
+    if count == 4:  # noqa: PLR2004 — as many as a homography takes
+        return f"{points.camera}: 4 pairs, which fit exactly whatever they are; a fifth would show errors"
+    worst = int(np.argmax(fit.image_error))
+    return (
+        f"{points.camera}: {count} pairs, off by {np.median(fit.floor_error):.3g} {unit} (median), "
+        f"{fit.floor_error.max():.3g} {unit} (most), in the picture {np.median(fit.image_error):.1f} and "
+        f"{fit.image_error[worst]:.1f} pixels; the worst is pair {worst + 1}"
+    )
