@@ -7,11 +7,14 @@ from bestview.identity import IdentityRegistry, IdentityUpdate
 from bestview.identity_settings import IdentitySettings
 from bestview.people import Merge
 from bestview.quality import HIDDEN_COST, size_quality, view_cost
-from bestview.score import ViewScore, score_views
+from bestview.score import ViewScore, cuts_of, score_views
+from bestview.score_objects import NOBODY, stands_for
+from bestview.score_truth import ViewTruth, best_views, true_views
 from bestview.sightings import LocalTrack
 
 __all__ = [
     "HIDDEN_COST",
+    "NOBODY",
     "NO_CAMERA",
     "NO_VIEW_COST",
     "Choices",
@@ -22,13 +25,18 @@ __all__ = [
     "Merge",
     "TrackKey",
     "ViewScore",
+    "ViewTruth",
+    "best_views",
     "checked_homography",
     "choose_views",
+    "cuts_of",
     "feet",
     "foot_spread",
     "person_heights",
     "score_views",
     "size_quality",
+    "stands_for",
     "to_ground",
+    "true_views",
     "view_cost",
 ]

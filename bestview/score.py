@@ -7,9 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview.choice import NO_CAMERA, NO_VIEW_COST, choose_views
+from bestview.choice import NO_CAMERA, NO_VIEW_COST
+from bestview.score_truth import ViewTruth, best_views
 
 _SECONDS_PER_MINUTE = 60.0
+_ROUNDING = 1e-9
+"""Frames: costs that differ by less are sums in another order."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,19 +23,30 @@ class ViewScore:
         frames: object-frames that count.
         agreement: share of them in which the choice is the optimum's.
         regret: extra cost over the optimum's, as a share of it (0: as good; infinite: the optimum is free).
+        excess: the same with both costs counted from `least_cost`: whoever is far from all cameras costs much
+            whatever is chosen, which makes regret small.
         visible: share of them in which the object is visible in the chosen camera.
+        chosen: share of them in which there is a choice at all.
         cuts_per_minute: cuts per minute of an object's stream.
         optimum_cuts_per_minute: the same for the optimum.
         shortest_shot: frames between the closest two cuts; 0 where there are fewer than two.
+        cost: of the choice, in frames of not seeing the object; `regret` compares it with the next.
+        optimum_cost: of the optimum.
+        least_cost: of the best view of every frame, if cuts cost nothing.
     """
 
     frames: int
     agreement: float
     regret: float
+    excess: float
     visible: float
+    chosen: float
     cuts_per_minute: float
     optimum_cuts_per_minute: float
     shortest_shot: int
+    cost: float
+    optimum_cost: float
+    least_cost: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,8 +55,10 @@ class _Tally:
 
     frames: int
     agreed: int
+    chosen: int
     cost: float
     best_cost: float
+    least_cost: float
     seen: int
     cuts: NDArray[np.int64]
     best_cuts: NDArray[np.int64]
@@ -77,50 +93,65 @@ def score_views(
         )
     if views.size and not (views.min() >= NO_CAMERA and views.max() < cost.shape[2]):
         raise ValueError(f"the choice names a camera outside -1 .. {cost.shape[2] - 1}")
-    counted = np.asarray(visible.any(axis=2))
+    truth = ViewTruth(cost, visible)
     tallies = [
-        _tally(cost[k][counted[k]], visible[k][counted[k]], views[k][counted[k]], switch_cost)
-        for k in range(len(cost))
-        if counted[k].any()
+        _tally(cost[k][on], visible[k][on], views[k][on], optimum[on], switch_cost)
+        for k, (on, optimum) in enumerate(zip(truth.counted, best_views(truth, switch_cost), strict=True))
+        if on.any()
     ]
     frames = sum(tally.frames for tally in tallies)
     per_minute = _SECONDS_PER_MINUTE * fps / max(frames, 1)
     best = sum(tally.best_cost for tally in tallies)
-    extra = sum(tally.cost for tally in tallies) - best
+    total = sum(tally.cost for tally in tallies)
+    least = sum(tally.least_cost for tally in tallies)
     shots = [int(np.diff(tally.cuts).min()) for tally in tallies if tally.cuts.size > 1]
     return ViewScore(
         frames=frames,
         agreement=sum(tally.agreed for tally in tallies) / max(frames, 1),
-        regret=extra / best if best > 0 else (float("inf") if extra > 0 else 0.0),
+        regret=_share(total - best, best),
+        excess=_share(total - best, best - least),
         visible=sum(tally.seen for tally in tallies) / max(frames, 1),
+        chosen=sum(tally.chosen for tally in tallies) / max(frames, 1),
         cuts_per_minute=sum(tally.cuts.size for tally in tallies) * per_minute,
         optimum_cuts_per_minute=sum(tally.best_cuts.size for tally in tallies) * per_minute,
         shortest_shot=min(shots, default=0),
+        cost=float(total),
+        optimum_cost=float(best),
+        least_cost=float(least),
     )
 
 
 def _tally(
-    cost: NDArray[np.float64], visible: NDArray[np.bool_], views: NDArray[np.int64], switch_cost: float
+    cost: NDArray[np.float64],
+    visible: NDArray[np.bool_],
+    views: NDArray[np.int64],
+    best: NDArray[np.int64],
+    switch_cost: float,
 ) -> _Tally:
-    """Sum up one object's (F, C) costs and (F,) views, all of whose frames count."""
-    frames = len(cost)
-    best = choose_views(cost[None], np.array([NO_CAMERA]), switch_cost, np.ones(frames, dtype=bool))
-    chosen = views >= 0
-    row = np.arange(frames)
-    each = np.where(chosen, cost[row, views], NO_VIEW_COST)
-    cuts = _cuts(views)
+    """Sum up one object's (F, C) costs, its (F,) views and the best ones, all of whose frames count."""
+    chosen, row = views >= 0, np.arange(len(cost))
+    cuts, best_cuts = cuts_of(views), cuts_of(best)
     return _Tally(
-        frames=frames,
-        agreed=int(np.count_nonzero(views == best.views[0])),
-        cost=float(each.sum() + switch_cost * cuts.size),
-        best_cost=float(best.costs[0]),
+        frames=len(cost),
+        agreed=int(np.count_nonzero(views == best)),
+        chosen=int(np.count_nonzero(chosen)),
+        cost=float(np.where(chosen, cost[row, views], NO_VIEW_COST).sum() + switch_cost * cuts.size),
+        best_cost=float(cost[row, best].sum() + switch_cost * best_cuts.size),
+        least_cost=float(cost.min(axis=1).sum()),
         seen=int(np.count_nonzero(chosen & visible[row, views])),
         cuts=cuts,
-        best_cuts=_cuts(best.views[0]),
+        best_cuts=best_cuts,
     )
 
 
-def _cuts(views: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Frames at which (F,) views change the camera; frames without a choice do not."""
+def _share(extra: float, whole: float) -> float:
+    """Give a part of the whole; of a whole that is nothing but for rounding, nothing or infinitely much."""
+    if whole > _ROUNDING:
+        return float(extra / whole)
+    return float("inf") if extra > _ROUNDING else 0.0
+
+
+def cuts_of(views: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Give the frames at which (F,) views change the camera; to a frame without a choice is no change."""
     shown = np.flatnonzero(views >= 0)
     return np.asarray(shown[1:][views[shown[1:]] != views[shown[:-1]]])

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 
 from server.run.pairing import pair_up
 from server.wire.errors import UserError
-from server.wire.output import whole_file
 from tracking.motchallenge import MotRow, read_rows
 
 try:
@@ -23,17 +22,26 @@ except ModuleNotFoundError as missing:
     raise UserError("evaluate: needs a library for the scores: pip install 'myview[evaluate]'") from missing
 
 
-def evaluate_files(tracks: Sequence[Path], truth: Sequence[Path], least_iou: float) -> CameraScores:
-    """Score files, or those of folders, in the pairs that :func:`pair_up` makes of them.
+def read_recordings(tracks: Sequence[Path], truth: Sequence[Path]) -> dict[str, Recording]:
+    """Read files, or those of folders, in the pairs that :func:`pair_up` makes of them; by camera.
 
     Raises:
         UserError: there is nothing to compare, or a file is missing or malformed.
     """
     recordings = {}
     for pair in pair_up(tracks, truth):
-        recording = Recording(truth=_rows(pair.truth), tracks=_rows(pair.tracks))
+        recording = Recording(truth=rows_of(pair.truth), tracks=rows_of(pair.tracks))
         _check(recording, pair.tracks, pair.truth)
         recordings[pair.camera] = recording
+    return recordings
+
+
+def evaluate_recordings(recordings: Mapping[str, Recording], least_iou: float) -> CameraScores:
+    """Score them.
+
+    Raises:
+        UserError: an id is twice in one frame of a camera.
+    """
     try:
         return evaluate_cameras(recordings, least_iou)
     except ValueError as error:
@@ -55,23 +63,21 @@ def print_table(scores: CameraScores) -> None:
     console.print(table, width=max(console.width, console.measure(table).maximum))
 
 
-def write_json(out: Path, scores: CameraScores, least_iou: float) -> None:
-    """Write all scores; shares are in [0, 1].
-
-    Raises:
-        UserError: the file cannot be written.
-    """
-    content = {
-        "iou": least_iou,
+def content_of(scores: CameraScores) -> dict[str, Any]:
+    """Give all scores for a file; shares are in [0, 1]."""
+    return {
         "cameras": {camera: asdict(found) for camera, found in scores.cameras.items()},
         "mean": asdict(scores.mean),
         "joint": asdict(scores.joint),
     }
-    with whole_file(out) as draft:
-        draft.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
 
 
-def _rows(path: Path) -> list[MotRow]:
+def rows_of(path: Path) -> list[MotRow]:
+    """Read a MOTChallenge file.
+
+    Raises:
+        UserError: it cannot be read, or is malformed.
+    """
     try:
         return read_rows(path)
     except OSError as error:

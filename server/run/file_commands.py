@@ -15,7 +15,7 @@ from server.wire.errors import UserError
 from server.wire.loading import read_content
 from server.wire.output import whole_folder
 
-SEVERAL = {"render": ("--det",), "evaluate": ("--gt", "--tracks")}
+SEVERAL = {"render": ("--det",), "evaluate": ("--gt", "--tracks", "--videos")}
 """Options by command that take several values after one flag (`server/run/several.py`)."""
 
 OutFolder = Annotated[Path, typer.Option("--out", help="A new folder to write into.")]
@@ -107,20 +107,36 @@ def evaluate(
         typer.Option("--gt", metavar="FILE…", help="Ground truth: files, or a folder of one per camera."),
     ],
     tracks: Annotated[
-        list[Path], typer.Option("--tracks", metavar="FILE…", help="Tracks: as many files, or such a folder.")
-    ],
+        list[Path] | None,
+        typer.Option("--tracks", metavar="FILE…", help="Tracks: as many files, or such a folder."),
+    ] = None,
+    views: Annotated[Path | None, typer.Option("--views", help="Choices of views: choices.csv.")] = None,
+    videos: Annotated[
+        list[Path] | None, typer.Option("--videos", metavar="FILE…", help="The views, for --plots.")
+    ] = None,
+    size: Annotated[str | None, typer.Option(help="WIDTHxHEIGHT of the cameras' pictures.")] = None,
+    fps: Annotated[float | None, typer.Option(min=0.01, help="Frames per second.")] = None,
+    switch_cost: Annotated[
+        float | None, typer.Option(min=0.0, help="Seconds of not seeing somebody that a cut must save.")
+    ] = None,
+    visible: Annotated[
+        float, typer.Option(min=0.0, max=1.0, help="Share of somebody that shows where they are visible.")
+    ] = 0.25,
     iou: Annotated[
         float, typer.Option(min=0.01, max=1.0, help="Overlap from which a box is at a person.")
     ] = 0.5,
     json_file: Annotated[Path | None, typer.Option("--json", help="A file for the numbers, too.")] = None,
+    plots: Annotated[
+        Path | None, typer.Option("--plots", help="A new folder for plots of the choices.")
+    ] = None,
 ) -> None:
-    """Score tracks against ground truth: HOTA, MOTA, IDF1, identity switches."""
-    from server.run.evaluate import evaluate_files, print_table, write_json
+    """Score tracks (HOTA, MOTA, IDF1, identity switches) and choices of views against ground truth."""
+    from server.run.evaluate_command import Asked
+    from server.run.evaluate_command import evaluate as score
+    from server.run.evaluate_site import SiteOptions
 
-    scores = evaluate_files(tracks, truth, iou)
-    if json_file is not None:
-        write_json(json_file, scores, iou)
-    print_table(scores)
+    site = SiteOptions(size, fps, switch_cost)
+    score(Asked(truth, tracks or [], views, videos or [], site, iou, visible, json_file, plots))
 
 
 def scene(

@@ -24,7 +24,7 @@ def plot_choices(choices: Path, cameras: Sequence[str], out: Path) -> None:
             shown[int(row["object"])].append((int(row["frame"]), cameras.index(row["camera"])))
     rows = max(1, len(shown))
     size = (_WIDTH_INCHES, 1 + _ROW_INCHES * rows)
-    figure = _figure(size)
+    figure = new_figure(size)
     axes = figure.subplots(rows, 1, sharex=True, squeeze=False)
     for axis, (number, points) in zip(axes[:, 0], sorted(shown.items()), strict=False):
         frames, views = np.array(points).T
@@ -34,12 +34,12 @@ def plot_choices(choices: Path, cameras: Sequence[str], out: Path) -> None:
         axis.set_ylabel(f"object {number}")
     axes[-1, 0].set_xlabel("frame")
     figure.suptitle("Camera chosen for each object")
-    _save(figure, out)
+    save_figure(figure, out)
 
 
 def plot_tracks(tracks: Path, out: Path) -> None:
     """Plot the middle of everybody's box over the frames, x above y."""
-    figure = _figure((_WIDTH_INCHES, 6))
+    figure = new_figure((_WIDTH_INCHES, 6))
     axes = figure.subplots(2, 1, sharex=True)
     places: dict[int, list[tuple[float, float, float]]] = defaultdict(list)
     for row in read_rows(tracks):
@@ -54,15 +54,16 @@ def plot_tracks(tracks: Path, out: Path) -> None:
         axes[0].legend(title="object", loc="upper right", markerscale=4, ncols=4, fontsize="small")
     axes[1].set_xlabel("frame")
     figure.suptitle(f"Tracks of {tracks.stem}")
-    _save(figure, out)
+    save_figure(figure, out)
 
 
-def _figure(size: tuple[float, float]) -> Figure:
+def new_figure(size: tuple[float, float]) -> Figure:
     """Give an empty figure that needs no screen and that nothing global holds on to."""
     figure = Figure(figsize=size, layout="tight")
     FigureCanvasAgg(figure)
     return figure
 
 
-def _save(figure: Figure, out: Path) -> None:
+def save_figure(figure: Figure, out: Path) -> None:
+    """Write a figure as PNG: the same bytes for the same figure."""
     figure.savefig(out, dpi=100, metadata={"Software": None})

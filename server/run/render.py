@@ -9,6 +9,7 @@ from pathlib import Path
 from server.run.films import Films
 from server.run.offline import Batch, CameraWorkers
 from server.run.plots import plot_choices, plot_tracks
+from server.run.site_file import Size, write_site
 from server.view.agreement import Agreement
 from server.view.align import Aligner
 from server.view.decide import Decider, GopDecision, homographies
@@ -39,6 +40,7 @@ class Renderer:
         )
         self._recorder = Recorder(folder, cameras, self._decider.people.fits)
         self._films = Films(folder / "best", self._shelves, agreement, config.site)
+        self._sizes: dict[str, Size] = {}
         self.ended: dict[str, int] = {}
         """The last pulse of each camera whose recording is over."""
         self.frames = 0
@@ -51,6 +53,7 @@ class Renderer:
             self.frames += 1
         if batch.tracks is not None:
             self._aligner.tracks(batch.tracks)
+            self._sizes[batch.camera] = batch.tracks.size
             if batch.ended:
                 self.ended[batch.camera] = batch.tracks.last
         for epoch in self._aligner.ready(now=-1):
@@ -62,6 +65,7 @@ class Renderer:
         for decision in self._decider.finish(max(self.ended.values())):
             self._write(decision)
         self.close()
+        write_site(self._folder, self._config, self._sizes)
         plot_choices(self._folder / "choices.csv", self._config.camera_ids, self._folder / "choices.png")
         for camera in self._config.camera_ids:
             plot_tracks(self._folder / "tracks" / f"{camera}.txt", self._folder / "tracks" / f"{camera}.png")

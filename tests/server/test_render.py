@@ -57,6 +57,7 @@ def test_two_views_become_films_tracks_choices_and_plots_and_the_shorter_one_is_
         "choices.csv",
         "choices.png",
         "late.csv",
+        "site.json",
         "tracks/c0.txt",
         "tracks/c0.png",
         "tracks/c1.txt",

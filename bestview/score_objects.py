@@ -1,0 +1,32 @@
+"""Which numbers stand for which people, when both were seen by several cameras."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
+
+NOBODY = -1
+
+
+def stands_for(matches: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Let each object stand for one person and each person have one object, the best way round.
+
+    The total of the matches is largest, as for IDF1 (Ristani et al., 2016), over all cameras together.
+
+    Args:
+        matches: (K, O) in how many frames of all cameras each of K people was at each of O objects' boxes.
+
+    Returns:
+        (O,) the index of each object's person; -1 where it is nobody's.
+
+    Raises:
+        ValueError: matches that are no table.
+    """
+    if matches.ndim != 2:  # noqa: PLR2004 — people, objects
+        raise ValueError(f"matches have shape {matches.shape}, not (people, objects)")
+    people = np.full(matches.shape[1], NOBODY, dtype=np.int64)
+    rows, columns = linear_sum_assignment(matches, maximize=True)
+    met = matches[rows, columns] > 0
+    people[columns[met]] = rows[met]
+    return people

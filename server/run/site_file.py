@@ -1,0 +1,64 @@
+"""`site.json`, beside `choices.csv`: what a rendering was made with, as far as judging it takes it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from server.wire.config import Config
+from server.wire.errors import UserError
+
+SITE_FILE = "site.json"
+
+Size = tuple[int, int]
+"""Width and height of a picture, pixels."""
+
+
+@dataclass(frozen=True, slots=True)
+class SiteFacts:
+    """What has to be known of a site to judge its choices.
+
+    Attributes:
+        fps: frames per second.
+        switch_cost_s: lambda, in seconds of not seeing the person.
+        sizes: each camera's own picture.
+    """
+
+    fps: float
+    switch_cost_s: float
+    sizes: Mapping[str, Size]
+
+    @property
+    def switch_cost(self) -> float:
+        """Lambda in frames of not seeing the person."""
+        return self.switch_cost_s * self.fps
+
+
+def write_site(folder: Path, config: Config, sizes: Mapping[str, Size]) -> None:
+    """Write it."""
+    content = {
+        "fps": config.site.fps,
+        "gop": config.encode.gop,
+        "lookahead": config.view.lookahead,
+        "switch_cost_s": config.view.switch_cost_s,
+        "sizes": {camera: list(sizes[camera]) for camera in config.camera_ids},
+    }
+    (folder / SITE_FILE).write_text(json.dumps(content, indent=1) + "\n", encoding="ascii")
+
+
+def read_site(path: Path) -> SiteFacts:
+    """Read it.
+
+    Raises:
+        UserError: it cannot be read, or is none.
+    """
+    try:
+        content = json.loads(path.read_text(encoding="ascii"))
+        sizes = {str(name): (int(width), int(height)) for name, (width, height) in content["sizes"].items()}
+        return SiteFacts(float(content["fps"]), float(content["switch_cost_s"]), sizes)
+    except OSError as error:
+        raise UserError(f"{path}: cannot be read: {error.strerror}") from error
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise UserError(f"{path}: is not what `myview render` writes: {error}") from error

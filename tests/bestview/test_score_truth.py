@@ -1,0 +1,98 @@
+"""What is visible, what the best views would have been, and who stands for whom, against trying all."""
+
+from __future__ import annotations
+
+from itertools import pairwise, permutations, product
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bestview import NOBODY, ViewTruth, best_views, score_views, stands_for, true_views
+
+BOX = [0.0, 0.0, 50.0, 50.0]  # a quarter of a picture of 100 x 100: its size is one half
+NOWHERE = [np.nan] * 4
+SQUARE, WIDE = [100.0, 100.0], [200.0, 200.0]
+
+
+def truth_of(boxes: list[list[float]], shown: list[float], least: float = 0.25) -> ViewTruth:
+    """Give one person's views in one frame of several cameras."""
+    laid = np.array(boxes)[None, None]
+    sizes = np.array([SQUARE] * len(boxes))
+    return true_views(laid, np.array(shown)[None, None], sizes, least)
+
+
+def test_a_view_costs_less_the_larger_the_person_is_in_its_own_picture() -> None:
+    boxes = np.array([BOX, BOX])[None, None]
+    truth = true_views(boxes, np.ones((1, 1, 2)), np.array([SQUARE, WIDE]), 0.25)
+    assert truth.cost.ravel().tolist() == [0.5, 0.75]
+    assert truth.visible.all()
+
+
+def test_who_is_hidden_or_not_there_costs_one_and_is_not_visible() -> None:
+    truth = truth_of([BOX, BOX, NOWHERE, [-9.0, 0.0, -1.0, 9.0]], [0.2, 0.0, 1.0, 1.0])
+    assert truth.cost.ravel().tolist() == [1.0] * 4
+    assert not truth.visible.any()
+    assert not truth.counted.any()
+
+
+def test_an_unknown_share_counts_as_all_and_the_threshold_is_the_callers() -> None:
+    assert truth_of([BOX] * 3, [-1.0, 0.25, 1.0]).visible.all()
+    assert truth_of([BOX] * 2, [0.0, 0.2], least=0.0).visible.all()
+    assert not truth_of([BOX], [0.9], least=1.0).visible.any()
+
+
+def test_shapes_that_do_not_fit_are_refused() -> None:
+    with pytest.raises(ValueError, match="shapes"):
+        true_views(np.zeros((1, 1, 2, 4)), np.zeros((1, 1, 2)), np.ones((1, 2)), 0.5)
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.integers(0, 10_000), st.sampled_from([0.0, 0.1, 0.4, 2.0]))
+def test_the_optimum_is_the_cheapest_of_all_sequences(seed: int, switch_cost: float) -> None:
+    rng = np.random.default_rng(seed)
+    visible = rng.random((2, 5, 3)) < 0.7
+    cost = np.where(visible, rng.random((2, 5, 3)), 1.0)
+    truth = ViewTruth(cost, visible)
+    views = best_views(truth, switch_cost)
+    for person in range(2):
+        on = visible[person].any(axis=1)
+        assert (views[person] >= 0).tolist() == on.tolist()
+        assert total(cost[person, on], views[person, on].tolist(), switch_cost) == pytest.approx(
+            min(total(cost[person, on], it, switch_cost) for it in product(range(3), repeat=int(on.sum())))
+        )
+
+
+def total(cost: np.ndarray, views: tuple[int, ...] | list[int], switch_cost: float) -> float:
+    seen = sum(float(cost[frame, view]) for frame, view in enumerate(views))
+    return seen + switch_cost * sum(a != b for a, b in pairwise(views))
+
+
+@settings(deadline=None, max_examples=80)
+@given(st.integers(1, 4), st.integers(1, 4), st.integers(0, 10_000))
+def test_numbers_stand_for_people_the_best_way_round(people: int, objects: int, seed: int) -> None:
+    matches = np.random.default_rng(seed).integers(0, 5, (people, objects))
+    found = stands_for(matches).tolist()
+    somebody = [it for it in found if it != NOBODY]
+    assert len(set(somebody)) == len(somebody), "one person has one object"
+    reached = sum(int(matches[person, thing]) for thing, person in enumerate(found) if person != NOBODY)
+    square = np.zeros((4, 4), dtype=np.int64)
+    square[:people, :objects] = matches
+    assert reached == max(sum(int(square[a, b]) for b, a in enumerate(way)) for way in permutations(range(4)))
+
+
+def test_who_was_never_met_is_nobody() -> None:
+    assert stands_for(np.array([[0, 3, 1], [0, 0, 2]])).tolist() == [NOBODY, 0, 1]
+    assert stands_for(np.zeros((0, 2), dtype=np.int64)).tolist() == [NOBODY, NOBODY]
+
+
+def test_excess_is_counted_from_what_no_choice_can_save() -> None:
+    cost = np.array([[[0.9, 0.8], [0.9, 0.8], [0.8, 0.9], [0.8, 0.9]]])
+    visible = np.ones(cost.shape, dtype=bool)
+    score = score_views(cost, visible, np.array([[0, 0, 0, 0]]), 0.1, 25.0)
+    assert (score.cost, score.optimum_cost, score.least_cost) == pytest.approx((3.4, 3.3, 3.2))
+    assert score.regret == pytest.approx(0.1 / 3.3)
+    assert score.excess == pytest.approx(1.0)
+    free = score_views(cost, visible, np.array([[1, 1, 0, 1]]), 0.0, 25.0)
+    assert free.excess == float("inf")
