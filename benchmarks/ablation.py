@@ -37,6 +37,7 @@ TERMS = (
     Term("off course is free", {"costs": {"course": 0.0}}),
     Term("out of hiding anywhere", {"costs": {"comeback": 0.0}}),
     Term("steps of any length", {"costs": {"gate": None}}),
+    Term("new people from weak boxes alone", {"window": {"birth_sure": 0.0}}),
     Term("hidden moments are left out", {"window": {"bridge": 0}}),
     Term("no displacement", {"costs": {"displacement": 0.0}}),
     Term(

@@ -121,6 +121,9 @@ class _Test:
         path = np.concatenate([np.full(first, OCCLUDED), forward])
         if np.count_nonzero(path != OCCLUDED) < _needed(self.window):
             return None
+        sure = max(seen.scores[k] for seen, k in zip(frames, path, strict=True) if k != OCCLUDED)
+        if sure < self.window.birth_sure:
+            return None
         return path if self._agree(frames[: last + 1], backward, path[: last + 1]) else None
 
     def _track(self, frames: Sequence[Detections], start: int, seed: int) -> npt.NDArray[np.int64]:

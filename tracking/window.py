@@ -24,16 +24,17 @@ class WindowSettings:
     birth_visible: float = 0.5  # share of the test's frames in which a new object must be seen
     birth_cost: float = 0.7  # mean cost per frame that its path may have: appearance, motion, confidence
     birth_score: float = 0.3  # least score of the detections that a new object may begin with
+    birth_sure: float = 0.65  # least score of the best of them: somebody new is seen clearly once
     birth_tests: int = 8  # tests per window at most, best detections first
     apart: float = 0.35  # overlap (IoU) with a known object above which a detection is not somebody new
     duplicate: float = 0.8  # mean overlap of two tracks above which they are one object
-    forget_after: int = 250  # F: frames hidden after which an object is forgotten and its number retired
+    forget_after: int = 1500  # F: frames hidden after which an object is forgotten and its number retired
     most_objects: int = 24  # objects remembered at most; the longest hidden is forgotten first
     template_rate: float = 0.05  # share of an object's template renewed by each final frame it is seen in
     reach: float = 0.5  # box heights by which an object may jump between two frames
     reach_per_frame: float = 0.3  # box heights added to that for each further frame since it was seen
     grow: float = 1.5  # factor by which its height may change meanwhile
-    bridge: int = 10  # frames hidden at most between two sightings for the track to say where
+    bridge: int = 20  # frames hidden at most between two sightings for the track to say where
     long_hidden: int = 100  # frames hidden after which an object only comes back the way new ones are born
     same_distance: float = 0.35  # largest appearance distance of somebody new who is one of those, 0..1
 

@@ -20,13 +20,14 @@ WIDTH, HEIGHT = 30.0, 90.0
 
 @dataclass(frozen=True)
 class Stroll:
-    """One person: walks `speed` pixels a frame from `x` at `y`, seen in the frames of `seen`."""
+    """One person: walks `speed` pixels a frame from `x`, `y`, in the frames of `seen`, clearly in `sure`."""
 
     x: float
     y: float
     speed: float
     look: int
     seen: range = range(1_000_000)
+    sure: range = range(1_000_000)
 
     def box(self, frame: int) -> tuple[float, float, float, float]:
         left = self.x + self.speed * frame
@@ -47,7 +48,8 @@ def seen_at(people: Iterable[Stroll], frame: int, jitter: float = 0.0, seed: int
     rng = np.random.default_rng((seed, frame))
     boxes = np.array([person.box(frame) for person in there]) + rng.normal(0.0, jitter, (len(there), 4))
     looks = np.stack([look(person.look) for person in there])
-    return Detections(boxes, np.full(len(there), 0.9), looks)
+    scores = np.array([0.9 if frame in person.sure else 0.5 for person in there])
+    return Detections(boxes, scores, looks)
 
 
 def tracker(settings: WindowSettings | None = None) -> OnlineTracker:

@@ -47,6 +47,17 @@ def test_confidences_are_stretched_to_scores_best_first_and_doubles_go(file: Pat
     assert len(MotFileDetector(file, MotFileSettings(least_score=0.5)).detect(NOTHING)) == 1
 
 
+def test_one_confidence_far_above_all_others_does_not_make_them_doubtful(tmp_path: Path) -> None:
+    path = tmp_path / "det.txt"
+    confidences = [10.0, *(20.0 + n / 10 for n in range(18)), 1000.0]
+    path.write_text("".join(f"{n + 1},-1,0,0,30,60,{c},-1,-1,-1\n" for n, c in enumerate(confidences)))
+    detector = MotFileDetector(path)
+    scores = [float(detector.detect(NOTHING).scores[0]) for _ in confidences]
+    assert scores[0] == 0.0
+    assert scores[-1] == 1.0
+    assert min(scores[1:]) > 0.8
+
+
 def test_appearance_comes_from_the_picture_where_there_is_one(file: Path) -> None:
     assert MotFileDetector(file).detect(NOTHING).histograms.shape == (2, 0)
     picture = np.full((100, 300, 3), 128, dtype=np.uint8)

@@ -122,6 +122,14 @@ def test_a_person_who_enters_later_is_born_and_shown_from_the_window_on() -> Non
     assert seen == list(range(min(seen), 60))
 
 
+def test_somebody_new_is_seen_clearly_once_and_what_led_up_to_it_counts() -> None:
+    vague = Stroll(100.0, 50.0, 2.0, 1, sure=range(0))
+    clear_once = Stroll(100.0, 50.0, 2.0, 1, sure=range(12, 13))
+    assert not _ids(follow([seen_at([vague], frame) for frame in range(30)], tracker()))
+    shown = final_boxes(follow([seen_at([clear_once], frame) for frame in range(30)], tracker()))
+    assert all(shown[frame].keys() == {1} for frame in range(30))
+
+
 def test_short_clutter_is_nobody() -> None:
     person = Stroll(20.0, 30.0, 2.0, 0)
     clutter = Stroll(300.0, 60.0, 0.0, 5, range(22, 29))

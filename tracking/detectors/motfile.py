@@ -26,11 +26,16 @@ class MotFileSettings:
     first_frame: int = 0  # frame number (pulse) of the file's frame 1
 
 
+_SURE = 0.9
+"""Quantile of confidences in an unknown unit that counts as sure."""
+
+
 class MotFileDetector:
     """Gives the detections of a file frame by frame; appearance from the picture where there is one.
 
     Confidences become scores in [0, 1]: as they are if all lie there, else stretched from the smallest
-    of the file to the largest (detectors write what they like, the files do not say the unit). Without
+    of the file to what a tenth of them exceeds (detectors write what they like, the files do not say the
+    unit, and a few may be far above all others). Without
     pictures (`image` of no pixels) histograms have no bins.
 
     Raises:
@@ -67,13 +72,13 @@ class MotFileDetector:
 def _by_frame(rows: Sequence[MotRow]) -> dict[int, np.ndarray[tuple[int, int], np.dtype[np.float64]]]:
     """Give the rows `left, top, right, bottom, score` of each frame, best first."""
     confidences = [row.confidence for row in rows]
-    least, most = min(confidences, default=0.0), max(confidences, default=1.0)
-    if least >= 0.0 and most <= 1.0:
-        least, most = 0.0, 1.0
+    least, most = 0.0, 1.0
+    if confidences and not (min(confidences) >= 0.0 and max(confidences) <= 1.0):
+        least, most = min(confidences), float(np.quantile(confidences, _SURE, method="higher"))
     spread = most - least
     frames: dict[int, list[tuple[float, ...]]] = {}
     for row in rows:
-        score = (row.confidence - least) / spread if spread > 0.0 else 1.0
+        score = min((row.confidence - least) / spread, 1.0) if spread > 0.0 else 1.0
         frames.setdefault(row.frame, []).append((*row.box, score))
     return {
         number: np.array(sorted(found, key=lambda row: (-row[-1], *row)), dtype=np.float64)
