@@ -1,11 +1,11 @@
 """View qualities in, view choices out: the sliding-window DP, identity across cameras, view quality."""
 
 from bestview.choice import NO_CAMERA, NO_VIEW_COST, Choices, choose_views
+from bestview.corrections import Merge, Split
 from bestview.evidence import TrackKey
 from bestview.ground import checked_homography, feet, foot_spread, person_heights, to_ground
 from bestview.identity import IdentityRegistry, IdentityUpdate
 from bestview.identity_settings import IdentitySettings
-from bestview.people import Merge
 from bestview.quality import HIDDEN_COST, size_quality, view_cost
 from bestview.score import ViewScore, cuts_of, score_views
 from bestview.score_objects import NOBODY, stands_for
@@ -23,6 +23,7 @@ __all__ = [
     "IdentityUpdate",
     "LocalTrack",
     "Merge",
+    "Split",
     "TrackKey",
     "ViewScore",
     "ViewTruth",

@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bestview.appearance import Appearances, distances, normalised
+from bestview.corrections import Corrections, Merge, Split
 from bestview.evidence import PairEvidence, TrackKey
 from bestview.ground import checked_homography
 from bestview.grouping import GroupingProblem, group
 from bestview.identity_settings import IdentitySettings
 from bestview.likeness import appearance_scores, ground_scores
-from bestview.people import Merge, People
+from bestview.people import People
 from bestview.persons import Finding
 from bestview.sightings import FootError, HeightScale, LocalTrack, Sightings, line_up
 from bestview.succession import Heirs
@@ -34,6 +35,7 @@ class IdentityUpdate:
         returned: numbers of people who had gone and are back.
         gone: numbers of people whom no camera has seen for a while; they are remembered.
         merged: numbers that turned out to be one person.
+        split: numbers that stood for somebody else than who was behind them before.
     """
 
     numbers: Mapping[TrackKey, int]
@@ -41,6 +43,7 @@ class IdentityUpdate:
     returned: tuple[int, ...]
     gone: tuple[int, ...]
     merged: tuple[Merge, ...]
+    split: tuple[Split, ...]
 
 
 class IdentityRegistry:
@@ -76,6 +79,7 @@ class IdentityRegistry:
         self._pairs = PairEvidence()
         self._people = People(settings)
         self._heirs = Heirs(settings.continuity)
+        self._corrections = Corrections()
         self._last_frame: int | None = None
 
     def update(self, tracks: Sequence[LocalTrack], last_frame: int) -> IdentityUpdate:
@@ -105,13 +109,17 @@ class IdentityRegistry:
         born, found = self._people.confirm(finding, since)
         gone, returned = self._people.comings_and_goings(last_frame)
         numbers = {key: self._people.person(key).number for key in seen.keys}
+        numbers = {key: number for key, number in numbers.items() if number}
         self._people.forget(last_frame)
+        split = self._corrections.update(numbers, merged)
+        self._corrections.keep_only(self._people.tracks)
         return IdentityUpdate(
-            numbers={key: number for key, number in numbers.items() if number},
+            numbers=numbers,
             born=tuple(sorted(born)),
             returned=tuple(sorted(found + returned)),
             gone=tuple(sorted(gone)),
             merged=tuple(sorted(merged)),
+            split=split,
         )
 
     def _gate(self) -> float:

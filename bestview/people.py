@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bestview.corrections import Merge
 from bestview.evidence import PairEvidence, TrackKey
 from bestview.identity_settings import IdentitySettings
 from bestview.persons import Finding, Person
@@ -17,14 +17,6 @@ _TENURE_UPDATES = 10.0
 
 _TENURE_SHARE = 0.25
 """That extra hold: enough to say which of two goes, too little to keep what should go."""
-
-
-@dataclass(frozen=True, slots=True, order=True)
-class Merge:
-    """Two numbers turned out to be one person: `lost` is never used again."""
-
-    kept: int
-    lost: int
 
 
 class People:
@@ -55,6 +47,11 @@ class People:
     def serials(self, keys: Sequence[TrackKey]) -> NDArray[np.int64]:
         """Give the internal number of each track's person: (T,)."""
         return np.array([self._serial_of[key] for key in keys], dtype=np.int64)
+
+    @property
+    def tracks(self) -> Collection[TrackKey]:
+        """All tracks remembered."""
+        return self._heard.keys()
 
     def tracks_heard_since(self, frame: int) -> list[TrackKey]:
         """List the tracks heard of since `frame`, sorted."""

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from bestview import IdentityRegistry, IdentitySettings, IdentityUpdate, LocalTrack, Merge, TrackKey
+from bestview import IdentityRegistry, IdentitySettings, IdentityUpdate, LocalTrack, Merge, Split, TrackKey
 
 WINDOW, STRIDE = 15, 5
 FOCAL, EYE = 400.0, 3.0
@@ -198,11 +198,24 @@ def test_a_track_that_changes_its_person_changes_its_number_and_not_before_evide
     # From frame 200 the tracker of one camera takes each for the other.
     stays = [replace(s, end=199) if s.camera == "west" else s for s in stays]
     stays += [Stay("west", i, 200, 299, at[3 - i]) for i in (1, 2)]
-    seen = [numbers(update) for update in play(registry(), stays, 300)]
+    updated = play(registry(), stays, 300)
+    seen = [numbers(update) for update in updated]
     assert seen[200 // STRIDE] == seen[190 // STRIDE]
     before, after = seen[190 // STRIDE], seen[-1]
     assert after["west", 1] == before["west", 2] == after["south", 2] == before["south", 2]
     assert after["west", 2] == before["west", 1] == after["south", 1] == before["south", 1]
+    told = [split for update in updated for split in update.split]
+    assert told == [Split(1, 2, "west"), Split(2, 1, "west")]
+
+
+def test_who_shared_a_number_with_somebody_else_gets_one_of_their_own_and_it_is_said() -> None:
+    # One camera sees two who walk as one and then part; the others see the one who stays.
+    together = [Stay(camera, 1, 0, 150, (0, 0)) for camera in VIEWS]
+    apart = [Stay(camera, 1, 151, 999, (4, 3) if camera == "west" else (0, 0)) for camera in VIEWS]
+    updated = play(registry(), [*together, *apart], 400)
+    assert numbers(updated[150 // STRIDE - 1]) == {("south", 1): 1, ("west", 1): 1, ("north", 1): 1}
+    assert [split for update in updated for split in update.split] == [Split(1, 2, "west")]
+    assert numbers(updated[-1]) == {("south", 1): 1, ("west", 1): 2, ("north", 1): 1}
 
 
 def test_feet_cut_off_by_the_picture_do_not_stand_where_the_cut_is() -> None:
@@ -296,5 +309,5 @@ def test_what_makes_no_sense_is_refused_in_one_line() -> None:
 
 def test_no_tracks_are_no_people() -> None:
     update = registry().update([], 4)
-    assert update == IdentityUpdate({}, (), (), (), ())
+    assert update == IdentityUpdate({}, (), (), (), (), ())
     assert TrackKey("a", 2) < TrackKey("b", 1)

@@ -29,7 +29,7 @@ class Dictated:
 
 def said(numbers: dict[tuple[str, int], int], *merged: Merge) -> IdentityUpdate:
     keys = {TrackKey(*key): number for key, number in numbers.items()}
-    return IdentityUpdate(numbers=keys, born=(), returned=(), gone=(), merged=merged)
+    return IdentityUpdate(numbers=keys, born=(), returned=(), gone=(), merged=merged, split=())
 
 
 def dictated(*updates: IdentityUpdate) -> People:
