@@ -39,6 +39,9 @@ BENCHMARKS = (
     ),
     Benchmark("observations", "what detectors find, and what the tracker makes of it; 10 minutes"),
     Benchmark("peers", "MyView beside other trackers, which pip installs, on public detections; 5 minutes"),
+    Benchmark(
+        "bestview", "who is who and the best view, beside simpler ways and beside the truth; 20 minutes"
+    ),
     Benchmark("ablation", "what each term of the tracker brings; 15 minutes"),
     Benchmark("experiments", "the paper's experiments again, on synthetic scenes; 10 minutes"),
     Benchmark("live", "four live cameras: whether tracking keeps up, and what each stage costs; 2 minutes"),

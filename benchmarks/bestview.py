@@ -1,0 +1,120 @@
+"""Who is who across cameras, and the best view of everybody, beside simpler ways and beside the truth.
+
+    OPENBLAS_NUM_THREADS=1 python -m benchmarks.bestview --data ../shared/data --out out/bench
+
+Joint IDF1 takes all cameras as one recording, in which a number is one person everywhere. The choices are
+scored as `myview evaluate --views` does, beside the exact offline optimum of what could really be seen.
+
+The truth stands in for MyView's stages, one after the other; what is lost between two rows is that stage's:
+*true boxes* of those who are visible; *own boxes, true ids*: those that MyView's cameras tracked, each with
+the number of the person it is at; *own tracks, true joins*: each track with the number of the person it is
+mostly at; *MyView's, chosen again*: all as MyView numbered it at last, known at once, nobody ever away. The
+mean of *own tracks, not joined* is what each camera's tracker is worth by itself.
+
+*Largest* chooses frame by frame the camera with the largest box. *Nearest feet* joins whole tracks of our
+cameras (or of ByteTrack, on the same boxes) by the median distance of their feet, and chooses so, too. The
+sweeps are on true boxes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import cv2
+
+from benchmarks.bestview_cases import Case, auditorium, room, terrace
+from benchmarks.bestview_plot import plot_sweeps, plot_ways
+from benchmarks.bestview_sweep import Swept, sweep, sweep_tables
+from benchmarks.bestview_ways import Outcome, outcome, ways
+from benchmarks.peer_environment import PeerEnvironment, PeersAwayError, default_folder, peer_environment
+from benchmarks.report import Report
+from benchmarks.surroundings import CannotRunError, parser
+
+SCENES = ("terrace", "auditorium", "room")
+ROOMS = ((2, 3, 40.0), (4, 8, 40.0), (8, 20, 30.0))
+"""Cameras, people, seconds."""
+QUICK_ROOMS = ((2, 3, 12.0),)
+COLUMNS = ["", "joint", "mean", "Agree", "Regret", "Excess", "Visible", "Chosen", "Cuts", "Best", "Shot"]
+
+
+def cases(options: argparse.Namespace, folder: Path, report: Report) -> Iterator[Case]:
+    """Give the scenes one after the other; those that are not there are said."""
+    wanted = options.scene or SCENES
+    for name, find in (("terrace", terrace), ("auditorium", auditorium)):
+        if name in wanted:
+            try:
+                yield find(options.data)
+            except CannotRunError as problem:
+                report.say(f"{name}: left out: {problem}")
+    if "room" in wanted:
+        for cameras, people, seconds in QUICK_ROOMS if options.quick else ROOMS:
+            yield room(folder, cameras, people, seconds)
+
+
+def row_of(it: Outcome) -> list[str]:
+    """Give a row of the table: percent, cuts a minute, and the shortest shot in frames."""
+    idf1 = (
+        ["", ""] if it.tracks is None else [f"{100 * s.idf1:.1f}" for s in (it.tracks.joint, it.tracks.mean)]
+    )
+    views = it.views
+    shares = (views.agreement, views.regret, views.excess, views.visible, views.chosen)
+    cuts = (views.cuts_per_minute, views.optimum_cuts_per_minute)
+    return [
+        it.name,
+        *idf1,
+        *(f"{100 * share:.1f}" for share in shares),
+        *(f"{it:.1f}" for it in cuts),
+        str(views.shortest_shot or "-"),
+    ]
+
+
+def peers_of(options: argparse.Namespace, report: Report) -> PeerEnvironment | None:
+    """Give the other trackers' environment, or say why there is none."""
+    if options.no_peers or options.quick:
+        return None
+    try:
+        return peer_environment(default_folder())
+    except PeersAwayError as problem:
+        report.say(f"without other trackers, which cannot be installed here: {problem}")
+        return None
+
+
+def measure(options: argparse.Namespace) -> None:
+    """Measure, print and save."""
+    cv2.setNumThreads(1)
+    report = Report()
+    peers = peers_of(options, report)
+    found: dict[str, list[Outcome]] = {}
+    swept: dict[str, list[Swept]] = {}
+    with tempfile.TemporaryDirectory(prefix="myview-bestview-") as name:
+        for case in cases(options, Path(name), report):
+            truth = case.truth()
+            found[case.name] = [outcome(case, truth, way) for way in ways(case, truth, case.watch(), peers)]
+            report.table(f"{case.name}: {case.about}", COLUMNS, [row_of(it) for it in found[case.name]])
+            if not options.no_sweeps:
+                swept[case.name] = sweep(case, truth, quick=options.quick)
+    report.say("joint, mean: IDF1. Cuts, Best: a minute, the choice's and the optimum's. Shot: frames.")
+    sweep_tables(report, swept)
+    report.save(options.out / "bestview.txt")
+    plot_ways(found, options.out / "bestview.png")
+    if swept:
+        plot_sweeps(swept, options.out / "bestview_sweeps.png")
+
+
+def main() -> None:
+    """Run the benchmark."""
+    options = parser(__doc__, "bestview")
+    options.add_argument("--scene", action="append", choices=SCENES, help="only this one; may be repeated")
+    options.add_argument("--quick", action="store_true", help="short synthetic scenes, no other trackers")
+    options.add_argument("--no-peers", action="store_true", help="leave out the other tracker")
+    options.add_argument(
+        "--no-sweeps", action="store_true", help="leave out look-ahead, cost of a cut and GOP"
+    )
+    measure(options.parse_args())
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,132 @@
+"""The ways to a best view: MyView's, simpler ones, and MyView's with the truth in place of its stages."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from benchmarks.bestview_cases import Case, Rows, Watched
+from benchmarks.bestview_decide import Rendering, decide, decide_given, largest
+from benchmarks.bestview_join import boxes_by_truth, by_nearest_feet, not_joined, own_tracks, tracks_by_truth
+from benchmarks.peer_environment import PEERS, PeerEnvironment
+from bestview import ViewScore
+from server.run.evaluate_choices import Choice
+from server.run.evaluate_truth import Truth, people_of_objects
+from server.run.evaluate_views import judge
+from server.run.site_file import SiteFacts
+from server.view.decide import homographies
+from tracking.evaluation import CameraScores, Recording, evaluate_cameras
+from tracking.motchallenge import MotRow, format_rows
+
+LEAST_IOU = 0.5
+TRUE, TRUE_LARGEST = "true boxes", "true boxes, largest"
+OURS, WITHOUT = "MyView", "no homographies"
+PEER = "ByteTrack"
+
+
+@dataclass(frozen=True, slots=True)
+class Way:
+    """One way's boxes by the person's number, and its choices."""
+
+    name: str
+    rendering: Rendering
+    given: bool = False
+    """Its boxes are the truth's: there is nothing to score in them."""
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """How good it is."""
+
+    name: str
+    tracks: CameraScores | None
+    views: ViewScore
+
+
+def visible_rows(case: Case, truth: Truth) -> dict[str, list[MotRow]]:
+    """Give the true boxes of those who are visible: what a camera that misses nothing would find."""
+    place = {person: index for index, person in enumerate(truth.people)}
+    return {
+        camera: [
+            row
+            for row in case.gt[camera]
+            if row.confidence != 0.0 and truth.views.visible[place[row.id], row.frame - 1, column]
+        ]
+        for column, camera in enumerate(truth.cameras)
+    }
+
+
+def ways(case: Case, truth: Truth, seen: Watched, peers: PeerEnvironment | None) -> Iterator[Way]:
+    """Give them, truth first."""
+    frames = truth.boxes.shape[1]
+    config, bare = case.config(), case.config(ground=False)
+
+    def chosen(rows: Rows) -> Rendering:
+        choices = decide_given(config, rows, frames).choices
+        return Rendering({camera: list(found) for camera, found in rows.items()}, choices)
+
+    def simple(rows: Rows) -> Rendering:
+        return Rendering(
+            {camera: list(found) for camera, found in rows.items()}, largest(rows, case.sizes, frames)
+        )
+
+    there = visible_rows(case, truth)
+    yield Way(TRUE, chosen(there), given=True)
+    yield Way(TRUE_LARGEST, simple(there), given=True)
+    own = own_tracks(seen.messages)
+    yield Way("own boxes, true ids", chosen(boxes_by_truth(own, case.gt)))
+    yield Way("own tracks, true joins", chosen(tracks_by_truth(own, case.gt)))
+    yield Way("own tracks, not joined", simple(not_joined(own)))
+    bare_run = decide(bare, seen.messages)
+    if case.calibrated:
+        ours = decide(config, seen.messages)
+        yield Way("MyView's, chosen again", chosen(ours.tracks))
+        yield Way(OURS, ours)
+        yield Way("MyView, largest", simple(ours.tracks))
+    yield Way(WITHOUT, bare_run)
+    if case.calibrated:
+        ground = {camera: it for camera, it in homographies(config).items() if it is not None}
+        yield Way("nearest feet, largest", simple(by_nearest_feet(own, ground)))
+        if peers is not None:
+            theirs = by_nearest_feet(_peer_tracks(peers, seen.boxes), ground)
+            yield Way(f"{PEER}, nearest feet", simple(theirs))
+    else:
+        yield Way("no homogr., largest", simple(bare_run.tracks))
+
+
+def outcome(case: Case, truth: Truth, way: Way) -> Outcome:
+    """Score a way."""
+    recordings = {camera: Recording(case.gt[camera], way.rendering.tracks[camera]) for camera in case.gt}
+    if way.given:
+        scores, person_of = None, {person: person for person in truth.people}
+    else:
+        scores = evaluate_cameras(recordings, LEAST_IOU)
+        person_of = people_of_objects(truth.people, recordings, LEAST_IOU)
+    return Outcome(way.name, scores, score_choices(case, truth, way.rendering.choices, person_of))
+
+
+def score_choices(
+    case: Case, truth: Truth, choices: Sequence[Choice], person_of: Mapping[int, int]
+) -> ViewScore:
+    """Score choices against the truth, as `myview evaluate --views` does."""
+    config = case.config()
+    facts = SiteFacts(config.site.fps, config.view.switch_cost_s, case.sizes)
+    return judge(truth, choices, person_of, facts).total
+
+
+def _peer_tracks(peers: PeerEnvironment, boxes: Rows) -> dict[str, list[MotRow]]:
+    """Give the peer's tracks of every camera's detections.
+
+    Raises:
+        PeersAwayError: it failed.
+    """
+    peer = next(it for it in PEERS if it.name == PEER)
+    tracks = {}
+    with tempfile.TemporaryDirectory() as folder:
+        for camera, rows in boxes.items():
+            path = Path(folder) / f"{camera}.txt"
+            path.write_text(format_rows(rows), encoding="ascii")
+            tracks[camera] = peers.track(peer, path)
+    return tracks

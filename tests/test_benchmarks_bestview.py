@@ -1,0 +1,158 @@
+"""The benchmark of best views: what stands in for MyView's stages, on boxes whose truth is plain."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks import bestview
+from benchmarks.bestview_cases import Case, Rows
+from benchmarks.bestview_decide import decide_given, largest
+from benchmarks.bestview_join import boxes_by_truth, by_nearest_feet, not_joined, own_tracks, tracks_by_truth
+from benchmarks.bestview_sweep import STRIDE, Setting, sweep
+from benchmarks.bestview_ways import Way, outcome, visible_rows
+from server.run.evaluate_choices import Choice
+from server.wire.messages import CameraTracks, Track
+from tracking.motchallenge import MotRow
+
+FRAMES = 60
+NEAR, FAR = (10.0, 10.0, 40.0, 60.0), (60.0, 20.0, 10.0, 20.0)
+GROUND = {"c0": np.eye(3), "c1": np.array([[1.0, 0.0, 100.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])}
+
+
+def rows(number: int, left: float, frames: Sequence[int], top: float = 0.0) -> list[MotRow]:
+    return [MotRow(frame, number, left, top, 10.0, 20.0) for frame in frames]
+
+
+def hall(gt: Rows, least_shown: float = 0.25) -> Case:
+    content = {
+        "site": {"name": "hall", "fps": 10.0, "width": 100, "height": 100},
+        "cameras": [{"id": camera, "source": "scene:none"} for camera in gt],
+    }
+    return Case("hall", "two views", content, gt, least_shown)
+
+
+@pytest.fixture
+def passing() -> Case:
+    """Somebody is near c0 for the first half and near c1 for the second; both always see them."""
+    first, second = range(1, FRAMES // 2 + 1), range(FRAMES // 2 + 1, FRAMES + 1)
+    return hall(
+        {
+            "c0": [MotRow(it, 5, *NEAR) for it in first] + [MotRow(it, 5, *FAR) for it in second],
+            "c1": [MotRow(it, 5, *FAR) for it in first] + [MotRow(it, 5, *NEAR) for it in second],
+        }
+    )
+
+
+def test_on_true_boxes_myviews_choice_is_the_optimum_where_it_is_plain(passing: Case) -> None:
+    truth = passing.truth()
+    for found in (
+        decide_given(passing.config(), passing.gt, FRAMES),
+        decide_given(passing.config(), visible_rows(passing, truth), FRAMES),
+    ):
+        score = outcome(passing, truth, Way("true", found, given=True)).views
+        assert (score.agreement, score.regret, score.visible, score.chosen) == (1.0, 0.0, 1.0, 1.0)
+        assert score.cuts_per_minute == score.optimum_cuts_per_minute == 10.0
+
+
+def test_the_largest_box_is_taken_frame_by_frame(passing: Case) -> None:
+    shown = largest(passing.gt, passing.sizes, FRAMES)
+    assert shown[:2] == [Choice(1, 5, "c0"), Choice(2, 5, "c0")]
+    assert {it.camera for it in shown[FRAMES // 2 :]} == {"c1"}
+    assert largest({"c0": [], "c1": []}, passing.sizes, FRAMES) == []
+
+
+def test_who_is_hidden_is_not_among_the_true_boxes() -> None:
+    case = hall({"c0": [MotRow(1, 1, *NEAR, visible=0.1), MotRow(2, 1, *NEAR, visible=0.9)], "c1": []})
+    assert [row.frame for row in visible_rows(case, case.truth())["c0"]] == [2]
+
+
+def test_whole_tracks_are_joined_by_their_feet() -> None:
+    seen = {
+        "c0": [*rows(1, 105.0, range(1, 20)), *rows(2, 150.0, range(1, 20))],
+        "c1": [*rows(1, 52.0, range(1, 20)), *rows(2, 7.0, range(1, 20)), *rows(3, 7.0, range(1, 4))],
+    }
+    joined = by_nearest_feet(seen, GROUND)
+    number = {camera: {row.left: row.id for row in reversed(found)} for camera, found in joined.items()}
+    assert number["c0"][105.0] == number["c1"][7.0]
+    assert number["c0"][150.0] == number["c1"][52.0]
+    assert len({row.id for found in joined.values() for row in found}) == 3, "the short one stays alone"
+
+
+def test_two_tracks_of_one_camera_are_never_joined_while_both_are_there() -> None:
+    seen = {
+        "c0": rows(1, 100.0, range(1, 20)),
+        "c1": [*rows(1, 0.0, range(1, 20)), *rows(2, 1.0, range(10, 20)), *rows(3, 2.0, range(30, 40))],
+    }
+    joined = by_nearest_feet(seen, GROUND)
+    assert len({row.id for row in joined["c1"]}) == 3
+    assert joined["c0"][0].id == joined["c1"][0].id
+
+
+def test_nobody_is_joined_where_nobody_shares_a_frame() -> None:
+    seen = {"c0": rows(1, 100.0, range(1, 20)), "c1": rows(1, 0.0, range(30, 40))}
+    joined = by_nearest_feet(seen, GROUND)
+    assert joined["c0"][0].id != joined["c1"][0].id
+    assert joined == not_joined(seen)
+
+
+def test_the_truth_may_name_boxes_or_whole_tracks() -> None:
+    gt = {"c0": [*rows(7, 0.0, range(1, 11)), *rows(8, 50.0, range(1, 11))]}
+    swapped = {"c0": [*rows(1, 0.0, range(1, 8)), *rows(1, 50.0, range(8, 11)), *rows(2, 80.0, range(1, 3))]}
+    assert [(row.frame, row.id) for row in boxes_by_truth(swapped, gt)["c0"]] == [
+        (frame, 7 if frame < 8 else 8) for frame in range(1, 11)
+    ]
+    assert {row.id for row in tracks_by_truth(swapped, gt)["c0"]} == {7}
+    assert len(tracks_by_truth(swapped, gt)["c0"]) == 10
+
+
+def test_of_two_tracks_at_one_person_the_longer_stays() -> None:
+    gt = {"c0": rows(7, 0.0, range(1, 11))}
+    double = {"c0": [*rows(2, 1.0, range(4, 7)), *rows(3, 0.0, range(1, 11))]}
+    assert [row.left for row in tracks_by_truth(double, gt)["c0"]] == [0.0] * 10
+
+
+def test_a_cameras_own_tracks_are_what_was_final() -> None:
+    def said(first: int, last: int, final_to: int, left: float, *, ended: bool = False) -> CameraTracks:
+        boxes = [(left, 0.0, left + 10.0, 20.0)] * (last - first + 1)
+        return CameraTracks(
+            camera="c0",
+            boot=0,
+            size=(100, 100),
+            epoch=last // 5,
+            first=first,
+            last=last,
+            final_to=final_to,
+            ended=ended,
+            shed=[],
+            tracks=[Track(id=3, boxes=boxes, histogram=[1.0], confidence=1.0)],
+            solve=None,
+        )
+
+    found = own_tracks({"c0": [said(0, 9, 4, 1.0), said(5, 14, 9, 2.0), said(10, 16, 16, 3.0, ended=True)]})
+    assert [row.frame for row in found["c0"]] == list(range(1, 18))
+    assert [row.left for row in found["c0"]] == [1.0] * 5 + [2.0] * 5 + [3.0] * 7
+
+
+def test_settings_are_swept_and_knowing_all_costs_nothing_but_the_gop(passing: Case) -> None:
+    found = {it.setting: it for it in sweep(passing, passing.truth(), quick=True)}
+    assert found[Setting(None, 1, 0.08)].score.regret == 0.0
+    assert found[Setting(25, 10, 0.08)].delay_s == (25 + STRIDE - 2) / 10.0
+    assert all(it.score.regret >= 0.0 for it in found.values())
+
+
+def test_the_benchmark_prints_a_row_for_every_way(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bestview, "QUICK_ROOMS", ((2, 1, 1.0),))
+    out = tmp_path / "out"
+    monkeypatch.setattr(sys, "argv", ["x", "--quick", "--out", str(out), "--data", str(tmp_path)])
+    bestview.main()
+    printed = (out / "bestview.txt").read_text(encoding="utf-8")
+    assert "terrace: left out: needs the recordings" in printed
+    for way in ("true boxes, largest", "own boxes, true ids", "MyView", "no homographies", "nearest feet"):
+        assert way in printed
+    assert (out / "bestview.png").stat().st_size > 1000
+    assert (out / "bestview_sweeps.png").stat().st_size > 1000
