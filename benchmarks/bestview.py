@@ -29,6 +29,7 @@ from benchmarks.bestview_cases import Case, auditorium, room, terrace
 from benchmarks.bestview_plot import plot_sweeps, plot_ways
 from benchmarks.bestview_sweep import Swept, sweep, sweep_tables
 from benchmarks.bestview_ways import Outcome, outcome, ways
+from benchmarks.bestview_why import Losses, losses
 from benchmarks.peer_environment import PeerEnvironment, PeersAwayError, default_folder, peer_environment
 from benchmarks.report import Report
 from benchmarks.surroundings import CannotRunError, parser
@@ -38,6 +39,8 @@ ROOMS = ((2, 3, 40.0), (4, 8, 40.0), (8, 20, 30.0))
 """Cameras, people, seconds."""
 QUICK_ROOMS = ((2, 3, 12.0),)
 COLUMNS = ["", "joint", "mean", "Agree", "Regret", "Excess", "Visible", "Chosen", "Cuts", "Best", "Shot"]
+
+WHY = ["", "Visible", "choice", "number", "missed"]
 
 
 def cases(options: argparse.Namespace, folder: Path, report: Report) -> Iterator[Case]:
@@ -71,6 +74,11 @@ def row_of(it: Outcome) -> list[str]:
     ]
 
 
+def losses_of(name: str, it: Losses) -> list[str]:
+    """Give a row of the other table, percent."""
+    return [name, *(f"{100 * share:.1f}" for share in (it.visible, it.choice, it.number, it.missed))]
+
+
 def peers_of(options: argparse.Namespace, report: Report) -> PeerEnvironment | None:
     """Give the other trackers' environment, or say why there is none."""
     if options.no_peers or options.quick:
@@ -92,11 +100,18 @@ def measure(options: argparse.Namespace) -> None:
     with tempfile.TemporaryDirectory(prefix="myview-bestview-") as name:
         for case in cases(options, Path(name), report):
             truth = case.truth()
-            found[case.name] = [outcome(case, truth, way) for way in ways(case, truth, case.watch(), peers)]
+            tried = list(ways(case, truth, case.watch(), peers))
+            found[case.name] = [outcome(case, truth, way) for way in tried]
             report.table(f"{case.name}: {case.about}", COLUMNS, [row_of(it) for it in found[case.name]])
+            why = [(way.name, losses(case, truth, way)) for way in tried if not way.given]
+            report.table(f"{case.name}: why not visible", WHY, [losses_of(name, it) for name, it in why])
             if not options.no_sweeps:
                 swept[case.name] = sweep(case, truth, quick=options.quick)
     report.say("joint, mean: IDF1. Cuts, Best: a minute, the choice's and the optimum's. Shot: frames.")
+    report.say(
+        "Not visible in the chosen view, though in some: by choice, their number was at them in a camera "
+        "that shows them; by number, only others were; missed, none was."
+    )
     sweep_tables(report, swept)
     report.save(options.out / "bestview.txt")
     plot_ways(found, options.out / "bestview.png")

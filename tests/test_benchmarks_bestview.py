@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,10 +12,11 @@ import pytest
 
 from benchmarks import bestview
 from benchmarks.bestview_cases import Case, Rows
-from benchmarks.bestview_decide import decide_given, largest
+from benchmarks.bestview_decide import Rendering, decide_given, largest
 from benchmarks.bestview_join import boxes_by_truth, by_nearest_feet, not_joined, own_tracks, tracks_by_truth
 from benchmarks.bestview_sweep import STRIDE, Setting, sweep
 from benchmarks.bestview_ways import Way, outcome, visible_rows
+from benchmarks.bestview_why import Losses, losses
 from server.run.evaluate_choices import Choice
 from server.wire.messages import CameraTracks, Track
 from tracking.motchallenge import MotRow
@@ -136,6 +138,17 @@ def test_a_cameras_own_tracks_are_what_was_final() -> None:
     found = own_tracks({"c0": [said(0, 9, 4, 1.0), said(5, 14, 9, 2.0), said(10, 16, 16, 3.0, ended=True)]})
     assert [row.frame for row in found["c0"]] == list(range(1, 18))
     assert [row.left for row in found["c0"]] == [1.0] * 5 + [2.0] * 5 + [3.0] * 7
+
+
+def test_what_keeps_somebody_from_being_seen_is_told_apart(passing: Case) -> None:
+    truth = passing.truth()
+    found = {
+        "c0": [replace(row, id=1 if row.frame <= 20 else 2) for row in passing.gt["c0"] if row.frame <= 30],
+        "c1": [],
+    }
+    shown = [Choice(frame, 1, "c0") for frame in range(1, 11)]
+    told = losses(passing, truth, Way("ours", Rendering(found, shown)))
+    assert told == Losses(visible=10 / 60, choice=10 / 60, number=10 / 60, missed=30 / 60)
 
 
 def test_settings_are_swept_and_knowing_all_costs_nothing_but_the_gop(passing: Case) -> None:
