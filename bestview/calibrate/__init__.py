@@ -9,14 +9,26 @@ from bestview.calibrate.points import (
     fit_cameras,
     fit_points,
 )
+from bestview.calibrate.result import LeftOut, Spread, WalkCalibration, WalkedCamera, calibrate_walks
+from bestview.calibrate.walk import Track, Walk, make_walk
+from bestview.calibrate.walk_settings import WalkSettings
 
 __all__ = [
     "CalibrationError",
     "Floats",
+    "LeftOut",
     "MarkedPoints",
     "PointFit",
     "PointSettings",
+    "Spread",
+    "Track",
+    "Walk",
+    "WalkCalibration",
+    "WalkSettings",
+    "WalkedCamera",
+    "calibrate_walks",
     "fit_cameras",
     "fit_homography",
     "fit_points",
+    "make_walk",
 ]

@@ -162,7 +162,7 @@ def _on_a_line(camera: str) -> str:
 def _distances(backwards: Floats, points: MarkedPoints) -> Floats:
     """How far each floor point is from its place in the picture, (N,); infinite where it is nowhere."""
     off = mapped(backwards, points.floor) - points.image
-    return np.nan_to_num(np.hypot(*off.T), nan=np.inf)
+    return np.asarray(np.nan_to_num(np.hypot(*off.T), nan=np.inf))
 
 
 def _spread(image: Floats) -> float:

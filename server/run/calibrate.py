@@ -1,4 +1,4 @@
-"""``myview calibrate`` from marked points: one homography per camera, and how far each is off."""
+"""``myview calibrate``: a homography per camera, from marked points or from walks, and how far off."""
 
 from __future__ import annotations
 
@@ -8,10 +8,19 @@ from pathlib import Path
 
 import numpy as np
 
-from bestview.calibrate import CalibrationError, MarkedPoints, PointFit, fit_cameras
+from bestview.calibrate import (
+    CalibrationError,
+    MarkedPoints,
+    PointFit,
+    WalkSettings,
+    calibrate_walks,
+    fit_cameras,
+)
 from server.run.calibrate_file import write_ground
 from server.run.calibrate_plan import PlanView, plot_plan
 from server.run.calibrate_points import read_points
+from server.run.calibrate_tracks import Walked
+from server.run.calibrate_words import details, in_words, missed
 from server.wire.errors import UserError
 from server.wire.output import whole_file
 
@@ -38,6 +47,30 @@ def calibrate_points(points: Path, out: Path, plan: Path, unit: str | None) -> l
             {"residuals": {camera: _rounded(fit) for camera, fit in fits.items()}},
         )
     return [_line(it, fits[it.camera], unit) for it in given.cameras]
+
+
+def calibrate_from_walks(
+    walked: Walked, out: Path, plan: Path, settings: WalkSettings, person: float, *, force: bool
+) -> list[str]:
+    """Lay the cameras on one floor, and write the file and the plan; give the lines to say.
+
+    Raises:
+        UserError: the walk says too little, or a file cannot be written.
+    """
+    with refusing("calibrate"):
+        found = calibrate_walks(walked.walks, settings, person)
+    missing = [line for it in found.cameras for line in missed(it)]
+    if any(it.serious for it in missing) and not force:
+        worst = next(it for it in missing if it.serious)
+        raise UserError(
+            f"calibrate: the walk covered too little: {worst.words} (--force writes it all the same)"
+        )
+    views = [PlanView(it.camera, it.homography, it.image, it.place, it.floor) for it in found.cameras]
+    with whole_file(plan) as draft:
+        plot_plan(views, "m", draft)
+        homographies = {it.camera: it.homography for it in found.cameras}
+        write_ground(out, "m", homographies, details(found, person))
+    return [*in_words(walked, found, settings), *(it.words for it in missing)]
 
 
 @contextmanager

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.colors import to_rgba
@@ -31,35 +32,42 @@ class PlanView:
         homography: its pixels to the floor, (3, 3).
         image: the points in its picture, (N, 2) pixels.
         place: where these are said to be, (N, 2) on the floor: marked, or agreed on by the cameras.
+        floor: cameras of one number share a floor; each floor has a plan of its own.
     """
 
     camera: str
     homography: Floats
     image: Floats
     place: Floats
+    floor: int = 0
 
 
 def plot_plan(views: Sequence[PlanView], unit: str, out: Path) -> None:
     """Draw the plan: an area and points for each camera, a line from each point to its place."""
-    figure = Figure(figsize=(_INCHES, _INCHES), layout="tight")
+    floors = sorted({view.floor for view in views})
+    figure = Figure(figsize=(_INCHES, _INCHES * len(floors)), layout="tight")
     FigureCanvasAgg(figure)
-    axis = figure.subplots()
-    for number, view in enumerate(views):
-        colour = _COLOURS[number % len(_COLOURS)]
-        step = -(-len(view.image) // _MOST_POINTS)
-        seen = to_ground(view.homography, view.image[::step])
-        axis.fill(*_area(view).T, facecolor=to_rgba(colour, 0.12), edgecolor=colour, linewidth=1)
-        lines = np.stack([seen, view.place[::step]], axis=1)
-        axis.add_collection(LineCollection(list(lines), colors=colour, linewidths=0.6, alpha=0.6))
-        axis.plot(*seen.T, ".", markersize=3, color=colour, label=view.camera)
-    axis.set_aspect("equal")
-    axis.margins(_MARGIN)
-    axis.autoscale_view()
-    axis.set_xlabel(unit)
-    axis.set_ylabel(unit)
-    axis.legend(title="camera", markerscale=3)
-    axis.set_title("Floor plan: what was covered, foot points, and how far they are off", fontsize="medium")
+    for axis, floor in zip(figure.subplots(len(floors), 1, squeeze=False)[:, 0], floors, strict=True):
+        for number, view in enumerate(views):
+            if view.floor == floor:
+                _draw(axis, view, _COLOURS[number % len(_COLOURS)])
+        axis.set_aspect("equal")
+        axis.margins(_MARGIN)
+        axis.autoscale_view()
+        axis.set_xlabel(unit)
+        axis.set_ylabel(unit)
+        axis.legend(title="camera", markerscale=3)
+    figure.suptitle("Floor plan: what was covered, foot points, and how far they are off", fontsize="medium")
     figure.savefig(out, dpi=100, format="png", metadata={"Software": None})
+
+
+def _draw(axis: Axes, view: PlanView, colour: str) -> None:
+    step = -(-len(view.image) // _MOST_POINTS)
+    seen = to_ground(view.homography, view.image[::step])
+    axis.fill(*_area(view).T, facecolor=to_rgba(colour, 0.12), edgecolor=colour, linewidth=1)
+    lines = np.stack([seen, view.place[::step]], axis=1)
+    axis.add_collection(LineCollection(list(lines), colors=colour, linewidths=0.6, alpha=0.6))
+    axis.plot(*seen.T, ".", markersize=3, color=colour, label=view.camera)
 
 
 def _area(view: PlanView) -> Floats:

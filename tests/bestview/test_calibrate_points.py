@@ -36,7 +36,7 @@ def marked(random: np.random.Generator, count: int) -> tuple[MarkedPoints, Float
 seeds = st.integers(0, 10_000).map(np.random.default_rng)
 
 
-@settings(deadline=None, max_examples=30)
+@settings(deadline=None, max_examples=15)
 @given(seeds, st.integers(4, 12))
 def test_exact_pairs_give_the_homography(random: np.random.Generator, count: int) -> None:
     points, truth = marked(random, count)
@@ -46,7 +46,7 @@ def test_exact_pairs_give_the_homography(random: np.random.Generator, count: int
     assert fit.image_error.max() < 1e-3
 
 
-@settings(deadline=None, max_examples=30)
+@settings(deadline=None, max_examples=15)
 @given(seeds, st.integers(8, 20))
 def test_clicks_that_are_a_pixel_off_leave_an_error_of_about_a_pixel(
     random: np.random.Generator, count: int
@@ -57,7 +57,7 @@ def test_clicks_that_are_a_pixel_off_leave_an_error_of_about_a_pixel(
     assert np.median(fit.image_error) < 2.5
 
 
-@settings(deadline=None, max_examples=30)
+@settings(deadline=None, max_examples=15)
 @given(seeds, st.integers(7, 14), st.data())
 def test_a_pair_that_contradicts_the_others_is_named(
     random: np.random.Generator, count: int, data: st.DataObject

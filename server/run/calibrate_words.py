@@ -1,0 +1,107 @@
+"""What a walk has shown, in plain words, and the same in numbers for the file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from bestview.calibrate import Spread, WalkCalibration, WalkedCamera, WalkSettings
+from server.run.calibrate_tracks import Walked
+
+_THIRDS = ("left", "middle", "right")
+_LITTLE = 0.03
+"""Share of a walk below which it has not covered a third of the picture."""
+_SHALLOW = 1.25
+"""How many times as tall the nearest must appear as the farthest."""
+
+
+@dataclass(frozen=True, slots=True)
+class Missed:
+    """Something that the walk did not cover; serious, where a calibration would be a guess."""
+
+    words: str
+    serious: bool
+
+
+def missed(camera: WalkedCamera) -> Iterator[Missed]:
+    """Say where somebody should walk, too."""
+    bare = [name for name, share in zip(_THIRDS, camera.thirds, strict=True) if share < _LITTLE]
+    if bare:
+        where = " and the ".join(bare)
+        yield Missed(
+            f"walk also through the {where} third of camera {camera.camera}, if there is floor and another "
+            "camera sees it",
+            serious=len(bare) > 1,
+        )
+    if camera.deep < _SHALLOW:
+        yield Missed(f"walk also nearer to camera {camera.camera}, and farther from it", serious=True)
+
+
+def in_words(walked: Walked, found: WalkCalibration, settings: WalkSettings) -> list[str]:
+    """Give the lines about errors, coverage and offsets."""
+    on_floor, in_pictures = _heights(found.heights), _shares(found.picture)
+    lines = [f"feet that two cameras see are {on_floor} apart, in the pictures {in_pictures} of the diagonal"]
+    for it in found.cameras:
+        left, middle, right = (f"{100 * share:.0f}" for share in it.thirds)
+        lines.append(
+            f"{it.camera}: {_heights(it.heights)}, {_shares(it.picture)}; of the walk {left} % in the left, "
+            f"{middle} % in the middle and {right} % in the right third, the nearest {it.deep:.1f} times as "
+            "tall as the farthest"
+        )
+    lines += [f"{it.camera}: left out: {it.why}" for it in found.left_out]
+    lines += _floors(found)
+    if walked.guessed:
+        sizes = ", ".join(f"{it.camera} {it.size[0]}x{it.size[1]}" for it in walked.walks)
+        lines.append(f"the pictures' size is guessed from the boxes ({sizes}); --size says it better")
+    if settings.shift:
+        lines += _offsets(found, walked.fps)
+    return lines
+
+
+def details(found: WalkCalibration, person: float) -> dict[str, Any]:
+    """Give what the file says beside the homographies."""
+    return {
+        "person": person,
+        "offset": {it.camera: round(it.offset, 2) for it in found.cameras},
+        "floor": {it.camera: it.floor for it in found.cameras},
+        "residuals": {
+            it.camera: {"heights": _numbers(it.heights), "picture": _numbers(it.picture)}
+            for it in found.cameras
+        },
+        "left_out": {it.camera: it.why for it in found.left_out},
+    }
+
+
+def _floors(found: WalkCalibration) -> list[str]:
+    floors = sorted({it.floor for it in found.cameras})
+    if len(floors) == 1:
+        return []
+    groups = (", ".join(it.camera for it in found.cameras if it.floor == floor) for floor in floors)
+    said = f"there are {len(floors)} floors: {'; '.join(groups)}; no camera sees two of them"
+    return [f"{said}; they lie far apart in the file, and offsets hold within each"]
+
+
+def _offsets(found: WalkCalibration, fps: float) -> list[str]:
+    """Give the offsets, as words and as lines of a configuration."""
+    moved = [it for it in found.cameras if round(it.offset)]
+    if not moved:
+        return ["the cameras are in step (to half a frame)"]
+    said = ", ".join(f"{it.camera} {it.offset:+.1f} frames ({it.offset / fps:+.2f} s)" for it in moved)
+    return [
+        f"out of step with {found.cameras[0].camera}: {said}; for the configuration:",
+        "cameras:",
+        *(f"  - id: {it.camera}\n    offset: {round(it.offset)}" for it in moved),
+    ]
+
+
+def _heights(spread: Spread) -> str:
+    return f"{spread.median:.2f} person heights (median; 90 % below {spread.most:.2f})"
+
+
+def _shares(spread: Spread) -> str:
+    return f"{100 * spread.median:.1f} % (90 % below {100 * spread.most:.1f} %)"
+
+
+def _numbers(spread: Spread) -> dict[str, float]:
+    return {"median": round(spread.median, 4), "p90": round(spread.most, 4)}
