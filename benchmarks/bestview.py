@@ -8,12 +8,13 @@ scored as `myview evaluate --views` does, beside the exact offline optimum of wh
 The truth stands in for MyView's stages, one after the other; what is lost between two rows is that stage's:
 *true boxes* of those who are visible; *own boxes, true ids*: those that MyView's cameras tracked, each with
 the number of the person it is at; *own tracks, true joins*: each track with the number of the person it is
-mostly at; *MyView's, chosen again*: all as MyView numbered it at last, known at once, nobody ever away. The
-mean of *own tracks, not joined* is what each camera's tracker is worth by itself.
+mostly at; *again*: all as MyView numbered it at last, known at once, and nobody ever away. The mean of *own
+tracks, not joined* is what each camera's tracker is worth by itself.
 
-*Largest* chooses frame by frame the camera with the largest box. *Nearest feet* joins whole tracks of our
-cameras (or of ByteTrack, on the same boxes) by the median distance of their feet, and chooses so, too. The
-sweeps are on true boxes.
+*Calibrated* has the homographies that `myview calibrate` makes of the cameras' own tracks. *Largest* chooses
+frame by frame the camera with the largest box. *Nearest feet* joins whole tracks of our cameras (or of
+ByteTrack, on the same boxes) by the median distance of their feet, and chooses so, too. The sweeps are on
+true boxes.
 """
 
 from __future__ import annotations
@@ -25,7 +26,9 @@ from pathlib import Path
 
 import cv2
 
-from benchmarks.bestview_cases import Case, auditorium, room, terrace
+from benchmarks.bestview_calibrate import CannotCalibrateError, calibrated
+from benchmarks.bestview_cases import Case, Watched, auditorium, room, terrace
+from benchmarks.bestview_join import own_tracks
 from benchmarks.bestview_plot import plot_sweeps, plot_ways
 from benchmarks.bestview_sweep import Swept, sweep, sweep_tables
 from benchmarks.bestview_ways import Outcome, outcome, ways
@@ -90,6 +93,15 @@ def peers_of(options: argparse.Namespace, report: Report) -> PeerEnvironment | N
         return None
 
 
+def walked_of(case: Case, seen: Watched, folder: Path, report: Report) -> Case | None:
+    """Give the scene calibrated by its own tracks, or say why it cannot be."""
+    try:
+        return calibrated(case, own_tracks(seen.messages), folder)
+    except CannotCalibrateError as problem:
+        report.say(f"{case.name}: not calibrated by its own tracks: {problem}")
+        return None
+
+
 def measure(options: argparse.Namespace) -> None:
     """Measure, print and save."""
     cv2.setNumThreads(1)
@@ -100,7 +112,9 @@ def measure(options: argparse.Namespace) -> None:
     with tempfile.TemporaryDirectory(prefix="myview-bestview-") as name:
         for case in cases(options, Path(name), report):
             truth = case.truth()
-            tried = list(ways(case, truth, case.watch(), peers))
+            seen = case.watch()
+            walked = None if options.quick else walked_of(case, seen, Path(name), report)
+            tried = list(ways(case, truth, seen, peers, walked))
             found[case.name] = [outcome(case, truth, way) for way in tried]
             report.table(f"{case.name}: {case.about}", COLUMNS, [row_of(it) for it in found[case.name]])
             why = [(way.name, losses(case, truth, way)) for way in tried if not way.given]

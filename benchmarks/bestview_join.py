@@ -66,7 +66,7 @@ def by_nearest_feet(rows: Rows, ground: Mapping[str, Floats]) -> dict[str, list[
     """Join whole tracks of different cameras by the median distance of their feet, the nearest first.
 
     The gate is MyView's own, `gate_heights` of a person. Two tracks of one camera that are there at once are
-    never joined.
+    never joined, and neither are those of a camera without homography.
     """
     walks, heights = _walks(rows, ground)
     gate = IdentitySettings().gate_heights * heights
@@ -83,9 +83,17 @@ def by_nearest_feet(rows: Rows, ground: Mapping[str, Floats]) -> dict[str, list[
         if ours is not theirs and not _clash(ours, theirs, walks):
             ours += theirs
             group.update(dict.fromkeys(theirs, ours))
-    numbers = {key: min(keys.index(member) for member in members) + 1 for key, members in group.items()}
+    alone = not_joined(rows)
+    number = {
+        _Key(camera, it.id): new.id
+        for camera in rows
+        for it, new in zip(rows[camera], alone[camera], strict=True)
+    }
+    joined = {key: min(number[member] for member in members) for key, members in group.items()}
     return {
-        camera: [replace(row, id=numbers[_Key(camera, row.id)]) for row in found]
+        camera: [
+            replace(row, id=joined.get(key, number[key])) for row in found for key in (_Key(camera, row.id),)
+        ]
         for camera, found in rows.items()
     }
 
@@ -130,6 +138,8 @@ def _walks(rows: Rows, ground: Mapping[str, Floats]) -> tuple[dict[_Key, _Walk],
             tracks[_Key(camera, row.id)].append(row)
     walks, heights = {}, []
     for key, found in tracks.items():
+        if key.camera not in ground:
+            continue
         boxes = np.array([row.box for row in found])
         places = to_ground(ground[key.camera], feet(boxes))
         walks[key] = _Walk(np.array([row.frame for row in found]), places)

@@ -22,7 +22,7 @@ from tracking.motchallenge import MotRow, format_rows
 
 LEAST_IOU = 0.5
 TRUE, TRUE_LARGEST = "true boxes", "true boxes, largest"
-OURS, WITHOUT = "MyView", "no homographies"
+OURS, CALIBRATED, WITHOUT = "MyView", "MyView, calibrated", "no homographies"
 PEER = "ByteTrack"
 
 
@@ -58,19 +58,18 @@ def visible_rows(case: Case, truth: Truth) -> dict[str, list[MotRow]]:
     }
 
 
-def ways(case: Case, truth: Truth, seen: Watched, peers: PeerEnvironment | None) -> Iterator[Way]:
-    """Give them, truth first."""
+def ways(
+    case: Case, truth: Truth, seen: Watched, peers: PeerEnvironment | None, walked: Case | None
+) -> Iterator[Way]:
+    """Give them, truth first; `walked` is the scene with the homographies of its own tracks."""
     frames = truth.boxes.shape[1]
-    config, bare = case.config(), case.config(ground=False)
+    config = case.config()
 
     def chosen(rows: Rows) -> Rendering:
-        choices = decide_given(config, rows, frames).choices
-        return Rendering({camera: list(found) for camera, found in rows.items()}, choices)
+        return Rendering(_lists(rows), decide_given(config, rows, frames).choices)
 
     def simple(rows: Rows) -> Rendering:
-        return Rendering(
-            {camera: list(found) for camera, found in rows.items()}, largest(rows, case.sizes, frames)
-        )
+        return Rendering(_lists(rows), largest(rows, case.sizes, frames))
 
     there = visible_rows(case, truth)
     yield Way(TRUE, chosen(there), given=True)
@@ -79,21 +78,27 @@ def ways(case: Case, truth: Truth, seen: Watched, peers: PeerEnvironment | None)
     yield Way("own boxes, true ids", chosen(boxes_by_truth(own, case.gt)))
     yield Way("own tracks, true joins", chosen(tracks_by_truth(own, case.gt)))
     yield Way("own tracks, not joined", simple(not_joined(own)))
-    bare_run = decide(bare, seen.messages)
-    if case.calibrated:
-        ours = decide(config, seen.messages)
-        yield Way("MyView's, chosen again", chosen(ours.tracks))
-        yield Way(OURS, ours)
-        yield Way("MyView, largest", simple(ours.tracks))
-    yield Way(WITHOUT, bare_run)
-    if case.calibrated:
-        ground = {camera: it for camera, it in homographies(config).items() if it is not None}
-        yield Way("nearest feet, largest", simple(by_nearest_feet(own, ground)))
+    bare = decide(case.config(ground=False), seen.messages)
+    yield Way(WITHOUT, bare)
+    if not case.calibrated:
+        yield Way(f"{WITHOUT}, largest", simple(bare.tracks))
+    for name, scene in ((OURS, case if case.calibrated else None), (CALIBRATED, walked)):
+        if scene is None:
+            continue
+        ours = decide(scene.config(), seen.messages)
+        yield Way(name, ours)
+        yield Way(f"{name}, again", chosen(ours.tracks))
+        yield Way(f"{name}, largest", simple(ours.tracks))
+        ground = {camera: it for camera, it in homographies(scene.config()).items() if it is not None}
+        short = "nearest feet" if scene is case else "nearest feet, calibr."
+        yield Way(short, simple(by_nearest_feet(own, ground)))
         if peers is not None:
             theirs = by_nearest_feet(_peer_tracks(peers, seen.boxes), ground)
-            yield Way(f"{PEER}, nearest feet", simple(theirs))
-    else:
-        yield Way("no homogr., largest", simple(bare_run.tracks))
+            yield Way(f"{PEER}, {short}", simple(theirs))
+
+
+def _lists(rows: Rows) -> dict[str, list[MotRow]]:
+    return {camera: list(found) for camera, found in rows.items()}
 
 
 def outcome(case: Case, truth: Truth, way: Way) -> Outcome:
