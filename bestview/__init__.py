@@ -6,7 +6,7 @@ from bestview.evidence import TrackKey
 from bestview.ground import checked_homography, feet, foot_spread, person_heights, to_ground
 from bestview.identity import IdentityRegistry, IdentityUpdate
 from bestview.identity_settings import IdentitySettings
-from bestview.quality import HIDDEN_COST, size_quality, view_cost
+from bestview.quality import HIDDEN_COST, QualitySettings, size_quality, view_cost
 from bestview.score import ViewScore, cuts_of, score_views
 from bestview.score_objects import NOBODY, stands_for
 from bestview.score_truth import ViewTruth, best_views, true_views
@@ -23,6 +23,7 @@ __all__ = [
     "IdentityUpdate",
     "LocalTrack",
     "Merge",
+    "QualitySettings",
     "Split",
     "TrackKey",
     "ViewScore",

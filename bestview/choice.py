@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-NO_CAMERA = -1
-NO_VIEW_COST = 1.0
-"""What a frame costs in which no camera can be shown: as much as a view of nobody."""
+from bestview.choice_program import NO_CAMERA, NO_VIEW_COST, Gops, solve
+from bestview.choice_shots import solve_with_shots
+
+__all__ = ["NO_CAMERA", "NO_VIEW_COST", "Choices", "choose_views"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,6 +33,9 @@ def choose_views(
     previous: NDArray[np.int64],
     switch_cost: float,
     cut_allowed: NDArray[np.bool_],
+    least_shot: int = 0,
+    held: NDArray[np.int64] | None = None,
+    weight: NDArray[np.float64] | None = None,
 ) -> Choices:
     """Minimise the sum of view costs and of cuts over the window, for all objects at once (section III).
 
@@ -45,28 +50,48 @@ def choose_views(
       first frame where a cut is allowed.
     * Between equally good sequences the one that stays longest with its camera wins, and then the
       lowest camera index. There are no other ties, so the answer is the same on every machine.
+    * With a least shot no camera is left before it was shown for that many GOPs, unless it cannot be shown in
+      the GOP, or shows nobody in it (every frame costs at least ``NO_VIEW_COST``). A hole counts as shown.
+
+    It is fastest where the costs lie in memory as (N, C, K), objects innermost.
 
     Args:
         cost: (K, N, C) c(n, b) per object, frame and camera; infinite where it cannot be shown.
         previous: (K,) b_(-1), the camera index just before the window; -1: none yet.
         switch_cost: lambda, the cost of one cut, in units of one frame's view cost.
         cut_allowed: (N,) where a cut may happen; entry 0 says whether frame 0 may differ from `previous`.
+        least_shot: GOPs that a shot lasts at least; up to 1 is the paper's program.
+        held: (K,) for how many GOPs `previous` has been shown, at least 1; None: long enough to be left.
+        weight: (N,) for how many frames each frame stands, above 0; None: one. Above 1 for the last ones, the
+            window is taken to go on as it ends: a view that stays better is worth a cut then.
 
     Raises:
         ValueError: shapes that do not fit, a cost that is not a number, a negative switching cost, or a
             previous camera that does not exist.
     """
     _check(cost, previous, switch_cost, cut_allowed)
-    objects, frames = cost.shape[:2]
+    objects, frames, cameras = cost.shape
+    if held is not None and held.shape != (objects,):
+        raise ValueError(f"held has shape {held.shape}, not ({objects},)")
     views = np.full((objects, frames), NO_CAMERA, dtype=np.int64)
-    if cost.size:
-        starts = np.flatnonzero(cut_allowed)
-        running = int(starts[0]) if starts.size else frames
-        if running:
-            _go_on(cost[:, :running], previous, views)
-        if starts.size:
-            _decide(_gop_costs(cost, starts), starts, previous, switch_cost, views)
-    return Choices(views, _total(cost, views, previous, switch_cost))
+    lasting = np.ones(frames) if weight is None else weight
+    if lasting.shape != (frames,) or not (lasting > 0).all():
+        raise ValueError(f"weight has shape {lasting.shape}, not ({frames},), or is not above 0")
+    if not cameras or not frames:
+        return Choices(views, np.full(objects, NO_VIEW_COST * lasting.sum()))
+    starts = np.flatnonzero(cut_allowed)
+    running = int(starts[0]) if starts.size else frames
+    costs = _go_on(cost[:, :running], lasting[:running], previous, views) if running else np.zeros(objects)
+    if starts.size:
+        gops = _gops(cost, lasting, starts, blind=least_shot > 1)
+        if least_shot > 1:
+            ages = np.full(objects, least_shot) if held is None else np.clip(held, 1, least_shot)
+            shown, ahead = solve_with_shots(gops, previous, ages, switch_cost, least_shot)
+        else:
+            shown, ahead = solve(gops, previous, switch_cost)
+        views[:, running:] = np.repeat(shown, np.diff(starts, append=frames), axis=0).T
+        costs += ahead
+    return Choices(views, costs)
 
 
 def _check(
@@ -91,78 +116,41 @@ def _check(
         raise ValueError("a view cost is not a number, or minus infinity")
 
 
-def _go_on(cost: NDArray[np.float64], previous: NDArray[np.int64], views: NDArray[np.int64]) -> None:
-    """Fill in the GOP that began before the window: (K, R, C) costs of its rest; no choice is left."""
+def _go_on(
+    cost: NDArray[np.float64],
+    lasting: NDArray[np.float64],
+    previous: NDArray[np.int64],
+    views: NDArray[np.int64],
+) -> NDArray[np.float64]:
+    """Fill in the GOP that began before the window: (K, R, C) costs of its rest; no choice is left.
+
+    Returns:
+        (K,) what those views cost.
+    """
     running = cost.shape[1]
     mine = np.take_along_axis(cost, np.maximum(previous, 0)[:, None, None], axis=2)[:, :, 0]
-    shown = np.logical_and.accumulate(np.isfinite(mine), axis=1)
+    shown = np.logical_and.accumulate(np.isfinite(mine) & (previous >= 0)[:, None], axis=1)
     views[:, :running] = np.where(shown, previous[:, None], NO_CAMERA)
+    return np.asarray((np.where(shown, mine, NO_VIEW_COST) * lasting).sum(axis=1))
 
 
-def _gop_costs(cost: NDArray[np.float64], starts: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Sum the (K, N, C) costs over each GOP that starts in the window: (S, C, K), objects innermost.
-
-    Objects are the long axis: with it innermost every step of the program is one vector operation.
-    """
+def _gops(
+    cost: NDArray[np.float64], lasting: NDArray[np.float64], starts: NDArray[np.int64], *, blind: bool
+) -> Gops:
+    """Sum the (K, N, C) costs, each frame as often as it lasts, over each GOP that starts in the window."""
     by_frame = cost.transpose(1, 2, 0)
-    if starts.size == cost.shape[1]:
-        return np.array(by_frame, order="C")  # a copy, always: the program works in it
-    return np.ascontiguousarray(np.add.reduceat(by_frame, starts, axis=0))
+    first = int(starts[0])
+    inside, starts, lasting = by_frame[first:], starts - first, lasting[first:]
+    cost_of_gops, blind_gops = [], []
+    for start, end in pairwise([*starts.tolist(), len(inside)]):
+        # Frame after frame, so that the order of the sums does not depend on how many objects there are.
+        total = _lasting(inside[start], lasting[start])
+        for n in range(start + 1, end):
+            total = total + _lasting(inside[n], lasting[n])
+        cost_of_gops.append(total)
+        blind_gops.append(inside[start:end].min(axis=0) >= NO_VIEW_COST if blind else None)
+    return Gops(cost_of_gops, np.add.reduceat(lasting, starts), blind_gops)
 
 
-def _decide(
-    cost: NDArray[np.float64],
-    starts: NDArray[np.int64],
-    previous: NDArray[np.int64],
-    switch_cost: float,
-    views: NDArray[np.int64],
-) -> None:
-    """Solve the program over the (S, C, K) GOP costs and write the cameras into `views`.
-
-    The recursion runs backwards (cost still to come), so that the decisions are read forwards and a tie
-    can be given to the camera that is being shown, which the paper's forward recursion leaves open.
-    """
-    gops, cameras, objects = cost.shape
-    best = np.empty((gops, objects))  # the least cost from GOP s on, over the cameras to show in it
-    ahead = np.zeros((cameras, objects))  # the least cost after GOP s, by the camera shown last
-    for s in range(gops - 1, -1, -1):
-        value = cost[s]
-        value += ahead  # in place: from here on cost[s] is the cost from GOP s on
-        np.min(value, axis=0, out=best[s])
-        after = np.minimum(value, best[s] + switch_cost)
-        hole = np.isinf(best[s])
-        ahead = np.where(hole, ahead, after) if hole.any() else after
-
-    possible = np.isfinite(best)
-    leave = best + switch_cost
-    ends = np.append(starts[1:], views.shape[1])
-    every = np.arange(objects)
-    current = previous.copy()
-    for s in range(gops):
-        going_on = (current >= 0) & (cost[s][current, every] <= leave[s])
-        cut = np.flatnonzero(possible[s] & ~going_on)
-        if cut.size:
-            current[cut] = np.argmin(cost[s][:, cut], axis=0)
-        views[:, starts[s] : ends[s]] = np.where(possible[s], current, NO_CAMERA)[:, None]
-
-
-def _total(
-    cost: NDArray[np.float64],
-    views: NDArray[np.int64],
-    previous: NDArray[np.int64],
-    switch_cost: float,
-) -> NDArray[np.float64]:
-    """Cost of the given views, per object: (K,)."""
-    if not cost.size:
-        return np.full(cost.shape[0], NO_VIEW_COST * cost.shape[1])
-    objects, frames, cameras = cost.shape
-    # A hole repeats the camera before it, so that it never counts as a cut.
-    last = np.concatenate([previous[:, None], views], axis=1)
-    holes = views < 0
-    if holes.any():
-        position = np.where(last >= 0, np.arange(frames + 1), 0)
-        last = np.take_along_axis(last, np.maximum.accumulate(position, axis=1), axis=1)
-    cuts = np.count_nonzero((last[:, 1:] != last[:, :-1]) & (last[:, :-1] >= 0), axis=1)
-    each = cost.reshape(-1, cameras)[np.arange(objects * frames), views.ravel()].reshape(objects, frames)
-    each[holes] = NO_VIEW_COST
-    return np.asarray(each.sum(axis=1) + switch_cost * cuts)
+def _lasting(cost: NDArray[np.float64], frames: float) -> NDArray[np.float64]:
+    return cost if frames == 1 else cost * frames

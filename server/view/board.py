@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from server.view.decide import GopDecision, ObjectChoice
+from server.view.why import Explanation, Why
 from server.wire.messages import Cut, GopChoices
 
 
@@ -29,6 +30,7 @@ class Board:
         self.standings: dict[int, Standing] = {}
         self.merged: dict[int, int] = {}
         self.cuts = 0
+        self._why: Why | None = None
 
     def put(self, decision: GopDecision) -> GopChoices:
         """Take a decision over; give it as the message that is published and sent to the page."""
@@ -40,7 +42,7 @@ class Board:
             self._stand(decision, choice)
         numbers = {choice.number for choice in decision.choices}
         self.standings = {number: it for number, it in self.standings.items() if number in numbers}
-        self.merged = decision.merged
+        self.merged, self._why = decision.merged, decision.why
         self.cuts += len(cuts)
         return GopChoices(
             first=decision.first,
@@ -56,6 +58,16 @@ class Board:
     def resolve(self, number: int) -> int:
         """Give the number that a merged one goes by now."""
         return self.merged.get(number, number)
+
+    def explain(self, number: int) -> Explanation:
+        """Give the numbers behind an object's newest choice.
+
+        Raises:
+            KeyError: there is none.
+        """
+        if self._why is None:
+            raise KeyError(number)
+        return self._why.of(number)
 
     def _stand(self, decision: GopDecision, choice: ObjectChoice) -> None:
         known = self.standings.get(choice.number)
@@ -77,16 +89,18 @@ def _cut(choice: ObjectChoice, pulse: int) -> Cut | None:
     return Cut(object=choice.number, pulse=pulse, from_camera=choice.before, to_camera=choice.camera)
 
 
-def reason(choice: ObjectChoice) -> str:
+def reason(choice: ObjectChoice, why: Explanation) -> str:
     """Say in one plain sentence why this view was chosen."""
     camera = choice.camera
     if camera is None:
         return "No camera's picture can be shown at the moment."
-    if choice.away or not any(choice.seen.values()):
+    if choice.away or not any(view.seen for view in why.views.values()):
         return f"Nobody sees this person at the moment; {camera} saw them last."
-    possible = {name: cost for name, cost in choice.costs.items() if cost is not None}
+    possible = {name: view.cost for name, view in why.views.items() if view.cost is not None}
     if len(possible) == 1:
         return f"{camera} is the only camera whose picture can be shown."
     if camera in possible and possible[camera] <= min(possible.values()):
         return f"{camera} sees this person best over the next frames."
+    if why.stay is not None and why.cut is not None and why.stay > why.cut:
+        return f"Another camera sees this person better, but {camera} has not been shown for long enough."
     return f"Another camera sees this person a little better than {camera}, but not enough to be worth a cut."

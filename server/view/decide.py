@@ -3,33 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview import NO_CAMERA, choose_views, size_quality, view_cost
+from bestview import NO_CAMERA, choose_views
 from server.view.align import Epoch
+from server.view.outlook import Outlook
 from server.view.people import People
+from server.view.shots import Shots
+from server.view.sight import Sight
+from server.view.why import Why
 from server.wire.config import Config
 from server.wire.messages import Box
 
 Floats = NDArray[np.float64]
 
+_LAST = 5
+"""How the look-ahead ends is read from its last fifth: a single frame would be too uncertain."""
+
 
 @dataclass(frozen=True, slots=True)
 class ObjectChoice:
-    """The view of one object in one GOP, and why."""
+    """The view of one object in one GOP."""
 
     number: int
     camera: str | None
     """None: no camera can be shown."""
     before: str | None
     """The camera of the GOP before."""
-    costs: dict[str, float | None]
-    """Mean cost of each camera over the look-ahead; None where it cannot be shown."""
-    seen: dict[str, float]
-    """Share of the look-ahead's frames in which each camera sees the object."""
     away: bool
     """No camera has seen the object for a while; its stream stays where it was."""
 
@@ -45,6 +48,8 @@ class GopDecision:
     """Per camera and frame: everybody's final box by number."""
     merged: dict[int, int]
     """Numbers that turned out to be another's, up to now."""
+    why: Why = field(compare=False, repr=False)
+    """What the choices were made by."""
 
 
 def homographies(config: Config) -> dict[str, Floats | None]:
@@ -58,6 +63,7 @@ def homographies(config: Config) -> dict[str, Floats | None]:
 class Decider:
     """Decides GOP by GOP as the epochs come in. No clock, no network: the same epochs give the same cuts.
 
+    Every decision looks at the whole look-ahead anew: a camera that has died meanwhile is no longer in it.
     ``has(camera, pulse)`` tells whether a camera's frame can be shown.
     """
 
@@ -69,10 +75,13 @@ class Decider:
         self._has = has
         size = (config.site.width, config.site.height)
         self.people = People(config.view.identity, self._cameras, homographies, size)
+        self._sight = Sight(config, homographies, self.people.fits)
         self.switch_cost = config.view.switch_cost_s * config.site.fps
-        self._previous: dict[int, int] = {}
+        self.least_shot = -(-round(config.view.min_shot_s * config.site.fps) // config.encode.gop)
+        """GOPs that a shot lasts at least."""
+        self._goes_on = config.view.goes_on_s * config.site.fps
+        self._shots = Shots()
         self._next_gop: int | None = None
-        self._known_to = -1
 
     def step(self, epoch: Epoch) -> list[GopDecision]:
         """Take an epoch in; give the GOPs whose look-ahead it completes."""
@@ -81,77 +90,70 @@ class Decider:
             start = epoch.last - self._config.track.window.stride + 1
             self._next_gop = -(-start // gop) * gop
         self.people.update(epoch)
-        self._known_to = epoch.last
-        decisions = []
-        while self._next_gop + lookahead - 1 <= self._known_to:
-            decisions.append(self._decide(self._next_gop, gop, lookahead))
-        return decisions
+        self._sight.put(
+            {camera: (message, self.people.keys(message)) for camera, message in epoch.tracks.items()}
+        )
+        last = epoch.last - lookahead + 1
+        if self._next_gop > last:
+            return []
+        outlook = self._outlook(self._next_gop, epoch.last)
+        weight = self._weight(lookahead)
+        return [self._decide(outlook, first, gop, weight) for first in range(self._next_gop, last + 1, gop)]
 
     def finish(self, last: int) -> list[GopDecision]:
         """Decide what is left when every recording is over; ``last`` is the last frame of the longest."""
-        decisions = []
-        self._known_to = last
-        while self._next_gop is not None and self._next_gop <= last:
-            left = last + 1 - self._next_gop
-            frames = min(self._config.encode.gop, left)
-            decisions.append(self._decide(self._next_gop, frames, min(self._config.view.lookahead, left)))
-        return decisions
-
-    def _decide(self, first: int, frames: int, lookahead: int) -> GopDecision:
-        people = self.people
-        window = [
-            {camera: people.boxes(camera, pulse) for camera in self._cameras}
-            for pulse in range(first, first + lookahead)
+        if self._next_gop is None or self._next_gop > last:
+            return []
+        gop, lookahead = self._config.encode.gop, self._config.view.lookahead
+        outlook = self._outlook(self._next_gop, last)
+        return [
+            self._decide(
+                outlook, first, min(gop, last + 1 - first), np.ones(min(lookahead, last + 1 - first))
+            )
+            for first in range(self._next_gop, last + 1, gop)
         ]
-        objects = [number for number in people.known if people.first_seen[number] < first + frames]
-        cost = self._cost(objects, window, first)
-        previous = np.array([self._previous.get(number, NO_CAMERA) for number in objects], dtype=np.int64)
-        cut_allowed = np.arange(lookahead) % self._config.encode.gop == 0
-        views = choose_views(cost, previous, self.switch_cost, cut_allowed).views
-        choices = []
-        for row, number in enumerate(objects):
-            chosen = int(views[row, 0])
-            choices.append(self._choice(number, chosen, cost[row], window))
-            if chosen != NO_CAMERA:
-                self._previous[number] = chosen
+
+    def _outlook(self, first: int, last: int) -> Outlook:
+        """Look at the frames from `first` to `last` with what is known of people by now."""
+        relative = self._config.view.quality.relative
+        return Outlook(self._cameras, self._sight, self.people, self._has, first, last, relative=relative)
+
+    def _weight(self, lookahead: int) -> Floats:
+        """Give for how many frames each frame of the look-ahead stands: what is seen last goes on a while."""
+        weight, last = np.ones(lookahead), max(1, lookahead // _LAST)
+        weight[-last:] += self._goes_on / last
+        return weight
+
+    def _decide(self, outlook: Outlook, first: int, frames: int, weight: Floats) -> GopDecision:
+        people, lookahead = self.people, len(weight)
+        everybody = outlook.numbers
+        known = np.fromiter((people.first_seen[it] for it in everybody.tolist()), np.int64, len(everybody))
+        part = outlook.part(first, lookahead, known < first + frames)
+        before = self._shots.of(part.numbers)
+        views = choose_views(
+            part.cost,
+            before.cameras,
+            self.switch_cost,
+            np.arange(lookahead) % self._config.encode.gop == 0,
+            self.least_shot,
+            before.held,
+            weight,
+        ).views[:, 0]
+        self._shots = before.then(views)
         self._next_gop = first + self._config.encode.gop
-        self._previous = {who: view for who, view in self._previous.items() if who in people.first_seen}
-        boxes = {camera: [window[place][camera] for place in range(frames)] for camera in self._cameras}
+        boxes = {
+            camera: [people.boxes(camera, pulse) for pulse in range(first, first + frames)]
+            for camera in self._cameras
+        }
+        self._sight.forget_before(self._next_gop)
         people.forget_boxes_before(self._next_gop)
-        return GopDecision(first, frames, tuple(choices), boxes, dict(people.merged))
-
-    def _cost(
-        self, objects: Sequence[int], window: Sequence[Mapping[str, Mapping[int, Box]]], first: int
-    ) -> Floats:
-        """Give c(n, b) ``(objects, frames, cameras)``: 1 - size of the box; infinite without a picture."""
-        boxes = np.full((len(objects), len(window), len(self._cameras), 4), np.nan)
-        row_of = {number: row for row, number in enumerate(objects)}
-        shown = np.ones((len(window), len(self._cameras)), dtype=np.bool_)
-        for place, frame in enumerate(window):
-            for column, camera in enumerate(self._cameras):
-                shown[place, column] = self._has(camera, first + place)
-                for number, box in frame[camera].items():
-                    if number in row_of:
-                        boxes[row_of[number], place, column] = box
-        cost = view_cost(size_quality(boxes, self._config.site.width, self._config.site.height))
-        return np.where(shown[None, :, :], cost, np.inf)
-
-    def _choice(
-        self, number: int, chosen: int, cost: Floats, window: Sequence[Mapping[str, Mapping[int, Box]]]
-    ) -> ObjectChoice:
-        before = self._previous.get(number, NO_CAMERA)
-        means = np.mean(cost, axis=0)
-        return ObjectChoice(
-            number=number,
-            camera=None if chosen == NO_CAMERA else self._cameras[chosen],
-            before=None if before == NO_CAMERA else self._cameras[before],
-            costs={
-                camera: float(mean) if np.isfinite(mean) else None
-                for camera, mean in zip(self._cameras, means, strict=True)
-            },
-            seen={
-                camera: sum(number in frame[camera] for frame in window) / len(window)
-                for camera in self._cameras
-            },
-            away=number in self.people.away,
+        names = [*self._cameras, None]  # NO_CAMERA is the last of them
+        assert NO_CAMERA == -1  # noqa: S101 — as the line above says
+        choices = tuple(
+            ObjectChoice(number, names[view], names[last], number in people.away)
+            for number, view, last in zip(
+                part.numbers.tolist(), views.tolist(), before.cameras.tolist(), strict=True
+            )
         )
+        why = Why(part, before.cameras, weight, self.switch_cost, self._config.view.quality)
+        return GopDecision(first, frames, choices, boxes, dict(people.merged), why)

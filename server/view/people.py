@@ -88,6 +88,16 @@ class People:
         local = self._locals.known(camera, boot, track)
         return None if local is None else self.number(camera, local)
 
+    def keys(self, message: CameraTracks) -> list[TrackKey]:
+        """Say what the tracks of a message are called here, once it was taken over."""
+        local_of = self._locals.of(message)
+        return [TrackKey(message.camera, local_of[track.id]) for track in message.tracks]
+
+    def numbers(self, keys: Sequence[TrackKey]) -> NDArray[np.int64]:
+        """Give the persons' numbers behind tracks, (T,); -1 where one is not confirmed."""
+        known = self._numbers
+        return np.fromiter((known.get(key, -1) for key in keys), dtype=np.int64, count=len(keys))
+
     def forget_boxes_before(self, pulse: int) -> None:
         """Let go of the boxes before a pulse."""
         for history in self._histories.values():

@@ -85,8 +85,24 @@ class Choice(msgspec.Struct, frozen=True):
     """Mean cost a frame of each camera over the look-ahead; null: cannot be shown."""
     seen: dict[str, float]
     """Share of the look-ahead in which each camera sees the person."""
+    quality: dict[str, float | None]
+    """How well each camera shows the person where it sees them, 0 to 1; null: it does not."""
+    terms: dict[str, dict[str, float]]
+    """By camera: the terms of that quality, likewise; empty where it does not see the person."""
+    weights: dict[str, float]
+    """By term: the share of a view's worth that is lost where the term is 0."""
+    before: str | None
+    """The camera of the GOP before; null: there was none."""
+    lookahead: int
+    """Frames from `first` on that were looked at."""
     switch_cost: float
     """What a cut costs, in frames of not seeing the person."""
+    stay: float | None
+    """What the look-ahead costs with `before`, likewise; null: there is none, or it cannot be shown."""
+    cut: float | None
+    """What it costs with the best other camera, the cut included; null: there is none."""
+    cut_to: str | None
+    """That camera."""
     reason: str
 
 

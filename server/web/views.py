@@ -73,16 +73,25 @@ def choice_info(service: BestViewService, number: int) -> Choice | None:
     standing = service.board.standings.get(service.board.resolve(number))
     if standing is None:
         return None
+    why = service.board.explain(standing.choice.number)
     return Choice(
         object=standing.choice.number,
         first=standing.first,
         frames=standing.frames,
         camera=standing.choice.camera,
         since=standing.since,
-        costs=standing.choice.costs,
-        seen=standing.choice.seen,
-        switch_cost=service.decider.switch_cost,
-        reason=reason(standing.choice),
+        costs={camera: view.cost for camera, view in why.views.items()},
+        seen={camera: view.seen for camera, view in why.views.items()},
+        quality={camera: view.quality for camera, view in why.views.items()},
+        terms={camera: view.terms for camera, view in why.views.items()},
+        weights=why.weights,
+        before=standing.choice.before,
+        lookahead=why.frames,
+        switch_cost=why.switch_cost,
+        stay=why.stay,
+        cut=why.cut,
+        cut_to=why.cut_to,
+        reason=reason(standing.choice, why),
     )
 
 

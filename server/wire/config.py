@@ -25,7 +25,7 @@ from pydantic import (
 )
 from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, SettingsConfigDict
 
-from bestview import IdentitySettings, checked_homography
+from bestview import IdentitySettings, QualitySettings, checked_homography
 from server.wire.detect import DetectSettings
 from server.wire.library import validated
 from tracking import DEFAULT_SOLVER, CostSettings, WindowSettings, solver_named
@@ -158,12 +158,19 @@ class View(Section):
 
     lookahead: PositiveInt = 25
     """Frames the choice of a view looks ahead: N of the paper's section III; all of it is delay."""
-    switch_cost_s: NonNegativeFloat = 0.08
-    """λ: a cut is worth it when it saves this many seconds of not seeing the person at all."""
+    switch_cost_s: NonNegativeFloat = 0.3
+    """λ: how many seconds of not seeing the person, while another camera does, are worth a cut; of a view
+    that is worth half the best one it takes twice as many."""
+    goes_on_s: NonNegativeFloat = 0.5
+    """For how long the views at the end of the look-ahead are taken to go on as they are."""
+    min_shot_s: NonNegativeFloat = 0.0
+    """A camera is shown for so long at least, in whole GOPs; one that sees nobody may be left sooner."""
     late_after_s: PositiveFloat = 0.5
     """How long to wait for a camera's tracks before going on without that camera."""
     buffer_s: PositiveFloat = 10.0
     """Video kept per camera."""
+    quality: Annotated[QualitySettings, validated(QualitySettings)] = QualitySettings()
+    """What makes a view good."""
     identity: Annotated[IdentitySettings, validated(IdentitySettings)] = IdentitySettings()
 
 

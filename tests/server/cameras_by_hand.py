@@ -10,10 +10,12 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from bestview import IdentityUpdate, LocalTrack
+from bestview import IdentityUpdate, LocalTrack, QualitySettings
 from server.camera.encode import AccessUnit, Encoder
 from server.view.align import Epoch
+from server.view.outlook import Part
 from server.view.service import BestViewService
+from server.view.why import Why
 from server.wire.config import Config, Encode, Site
 from server.wire.epochs import end_of_epoch
 from server.wire.inbox import Message
@@ -25,6 +27,11 @@ GOP = STRIDE = 5
 CAMERAS = ("c0", "c1")
 SMALL: Box = (10.0, 10.0, 16.0, 28.0)
 LARGE: Box = (20.0, 4.0, 36.0, 44.0)
+_NOBODY = np.zeros(0, dtype=np.int64)
+NO_REASON = Why(
+    Part(CAMERAS, _NOBODY, np.zeros((0, 1, len(CAMERAS))), []), _NOBODY, np.ones(1), 0.0, QualitySettings()
+)
+"""Of decisions that a test makes up: nobody will ask why."""
 
 
 def small_config(cameras: Sequence[str] = CAMERAS, **changes: Any) -> Config:
@@ -126,7 +133,7 @@ class TrackNumbers:
     def update(self, tracks: Sequence[LocalTrack], last_frame: int) -> IdentityUpdate:
         """Give everybody their number."""
         del last_frame
-        return IdentityUpdate({track.key: track.local for track in tracks}, (), (), (), ())
+        return IdentityUpdate({track.key: track.local for track in tracks}, (), (), (), (), ())
 
 
 class FedService(BestViewService):

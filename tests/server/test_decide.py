@@ -39,6 +39,10 @@ def shown(decisions: list[GopDecision], number: int = 1) -> list[str | None]:
     return [choice.camera for it in decisions for choice in it.choices if choice.number == number]
 
 
+def said(decision: GopDecision) -> str:
+    return reason(decision.choices[0], decision.why.of(decision.choices[0].number))
+
+
 def test_a_gop_is_decided_when_its_look_ahead_is_known() -> None:
     it = decider()
     assert decide(it, [{A: {1: SMALL}, B: {}}]) == []
@@ -49,8 +53,9 @@ def test_a_gop_is_decided_when_its_look_ahead_is_known() -> None:
 def test_the_camera_with_the_bigger_box_shows_the_person() -> None:
     decisions = decide(decider(), [{A: {1: SMALL}, B: {1: LARGE}}] * 4)
     assert shown(decisions) == [B, B, B]
-    costs = decisions[-1].choices[0].costs
-    assert (costs[A] or 0.0) > (costs[B] or 0.0) > 0.0
+    views = decisions[-1].why.of(1).views
+    assert views[B].cost == 0.0
+    assert views[A].cost == pytest.approx(1 - (views[A].quality or 0.0) / (views[B].quality or 0.0))
 
 
 def test_a_little_better_is_not_worth_a_cut_and_much_better_is() -> None:
@@ -60,7 +65,7 @@ def test_a_little_better_is_not_worth_a_cut_and_much_better_is() -> None:
     after: Seen = {A: {1: SMALL}, B: {1: LARGE}}
     decisions = decide(decider(), [before] * 2 + [between] * 3 + [after] * 3)
     assert shown(decisions) == [A, A, A, A, B, B, B]
-    assert "a little better than c0, but not enough" in reason(decisions[2].choices[0])
+    assert "a little better than c0, but not enough" in said(decisions[2])
 
 
 def test_a_person_who_is_seen_by_one_camera_alone_is_shown_by_it() -> None:
@@ -82,14 +87,14 @@ def test_a_camera_of_which_a_frame_is_missing_is_not_chosen_for_that_gop() -> No
     it = decider(has=lambda camera, pulse: (camera, pulse) != (A, GOP + 2))
     decisions = decide(it, [{A: {1: LARGE}, B: {}}] * 5, end=5 * STRIDE - 1)
     assert shown(decisions) == [A, B, A, A, A]
-    assert decisions[1].choices[0].costs[A] is None
+    assert decisions[1].why.of(1).views[A].cost is None
 
 
 def test_where_no_camera_can_be_shown_none_is_chosen_and_the_stream_goes_on_after() -> None:
     it = decider(has=lambda _camera, pulse: pulse // GOP != 1)
     decisions = decide(it, [{A: {1: LARGE}, B: {}}] * 5, end=5 * STRIDE - 1)
     assert shown(decisions) == [A, None, A, A, A]
-    assert reason(decisions[1].choices[0]) == "No camera's picture can be shown at the moment."
+    assert said(decisions[1]) == "No camera's picture can be shown at the moment."
 
 
 @pytest.mark.parametrize("left", range(1, GOP + 1))
@@ -170,9 +175,9 @@ def test_after_a_hole_the_same_camera_is_no_cut() -> None:
 
 def test_the_reason_is_one_plain_sentence_for_every_case() -> None:
     story: list[Seen] = [{A: {1: LARGE}, B: {}}] * 2
-    only_a = decide(decider(has=lambda camera, _pulse: camera == A), story)[0].choices[0]
-    assert reason(only_a) == "c0 is the only camera whose picture can be shown."
-    best = decide(decider(), story)[0].choices[0]
-    assert reason(best) == "c0 sees this person best over the next frames."
-    away = decide(decider(), [*story, *[{A: {}, B: {}}] * 3])[-1].choices[0]
-    assert reason(away) == "Nobody sees this person at the moment; c0 saw them last."
+    only_a = decide(decider(has=lambda camera, _pulse: camera == A), story)[0]
+    assert said(only_a) == "c0 is the only camera whose picture can be shown."
+    best = decide(decider(), story)[0]
+    assert said(best) == "c0 sees this person best over the next frames."
+    away = decide(decider(), [*story, *[{A: {}, B: {}}] * 3])[-1]
+    assert said(away) == "Nobody sees this person at the moment; c0 saw them last."

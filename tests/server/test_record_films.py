@@ -6,7 +6,7 @@ from pathlib import Path
 
 import av
 import numpy as np
-from cameras_by_hand import CAMERAS, FPS, GOP, HEIGHT, LARGE, SMALL, WIDTH, encoded
+from cameras_by_hand import CAMERAS, FPS, GOP, HEIGHT, LARGE, NO_REASON, SMALL, WIDTH, encoded
 from test_splice import choice
 
 from server.run.films import Films
@@ -26,7 +26,9 @@ def decision(
     gop: int, *choices: ObjectChoice, frames: int = GOP, **boxes: list[dict[int, Box]]
 ) -> GopDecision:
     nobody: list[dict[int, Box]] = [{}] * frames
-    return GopDecision(gop * GOP, frames, choices, {it: boxes.get(it, nobody) for it in CAMERAS}, {})
+    return GopDecision(
+        gop * GOP, frames, choices, {it: boxes.get(it, nobody) for it in CAMERAS}, {}, NO_REASON
+    )
 
 
 def test_the_files_are_these_bytes(tmp_path: Path) -> None:

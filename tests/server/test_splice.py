@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Iterable
 
-from cameras_by_hand import CAMERAS, FPS, GOP, encoded, small_config
+from cameras_by_hand import CAMERAS, FPS, GOP, NO_REASON, encoded, small_config
 
 from server.view.agreement import Agreement
 from server.view.channel import Viewer
@@ -26,15 +26,15 @@ def filled() -> tuple[Splicer, dict[str, Shelf]]:
 
 
 def choice(number: int, camera: str | None, before: str | None = None, *, away: bool = False) -> ObjectChoice:
-    return ObjectChoice(
-        number, camera, before, dict.fromkeys(CAMERAS, 0.5), dict.fromkeys(CAMERAS, 1.0), away
-    )
+    return ObjectChoice(number, camera, before, away)
 
 
 def decision(
     gop: int, *choices: ObjectChoice, merged: dict[int, int] | None = None, frames: int = GOP
 ) -> GopDecision:
-    return GopDecision(gop * GOP, frames, choices, {camera: [] for camera in CAMERAS}, merged or {})
+    return GopDecision(
+        gop * GOP, frames, choices, {camera: [] for camera in CAMERAS}, merged or {}, NO_REASON
+    )
 
 
 async def received(viewer: Viewer) -> list[bytes]:

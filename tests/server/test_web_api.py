@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import re
 
+import pytest
 from cameras_by_hand import CAMERAS, FPS, GOP, HEIGHT, WIDTH, encoded, status, thumbnail, video
 from halls import A, B, Hall
 
@@ -77,8 +79,13 @@ async def test_a_refused_camera_says_why(busy: Hall) -> None:
 
 async def test_a_choice_is_explained(busy: Hall) -> None:
     choice = await busy.get_json("/api/objects/1/choice")
-    costs = choice.pop("costs")
-    assert costs[B] < costs[A] < 1
+    costs, quality, terms, weights = (choice.pop(it) for it in ("costs", "quality", "terms", "weights"))
+    assert 0 == costs[B] < costs[A] < 1
+    assert costs[A] == pytest.approx(1 - quality[A] / quality[B])
+    for camera, worth in quality.items():
+        assert worth == pytest.approx(math.prod(1 - weights[it] * (1 - terms[camera][it]) for it in weights))
+    assert choice.pop("stay") == 0.0
+    assert choice.pop("cut") == pytest.approx((2 * GOP + 0.5 * FPS) * costs[A] + 1.0)
     assert choice == {
         "object": 1,
         "first": GOP,
@@ -86,6 +93,9 @@ async def test_a_choice_is_explained(busy: Hall) -> None:
         "camera": B,
         "since": 0,
         "seen": {A: 1.0, B: 1.0},
+        "before": B,
+        "lookahead": 2 * GOP,
+        "cut_to": A,
         "switch_cost": 1.0,
         "reason": "c1 sees this person best over the next frames.",
     }

@@ -1,15 +1,14 @@
-"""How well a view shows an object: the c(n, b) of section III comes from here."""
+"""How large a view shows a person: the paper's view quality, as a length."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-HIDDEN_COST = 1.0
-"""The view cost of a camera that runs but does not see the object."""
+from bestview.quality.boxes import Floats, areas, clipped
 
 
-def size_quality(boxes: NDArray[np.float64], width: float, height: float) -> NDArray[np.float64]:
+def size_quality(boxes: Floats, width: float, height: float) -> NDArray[np.float64]:
     """Linear size of the part of each box inside the picture: ``sqrt(box area / picture area)``.
 
     The paper's view quality is the size of the bounding box (section III); the root makes it grow with
@@ -31,12 +30,5 @@ def size_quality(boxes: NDArray[np.float64], width: float, height: float) -> NDA
         raise ValueError(f"a picture of {width} x {height} pixels has no area")
     if boxes.ndim < 1 or boxes.shape[-1] != 4:  # noqa: PLR2004 — left, top, right, bottom
         raise ValueError(f"boxes have shape {boxes.shape}, not (..., 4)")
-    left, top = np.maximum(boxes[..., 0], 0.0), np.maximum(boxes[..., 1], 0.0)
-    right, bottom = np.minimum(boxes[..., 2], width), np.minimum(boxes[..., 3], height)
-    area = np.maximum(right - left, 0.0) * np.maximum(bottom - top, 0.0)
+    area = areas(clipped(boxes, np.array([0.0, 0.0, width, height])))
     return np.asarray(np.sqrt(np.nan_to_num(area) / (width * height)))
-
-
-def view_cost(quality: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Turn quality in [0, 1] into the cost ``1 - quality`` of section III; hidden (quality 0) costs 1."""
-    return HIDDEN_COST - np.clip(quality, 0.0, 1.0)

@@ -1,0 +1,27 @@
+"""What the terms of view quality ask of boxes: (..., 4) left, top, right, bottom in pixels."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+def clipped(boxes: Floats, pictures: Floats) -> Floats:
+    """Give the part of each box that is inside its picture; both (..., 4), broadcast to each other."""
+    return np.concatenate(
+        [np.maximum(boxes[..., :2], pictures[..., :2]), np.minimum(boxes[..., 2:], pictures[..., 2:])],
+        axis=-1,
+    )
+
+
+def areas(boxes: Floats) -> Floats:
+    """Give the area of each box, (..., 4) -> (...); 0 where its sides are the wrong way round."""
+    width, height = boxes[..., 2] - boxes[..., 0], boxes[..., 3] - boxes[..., 1]
+    return np.asarray(np.maximum(width, 0.0) * np.maximum(height, 0.0))
+
+
+def shares(parts: Floats, wholes: Floats) -> Floats:
+    """Divide areas; 0 where there is nothing to have a share of."""
+    return np.asarray(np.divide(parts, wholes, out=np.zeros_like(parts), where=wholes > 0))

@@ -1,0 +1,57 @@
+"""Whether somebody walks towards the camera or away from it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bestview.ground import feet, person_heights, to_ground
+from bestview.quality.boxes import Floats
+
+_STROLL = 0.15
+"""Heights a second (about 0.25 m/s): at this speed the way somebody goes tells half of what it can."""
+
+_PIXEL_DOWN = np.array([0.0, 1.0])
+
+NEUTRAL = 0.5
+"""Of somebody who stands, goes across, or of whom the ground is not known."""
+
+
+def facing(boxes: Floats, homography: Floats, fps: float) -> Floats:
+    """1 for who walks towards the camera, 0 for who walks away, 1/2 for who stands or goes across.
+
+    With *v* the velocity of the feet on the ground over the frames given (least squares) and *u* the ground
+    direction that points down the picture at the feet, which is towards the camera::
+
+        1/2 + 1/2 cos(v, u) |v| / (|v| + 0.15 heights a second)
+
+    Args:
+        boxes: (K, N, 4) pixels of one camera over a window of N frames, about half a second; NaN: hidden.
+        homography: (3, 3) from those pixels to the ground.
+        fps: frames per second.
+
+    Returns:
+        (K,) values in [0, 1], one for the whole window.
+    """
+    ground = to_ground(homography, feet(boxes))
+    known = ~np.isnan(ground[..., 0])
+    count = known.sum(axis=1)
+    enough = count > 1
+    weight = known / np.maximum(count, 1)[:, None]
+    time = np.arange(boxes.shape[1]) / fps
+    away = time - (weight * time).sum(axis=1, keepdims=True)
+    spread = (weight * away**2).sum(axis=1)
+    # Hidden frames have no weight; a number must stand there all the same.
+    place = np.where(known[..., None], ground, 0.0)
+    velocity = ((weight * away)[..., None] * place).sum(axis=1) / np.where(enough, spread, 1.0)[:, None]
+
+    middle = (weight[..., None] * np.where(known[..., None], boxes, 0.0)).sum(axis=1)
+    foot = feet(middle)
+    down = to_ground(homography, foot + _PIXEL_DOWN) - to_ground(homography, foot)
+    speed = np.hypot(velocity[:, 0], velocity[:, 1])
+    length = np.hypot(down[:, 0], down[:, 1])
+    along = (velocity * down).sum(axis=1)
+    # cos |v| / (|v| + stroll): the speed in the cosine's divisor goes out.
+    divisor = length * (speed + _STROLL * person_heights(homography, middle))
+    known_way = enough & (divisor > 0)
+    towards = np.divide(along, divisor, out=np.zeros(len(boxes)), where=known_way)
+    return np.asarray(NEUTRAL + NEUTRAL * towards)
