@@ -7,9 +7,9 @@ scored as `myview evaluate --views` does, beside the exact offline optimum of wh
 
 The truth stands in for MyView's stages, one after the other; what is lost between two rows is that stage's:
 *true boxes* of those who are visible; *own boxes, true ids*: those that MyView's cameras tracked, each with
-the number of the person it is at; *own tracks, true joins*: each track with the number of the person it is
-mostly at; *again*: all as MyView numbered it at last, known at once, and nobody ever away. The mean of *own
-tracks, not joined* is what each camera's tracker is worth by itself.
+the number of the person it is at, and the same with short gaps bridged; *own tracks, true joins*: each track
+with the number of the person it is mostly at; *again*: all as MyView numbered it at last, known at once, and
+nobody ever away. The mean of *own tracks, not joined* is what each camera's tracker is worth by itself.
 
 *Calibrated* has the homographies that `myview calibrate` makes of the cameras' own tracks. *Largest* chooses
 frame by frame the camera with the largest box. *Nearest feet* joins whole tracks of our cameras (or of

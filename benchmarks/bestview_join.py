@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -120,6 +121,33 @@ def tracks_by_truth(rows: Rows, gt: Rows, least_iou: float = 0.5) -> dict[str, l
         kept = sorted((row for row in found if row.id in best), key=lambda row: (row.frame, -long[row.id]))
         joined[camera] = _first_of_each([replace(row, id=best[row.id]) for row in kept])
     return joined
+
+
+def bridged(rows: Rows, most: int) -> dict[str, list[MotRow]]:
+    """Put boxes, on the straight line, where a camera finds somebody again within `most` frames."""
+    filled = {}
+    for camera, found in rows.items():
+        by_person: dict[int, list[MotRow]] = defaultdict(list)
+        for row in sorted(found, key=lambda row: row.frame):
+            by_person[row.id].append(row)
+        between = [
+            _between(one, other, frame)
+            for track in by_person.values()
+            for one, other in pairwise(track)
+            if other.frame - one.frame <= most
+            for frame in range(one.frame + 1, other.frame)
+        ]
+        filled[camera] = sorted([*found, *between], key=lambda row: (row.frame, row.id))
+    return filled
+
+
+def _between(one: MotRow, other: MotRow, frame: int) -> MotRow:
+    share = (frame - one.frame) / (other.frame - one.frame)
+    sides = {
+        name: (1.0 - share) * getattr(one, name) + share * getattr(other, name)
+        for name in ("left", "top", "width", "height")
+    }
+    return replace(one, frame=frame, **sides)
 
 
 def _first_of_each(rows: Sequence[MotRow]) -> list[MotRow]:

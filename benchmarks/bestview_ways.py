@@ -9,7 +9,14 @@ from pathlib import Path
 
 from benchmarks.bestview_cases import Case, Rows, Watched
 from benchmarks.bestview_decide import Rendering, decide, decide_given, largest
-from benchmarks.bestview_join import boxes_by_truth, by_nearest_feet, not_joined, own_tracks, tracks_by_truth
+from benchmarks.bestview_join import (
+    boxes_by_truth,
+    bridged,
+    by_nearest_feet,
+    not_joined,
+    own_tracks,
+    tracks_by_truth,
+)
 from benchmarks.peer_environment import PEERS, PeerEnvironment
 from bestview import ViewScore
 from server.run.evaluate_choices import Choice
@@ -21,6 +28,8 @@ from tracking.evaluation import CameraScores, Recording, evaluate_cameras
 from tracking.motchallenge import MotRow, format_rows
 
 LEAST_IOU = 0.5
+BRIDGE = 20
+"""Frames that somebody may be hidden for and still count as shown."""
 TRUE, TRUE_LARGEST = "true boxes", "true boxes, largest"
 OURS, CALIBRATED, WITHOUT = "MyView", "MyView, calibrated", "no homographies"
 PEER = "ByteTrack"
@@ -75,7 +84,9 @@ def ways(
     yield Way(TRUE, chosen(there), given=True)
     yield Way(TRUE_LARGEST, simple(there), given=True)
     own = own_tracks(seen.messages)
-    yield Way("own boxes, true ids", chosen(boxes_by_truth(own, case.gt)))
+    named = boxes_by_truth(own, case.gt)
+    yield Way("own boxes, true ids", chosen(named))
+    yield Way("  and gaps bridged", chosen(bridged(named, BRIDGE)))
     yield Way("own tracks, true joins", chosen(tracks_by_truth(own, case.gt)))
     yield Way("own tracks, not joined", simple(not_joined(own)))
     bare = decide(case.config(ground=False), seen.messages)

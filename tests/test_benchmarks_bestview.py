@@ -13,7 +13,14 @@ import pytest
 from benchmarks import bestview
 from benchmarks.bestview_cases import Case, Rows
 from benchmarks.bestview_decide import Rendering, decide_given, largest
-from benchmarks.bestview_join import boxes_by_truth, by_nearest_feet, not_joined, own_tracks, tracks_by_truth
+from benchmarks.bestview_join import (
+    boxes_by_truth,
+    bridged,
+    by_nearest_feet,
+    not_joined,
+    own_tracks,
+    tracks_by_truth,
+)
 from benchmarks.bestview_sweep import STRIDE, Setting, sweep
 from benchmarks.bestview_ways import Way, outcome, visible_rows
 from benchmarks.bestview_why import Losses, losses
@@ -110,6 +117,12 @@ def test_the_truth_may_name_boxes_or_whole_tracks() -> None:
     ]
     assert {row.id for row in tracks_by_truth(swapped, gt)["c0"]} == {7}
     assert len(tracks_by_truth(swapped, gt)["c0"]) == 10
+
+
+def test_moments_of_hiding_are_bridged_and_absences_are_not() -> None:
+    seen = {"c0": [*rows(1, 0.0, [1, 2]), *rows(1, 4.0, [6]), *rows(1, 9.0, [20]), *rows(2, 50.0, [1])]}
+    found = [(row.frame, row.left) for row in bridged(seen, 4)["c0"] if row.id == 1]
+    assert found == [(1, 0.0), (2, 0.0), (3, 1.0), (4, 2.0), (5, 3.0), (6, 4.0), (20, 9.0)]
 
 
 def test_of_two_tracks_at_one_person_the_longer_stays() -> None:
