@@ -40,6 +40,8 @@ class SeenObject(msgspec.Struct, frozen=True):
     """Who sees it now."""
     thumbnail: str | None
     """A path on the server."""
+    also: tuple[int, ...] = ()
+    """Other numbers that this person once had; they go on to work."""
 
 
 class Camera(msgspec.Struct, frozen=True):
@@ -91,6 +93,21 @@ class Cut(msgspec.Struct, frozen=True, rename={"before": "from", "after": "to"})
     pulse: int
 
 
+class Merged(msgspec.Struct, frozen=True):
+    """Two numbers turned out to be one person: ``lost`` is never used again."""
+
+    kept: int
+    lost: int
+
+
+class Split(msgspec.Struct, frozen=True):
+    """Whom a camera showed as ``kept`` turned out to be ``parted``, somebody else."""
+
+    kept: int
+    parted: int
+    camera: str
+
+
 class Gop(msgspec.Struct, frozen=True):
     """Event ``gop``: what is shown in frames ``first`` to ``first + frames - 1``."""
 
@@ -101,6 +118,9 @@ class Gop(msgspec.Struct, frozen=True):
     boxes: dict[str, tuple[tuple[Box, ...], ...]]
     """By camera: for each frame, the boxes in it."""
     cuts: tuple[Cut, ...]
+    merged: tuple[Merged, ...] = ()
+    """What has turned out about numbers since the GOP before, as ``split``."""
+    split: tuple[Split, ...] = ()
 
 
 class Objects(msgspec.Struct, frozen=True):

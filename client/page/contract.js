@@ -17,6 +17,7 @@
  *
  * @typedef {object} Person an entry of /api/objects
  * @property {number} object
+ * @property {number[]} [also] other numbers that this person once had
  * @property {number} first_seen pulse
  * @property {number} last_seen pulse
  * @property {boolean} visible
@@ -46,6 +47,8 @@
  * @property {Record<string, string>} choices camera by object
  * @property {Record<string, Box[][]>} boxes by camera, one list per frame
  * @property {Cut[]} cuts
+ * @property {{kept: number, lost: number}[]} [merged] numbers that turned out to be one person
+ * @property {{kept: number, parted: number, camera: string}[]} [split] whom a camera showed as another than they are
  *
  * @typedef {object} Choice /api/objects/{k}/choice
  * @property {number} object

@@ -70,6 +70,8 @@ function readOut() {
   stage.classList.toggle('pictured', probe.pulse !== null && !['unknown', 'empty'].includes(status.state));
   if (title.textContent !== status.title) title.textContent = status.title; // or it is read out again
   if (text.textContent !== status.text) text.textContent = status.text;
+  const notice = element('notice');
+  if (notice.textContent !== viewer.notice) notice.textContent = viewer.notice;
   const delay = median(probe.delays.slice(-DELAY_FRAMES).map(({ delayMs }) => delayMs ?? NaN));
   element('delay').textContent = viewer.flowing && delay > 0 ? `${(delay / 1000).toFixed(1)} s` : MISSING;
   if (!site || probe.pulse === null || viewer.object === null) return strip.clear();

@@ -13,6 +13,7 @@ import { describe } from './status.js';
 
 const STANDING_MS = 1500; // without a new frame the picture counts as standing
 const RECENT_S = 10; // after this out of view a person belongs to the earlier ones
+const NOTICE_MS = 10_000; // for which it is said that a number was corrected
 const RESTART_S = 1; // pulse 0 moved by more than this: the pulses began anew
 
 export class Viewer {
@@ -36,6 +37,8 @@ export class Viewer {
   #asked = this.object !== null; // by the viewer, not by default
   #frameAt = -Infinity;
   #chosenAt = -Infinity;
+  #notice = '';
+  #noticeAt = -Infinity;
 
   /**
    * @param {HTMLVideoElement} video
@@ -63,6 +66,7 @@ export class Viewer {
   /** @param {Person[]} people */
   setPeople(people) {
     this.people = people;
+    this.#followMerge();
     const lost = this.object !== null && !this.chosen;
     if (this.object === null || (lost && !this.#asked)) this.#chooseDefault();
     this.#play();
@@ -78,6 +82,9 @@ export class Viewer {
   /** @param {Gop} gop */
   addGop(gop) {
     this.decisions.add(gop);
+    for (const { kept, parted, camera } of gop.split ?? []) {
+      if (kept === this.object) this.#say(`${camera} took somebody else for person ${kept}: that is person ${parted}.`);
+    }
   }
 
   /** @param {boolean} connected */
@@ -152,6 +159,11 @@ export class Viewer {
     return status;
   }
 
+  /** @returns {string} what has just turned out about the chosen person's number; empty: nothing */
+  get notice() {
+    return performance.now() - this.#noticeAt < NOTICE_MS ? this.#notice : '';
+  }
+
   /** @type {number | null} milliseconds that the server's clock is ahead; set from outside */
   clockOffset = null;
 
@@ -163,6 +175,23 @@ export class Viewer {
     const { site, clockOffset } = this;
     if (!site || site.pulse0 === null || clockOffset === null) return null;
     return shownAt + clockOffset - (site.pulse0 + pulse / site.fps) * 1000;
+  }
+
+  /** Whoever was chosen by a number that is no longer theirs stays chosen by the one they have. */
+  #followMerge() {
+    const { object } = this;
+    const same = this.people?.find((person) => object !== null && person.also?.includes(object));
+    if (!same || this.chosen) return;
+    this.#say(`Person ${object} turned out to be person ${same.object}.`);
+    this.#turnTo(same.object, this.#asked);
+    writeAddress(same.object, false);
+  }
+
+  /** @param {string} text */
+  #say(text) {
+    this.#notice = text;
+    this.#noticeAt = performance.now();
+    this.changed();
   }
 
   #chooseDefault() {

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from bestview import Merge, Split
 from server.view.decide import GopDecision, ObjectChoice
 from server.view.why import Explanation, Why
-from server.wire.messages import Cut, GopChoices
+from server.wire.messages import Cut, GopChoices, Merged, Parted
 
 
 @dataclass(slots=True)
@@ -53,6 +54,14 @@ class Board:
                 for camera, frames in decision.boxes.items()
             },
             cuts=cuts,
+            merged=[
+                Merged(kept=it.kept, lost=it.lost) for it in decision.corrections if isinstance(it, Merge)
+            ],
+            split=[
+                Parted(kept=it.kept, parted=it.parted, camera=it.camera)
+                for it in decision.corrections
+                if isinstance(it, Split)
+            ],
         )
 
     def resolve(self, number: int) -> int:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview import NO_CAMERA, choose_views
+from bestview import NO_CAMERA, Merge, Split, choose_views
 from server.view.align import Epoch
 from server.view.outlook import Outlook
 from server.view.people import People
@@ -48,6 +48,8 @@ class GopDecision:
     """Per camera and frame: everybody's final box by number."""
     merged: dict[int, int]
     """Numbers that turned out to be another's, up to now."""
+    corrections: tuple[Merge | Split, ...]
+    """What has turned out about numbers since the last decision."""
     why: Why = field(compare=False, repr=False)
     """What the choices were made by."""
 
@@ -156,4 +158,4 @@ class Decider:
             )
         )
         why = Why(part, before.cameras, weight, self.switch_cost, self._config.view.quality)
-        return GopDecision(first, frames, choices, boxes, dict(people.merged), why)
+        return GopDecision(first, frames, choices, boxes, dict(people.merged), people.take_corrections(), why)

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview import IdentityRegistry, IdentitySettings, LocalTrack, TrackKey
+from bestview import IdentityRegistry, IdentitySettings, LocalTrack, Merge, Split, TrackKey
 from server.view.align import Epoch
 from server.view.history import BoxHistory
 from server.view.locals import LocalNumbers
@@ -43,6 +43,7 @@ class People:
         """Those whom no camera has seen for a while; they are remembered."""
         self.merged: dict[int, int] = {}
         """Numbers that turned out to be another's."""
+        self._corrections: list[Merge | Split] = []
 
     def update(self, epoch: Epoch) -> None:
         """Take over what all cameras said about an epoch."""
@@ -63,6 +64,7 @@ class People:
         self.away = (self.away | set(update.gone)) - set(update.returned)
         for merge in update.merged:
             self._merge(merge.kept, merge.lost)
+        self._corrections += [*update.merged, *update.split]
         self._forget(epoch.last)
 
     @property
@@ -97,6 +99,15 @@ class People:
         """Give the persons' numbers behind tracks, (T,); -1 where one is not confirmed."""
         known = self._numbers
         return np.fromiter((known.get(key, -1) for key in keys), dtype=np.int64, count=len(keys))
+
+    def also(self, number: int) -> list[int]:
+        """Give the other numbers that somebody once had, in order."""
+        return sorted(old for old, new in self.merged.items() if new == number)
+
+    def take_corrections(self) -> tuple[Merge | Split, ...]:
+        """Give what has turned out about numbers since this was last asked, in order."""
+        taken, self._corrections = tuple(self._corrections), []
+        return taken
 
     def forget_boxes_before(self, pulse: int) -> None:
         """Let go of the boxes before a pulse."""

@@ -8,16 +8,18 @@ from typing import TextIO
 
 import numpy as np
 
+from bestview import Merge, Split
 from server.view.decide import GopDecision
 from server.wire.fit import Fit
 from tracking.motchallenge import MotRow, format_row
 
 CHOICES_HEAD = "frame,object,camera\n"
+CORRECTIONS_HEAD = "frame,what,object,other,camera\n"
 LATE_HEAD = "frame,camera,what\n"
 
 
 class Recorder:
-    """Writes ``tracks/<camera>.txt``, ``choices.csv`` and ``late.csv`` as decisions are made.
+    """Writes decisions: ``tracks/<camera>.txt``, ``choices.csv``, ``corrections.csv``, ``late.csv``.
 
     ``fits`` may grow: a camera is in it from its first word on.
 
@@ -31,6 +33,7 @@ class Recorder:
         (folder / "tracks").mkdir(parents=True, exist_ok=True)
         self._tracks = {camera: _open(folder / "tracks" / f"{camera}.txt") for camera in cameras}
         self._choices = _open(folder / "choices.csv", CHOICES_HEAD)
+        self._corrections = _open(folder / "corrections.csv", CORRECTIONS_HEAD)
         self._late = _open(folder / "late.csv", LATE_HEAD)
 
     def write(self, decision: GopDecision) -> None:
@@ -43,7 +46,9 @@ class Recorder:
                 if choice.camera is not None and not choice.away:
                     frame = decision.first + place + 1
                     self._choices.write(f"{frame},{choice.number},{choice.camera}\n")
-        for file in (*self._tracks.values(), self._choices):
+        for correction in decision.corrections:
+            self._corrections.write(f"{decision.first + 1},{_line(correction)}\n")
+        for file in (*self._tracks.values(), self._choices, self._corrections):
             file.flush()
 
     def late(self, camera: str, pulses: Sequence[int], what: str) -> None:
@@ -54,7 +59,7 @@ class Recorder:
 
     def close(self) -> None:
         """Close the files."""
-        for file in (*self._tracks.values(), self._choices, self._late):
+        for file in (*self._tracks.values(), self._choices, self._corrections, self._late):
             file.close()
 
     def _write_tracks(self, camera: str, frame: int, boxes: Mapping[int, Sequence[float]]) -> None:
@@ -62,6 +67,12 @@ class Recorder:
             left, top, right, bottom = self._fits[camera].boxes_to_own(np.asarray(box, dtype=np.float64))
             row = MotRow(frame, number, left, top, right - left, bottom - top)
             self._tracks[camera].write(format_row(row) + "\n")
+
+
+def _line(correction: Merge | Split) -> str:
+    if isinstance(correction, Merge):
+        return f"merged,{correction.kept},{correction.lost},"
+    return f"split,{correction.kept},{correction.parted},{correction.camera}"
 
 
 def _open(path: Path, head: str = "") -> TextIO:

@@ -27,6 +27,8 @@ class ObjectInfo(msgspec.Struct, frozen=True):
     """One person."""
 
     object: int
+    also: list[int]
+    """Other numbers that this person once had; they go on to work."""
     first_seen: int
     """Pulse."""
     last_seen: int

@@ -36,6 +36,7 @@ def objects_info(service: BestViewService) -> Objects:
         objects.append(
             ObjectInfo(
                 object=number,
+                also=people.also(number),
                 first_seen=people.first_seen.get(number, standing.first),
                 last_seen=people.last_seen.get(number, standing.first),
                 visible=bool(standing.cameras),

@@ -134,6 +134,21 @@ class Cut(msgspec.Struct, frozen=True, kw_only=True):
     to_camera: str = msgspec.field(name="to")
 
 
+class Merged(msgspec.Struct, frozen=True, kw_only=True):
+    """Two numbers turned out to be one person: ``lost`` is never used again."""
+
+    kept: int
+    lost: int
+
+
+class Parted(msgspec.Struct, frozen=True, kw_only=True):
+    """Whom a camera showed as ``kept`` turned out to be ``parted``, somebody else."""
+
+    kept: int
+    parted: int
+    camera: str
+
+
 class GopChoices(msgspec.Struct, frozen=True, kw_only=True):
     """The chosen camera of every object for one GOP, and the final boxes of its frames."""
 
@@ -143,6 +158,9 @@ class GopChoices(msgspec.Struct, frozen=True, kw_only=True):
     boxes: dict[str, list[list[tuple[int, float, float, float, float]]]]
     """Per camera and frame: object, left, top, right, bottom."""
     cuts: list[Cut]
+    merged: list[Merged] = []
+    """What has turned out since the GOP before, as ``split``."""
+    split: list[Parted] = []
 
 
 _CAMERA_PART = 3

@@ -33,6 +33,8 @@ class FakeSite:
     Args:
         bursts: Send whole GOPs at once instead of frame by frame.
         people: Who is known, and whether they are in view.
+        also: Other numbers that somebody once had.
+        split: What every GOP says about numbers that turned out to be somebody else's.
         first_pulse: Pulse of about the moment at which the site is made.
         skipped: Pulses whose frames are missing from every stream.
         opened: Whose stream was asked for, in order.
@@ -41,6 +43,8 @@ class FakeSite:
 
     bursts: bool = False
     people: dict[int, bool] = field(default_factory=lambda: {1: True, 2: True})
+    also: dict[int, list[int]] = field(default_factory=dict)
+    split: list[dict[str, Any]] = field(default_factory=list)
     first_pulse: int = STARTS_AT
     skipped: range = range(0)
     opened: list[int] = field(default_factory=list)
@@ -77,6 +81,7 @@ class FakeSite:
     def _object(self, person: int, seen: bool) -> dict[str, Any]:
         return {
             "object": person,
+            "also": self.also.get(person, []),
             "first_seen": self.first_pulse,
             "last_seen": self.edge if seen else self.first_pulse,
             "visible": seen,
@@ -101,7 +106,15 @@ class FakeSite:
         if old != new:
             cuts.append({"object": 1, "from": CAMERAS[old], "to": CAMERAS[new], "pulse": first})
         boxes = {c: [self._boxes(m, n) for n in range(first, first + GOP)] for m, c in enumerate(CAMERAS)}
-        return {"first": first, "frames": GOP, "choices": choices, "boxes": boxes, "cuts": cuts}
+        return {
+            "first": first,
+            "frames": GOP,
+            "choices": choices,
+            "boxes": boxes,
+            "cuts": cuts,
+            "merged": [],
+            "split": self.split,
+        }
 
     def _boxes(self, camera: int, pulse: int) -> list[list[float]]:
         corners = {1: square(camera, pulse), 2: second(camera, pulse)}

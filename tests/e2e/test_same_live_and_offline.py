@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from running_site import CAMERAS, MYVIEW, bounded, configuration, running
 
-WRITTEN = ("choices.csv", "late.csv", *(f"tracks/{camera}.txt" for camera in CAMERAS))
+WRITTEN = ("choices.csv", "corrections.csv", "late.csv", *(f"tracks/{camera}.txt" for camera in CAMERAS))
 
 
 async def rendered(config: Path, recording: Path, out: Path) -> None:

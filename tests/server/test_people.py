@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from cameras_by_hand import CAMERAS, HEIGHT, LARGE, SMALL, STRIDE, WIDTH, epoch_of, word
 
-from bestview import IdentitySettings, IdentityUpdate, LocalTrack, Merge, TrackKey
+from bestview import IdentitySettings, IdentityUpdate, LocalTrack, Merge, Split, TrackKey
 from server.view.history import BoxHistory
 from server.view.locals import LocalNumbers
 from server.view.people import People
@@ -27,9 +27,11 @@ class Dictated:
         return self._updates.pop(0)
 
 
-def said(numbers: dict[tuple[str, int], int], *merged: Merge) -> IdentityUpdate:
+def said(numbers: dict[tuple[str, int], int], *corrections: Merge | Split) -> IdentityUpdate:
     keys = {TrackKey(*key): number for key, number in numbers.items()}
-    return IdentityUpdate(numbers=keys, born=(), returned=(), gone=(), merged=merged, split=())
+    merged = tuple(it for it in corrections if isinstance(it, Merge))
+    split = tuple(it for it in corrections if isinstance(it, Split))
+    return IdentityUpdate(numbers=keys, born=(), returned=(), gone=(), merged=merged, split=split)
 
 
 def dictated(*updates: IdentityUpdate) -> People:
@@ -103,6 +105,17 @@ def test_a_merged_number_lives_on_as_the_others_and_chains_are_followed() -> Non
     assert it.known == [1]
     assert it.merged == {3: 1, 2: 1}
     assert it.boxes("c1", 0) == {1: LARGE}, "in frames past, too"
+    assert it.also(1) == [2, 3]
+
+
+def test_what_turned_out_is_taken_once_and_in_order() -> None:
+    merge, split = Merge(kept=1, lost=2), Split(kept=1, parted=4, camera="c0")
+    it = dictated(said({("c0", 1): 1}, merge), said({("c0", 1): 4}, split), said({("c0", 1): 4}))
+    for epoch in range(2):
+        it.update(epoch_of(epoch, word("c0", epoch, {1: SMALL})))
+    assert it.take_corrections() == (merge, split)
+    it.update(epoch_of(2, word("c0", 2, {1: SMALL})))
+    assert it.take_corrections() == ()
 
 
 def test_who_has_left_a_person_for_one_not_confirmed_yet_has_no_number() -> None:

@@ -9,6 +9,7 @@ import numpy as np
 from cameras_by_hand import CAMERAS, FPS, GOP, HEIGHT, LARGE, NO_REASON, SMALL, WIDTH, encoded
 from test_splice import choice
 
+from bestview import Merge, Split
 from server.run.films import Films
 from server.view.agreement import Agreement
 from server.view.decide import GopDecision, ObjectChoice
@@ -23,12 +24,15 @@ SITE = Site(width=WIDTH, height=HEIGHT, fps=FPS)
 
 
 def decision(
-    gop: int, *choices: ObjectChoice, frames: int = GOP, **boxes: list[dict[int, Box]]
+    gop: int,
+    *choices: ObjectChoice,
+    frames: int = GOP,
+    corrections: tuple[Merge | Split, ...] = (),
+    **boxes: list[dict[int, Box]],
 ) -> GopDecision:
     nobody: list[dict[int, Box]] = [{}] * frames
-    return GopDecision(
-        gop * GOP, frames, choices, {it: boxes.get(it, nobody) for it in CAMERAS}, {}, NO_REASON
-    )
+    shown = {it: boxes.get(it, nobody) for it in CAMERAS}
+    return GopDecision(gop * GOP, frames, choices, shown, {}, corrections, NO_REASON)
 
 
 def test_the_files_are_these_bytes(tmp_path: Path) -> None:
@@ -36,7 +40,10 @@ def test_the_files_are_these_bytes(tmp_path: Path) -> None:
     recorder = Recorder(tmp_path / "out", CAMERAS, fits)
     boxes: list[dict[int, Box]] = [{1: SMALL}, {1: SMALL, 2: LARGE}]
     recorder.write(decision(0, choice(1, A), choice(2, None), frames=2, c0=boxes))
-    recorder.write(decision(1, choice(1, B), choice(2, A, away=True), frames=1, c1=[{2: LARGE}]))
+    turned_out = (Merge(kept=1, lost=3), Split(kept=1, parted=2, camera=B))
+    recorder.write(
+        decision(1, choice(1, B), choice(2, A, away=True), frames=1, corrections=turned_out, c1=[{2: LARGE}])
+    )
     recorder.late(B, range(3, 5), "tracks late")
     recorder.close()
     files = {str(path.relative_to(tmp_path / "out")): path.read_bytes() for path in tmp_path.rglob("*.*")}
@@ -46,6 +53,7 @@ def test_the_files_are_these_bytes(tmp_path: Path) -> None:
         b"2,2,40.00,8.00,32.00,80.00,1.00,-1,-1,-1\n",
         "tracks/c1.txt": b"6,2,20.00,4.00,16.00,40.00,1.00,-1,-1,-1\n",
         "choices.csv": b"frame,object,camera\n1,1,c0\n2,1,c0\n6,1,c1\n",
+        "corrections.csv": b"frame,what,object,other,camera\n6,merged,1,3,\n6,split,1,2,c1\n",
         "late.csv": b"frame,camera,what\n4,c1,tracks late\n5,c1,tracks late\n",
     }
 

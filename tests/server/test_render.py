@@ -56,6 +56,7 @@ def test_two_views_become_films_tracks_choices_and_plots_and_the_shorter_one_is_
     assert files - films == {
         "choices.csv",
         "choices.png",
+        "corrections.csv",
         "late.csv",
         "site.json",
         "tracks/c0.txt",

@@ -12,6 +12,7 @@ from server.view.channel import Viewer
 from server.view.decide import GopDecision, ObjectChoice
 from server.view.shelf import Shelf
 from server.view.splice import Splicer
+from server.wire.messages import Box
 
 A, B = CAMERAS
 
@@ -32,9 +33,8 @@ def choice(number: int, camera: str | None, before: str | None = None, *, away: 
 def decision(
     gop: int, *choices: ObjectChoice, merged: dict[int, int] | None = None, frames: int = GOP
 ) -> GopDecision:
-    return GopDecision(
-        gop * GOP, frames, choices, {camera: [] for camera in CAMERAS}, merged or {}, NO_REASON
-    )
+    nobody: dict[str, list[dict[int, Box]]] = {camera: [] for camera in CAMERAS}
+    return GopDecision(gop * GOP, frames, choices, nobody, merged or {}, (), NO_REASON)
 
 
 async def received(viewer: Viewer) -> list[bytes]:
