@@ -41,7 +41,7 @@ SCENES = ("terrace", "auditorium", "room")
 ROOMS = ((2, 3, 40.0), (4, 8, 40.0), (8, 20, 30.0))
 """Cameras, people, seconds."""
 QUICK_ROOMS = ((2, 3, 12.0),)
-COLUMNS = ["", "joint", "mean", "Agree", "Regret", "Excess", "Visible", "Chosen", "Cuts", "Best", "Shot"]
+COLUMNS = ["", "joint", "mean", "Agree", "Regret", "Visible", "Chosen", "Cuts", "Best", "Shot"]
 
 WHY = ["", "Visible", "choice", "number", "missed"]
 
@@ -66,7 +66,7 @@ def row_of(it: Outcome) -> list[str]:
         ["", ""] if it.tracks is None else [f"{100 * s.idf1:.1f}" for s in (it.tracks.joint, it.tracks.mean)]
     )
     views = it.views
-    shares = (views.agreement, views.regret, views.excess, views.visible, views.chosen)
+    shares = (views.agreement, views.regret, views.visible, views.chosen)
     cuts = (views.cuts_per_minute, views.optimum_cuts_per_minute)
     return [
         it.name,

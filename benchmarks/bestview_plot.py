@@ -7,7 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.bestview_sweep import DEFAULT_GOP, DEFAULT_LOOKAHEAD, DEFAULT_SWITCH_COST_S, Swept
+from benchmarks.bestview_sweep import (
+    DEFAULT_GOES_ON_S,
+    DEFAULT_GOP,
+    DEFAULT_LOOKAHEAD,
+    DEFAULT_SWITCH_COST_S,
+    Swept,
+)
 from benchmarks.bestview_ways import Outcome
 from server.run.plots import new_figure, save_figure
 
@@ -38,7 +44,8 @@ def plot_sweeps(swept: Mapping[str, Sequence[Swept]], out: Path) -> None:
     figure = new_figure((12.0, 0.8 + 3.0 * len(swept)))
     axes = figure.subplots(len(swept), 3, squeeze=False)
     for line, (name, found) in zip(axes, swept.items(), strict=True):
-        usual = [it for it in found if it.setting.switch_cost_s == DEFAULT_SWITCH_COST_S]
+        plain = [it for it in found if it.setting.goes_on_s == DEFAULT_GOES_ON_S]
+        usual = [it for it in plain if it.setting.switch_cost_s == DEFAULT_SWITCH_COST_S]
         for gop in sorted({it.setting.gop for it in usual}):
             mine = [it for it in usual if it.setting.gop == gop and it.setting.lookahead is not None]
             line[0].plot(
@@ -54,7 +61,7 @@ def plot_sweeps(swept: Mapping[str, Sequence[Swept]], out: Path) -> None:
         costs = sorted(
             (
                 it
-                for it in found
+                for it in plain
                 if it.setting.gop == DEFAULT_GOP and it.setting.lookahead == DEFAULT_LOOKAHEAD
             ),
             key=lambda it: it.setting.switch_cost_s,

@@ -23,8 +23,6 @@ class ViewScore:
         frames: object-frames that count.
         agreement: share of them in which the choice is the optimum's.
         regret: extra cost over the optimum's, as a share of it (0: as good; infinite: the optimum is free).
-        excess: the same with both costs counted from `least_cost`: whoever is far from all cameras costs much
-            whatever is chosen, which makes regret small.
         visible: share of them in which the object is visible in the chosen camera.
         chosen: share of them in which there is a choice at all.
         cuts_per_minute: cuts per minute of an object's stream.
@@ -32,13 +30,11 @@ class ViewScore:
         shortest_shot: frames between the closest two cuts; 0 where there are fewer than two.
         cost: of the choice, in frames of not seeing the object; `regret` compares it with the next.
         optimum_cost: of the optimum.
-        least_cost: of the best view of every frame, if cuts cost nothing.
     """
 
     frames: int
     agreement: float
     regret: float
-    excess: float
     visible: float
     chosen: float
     cuts_per_minute: float
@@ -46,7 +42,6 @@ class ViewScore:
     shortest_shot: int
     cost: float
     optimum_cost: float
-    least_cost: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +53,6 @@ class _Tally:
     chosen: int
     cost: float
     best_cost: float
-    least_cost: float
     seen: int
     cuts: NDArray[np.int64]
     best_cuts: NDArray[np.int64]
@@ -103,13 +97,11 @@ def score_views(
     per_minute = _SECONDS_PER_MINUTE * fps / max(frames, 1)
     best = sum(tally.best_cost for tally in tallies)
     total = sum(tally.cost for tally in tallies)
-    least = sum(tally.least_cost for tally in tallies)
     shots = [int(np.diff(tally.cuts).min()) for tally in tallies if tally.cuts.size > 1]
     return ViewScore(
         frames=frames,
         agreement=sum(tally.agreed for tally in tallies) / max(frames, 1),
         regret=_share(total - best, best),
-        excess=_share(total - best, best - least),
         visible=sum(tally.seen for tally in tallies) / max(frames, 1),
         chosen=sum(tally.chosen for tally in tallies) / max(frames, 1),
         cuts_per_minute=sum(tally.cuts.size for tally in tallies) * per_minute,
@@ -117,7 +109,6 @@ def score_views(
         shortest_shot=min(shots, default=0),
         cost=float(total),
         optimum_cost=float(best),
-        least_cost=float(least),
     )
 
 
@@ -137,7 +128,6 @@ def _tally(
         chosen=int(np.count_nonzero(chosen)),
         cost=float(np.where(chosen, cost[row, views], NO_VIEW_COST).sum() + switch_cost * cuts.size),
         best_cost=float(cost[row, best].sum() + switch_cost * best_cuts.size),
-        least_cost=float(cost.min(axis=1).sum()),
         seen=int(np.count_nonzero(chosen & visible[row, views])),
         cuts=cuts,
         best_cuts=best_cuts,

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bestview.choice import NO_CAMERA, choose_views
-from bestview.quality import HIDDEN_COST, size_quality, view_cost
+from bestview.quality import compared, size_quality, view_cost
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -16,7 +16,8 @@ class ViewTruth:
     """How well every camera shows every person at every frame, K people, N frames, C cameras.
 
     Attributes:
-        cost: (K, N, C) float64, view cost in [0, 1]: 1 less the size quality; 1 where not visible.
+        cost: (K, N, C) float64, view cost in [0, 1]: the share of the best view's size quality that the view
+            lacks; 1 where the person is not visible.
         visible: (K, N, C) bool, where the person really is visible.
     """
 
@@ -37,7 +38,8 @@ def true_views(
 ) -> ViewTruth:
     """Derive the quality of every view from ground truth.
 
-    A person is visible in a camera where there is a box of which at least `least_shown` shows.
+    A person is visible in a camera where there is a box of which at least `least_shown` shows. Of several
+    such views the largest is worth 1, and the others are compared with it.
 
     Args:
         boxes: (K, N, C, 4) left, top, right, bottom in pixels of the camera's picture; NaN: there is none.
@@ -55,7 +57,7 @@ def true_views(
     for camera, (width, height) in enumerate(sizes.tolist()):
         quality[:, :, camera] = size_quality(boxes[:, :, camera], width, height)
     visible = (quality > 0.0) & ((shown < 0.0) | (shown >= least_shown))
-    return ViewTruth(np.where(visible, view_cost(quality), HIDDEN_COST), visible)
+    return ViewTruth(view_cost(compared(np.where(visible, quality, 0.0), axis=2)), visible)
 
 
 def best_views(truth: ViewTruth, switch_cost: float) -> NDArray[np.int64]:

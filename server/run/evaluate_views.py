@@ -71,7 +71,6 @@ HEADINGS = (
     "frames",
     "Agree",
     "Regret",
-    "Excess",
     "Visible",
     "Chosen",
     "Cuts",
@@ -100,7 +99,7 @@ def score_cells(score: ViewScore) -> list[str]:
 
 
 def _shares(score: ViewScore) -> tuple[float, ...]:
-    return score.agreement, score.regret, score.excess, score.visible, score.chosen
+    return score.agreement, score.regret, score.visible, score.chosen
 
 
 def content_of_views(judged: Judged, facts: SiteFacts) -> dict[str, Any]:

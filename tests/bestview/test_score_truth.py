@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bestview import NOBODY, ViewTruth, best_views, score_views, stands_for, true_views
+from bestview import NOBODY, ViewTruth, best_views, stands_for, true_views
 
 BOX = [0.0, 0.0, 50.0, 50.0]  # a quarter of a picture of 100 x 100: its size is one half
 NOWHERE = [np.nan] * 4
@@ -23,10 +23,10 @@ def truth_of(boxes: list[list[float]], shown: list[float], least: float = 0.25) 
     return true_views(laid, np.array(shown)[None, None], sizes, least)
 
 
-def test_a_view_costs_less_the_larger_the_person_is_in_its_own_picture() -> None:
+def test_a_view_costs_what_it_lacks_of_the_one_in_whose_picture_the_person_is_largest() -> None:
     boxes = np.array([BOX, BOX])[None, None]
     truth = true_views(boxes, np.ones((1, 1, 2)), np.array([SQUARE, WIDE]), 0.25)
-    assert truth.cost.ravel().tolist() == [0.5, 0.75]
+    assert truth.cost.ravel().tolist() == [0.0, 0.5]
     assert truth.visible.all()
 
 
@@ -35,6 +35,11 @@ def test_who_is_hidden_or_not_there_costs_one_and_is_not_visible() -> None:
     assert truth.cost.ravel().tolist() == [1.0] * 4
     assert not truth.visible.any()
     assert not truth.counted.any()
+
+
+def test_views_are_compared_with_the_best_of_those_that_show_somebody() -> None:
+    truth = truth_of([BOX, [0.0, 0.0, 25.0, 25.0]], [0.1, 1.0])
+    assert truth.cost.ravel().tolist() == [1.0, 0.0]
 
 
 def test_an_unknown_share_counts_as_all_and_the_threshold_is_the_callers() -> None:
@@ -85,14 +90,3 @@ def test_numbers_stand_for_people_the_best_way_round(people: int, objects: int, 
 def test_who_was_never_met_is_nobody() -> None:
     assert stands_for(np.array([[0, 3, 1], [0, 0, 2]])).tolist() == [NOBODY, 0, 1]
     assert stands_for(np.zeros((0, 2), dtype=np.int64)).tolist() == [NOBODY, NOBODY]
-
-
-def test_excess_is_counted_from_what_no_choice_can_save() -> None:
-    cost = np.array([[[0.9, 0.8], [0.9, 0.8], [0.8, 0.9], [0.8, 0.9]]])
-    visible = np.ones(cost.shape, dtype=bool)
-    score = score_views(cost, visible, np.array([[0, 0, 0, 0]]), 0.1, 25.0)
-    assert (score.cost, score.optimum_cost, score.least_cost) == pytest.approx((3.4, 3.3, 3.2))
-    assert score.regret == pytest.approx(0.1 / 3.3)
-    assert score.excess == pytest.approx(1.0)
-    free = score_views(cost, visible, np.array([[1, 1, 0, 1]]), 0.0, 25.0)
-    assert free.excess == float("inf")

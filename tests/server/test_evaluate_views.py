@@ -73,8 +73,8 @@ def test_the_best_choices_agree_with_the_optimum(myview: Command, hall: Path) ->
     code, out, _ = myview("--gt", hall, "--views", path, *SIZE)
     assert code == 0
     table = judged(out)
-    assert table["person"][3:8] == ["Agree", "Regret", "Excess", "Visible", "Chosen"]
-    assert table["all"] == ["all", "40", "100.0", "0.0", "0.0", "100.0", "100.0", "0.0", "0.0", "-"]
+    assert table["person"][3:8] == ["Agree", "Regret", "Visible", "Chosen", "Cuts"]
+    assert table["all"] == ["all", "40", "100.0", "0.0", "100.0", "100.0", "0.0", "0.0", "-"]
     assert table["2"][:4] == ["2", "2", "20", "100.0"]
 
 
@@ -92,9 +92,10 @@ def test_worse_choices_cost_more_and_everything_is_in_the_file(myview: Command, 
     assert content["all"]["chosen"] == 35 / 40
     assert content["all"]["visible"] == 35 / 40
     assert content["people"]["1"]["regret"] == 0.0
-    # 5 frames of the small view (0.8 for 0.5), 5 of none (1 for 0.5), and a cut of 2 frames.
-    assert content["people"]["2"]["regret"] == pytest.approx((5 * 0.3 + 5 * 0.5 + 2.0) / (20 * 0.5))
-    assert content["people"]["2"]["excess"] is None
+    # 5 frames of a view two fifths as large as the best, 5 of none, and a cut worth 2 frames.
+    assert content["people"]["2"]["cost"] == pytest.approx(5 * 0.6 + 5 * 1.0 + 2.0)
+    assert content["people"]["2"]["optimum_cost"] == 0.0
+    assert content["people"]["2"]["regret"] is None, "the optimum is free"
     assert content["people"]["2"]["cuts_per_minute"] == pytest.approx(30.0)
     assert (content["fps"], content["switch_cost_s"]) == (10.0, 0.2)
 
@@ -109,7 +110,7 @@ def test_objects_are_told_apart_by_their_tracks(myview: Command, hall: Path) -> 
     assert table["joint"][0] == "joint"
     assert table["1"][:4] == ["1", "7", "20", "75.0"]
     assert table["2"][:4] == ["2", "4", "20", "75.0"]
-    assert table["all"][6] == "75.0", "the last five frames have no choice"
+    assert table["all"][5] == "75.0", "the last five frames have no choice"
     assert "none of its objects" in myview("--gt", hall, "--views", path, *SIZE)[2]
 
 
@@ -123,7 +124,7 @@ def test_an_object_that_changes_people_stands_for_one_of_them(myview: Command, h
     table = judged(out)
     assert table["1"][1] == "5"
     assert table["2"][1] == "-"
-    assert table["2"][7] == "0.0"
+    assert table["2"][6] == "0.0"
 
 
 def test_who_is_hidden_is_not_visible_unless_told_otherwise(myview: Command, tmp_path: Path) -> None:
@@ -131,11 +132,11 @@ def test_who_is_hidden_is_not_visible_unless_told_otherwise(myview: Command, tmp
     write(tmp_path / "gt" / "c1.txt", boxes({1: SMALL}))
     path = write(tmp_path / "choices.csv", choices({1: "c0"}))
     told = [myview("--gt", tmp_path, "--views", path, *SIZE, "--visible", it)[1] for it in (0.25, 0)]
-    assert [judged(it)["all"][5] for it in told] == ["0.0", "100.0"]
+    assert [judged(it)["all"][4] for it in told] == ["0.0", "100.0"]
 
 
 def test_a_rendering_tells_rate_and_sizes_itself(myview: Command, hall: Path) -> None:
-    path = write(hall / "choices.csv", choices({1: "c0", 2: "c1"}))
+    path = write(hall / "choices.csv", choices({1: "c1", 2: "c1"}))
     assert "size of camera c0's picture is not known" in myview("--gt", hall, "--views", path)[2]
     site = {"fps": 10.0, "switch_cost_s": 0.3, "sizes": {"c0": [100, 100], "c1": [50, 50]}}
     (hall / "site.json").write_text(json.dumps(site))
@@ -143,8 +144,8 @@ def test_a_rendering_tells_rate_and_sizes_itself(myview: Command, hall: Path) ->
     assert myview("--gt", hall, "--views", path, "--json", out)[0] == 0
     content = json.loads(out.read_text())["views"]
     assert content["switch_cost_s"] == 0.3
-    # The second person nearly fills c1's smaller picture.
-    assert content["people"]["2"]["cost"] == pytest.approx(20 * 0.2)
+    # 20 pixels of c1's 50 are four fifths of what 50 of c0's 100 are.
+    assert content["people"]["1"]["cost"] == pytest.approx(20 * 0.2)
 
 
 def test_plots_show_the_choice_and_the_frames_around_its_cuts(myview: Command, hall: Path) -> None:
