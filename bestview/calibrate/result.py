@@ -10,11 +10,11 @@ import numpy as np
 from bestview.calibrate.homography import Floats
 from bestview.calibrate.points import CalibrationError
 from bestview.calibrate.refine import Matches
+from bestview.calibrate.timing import offset_errors
 from bestview.calibrate.together import Group, PairOf, group_up, pairs_of
 from bestview.calibrate.walk import Walk
 from bestview.calibrate.walk_settings import WalkSettings
 
-THIRDS = ("left", "middle", "right")
 _APART = 100.0
 """Person heights between floors that no camera connects: further than anybody is mistaken by."""
 
@@ -36,6 +36,7 @@ class WalkedCamera:
         floor: which floor it is on; cameras with one number share one.
         homography: its pixels to the floor, (3, 3), a person being `person` tall.
         offset: the pulse at which its frame 0 was taken, frames, against the first camera of its floor.
+        offset_error: the standard error of the offset, frames.
         image: feet that another camera saw too, (N, 2) pixels.
         place: where the two cameras have them in the middle, (N, 2) on the floor.
         heights: how far apart the two have them on the floor, in person heights.
@@ -48,6 +49,7 @@ class WalkedCamera:
     floor: int
     homography: Floats
     offset: float
+    offset_error: float
     image: Floats
     place: Floats
     heights: Spread
@@ -106,9 +108,10 @@ def calibrate_walks(
     for number in sorted(set(range(len(walks))) - grouped):
         best = max((it for it in pairs if number in (it.one, it.other)), key=_hope)
         left_out.append(LeftOut(walks[number].camera, _why(walks, best, settings)))
+    unsure = [offset_errors(it.rig, it.samples, it.matches, settings) for it in groups]
     found = [
-        _camera(walks[number].camera, floor, group, place, person)
-        for floor, group in enumerate(groups)
+        _camera(walks[number].camera, floor, group, place, errors, person)
+        for floor, (group, errors) in enumerate(zip(groups, unsure, strict=True))
         for place, number in enumerate(group.members)
     ]
     order = {walk.camera: number for number, walk in enumerate(walks)}
@@ -142,7 +145,7 @@ def _off(group: Group, it: Matches, own: int) -> _Off:
     return _Off(np.hypot(*(mine - other).T), aside, image, (mine + other) / 2)
 
 
-def _camera(name: str, floor: int, group: Group, own: int, person: float) -> WalkedCamera:
+def _camera(name: str, floor: int, group: Group, own: int, errors: Floats, person: float) -> WalkedCamera:
     off = [_off(group, it, own) for it in group.matches if own in (it.one, it.other)]
     image, place = (np.concatenate([getattr(it, name) for it in off]) for name in ("image", "place"))
     tall = group.rig.cameras[own].heights(image)
@@ -157,6 +160,7 @@ def _camera(name: str, floor: int, group: Group, own: int, person: float) -> Wal
         floor=floor,
         homography=homography / np.abs(homography).max(),
         offset=float(group.rig.offsets[own]),
+        offset_error=float(errors[own]),
         image=image,
         place=(place + shift) * person,
         heights=_spread([it.heights for it in off]),

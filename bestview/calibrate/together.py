@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -30,21 +30,23 @@ class PairOf:
 
     def why_not(self, settings: WalkSettings) -> str | None:
         """Say why the two cannot be laid on one floor; None if they can."""
-        it = self.link
-        if it is None:
+        if self.link is None:
             return "nobody was seen walking by both at once"
-        if it.places < settings.least_places:
-            return (
-                f"people stand in one place at only {it.places:.0f} steps of the walk "
-                f"({settings.least_places:.0f} are needed): walk longer where both see"
-            )
-        if it.share < settings.least_share:
-            return f"of what both should see they agree about {100 * it.share:.0f} % only"
-        if it.merit < settings.beyond_chance * it.chance:
-            return "they agree hardly better than by chance"
-        if it.breadth < settings.least_breadth:
-            return "the walk that both saw is a straight line: walk in curves, to and fro and sideways"
-        return None
+        return next((words for holds, words in _doubts(self.link, settings) if holds), None)
+
+
+def _doubts(it: Link, settings: WalkSettings) -> Iterator[tuple[bool, str]]:
+    """Give what may speak against two cameras' being on one floor, and whether it does."""
+    few = f"at only {it.places:.0f} steps of the walk people stand in one place"
+    needed = f"{settings.least_places:.0f} are needed: walk longer where both see"
+    yield it.places < settings.least_places, f"{few}; {needed}"
+    share = f"of what both should see they agree about {100 * it.share:.0f} % only"
+    yield it.share < settings.least_share, share
+    differs = f"where they have people differs by {it.error:.2f} person heights (median)"
+    yield it.error > settings.most_error, f"{differs}: are feet hidden, or do people sit?"
+    yield it.merit < settings.beyond_chance * it.chance, "they agree hardly better than by chance"
+    line = "the walk that both saw is a straight line: walk in curves, to and fro and sideways"
+    yield it.breadth < settings.least_breadth, line
 
 
 @dataclass(frozen=True, slots=True)

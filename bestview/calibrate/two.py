@@ -46,6 +46,7 @@ class Link:
         rig: both of them; the first is at the origin, its offset 0.
         places: at how many places they agree about who stands there.
         share: about what share that is of all that both could see.
+        error: how far apart they have the same people, person heights (median).
         chance: what places times share would be by chance.
         breadth: how broad the walk is that both saw: standard deviation across its main direction,
             person heights.
@@ -55,6 +56,7 @@ class Link:
     places: float
     share: float
     breadth: float
+    error: float
     chance: float = 0.0
 
     @property
@@ -178,8 +180,10 @@ def _refined(
             in_step=settings.shift == 0,
         )
     floor = rig.cameras[0].floor(here.feet[meeting.here[chosen]])
+    away = np.hypot(*(floor - rig.cameras[1].floor(there.feet[meeting.there[chosen]])).T)
+    error = float(np.median(away)) if len(away) else float("inf")
     share = shared(rig.cameras, (here, there), (meeting.here[chosen], meeting.there[chosen]))
-    return Link(rig, score(places, meeting), share, breadth(floor, meeting.weight[chosen]))
+    return Link(rig, score(places, meeting), share, breadth(floor, meeting.weight[chosen]), error)
 
 
 _LEAST_MATCHES = 8

@@ -42,8 +42,10 @@ class WalkSettings:
     # the other's walk is run backwards, or its second half first.
     least_places: float = 12.0
     stride: float = 0.15
-    least_share: float = 0.4
+    least_share: float = 0.45
     beyond_chance: float = 1.5
+    # ... and have people at one place to within this (median).
+    most_error: float = 0.25
     # A walk less broad than this is a line (standard deviation of its places across its main direction).
     least_breadth: float = 0.25
 

@@ -12,6 +12,8 @@ from server.run.calibrate_tracks import Walked
 _THIRDS = ("left", "middle", "right")
 _LITTLE = 0.03
 """Share of a walk below which it has not covered a third of the picture."""
+_SURE = 2.0
+"""Standard errors that an offset must be away from 0, or else it is none."""
 _SHALLOW = 1.25
 """How many times as tall the nearest must appear as the farthest."""
 
@@ -63,7 +65,7 @@ def details(found: WalkCalibration, person: float) -> dict[str, Any]:
     """Give what the file says beside the homographies."""
     return {
         "person": person,
-        "offset": {it.camera: round(it.offset, 2) for it in found.cameras},
+        "offset": {it.camera: _offset(it) for it in found.cameras},
         "floor": {it.camera: it.floor for it in found.cameras},
         "residuals": {
             it.camera: {"heights": _numbers(it.heights), "picture": _numbers(it.picture)}
@@ -84,15 +86,28 @@ def _floors(found: WalkCalibration) -> list[str]:
 
 def _offsets(found: WalkCalibration, fps: float) -> list[str]:
     """Give the offsets, as words and as lines of a configuration."""
-    moved = [it for it in found.cameras if round(it.offset)]
-    if not moved:
-        return ["the cameras are in step (to half a frame)"]
-    said = ", ".join(f"{it.camera} {it.offset:+.1f} frames ({it.offset / fps:+.2f} s)" for it in moved)
-    return [
-        f"out of step with {found.cameras[0].camera}: {said}; for the configuration:",
-        "cameras:",
-        *(f"  - id: {it.camera}\n    offset: {round(it.offset)}" for it in moved),
-    ]
+    first = found.cameras[0].camera
+    lines = []
+    for it in found.cameras:
+        if it.offset or it.offset_error:
+            how = "out of step" if _moved(it) else "in step, as far as can be told"
+            frames = f"{it.offset:+.1f} frames ({it.offset / fps:+.2f} s)"
+            unsure = f"give or take {_SURE * it.offset_error:.1f}"
+            lines.append(f"{it.camera}: {frames} later than {first}, {unsure}: {how}")
+    moved = [it for it in found.cameras if _moved(it)]
+    if moved:
+        lines += ["for the configuration:", "cameras:"]
+        lines += [f"  - id: {it.camera}\n    offset: {round(it.offset)}" for it in moved]
+    return lines
+
+
+def _offset(camera: WalkedCamera) -> dict[str, float]:
+    use = round(camera.offset) if _moved(camera) else 0
+    return {"frames": round(camera.offset, 2), "error": round(camera.offset_error, 2), "use": use}
+
+
+def _moved(camera: WalkedCamera) -> bool:
+    return abs(camera.offset) > _SURE * camera.offset_error and round(camera.offset) != 0
 
 
 def _heights(spread: Spread) -> str:

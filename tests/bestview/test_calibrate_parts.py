@@ -6,14 +6,16 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from walkers import SIZE, camera_at, stroll
+from walkers import SIZE, Noise, camera_at, seen, stroll
 
 from bestview import foot_spread, to_ground
 from bestview.calibrate import Track, Walk, WalkSettings, make_walk
 from bestview.calibrate.agreement import apart, matched, placed, score, tally
 from bestview.calibrate.hypotheses import guesses
 from bestview.calibrate.pinhole import Pinhole
+from bestview.calibrate.refine import Matches, Rig
 from bestview.calibrate.samples import meetings, sample
+from bestview.calibrate.timing import offset_errors
 from bestview.calibrate.two import backwards, breadth, late
 from bestview.ground import feet
 
@@ -180,3 +182,18 @@ def test_a_line_has_no_breadth() -> None:
     assert breadth(np.empty((0, 2)), np.empty(0)) == 0.0
     square = np.random.default_rng(0).uniform(-1, 1, (4000, 2))
     assert breadth(square, np.ones(4000)) == pytest.approx(1 / np.sqrt(3), rel=0.05)
+
+
+def test_how_sure_an_offset_is_grows_with_the_noise() -> None:
+    errors = []
+    for noise in (0.005, 0.05):
+        random = np.random.default_rng(3)
+        cameras, path = (camera_at(-4, -1), camera_at(1, -4.5)), stroll(np.random.default_rng(3), 500)
+        views = [seen("c", it, [path], random, noise=Noise(noise, noise)) for it in cameras]
+        samples = [sample(it, np.arange(0.0, 500.0, 5.0), 0.0, 5, 0.15) for it in views]
+        met = meetings(*samples)
+        matches = Matches(0, 1, met.here, met.there, met.weight)
+        first, second = offset_errors(Rig(cameras, np.zeros(2)), samples, [matches], SETTINGS)
+        assert first == 0.0
+        errors.append(second)
+    assert 0.0 < 3 * errors[0] < errors[1] < 2.0
