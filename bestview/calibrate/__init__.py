@@ -1,14 +1,8 @@
 """Calibration: homographies to a common floor, from marked points or from people who walk about."""
 
 from bestview.calibrate.homography import Floats, fit_homography
-from bestview.calibrate.points import (
-    CalibrationError,
-    MarkedPoints,
-    PointFit,
-    PointSettings,
-    fit_cameras,
-    fit_points,
-)
+from bestview.calibrate.marked import CalibrationError, MarkedPoints, PointSettings
+from bestview.calibrate.points import PointFit, fit_cameras, fit_points
 from bestview.calibrate.result import LeftOut, Spread, WalkCalibration, WalkedCamera, calibrate_walks
 from bestview.calibrate.walk import Track, Walk, make_walk
 from bestview.calibrate.walk_settings import WalkSettings

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bestview.calibrate.homography import Floats
-from bestview.calibrate.points import CalibrationError
+from bestview.calibrate.marked import CalibrationError
 from bestview.calibrate.refine import Matches
 from bestview.calibrate.timing import offset_errors
 from bestview.calibrate.together import Group, PairOf, group_up, pairs_of

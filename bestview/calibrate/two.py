@@ -14,8 +14,9 @@ from bestview.calibrate.pinhole import EAST, NORTH, PAN, Pinhole
 from bestview.calibrate.refine import Matches, Rig, refined, sharpness_of
 from bestview.calibrate.samples import Meetings, Samples, meetings, sample
 from bestview.calibrate.sight import shared
-from bestview.calibrate.walk import Track, Walk
+from bestview.calibrate.walk import Walk
 from bestview.calibrate.walk_settings import WalkSettings
+from bestview.calibrate.wrong_times import backwards, late
 
 _GUESSES = 60
 """Guesses looked at for each offset that is tried."""
@@ -74,22 +75,6 @@ def link(one: Seer, other: Seer, settings: WalkSettings) -> Link | None:
         _best(one, replace(other, walk=it), settings) for it in (backwards(other.walk), late(other.walk))
     ]
     return replace(best, chance=max((it.merit for it in wrong if it is not None), default=0.0))
-
-
-def backwards(walk: Walk) -> Walk:
-    """Give the same walk with time running backwards, within the same frames."""
-    return replace(walk, tracks=tuple(Track(walk.end - it.end, it.boxes[::-1]) for it in walk.tracks))
-
-
-def late(walk: Walk) -> Walk:
-    """Give the same walk with its second half before its first."""
-    half = walk.end // 2
-    parts = []
-    for it in walk.tracks:
-        cut = min(max(half - it.first, 0), len(it.boxes))
-        parts += [Track(it.first + walk.end - half, it.boxes[:cut])] if cut > 1 else []
-        parts += [Track(it.first + cut - half, it.boxes[cut:])] if len(it.boxes) - cut > 1 else []
-    return replace(walk, tracks=tuple(parts))
 
 
 def pulses_of(walks: Sequence[Walk], settings: WalkSettings) -> Floats:

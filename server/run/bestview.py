@@ -6,7 +6,7 @@ import logging
 from pathlib import Path
 
 from camsync import SyncError
-from server.run.calibration import with_scene_ground
+from server.run.scene_ground import with_scene_ground
 from server.view.service import BestViewService
 from server.web.app import make_app, serving
 from server.wire.config import Config

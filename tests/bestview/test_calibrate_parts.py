@@ -16,7 +16,8 @@ from bestview.calibrate.pinhole import Pinhole
 from bestview.calibrate.refine import Matches, Rig
 from bestview.calibrate.samples import meetings, sample
 from bestview.calibrate.timing import offset_errors
-from bestview.calibrate.two import backwards, breadth, late
+from bestview.calibrate.two import breadth
+from bestview.calibrate.wrong_times import backwards, late
 from bestview.ground import feet
 
 seeds = st.integers(0, 10_000).map(np.random.default_rng)
