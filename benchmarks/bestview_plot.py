@@ -20,7 +20,8 @@ from server.run.plots import new_figure, save_figure
 
 def plot_ways(found: Mapping[str, Sequence[Outcome]], out: Path) -> None:
     """Draw joint IDF1, agreement and visibility of every way, a row for each scene."""
-    figure = new_figure((12.0, 0.8 + 3.2 * len(found)))
+    most = max(len(outcomes) for outcomes in found.values())
+    figure = new_figure((12.0, 0.8 + (0.8 + 0.2 * most) * len(found)))
     axes = figure.subplots(len(found), 3, squeeze=False)
     for line, (name, outcomes) in zip(axes, found.items(), strict=True):
         names = [it.name for it in outcomes]
@@ -34,6 +35,7 @@ def plot_ways(found: Mapping[str, Sequence[Outcome]], out: Path) -> None:
         for axis, (title, values) in zip(line, columns.items(), strict=True):
             axis.barh(places, values, color="#2a7f3f")
             axis.set_xlim(0, 100)
+            axis.set_ylim(-0.6, len(names) - 0.4)  # where bars are missing, too
             axis.set_title(f"{name}: {title}, %", fontsize="small")
             axis.set_yticks(places, names if title == "joint IDF1" else [], fontsize="x-small")
     save_figure(figure, out)
@@ -69,7 +71,7 @@ def plot_sweeps(swept: Mapping[str, Sequence[Swept]], out: Path) -> None:
         values = [it.setting.switch_cost_s for it in costs]
         line[2].plot(values, [it.score.cuts_per_minute for it in costs], "o-", label="MyView's choice")
         line[2].plot(values, [it.score.optimum_cuts_per_minute for it in costs], "s--", label="optimum")
-        line[2].set_xlabel("a cut saves, s")
+        line[2].set_xlabel("what a cut costs, seconds of not seeing somebody")
         line[2].set_ylabel("cuts a minute")
         line[2].legend(fontsize="x-small")
         line[0].set_title(f"{name}, true boxes", fontsize="small")
