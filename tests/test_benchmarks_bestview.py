@@ -21,7 +21,7 @@ from benchmarks.bestview_join import (
     own_tracks,
     tracks_by_truth,
 )
-from benchmarks.bestview_sweep import STRIDE, Setting, sweep
+from benchmarks.bestview_sweep import DEFAULT_SWITCH_COST_S, STRIDE, Setting, sweep
 from benchmarks.bestview_ways import Way, outcome, visible_rows
 from benchmarks.bestview_why import Losses, losses
 from server.run.evaluate_choices import Choice
@@ -166,8 +166,8 @@ def test_what_keeps_somebody_from_being_seen_is_told_apart(passing: Case) -> Non
 
 def test_settings_are_swept_and_knowing_all_costs_nothing_but_the_gop(passing: Case) -> None:
     found = {it.setting: it for it in sweep(passing, passing.truth(), quick=True)}
-    assert found[Setting(None, 1, 0.08)].score.regret == 0.0
-    assert found[Setting(25, 10, 0.08)].delay_s == (25 + STRIDE - 2) / 10.0
+    assert found[Setting(None, 1, DEFAULT_SWITCH_COST_S)].score.regret == 0.0
+    assert found[Setting(25, 10, DEFAULT_SWITCH_COST_S)].delay_s == (25 + STRIDE - 2) / 10.0
     assert all(it.score.regret >= 0.0 for it in found.values())
 
 
