@@ -19,8 +19,9 @@ class Choices:
     """The cameras chosen for a window of N frames and K objects.
 
     Attributes:
-        views: (K, N) int64, the camera index b_n* per object and frame; -1 where no camera is possible.
-        costs: (K,) float64, the cost of those views: the view costs, plus the switching cost for every
+        views: (K, N) int64, the camera index b_n* per object and frame; -1 where no camera is possible. Fewer
+            frames where not all are asked for.
+        costs: (K,) float64, the cost of the whole window: the view costs, plus the switching cost for every
             cut, plus ``NO_VIEW_COST`` for every frame without a camera.
     """
 
@@ -36,6 +37,7 @@ def choose_views(
     least_shot: int = 0,
     held: NDArray[np.int64] | None = None,
     weight: NDArray[np.float64] | None = None,
+    asked: int | None = None,
 ) -> Choices:
     """Minimise the sum of view costs and of cuts over the window, for all objects at once (section III).
 
@@ -64,6 +66,8 @@ def choose_views(
         held: (K,) for how many GOPs `previous` has been shown, at least 1; None: long enough to be left.
         weight: (N,) for how many frames each frame stands, above 0; None: one. Above 1 for the last ones, the
             window is taken to go on as it ends: a view that stays better is worth a cut then.
+        asked: of how many GOPs the views are asked for, at least 1: all before the next GOP; None: of all. It
+            saves time where a window moves on by a GOP and the rest is decided again.
 
     Raises:
         ValueError: shapes that do not fit, a cost that is not a number, a negative switching cost, or a
@@ -73,6 +77,8 @@ def choose_views(
     objects, frames, cameras = cost.shape
     if held is not None and held.shape != (objects,):
         raise ValueError(f"held has shape {held.shape}, not ({objects},)")
+    if asked is not None and asked < 1:
+        raise ValueError(f"views of {asked} GOPs are asked for")
     views = np.full((objects, frames), NO_CAMERA, dtype=np.int64)
     lasting = np.ones(frames) if weight is None else weight
     if lasting.shape != (frames,) or not (lasting > 0).all():
@@ -84,12 +90,15 @@ def choose_views(
     costs = _go_on(cost[:, :running], lasting[:running], previous, views) if running else np.zeros(objects)
     if starts.size:
         gops = _gops(cost, lasting, starts, blind=least_shot > 1)
+        count = starts.size if asked is None else min(asked, starts.size)
         if least_shot > 1:
             ages = np.full(objects, least_shot) if held is None else np.clip(held, 1, least_shot)
-            shown, ahead = solve_with_shots(gops, previous, ages, switch_cost, least_shot)
+            shown, ahead = solve_with_shots(gops, previous, ages, switch_cost, least_shot, count)
         else:
-            shown, ahead = solve(gops, previous, switch_cost)
-        views[:, running:] = np.repeat(shown, np.diff(starts, append=frames), axis=0).T
+            shown, ahead = solve(gops, previous, switch_cost, count)
+        lengths = np.diff(starts, append=frames)[:count]
+        views = views[:, : running + int(lengths.sum())]
+        views[:, running:] = np.repeat(shown, lengths, axis=0).T
         costs += ahead
     return Choices(views, costs)
 
@@ -148,7 +157,8 @@ def _gops(
         for n in range(start + 1, end):
             total = total + _lasting(inside[n], lasting[n])
         cost_of_gops.append(total)
-        blind_gops.append(inside[start:end].min(axis=0) >= NO_VIEW_COST if blind else None)
+        nobody = inside[start:end].min(axis=0) >= NO_VIEW_COST if blind else None
+        blind_gops.append(nobody if nobody is None else nobody | np.isinf(total))
     return Gops(cost_of_gops, np.add.reduceat(lasting, starts), blind_gops)
 
 

@@ -30,22 +30,23 @@ class Gops:
 
 
 def solve(
-    gops: Gops, previous: NDArray[np.int64], switch_cost: float
+    gops: Gops, previous: NDArray[np.int64], switch_cost: float, asked: int
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Give the cameras (S, K), -1 where none is possible, and what they cost (K,).
+    """Give the cameras (asked, K) of the first GOPs, -1 where none is possible, and what all cost (K,).
 
     The recursion runs backwards (cost still to come), so that the decisions are read forwards and a tie
     can be given to the camera that is being shown, which the paper's forward recursion leaves open.
     """
     count, (cameras, objects) = len(gops.cost), gops.cost[0].shape
-    onward = np.empty((count, cameras, objects))  # the cost from GOP s on, by the camera shown in it
-    best = np.empty((count, objects))  # the least cost of these over the cameras
+    onward = np.empty((asked, cameras, objects))  # the cost from GOP s on, by the camera shown in it
+    best = np.empty((count, objects))  # the least of these over the cameras
+    later = np.empty((cameras, objects))  # the same for GOPs that nobody asks for
     ahead = np.zeros((cameras, objects))  # the least cost after GOP s, by the camera shown last
     start = np.zeros(objects)  # the same where no camera was shown before
     if not objects:
-        return np.empty((count, 0), dtype=np.int64), start
+        return np.empty((asked, 0), dtype=np.int64), start
     for s in range(count - 1, -1, -1):
-        value = np.add(gops.cost[s], ahead, out=onward[s])
+        value = np.add(gops.cost[s], ahead, out=onward[s] if s < asked else later)
         np.minimum.reduce(value, axis=0, out=best[s])
         if best[s].max() == np.inf:
             hole = np.isinf(best[s])
@@ -58,11 +59,11 @@ def solve(
     every = np.arange(objects)
     total = np.where(previous >= 0, ahead[previous, every], start)
 
-    possible = np.isfinite(best)
-    leave = best + switch_cost
-    views = np.empty((count, objects), dtype=np.int64)
+    possible = np.isfinite(best[:asked])
+    leave = best[:asked] + switch_cost
+    views = np.empty((asked, objects), dtype=np.int64)
     current = previous.copy()
-    for s in range(count):
+    for s in range(asked):
         goes_on = np.take(onward[s], np.maximum(current, 0) * objects + every) <= leave[s]
         cut = np.flatnonzero(possible[s] & ~(goes_on & (current >= 0)))
         if cut.size:

@@ -14,8 +14,9 @@ def solve_with_shots(
     held: NDArray[np.int64],
     switch_cost: float,
     least_shot: int,
+    asked: int,
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Give the cameras (S, K), -1 where none is possible, and what they cost (K,).
+    """Give the cameras (asked, K) of the first GOPs, -1 where none is possible, and what all cost (K,).
 
     The state before a GOP is the camera shown and its age: for how many GOPs it has been shown, counted up to
     `least_shot`, when it may be left. Before that it may be left only where it is blind. The older a shot,
@@ -27,35 +28,37 @@ def solve_with_shots(
         held: (K,) its age, 1 to `least_shot`.
         switch_cost: of one cut.
         least_shot: GOPs, at least 2.
+        asked: GOPs.
     """
     cost, count = gops.cost, len(gops.cost)
     cameras, objects = cost[0].shape
     # After GOP s, by age - 1 and camera: the least cost still to come.
     ahead = np.zeros((least_shot, cameras, objects))
     start = np.zeros(objects)
-    leaves = np.empty((count, least_shot, cameras, objects), dtype=np.bool_)
-    cut_to = np.empty((count, objects), dtype=np.int64)
-    possible = np.empty((count, objects), dtype=np.bool_)
+    leaves = np.empty((asked, least_shot, cameras, objects), dtype=np.bool_)
+    cut_to = np.empty((asked, objects), dtype=np.int64)
+    possible = np.empty((asked, objects), dtype=np.bool_)
     for s in range(count - 1, -1, -1):
         fresh = cost[s] + ahead[0]
-        cut_to[s] = np.argmin(fresh, axis=0)
         best = np.min(fresh, axis=0)
-        possible[s] = np.isfinite(best)
+        here = np.isfinite(best)
         older = np.concatenate([ahead[1:], ahead[-1:]])  # a shot that goes on is one GOP older after it
         stay = cost[s] + older
-        leaves[s] = best + switch_cost < stay
+        leave = best + switch_cost < stay
         blind = gops.blind[s]
         if blind is not None:
-            leaves[s, :-1] &= blind
+            leave[:-1] &= blind
+        if s < asked:
+            leaves[s], cut_to[s], possible[s] = leave, np.argmin(fresh, axis=0), here
         none = NO_VIEW_COST * gops.frames[s]
-        ahead = np.where(possible[s], np.where(leaves[s], best + switch_cost, stay), older + none)
-        start = np.where(possible[s], best, start + none)
+        ahead = np.where(here, np.where(leave, best + switch_cost, stay), older + none)
+        start = np.where(here, best, start + none)
     every = np.arange(objects)
     total = np.where(previous >= 0, ahead[held - 1, previous, every], start)
 
-    views = np.empty((count, objects), dtype=np.int64)
+    views = np.empty((asked, objects), dtype=np.int64)
     current, age = previous.copy(), held.copy()
-    for s in range(count):
+    for s in range(asked):
         cut = possible[s] & ((current < 0) | leaves[s, age - 1, current, every])
         age = np.where(cut, 1, np.minimum(age + 1, least_shot))
         current = np.where(cut, cut_to[s], current)

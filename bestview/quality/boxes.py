@@ -8,12 +8,11 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 
-def clipped(boxes: Floats, pictures: Floats) -> Floats:
-    """Give the part of each box that is inside its picture; both (..., 4), broadcast to each other."""
-    return np.concatenate(
-        [np.maximum(boxes[..., :2], pictures[..., :2]), np.minimum(boxes[..., 2:], pictures[..., 2:])],
-        axis=-1,
-    )
+def areas_inside(boxes: Floats, pictures: Floats) -> Floats:
+    """Give the area of the part of each box that is in its picture: two (..., 4), broadcast to (...)."""
+    width = np.minimum(boxes[..., 2], pictures[..., 2]) - np.maximum(boxes[..., 0], pictures[..., 0])
+    height = np.minimum(boxes[..., 3], pictures[..., 3]) - np.maximum(boxes[..., 1], pictures[..., 1])
+    return np.asarray(np.maximum(width, 0.0) * np.maximum(height, 0.0))
 
 
 def areas(boxes: Floats) -> Floats:
@@ -24,4 +23,4 @@ def areas(boxes: Floats) -> Floats:
 
 def shares(parts: Floats, wholes: Floats) -> Floats:
     """Divide areas; 0 where there is nothing to have a share of."""
-    return np.asarray(np.divide(parts, wholes, out=np.zeros_like(parts), where=wholes > 0))
+    return np.asarray(np.divide(parts, wholes, out=np.zeros(parts.shape), where=wholes > 0))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bestview.quality.boxes import Floats, areas, clipped, shares
+from bestview.quality.boxes import Floats, areas, areas_inside, shares
 
 _CUT = 0.5
 """What a box is worth that ends at the upper or lower edge: nobody can say how much is beyond it."""
@@ -27,7 +27,7 @@ def whole(boxes: Floats, pictures: Floats) -> Floats:
     Returns:
         (...) values in [0, 1].
     """
-    inside = shares(areas(clipped(boxes, pictures)), areas(boxes))
+    inside = shares(areas_inside(boxes, pictures), areas(boxes))
     gap = np.minimum(boxes[..., 1] - pictures[..., 1], pictures[..., 3] - boxes[..., 3])
     room = np.maximum(_NEAR_EDGE * (boxes[..., 3] - boxes[..., 1]), np.finfo(np.float64).tiny)
     return np.asarray(inside * (_CUT + (1.0 - _CUT) * np.clip(gap / room, 0.0, 1.0)))

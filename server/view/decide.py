@@ -140,6 +140,7 @@ class Decider:
             self.least_shot,
             before.held,
             weight,
+            asked=1,
         ).views[:, 0]
         self._shots = before.then(views)
         self._next_gop = first + self._config.encode.gop

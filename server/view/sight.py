@@ -98,7 +98,7 @@ class Sight:
         sharp = np.full((tracks, len(messages)), np.nan)
         for column, message in enumerate(messages):
             rows, count = slice(message.first - first, message.last - first + 1), len(message.tracks)
-            boxes[column, rows, :count] = _boxes(message).transpose(1, 0, 2)
+            boxes[column, rows, :count] = read_boxes(message).transpose(1, 0, 2)
             sure[:count, column] = np.clip([track.confidence for track in message.tracks], 0.0, 1.0)
         return view_quality(
             Seen(boxes.transpose(2, 1, 0, 3), sure, sharp),
@@ -126,9 +126,9 @@ class Sight:
         return np.asarray(own @ to_own)
 
 
-def _boxes(message: CameraTracks) -> Floats:
+def read_boxes(message: CameraTracks) -> Floats:
     """Give the boxes of a message: (T, F, 4), NaN where hidden."""
     frames = message.last - message.first + 1
-    sides = chain.from_iterable(box or _HIDDEN for track in message.tracks for box in track.boxes)
-    flat = np.fromiter(sides, dtype=np.float64, count=len(message.tracks) * frames * 4)
+    boxes = [box or _HIDDEN for track in message.tracks for box in track.boxes]
+    flat = np.fromiter(chain.from_iterable(boxes), dtype=np.float64, count=4 * len(boxes))
     return flat.reshape(len(message.tracks), frames, 4)

@@ -21,20 +21,50 @@ def choose(cost: list[list[float]], previous: int, switch_cost: float, cuts: lis
     return [int(view) for view in choices.views[0]]
 
 
-def price(cost: NDArray[np.float64], views: tuple[int, ...], previous: int, switch_cost: float) -> float:
+def price(
+    cost: NDArray[np.float64],
+    views: tuple[int, ...],
+    previous: int,
+    switch_cost: float,
+    weight: NDArray[np.float64] | None = None,
+) -> float:
     """Cost of one object's views over its (N, C) costs, written the slow and obvious way."""
     total, current = 0.0, previous
+    lasting = np.ones(len(cost)) if weight is None else weight
     for frame, view in enumerate(views):
         if view < 0:
-            total += NO_VIEW_COST
+            total += NO_VIEW_COST * lasting[frame]
             continue
-        total += cost[frame, view] + (switch_cost if current not in (-1, view) else 0.0)
+        total += cost[frame, view] * lasting[frame] + (switch_cost if current not in (-1, view) else 0.0)
         current = view
     return total
 
 
+def keeps(  # every shot is long enough, or was left where its camera showed nobody
+    cost: NDArray[np.float64], views: tuple[int, ...], starts: list[int], previous: int, least: int, held: int
+) -> bool:
+    current, age = previous, held
+    for start, end in pairwise([*starts, len(cost)]):
+        view = views[start]
+        if view in (-1, current) or current == -1:
+            age = age + 1 if view in (-1, current) else 1
+        else:
+            blind = bool((cost[start:end, current] >= NO_VIEW_COST).all())
+            if age < least and not blind and np.isfinite(cost[start:end, current]).all():
+                return False
+            age = 1
+        current = view if view >= 0 else current
+    return True
+
+
 def exhaustive(
-    cost: NDArray[np.float64], previous: int, switch_cost: float, cuts: list[bool]
+    cost: NDArray[np.float64],
+    previous: int,
+    switch_cost: float,
+    cuts: list[bool],
+    least_shot: int = 0,
+    held: int = 1,
+    weight: NDArray[np.float64] | None = None,
 ) -> tuple[float, tuple[int, ...]]:
     """Try every sequence that the rules allow; ties: stay with the camera, else the lowest index."""
     frames, cameras = cost.shape
@@ -53,10 +83,10 @@ def exhaustive(
         for view in views:
             order.append(-1 if view in (-1, current) else view)
             current = view if view >= 0 else current
-        return price(cost, views, previous, switch_cost), order
+        return price(cost, views, previous, switch_cost, weight), order
 
     every = [tuple(head) + tuple(v for gop in parts for v in gop) for parts in product(*options)]
-    best = min(every, key=rank)
+    best = min((it for it in every if keeps(cost, it, bounds[:-1], previous, least_shot, held)), key=rank)
     return rank(best)[0], best
 
 
@@ -66,8 +96,14 @@ COSTS = st.one_of(EIGHTHS, EIGHTHS, EIGHTHS, st.just(INF))
 
 
 @st.composite
-def windows(draw: st.DrawFn) -> tuple[NDArray[np.float64], NDArray[np.int64], float, list[bool]]:
-    objects, frames, cameras = draw(st.integers(1, 3)), draw(st.integers(1, 5)), draw(st.integers(1, 3))
+def windows(
+    draw: st.DrawFn, most_frames: int = 5
+) -> tuple[NDArray[np.float64], NDArray[np.int64], float, list[bool]]:
+    objects, frames, cameras = (
+        draw(st.integers(1, 3)),
+        draw(st.integers(1, most_frames)),
+        draw(st.integers(1, 3)),
+    )
     size = objects * frames * cameras
     cost = np.array(draw(st.lists(COSTS, min_size=size, max_size=size))).reshape(objects, frames, cameras)
     ints = st.lists(st.integers(-1, cameras - 1), min_size=objects, max_size=objects)
@@ -86,6 +122,57 @@ def test_no_sequence_of_cameras_is_better(
         best_cost, best = exhaustive(cost[k], int(previous[k]), switch_cost, cuts)
         assert tuple(choices.views[k]) == best
         assert choices.costs[k] == best_cost
+
+
+@settings(deadline=None, max_examples=250)
+@given(windows(most_frames=6), st.integers(0, 4), st.integers(1, 4), st.data())
+def test_no_sequence_that_keeps_the_least_shot_is_better(
+    window: tuple[NDArray[np.float64], NDArray[np.int64], float, list[bool]],
+    least_shot: int,
+    age: int,
+    data: st.DataObject,
+) -> None:
+    cost, previous, switch_cost, cuts = window
+    lasting = st.lists(st.sampled_from([1.0, 1.0, 2.0, 3.5]), min_size=len(cuts), max_size=len(cuts))
+    held, weight = np.full(len(cost), age), np.array(data.draw(lasting))
+    choices = choose_views(cost, previous, switch_cost, np.array(cuts), least_shot, held, weight)
+    for k in range(len(cost)):
+        best = exhaustive(cost[k], int(previous[k]), switch_cost, cuts, least_shot, age, weight)
+        assert (choices.costs[k], tuple(choices.views[k])) == best
+
+
+def test_without_a_word_about_its_age_a_camera_may_be_left() -> None:
+    cost, cuts = np.array([[[0.5, 0.0]] * 2]), np.ones(2, bool)
+    assert choose_views(cost, np.array([0]), 0.25, cuts, least_shot=3).views.tolist() == [[1, 1]]
+    young = choose_views(cost, np.array([0]), 0.25, cuts, least_shot=3, held=np.array([2]))
+    assert young.views.tolist() == [[0, 1]], "shown for one GOP more, then left"
+
+
+def test_a_shot_may_be_short_where_its_camera_shows_nobody_any_more() -> None:
+    cost, cuts = np.array([[[1.0, 0.25]] * 3]), np.ones(3, bool)
+    assert choose_views(cost, np.array([0]), 0.25, cuts, 9, np.array([1])).views.tolist() == [[1, 1, 1]]
+
+
+def test_what_is_seen_last_may_be_taken_to_go_on() -> None:
+    cost, cuts = np.array([[[0.5, 0.5], [0.5, 0.25]]]), np.ones(2, bool)
+    assert choose_views(cost, np.array([0]), 1.0, cuts).views.tolist() == [[0, 0]]
+    lasting = choose_views(cost, np.array([0]), 1.0, cuts, weight=np.array([1.0, 8.0]))
+    assert lasting.views.tolist() == [[0, 1]]
+    assert lasting.costs.tolist() == [0.5 + 1.0 + 8 * 0.25]
+
+
+@settings(deadline=None, max_examples=100)
+@given(windows(), st.integers(0, 3), st.integers(1, 3))
+def test_the_first_gops_are_the_same_where_only_they_are_asked_for(
+    window: tuple[NDArray[np.float64], NDArray[np.int64], float, list[bool]], least_shot: int, asked: int
+) -> None:
+    cost, previous, switch_cost, cuts = window
+    whole = choose_views(cost, previous, switch_cost, np.array(cuts), least_shot)
+    part = choose_views(cost, previous, switch_cost, np.array(cuts), least_shot, asked=asked)
+    after = [frame for frame, cut in enumerate(cuts) if cut][asked:]
+    assert part.views.shape[1] == (after[0] if after else len(cuts))
+    assert np.array_equal(part.views, whole.views[:, : part.views.shape[1]])
+    assert np.array_equal(part.costs, whole.costs)
 
 
 @settings(deadline=None, max_examples=50)
@@ -169,6 +256,8 @@ def test_what_makes_no_sense_is_refused() -> None:
     refused("cut_allowed", cost, np.array([0]), 1.0, np.ones(3, bool))
     refused("previous", cost, np.array([0, 1]), 1.0, cuts)
     refused("cost has shape", np.zeros((2, 2)), np.array([0]), 1.0, cuts)
+    refused("held", cost, np.array([0]), 1.0, cuts, 2, np.array([1, 1]))
+    refused("weight", cost, np.array([0]), 1.0, cuts, 0, None, np.array([1.0, 0.0]))
 
 
 def test_a_thousand_objects_are_chosen_for_at_once() -> None:

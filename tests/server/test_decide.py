@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -181,3 +182,55 @@ def test_the_reason_is_one_plain_sentence_for_every_case() -> None:
     assert said(best) == "c0 sees this person best over the next frames."
     away = decide(decider(), [*story, *[{A: {}, B: {}}] * 3])[-1]
     assert said(away) == "Nobody sees this person at the moment; c0 saw them last."
+
+
+def test_a_camera_that_dies_in_the_middle_of_a_window_is_left_at_the_gop_it_dies_in() -> None:
+    dies = 2 * GOP + 2
+    story: list[Seen] = [{A: {1: LARGE}, B: {1: SMALL}}] * 8
+    alive = {A: 10 * GOP}
+    it = decider(has=lambda camera, pulse: pulse < alive.get(camera, pulse + 1))
+    before = decide(it, story[:3])  # decides GOPs 0 and 1; the look-ahead of the second ends with GOP 2
+    alive[A] = dies
+    after = []
+    for number in range(3, 8):  # its last words are lost with it
+        after += it.step(epoch_of(number, word(B, number, story[number][B])))
+    assert shown(before) == [A, A]
+    assert shown(after) == [B, B, B, B, B], "no hole, and one cut"
+    assert after[0].why.of(1).views[A].cost is None
+
+
+def test_what_was_seen_ahead_of_a_death_is_decided_again_without_the_camera() -> None:
+    story: list[Seen] = [{A: {1: LARGE}, B: {1: SMALL}}] * 3
+    late = decider(has=lambda camera, pulse: camera == B or pulse < 2 * GOP, view={"lookahead": 4 * GOP})
+    early = decide(late, [*story, *[{B: {1: SMALL}}] * 4])
+    assert shown(early) == [A, A, B, B]
+    sum_ahead = early[0].why.of(1)
+    assert sum_ahead.stay is None
+    assert sum_ahead.views[A].cost is None, "it cannot be shown to the end of the look-ahead"
+
+
+@pytest.mark.parametrize(("min_shot_s", "cuts"), [(0.0, 4), (0.5, 2)])
+def test_a_shot_is_as_long_as_asked_for(min_shot_s: float, cuts: int) -> None:
+    here: Seen = {A: {1: LARGE}, B: {1: SMALL}}
+    there: Seen = {A: {1: SMALL}, B: {1: LARGE}}
+    story = [here, here, there, there, here, here, there, there, here, here, here]
+    it = decider(view={"min_shot_s": min_shot_s})
+    views = shown(decide(it, story, end=11 * STRIDE - 1))
+    changes = [n for n in range(1, len(views)) if views[n] != views[n - 1]]
+    assert len(changes) == cuts
+    assert all(b - a >= it.least_shot for a, b in itertools.pairwise(changes))
+
+
+def test_a_shot_that_shows_nobody_may_be_short() -> None:
+    here, gone = {A: {1: LARGE}, B: {1: SMALL}}, {A: {}, B: {1: SMALL}}
+    it = decider(view={"min_shot_s": 2.0})
+    assert shown(decide(it, [here, here, *[gone] * 4])) == [A, A, B, B, B]
+
+
+def test_how_far_away_everybody_is_makes_no_difference() -> None:
+    tiny: Box = (30.0, 30.0, 31.0, 33.0)
+    half: Box = (30.0, 30.0, 30.5, 31.5)
+    story: list[Seen] = [{A: {1: tiny}, B: {1: half}}] * 3 + [{A: {1: half}, B: {1: tiny}}] * 3
+    assert shown(decide(decider(), story)) == [A, A, A, B, B]
+    papers = decider(view={"quality": {"relative": False}})
+    assert shown(decide(papers, story)) == [A] * 5, "the paper's cost of a cut is of a picture full of them"

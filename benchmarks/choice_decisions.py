@@ -1,0 +1,157 @@
+"""Times of the whole decision, from what cameras send to everybody's camera, on made-up crowds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.stopwatch import Stopwatch
+from bestview import IdentityUpdate, LocalTrack, QualitySettings
+from server.view import decide, sight
+from server.view.align import Epoch
+from server.view.board import Board
+from server.view.decide import Decider
+from server.view.outlook import Outlook
+from server.view.people import People
+from server.view.sight import Sight
+from server.wire.config import Config
+from server.wire.epochs import end_of_epoch
+from server.wire.loading import build_config
+from server.wire.messages import CameraTracks, Track
+
+_SEED, _WIDTH, _HEIGHT = 5, 1280, 720
+_WARM = 6
+"""Epochs before it counts: the look-ahead has to fill."""
+_ALL = QualitySettings(1.0, *[0.5] * 6)
+
+
+@dataclass(frozen=True, slots=True)
+class Crowd:
+    """People who walk, each before as many of the cameras."""
+
+    people: int
+    cameras: int
+    seen_by: int
+
+    def epochs(self, config: Config, count: int) -> Iterator[Epoch]:
+        """Give what the cameras say: each window anew, as the tracker sends it."""
+        rng = np.random.default_rng(_SEED)
+        window, stride = config.track.window.window, config.track.window.stride
+        cameras = [rng.permutation(self.cameras)[: self.seen_by] for _ in range(self.people)]
+        height = rng.uniform(40, 120, self.people)
+        begin = rng.uniform((0, 200), (_WIDTH, _HEIGHT), (self.people, 2))
+        walk = rng.normal(0, 1.5, (self.people, 2))
+        for number in range(count):
+            last = end_of_epoch(number, stride)
+            first = max(0, last - window + 1)
+            said: dict[str, list[Track]] = {camera: [] for camera in config.camera_ids}
+            for person in range(self.people):
+                feet = begin[person] + walk[person] * np.arange(first, last + 1)[:, None]
+                tall = height[person]
+                boxes = (feet[:, [0, 1, 0, 1]] + np.array([-0.2, -1.0, 0.2, 0.0]) * tall).tolist()
+                track = Track(
+                    id=person,
+                    boxes=[(a, b, c, d) for a, b, c, d in boxes],
+                    histogram=[float(person + 1)],
+                    confidence=0.7,
+                )
+                for camera in cameras[person]:
+                    said[config.camera_ids[camera]].append(track)
+            yield Epoch(number, last, {it: _message(it, number, first, last, said[it]) for it in said})
+
+
+@dataclass(frozen=True, slots=True)
+class Spent:
+    """Seconds of processor time a frame."""
+
+    reading: float
+    """Boxes out of messages."""
+    quality: float
+    """Of views, from boxes."""
+    costs: float
+    """Laid out by person."""
+    choice: float
+    """The program."""
+    rest: float
+    """Whose each shot is, and what is said of it."""
+    people: float
+    """Who is who, with the numbers given: only the keeping of them."""
+    telling: float
+    """Boxes and choices written down as messages."""
+
+    @property
+    def decision(self) -> float:
+        """From boxes to everybody's camera."""
+        return self.quality + self.costs + self.choice + self.rest
+
+
+class _Given:
+    """A registry that reads people's numbers off their looks."""
+
+    def update(self, tracks: Sequence[LocalTrack], last_frame: int) -> IdentityUpdate:
+        """Give everybody their number."""
+        del last_frame
+        numbers = {track.key: int(track.histogram[0]) for track in tracks}
+        return IdentityUpdate(numbers, born=(), returned=(), gone=(), merged=(), split=())
+
+
+def decision_times(crowd: Crowd, gop: int, epochs: int, *, all_terms: bool) -> Spent:
+    """Decide for a crowd, and give what the stages cost."""
+    config = _config(crowd, gop, asdict(_ALL) if all_terms else {})
+    ground = np.array([[1.0, 0.0, 0.0], [0.0, 3.0, 0.0], [0.0, 0.002, 1.0]])
+    decider = Decider(config, dict.fromkeys(config.camera_ids, ground), lambda _camera, _pulse: True)
+    decider.people._registry = _Given()  # type: ignore[assignment]  # noqa: SLF001 — joining is measured elsewhere
+    board, watch = Board(), Stopwatch()
+    stages = (
+        (sight, "read_boxes", "reading"),
+        (Sight, "put", "quality"),
+        (Outlook, "__init__", "costs"),
+        (Outlook, "part", "costs"),
+        (decide, "choose_views", "choice"),
+        (Decider, "step", "rest"),
+        (People, "update", "people"),
+        (People, "boxes", "telling"),
+        (Board, "put", "telling"),
+    )
+    for epoch in crowd.epochs(config, _WARM + epochs):
+        if epoch.number < _WARM:
+            decider.step(epoch)
+            continue
+        with watch.watching(*stages):
+            for decision in decider.step(epoch):
+                board.put(decision)
+    frames = epochs * config.track.window.stride
+    return Spent(**{stage: spent / frames for stage, spent in watch.seconds.items()})
+
+
+def _config(crowd: Crowd, gop: int, quality: dict[str, float]) -> Config:
+    cameras = [{"id": f"c{number}", "source": "scene:room"} for number in range(crowd.cameras)]
+    return build_config(
+        {
+            "site": {"width": _WIDTH, "height": _HEIGHT},
+            "encode": {"gop": gop},
+            "cameras": cameras,
+            "view": {"quality": quality},
+        },
+        where="the benchmark",
+        folder=Path(),
+    )
+
+
+def _message(camera: str, epoch: int, first: int, last: int, tracks: list[Track]) -> CameraTracks:
+    return CameraTracks(
+        camera=camera,
+        boot=1,
+        size=(_WIDTH, _HEIGHT),
+        epoch=epoch,
+        first=first,
+        last=last,
+        final_to=first,
+        ended=False,
+        shed=[],
+        tracks=tracks,
+        solve=None,
+    )

@@ -1,0 +1,41 @@
+"""Times of the program that chooses views, on costs drawn from a seed."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from bestview import choose_views
+
+_SEED = 3
+_SWITCH_COST = 7.5
+
+
+@dataclass(frozen=True, slots=True)
+class Size:
+    """How much there is to choose."""
+
+    objects: int
+    cameras: int
+    lookahead: int
+    gop: int
+    least_shot: int
+    """GOPs."""
+
+
+def frame_time(size: Size, repeats: int) -> float:
+    """Give the seconds a frame: one choice serves all frames of a GOP; the median of some."""
+    rng = np.random.default_rng(_SEED)
+    # As the service has them: objects innermost.
+    cost = rng.random((size.lookahead, size.cameras, size.objects)).transpose(2, 0, 1)
+    previous = rng.integers(0, size.cameras, size.objects)
+    held = rng.integers(1, max(2, size.least_shot), size.objects)
+    starts = np.arange(size.lookahead) % size.gop == 0
+    spent = []
+    for _ in range(repeats):
+        begin = time.process_time()
+        choose_views(cost, previous, _SWITCH_COST, starts, size.least_shot, held, asked=1)
+        spent.append(time.process_time() - begin)
+    return float(np.median(spent)) / size.gop

@@ -1,0 +1,195 @@
+"""Each term of a view's quality says what its name says, and all of them together are one product."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from bestview import QualitySettings, size_quality
+from bestview.quality import Looks, Seen, compared, view_cost, view_quality
+from bestview.quality.central import central
+from bestview.quality.facing import facing
+from bestview.quality.unhidden import unhidden
+from bestview.quality.whole import whole
+
+WIDTH, HEIGHT, FPS = 100.0, 80.0, 25.0
+PICTURE = np.array([0.0, 0.0, WIDTH, HEIGHT])
+ONE = np.zeros(9, dtype=np.int64)
+"""All boxes in one picture."""
+FLOOR = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+"""A camera that looks straight down: a pixel is a unit of ground, down the picture is towards it."""
+
+
+def box(left: float, top: float, width: float = 10.0, height: float = 40.0) -> list[float]:
+    return [left, top, left + width, top + height]
+
+
+def walk(x: float, y: float, frames: int = 15) -> NDArray[np.float64]:
+    """Give one person's boxes (1, N, 4) who goes by (x, y) pixels a frame."""
+    steps = np.arange(frames)[:, None] * np.array([x, y, x, y])
+    return np.array([box(50, 200)]) + steps[None]
+
+
+def looks(*homographies: NDArray[np.float64] | None) -> Looks:
+    cameras = homographies or (None,)
+    return Looks((WIDTH, HEIGHT), np.tile(PICTURE, (len(cameras), 1)), cameras, FPS)
+
+
+def seen(boxes: NDArray[np.float64], sure: float = 1.0, sharp: float = np.nan) -> Seen:
+    shape = (boxes.shape[0], boxes.shape[2])
+    return Seen(boxes, np.full(shape, sure), np.full(shape, sharp))
+
+
+def only(**weights: float) -> QualitySettings:
+    nothing = dict.fromkeys(QualitySettings().weights, 0.0)
+    return QualitySettings(**{**nothing, **weights})
+
+
+def test_who_is_inside_the_picture_and_clear_of_its_edges_is_whole() -> None:
+    boxes = np.array([box(20, 20), box(-5, 20), box(20, 40), box(20, 0), box(20, 60), box(200, 20)])
+    assert whole(boxes, PICTURE) == pytest.approx([1.0, 0.5, 0.5, 0.5, 0.25, 0.0])
+
+
+def test_the_edge_counts_gradually() -> None:
+    values = whole(np.array([box(20, 40 - gap) for gap in (0.0, 0.3, 0.6, 1.2, 5.0)]), PICTURE)
+    assert values == pytest.approx([0.5, 0.625, 0.75, 1.0, 1.0])
+
+
+def test_who_is_in_the_middle_is_central() -> None:
+    boxes = np.array([box(45, 20), [-5.0, -20.0, 5.0, 20.0], [20.0, 20.0, 30.0, 60.0]])
+    assert central(boxes, PICTURE) == pytest.approx([1.0, 0.0, 1 - 25 / np.hypot(50, 40)])
+
+
+def test_whose_feet_are_lower_hides_whom_they_cover() -> None:
+    near, far = box(20, 30), box(22, 20, 10, 40)
+    assert unhidden(np.array([near, far]), ONE[:2]) == pytest.approx([1.0, 2 * (1 - 8 * 30 / 400)])
+    assert unhidden(np.array([near, far]), np.array([0, 1])).tolist() == [1.0, 1.0], "of two pictures"
+
+
+def test_half_of_somebody_is_enough_and_nothing_of_them_is_nothing() -> None:
+    half, nobody = box(25, 30), box(20, 30)
+    behind = box(20, 20, 10, 40)
+    assert unhidden(np.array([behind, half]), ONE[:2]).tolist() == [1.0, 1.0]
+    assert unhidden(np.array([behind, [15, 10, 35, 80]]), ONE[:2]).tolist() == [0.0, 1.0]
+    assert unhidden(np.array([behind, nobody]), ONE[:2])[0] == pytest.approx(2 * 0.25)
+
+
+def test_of_two_at_one_distance_nobody_can_say_who_is_in_front() -> None:
+    values = unhidden(np.array([box(20, 20), box(20, 20)]), ONE[:2])
+    assert values.tolist() == [1.0, 1.0], "half of the box may be covered, in both"
+
+
+BOXES = st.lists(
+    st.tuples(
+        *(st.integers(0, 30).map(float) for _ in "xy"), *(st.integers(0, 20).map(float) for _ in "wh")
+    ).map(lambda it: box(*it)),
+    max_size=9,
+)
+
+
+def slowly(boxes: NDArray[np.float64], pictures: NDArray[np.int64]) -> list[float]:
+    """Work out who is hidden pair by pair."""
+    values = []
+    for i, a in enumerate(boxes):
+        free = 1.0
+        for j, b in enumerate(boxes):
+            width = min(a[2], b[2]) - max(a[0], b[0])
+            height = min(a[3], b[3]) - max(a[1], b[1])
+            if i == j or pictures[i] != pictures[j] or width <= 0 or height <= 0:
+                continue
+            lower = (b[3] - a[3]) / max(a[3] - a[1], b[3] - b[1])
+            free *= 1 - min(max(0.5 + 10 * lower, 0), 1) * width * height / ((a[2] - a[0]) * (a[3] - a[1]))
+        values.append(min(2 * free, 1.0))
+    return values
+
+
+@settings(deadline=None, max_examples=100)
+@given(BOXES, st.lists(st.integers(0, 2), min_size=9, max_size=9))
+def test_the_fast_way_finds_whom_the_slow_way_finds_hidden(
+    boxes: list[list[float]], places: list[int]
+) -> None:
+    rows, pictures = np.array(boxes).reshape(-1, 4), np.array(places[: len(boxes)], dtype=np.int64)
+    assert unhidden(rows, pictures).tolist() == pytest.approx(slowly(rows, pictures))
+
+
+def test_who_comes_faces_the_camera_and_who_goes_does_not() -> None:
+    comes, goes, across, stands = (
+        facing(walk(*way), FLOOR, FPS)[0] for way in ((0.0, 3.0), (0.0, -3.0), (3.0, 0.0), (0.0, 0.0))
+    )
+    assert comes > 0.9
+    assert goes == pytest.approx(1 - comes)
+    assert (across, stands) == (pytest.approx(0.5), pytest.approx(0.5))
+
+
+def test_slow_steps_say_less_than_fast_ones_and_hidden_frames_nothing() -> None:
+    slow, fast = (facing(walk(0.0, speed), FLOOR, FPS)[0] for speed in (0.2, 2.0))
+    assert 0.5 < slow < fast < 1.0
+    gaps = walk(0.0, 2.0)
+    gaps[0, 3:9] = np.nan
+    assert facing(gaps, FLOOR, FPS)[0] == pytest.approx(fast)
+    assert facing(np.full((2, 15, 4), np.nan), FLOOR, FPS).tolist() == [0.5, 0.5]
+
+
+def test_what_is_towards_the_camera_is_read_off_the_ground() -> None:
+    turned = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    assert facing(walk(0.0, 3.0), turned, FPS)[0] == facing(walk(0.0, 3.0), FLOOR, FPS)[0]
+
+
+def test_size_alone_without_comparing_is_the_papers() -> None:
+    boxes = np.random.default_rng(1).uniform(0, 80, (3, 4, 2, 4))
+    boxes[..., 2:] += boxes[..., :2]
+    boxes[1, 2, 0] = np.nan
+    found = view_quality(seen(boxes), looks(None, None), only(size=1.0))
+    assert found.names == ("size",)
+    np.testing.assert_allclose(found.quality, size_quality(boxes, WIDTH, HEIGHT))
+
+
+WEIGHTS = st.fixed_dictionaries({name: st.floats(0, 1) for name in QualitySettings().weights})
+
+
+@settings(deadline=None, max_examples=60)
+@given(WEIGHTS, st.integers(0, 2**32 - 1))
+def test_the_quality_is_the_product_of_what_each_term_leaves(weights: dict[str, float], seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    boxes = rng.uniform(-20, 90, (3, 5, 2, 4))
+    boxes[..., 2:] = boxes[..., :2] + rng.uniform(1, 60, (3, 5, 2, 2))
+    boxes[rng.random((3, 5, 2)) < 0.3] = np.nan
+    terms = QualitySettings(**{**weights, "size": 1.0})
+    found = view_quality(Seen(boxes, rng.random((3, 2)), rng.random((3, 2))), looks(FLOOR, None), terms)
+    there = ~np.isnan(boxes[..., 0])
+    expected = np.ones(there.shape)
+    for name, term in zip(found.names, found.terms, strict=True):
+        assert ((term[there] >= 0) & (term[there] <= 1)).all(), name
+        assert np.isnan(term[~there]).all()
+        expected *= 1 - terms.weights[name] * (1 - term)
+    np.testing.assert_allclose(found.quality[there], expected[there])
+    assert (found.quality[~there] == 0).all()
+    assert set(found.names) == {name for name, weight in terms.weights.items() if weight > 0}
+
+
+def test_what_nobody_has_measured_counts_as_sharp_and_a_doubtful_track_for_less() -> None:
+    boxes = np.array(box(20, 20)).reshape(1, 1, 1, 4)
+    assert view_quality(seen(boxes), looks(), only(sharp=1.0)).quality.item() == 1.0
+    assert view_quality(seen(boxes, sharp=0.4), looks(), only(sharp=0.5)).quality.item() == pytest.approx(0.7)
+    assert view_quality(seen(boxes, sure=0.4), looks(), only(sure=1.0)).quality.item() == pytest.approx(0.4)
+
+
+def test_views_are_compared_with_the_best_of_the_moment() -> None:
+    quality = np.array([[[0.1, 0.2], [0.0, 0.0]]])
+    assert compared(quality, axis=2).tolist() == [[[0.5, 1.0], [0.0, 0.0]]]
+    assert view_cost(compared(quality, axis=2)).tolist() == [[[0.5, 0.0], [1.0, 1.0]]]
+
+
+def test_weights_and_shapes_that_make_no_sense_are_refused() -> None:
+    with pytest.raises(ValueError, match=r"facing is a share between 0 and 1, not 1\.5"):
+        QualitySettings(facing=1.5)
+    with pytest.raises(ValueError, match="all weights are 0"):
+        only()
+    boxes = np.zeros((1, 1, 2, 4))
+    with pytest.raises(ValueError, match="boxes have shape"):
+        view_quality(seen(boxes), looks(), QualitySettings())
+    with pytest.raises(ValueError, match="sure has shape"):
+        view_quality(Seen(boxes, np.ones((2, 2)), np.ones((1, 2))), looks(None, None), QualitySettings())
