@@ -37,9 +37,9 @@ _RATED = """async () => {
   const { objects } = await (await fetch('api/objects')).json();
   const seen = objects.filter((it) => it.visible && it.thumbnail);
   const rated = await Promise.all(seen.map(async ({ object, camera, cameras }) => {
-    const { costs } = await (await fetch(`api/objects/${object}/choice`)).json();
+    const { quality } = await (await fetch(`api/objects/${object}/choice`)).json();
     const together = seen.filter((it) => it.cameras.includes(camera)).length;
-    const large = 1 - (costs[camera] ?? 1);
+    const large = quality[camera] ?? 0;
     return { object, score: seen.length + together + cameras.length + 4 * large };
   }));
   return rated.sort((a, b) => b.score - a.score);

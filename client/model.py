@@ -71,7 +71,23 @@ class Choice(msgspec.Struct, frozen=True):
     costs: dict[str, float | None]
     """By camera; None: it cannot be shown."""
     switch_cost: float
+    """What a cut costs, in frames of not seeing the object."""
     reason: str
+    seen: dict[str, float] = {}
+    """By camera: the share of the look-ahead in which it sees the object."""
+    quality: dict[str, float | None] = {}
+    """By camera: how well it shows the object, 0 to 1; None: it does not see it."""
+    terms: dict[str, dict[str, float]] = {}
+    """By camera: what the quality is made of, 0 to 1 each."""
+    weights: dict[str, float] = {}
+    """By term: the share of a view's worth that is lost where the term is 0."""
+    before: str | None = None
+    """The camera of the GOP before."""
+    stay: float | None = None
+    """What the look-ahead costs with that camera, in the unit of `switch_cost`; None: it cannot be shown."""
+    cut: float | None = None
+    """What it costs with the best other camera, the cut included; None: there is none."""
+    cut_to: str | None = None
 
 
 class Box(msgspec.Struct, frozen=True, array_like=True):

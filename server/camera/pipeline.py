@@ -5,6 +5,7 @@ from __future__ import annotations
 from server.camera.encode import AccessUnit, Encoder
 from server.camera.observe import make_detector
 from server.camera.report import Reporter
+from server.camera.sharpness import Sharpness
 from server.camera.sources import Image, open_source
 from server.wire.config import Config
 from server.wire.fit import Fit
@@ -30,6 +31,7 @@ class CameraPipeline:
         window = config.track.window
         self._tracker = OnlineTracker(window, config.track.costs, solver_named(config.track.solver))
         self._reporter = Reporter(camera_id, boot, self.source.size, window.stride)
+        self._sharpness = Sharpness() if config.view.quality.sharp > 0 else None
         self.begins = camera.offset if self.source.recorded else 0
         """The pulse at which the pictures begin."""
         self._last: int | None = None
@@ -63,7 +65,7 @@ class CameraPipeline:
         else:
             detections = self._detector.detect(image, pulse)
         result = self._tracker.push(pulse, detections)
-        return None if result is None else self._reporter.regular(result)
+        return None if result is None else self._measured(self._reporter.regular(result), image)
 
     def finish(self, end: int) -> CameraTracks:
         """Close the recording, which has no frame ``end``: what is provisional becomes final.
@@ -71,7 +73,11 @@ class CameraPipeline:
         A camera that was started again after its recording was over says so, too.
         """
         last = end - 1 if self._last is None else self._last
-        return self._reporter.closing(self._tracker.flush(), last)
+        return self._measured(self._reporter.closing(self._tracker.flush(), last), None)
+
+    def _measured(self, tracks: CameraTracks, image: Image | None) -> CameraTracks:
+        """Say how sharp everybody is, where that counts."""
+        return tracks if self._sharpness is None else self._sharpness.measured(tracks, image)
 
     def close(self) -> None:
         """Let go of the source."""

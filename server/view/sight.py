@@ -99,6 +99,9 @@ class Sight:
         for column, message in enumerate(messages):
             rows, count = slice(message.first - first, message.last - first + 1), len(message.tracks)
             boxes[column, rows, :count] = read_boxes(message).transpose(1, 0, 2)
+            sharp[:count, column] = [
+                np.nan if track.sharpness is None else track.sharpness for track in message.tracks
+            ]
             sure[:count, column] = np.clip([track.confidence for track in message.tracks], 0.0, 1.0)
         return view_quality(
             Seen(boxes.transpose(2, 1, 0, 3), sure, sharp),

@@ -59,6 +59,8 @@ class Track(msgspec.Struct, frozen=True, kw_only=True):
     """One per frame of the window; null where the person is hidden."""
     histogram: list[float]
     confidence: float
+    sharpness: Annotated[float, msgspec.Meta(ge=0, le=1)] | None = None
+    """How sharp the picture of the person is; null where nobody has measured it."""
 
 
 class Solve(msgspec.Struct, frozen=True, kw_only=True):

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from videos_by_hand import HEIGHT, WIDTH, write_video
 
+from bestview import QualitySettings
 from server.camera.encode import AccessUnit
 from server.camera.pipeline import CameraPipeline
 from server.camera.scene import Scene, write_recording
@@ -169,3 +170,15 @@ def test_detections_that_cannot_be_read_are_refused(
 def test_a_recording_that_ends_before_the_first_pulse_is_refused_offline(recording: Path) -> None:
     with pytest.raises(UserError, match="camera c0: there is not one picture"):
         offline(config_of(recording, offset=-1000))
+
+
+def test_sharpness_is_measured_where_it_counts_alone(recording: Path) -> None:
+    config = config_of(recording)
+    weighs = config.model_copy(
+        update={"view": config.view.model_copy(update={"quality": QualitySettings(sharp=0.5)})}
+    )
+    for given, measured in ((config, False), (weighs, True)):
+        tracks = [track for word in live(given)[1] for track in word.tracks]
+        assert tracks, "somebody is there"
+        assert any(track.sharpness is not None for track in tracks) == measured
+    assert live(weighs)[1] == [batch.tracks for batch in offline(weighs)]
