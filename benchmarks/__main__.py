@@ -46,6 +46,7 @@ BENCHMARKS = (
     Benchmark("experiments", "the paper's experiments again, on synthetic scenes; 10 minutes"),
     Benchmark("live", "four live cameras: whether tracking keeps up, and what each stage costs; 2 minutes"),
     Benchmark("endurance", "memory and time over 50 000 frames; 10 minutes"),
+    Benchmark("calibration", "cameras placed from nothing but people who walk; 5 minutes"),
     Benchmark("choice", "what choosing views costs, and how it grows; 1 minute"),
     Benchmark("solvers", "the solvers of the tracking program against each other; 3 minutes"),
 )

@@ -12,7 +12,7 @@ from bestview.calibrate.samples import Samples, moments
 from bestview.calibrate.walk_settings import WalkSettings
 
 _TILTS = (0.1, 0.35, 0.8)
-_HIGHS = (1.2, 2.5)
+_HIGH = 1.7
 _MOMENTS = 600
 _FIXED = 0.01
 """Spread of the focal length where it is given."""
@@ -28,23 +28,17 @@ def view_of(samples: Samples, size: tuple[int, int], focal: float, settings: Wal
     feet, tall, weight = samples.feet[chosen], samples.tall[chosen], samples.weight[chosen]
     best, least = None, np.inf
     for tilt in _TILTS:
-        for high in _HIGHS:
-            start = np.zeros(PARAMETERS)
-            start[[FOCAL, TILT, HIGH]] = np.log(focal), tilt, np.log(high)
+        start = np.zeros(PARAMETERS)
+        start[[FOCAL, TILT, HIGH]] = np.log(focal), tilt, np.log(_HIGH)
 
-            def errors(view: Floats, start: Floats = start) -> Floats:
-                camera = Pinhole(np.concatenate([view, start[VIEW.stop :]]), size)
-                given = (view[FOCAL] - np.log(focal)) / _FIXED
-                return np.concatenate(
-                    [
-                        height_errors(camera, feet, tall, weight, settings),
-                        prior_errors(camera, settings),
-                        [given],
-                    ]
-                )
+        def errors(view: Floats, start: Floats = start) -> Floats:
+            camera = Pinhole(np.concatenate([view, start[VIEW.stop :]]), size)
+            given = (view[FOCAL] - np.log(focal)) / _FIXED
+            heights = height_errors(camera, feet, tall, weight, settings)
+            return np.concatenate([heights, prior_errors(camera, settings), [given]])
 
-            found = least_squares(errors, start[VIEW], x_scale="jac", max_nfev=60)
-            if found.cost < least:
-                best, least = np.concatenate([found.x, start[VIEW.stop :]]), found.cost
+        found = least_squares(errors, start[VIEW], x_scale="jac", ftol=1e-5, max_nfev=60)
+        if found.cost < least:
+            best, least = np.concatenate([found.x, start[VIEW.stop :]]), found.cost
     assert best is not None  # noqa: S101 — priors are finite
     return Pinhole(best, size)

@@ -48,6 +48,8 @@ def calibrate(
         if not path.exists():
             raise UserError(f"{path}: is not there")
     plan = plan or out.with_suffix(".png")
+    if plan.resolve() == out.resolve():
+        raise UserError(f"--out: {out}: the floor plan would be written there too; name a .json, or --plan")
     if any(path.suffix.lower() in ENDINGS for path in given):
         if len(given) > 1:
             raise UserError("calibrate: marked points are one file, with all cameras in it")

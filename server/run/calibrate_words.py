@@ -14,6 +14,8 @@ _LITTLE = 0.03
 """Share of a walk below which it has not covered a third of the picture."""
 _SURE = 2.0
 """Standard errors that an offset must be away from 0, or else it is none."""
+_SHORT_S = 0.15
+"""Seconds in which people walk by a tenth of their height, which is how exactly feet are found."""
 _SHALLOW = 1.25
 """How many times as tall the nearest must appear as the farthest."""
 
@@ -91,6 +93,8 @@ def _offsets(found: WalkCalibration, fps: float) -> list[str]:
     for it in found.cameras:
         if it.offset or it.offset_error:
             how = "out of step" if _moved(it) else "in step, as far as can be told"
+            if _moved(it) and abs(it.offset) / fps < _SHORT_S:
+                how = "perhaps out of step; feet that are found late look so, too: compare two frames first"
             frames = f"{it.offset:+.1f} frames ({it.offset / fps:+.2f} s)"
             unsure = f"give or take {_SURE * it.offset_error:.1f}"
             lines.append(f"{it.camera}: {frames} later than {first}, {unsure}: {how}")

@@ -122,6 +122,7 @@ def test_a_walk_in_the_middle_alone_is_written_only_if_forced(run: Run, tmp_path
         (("a.txt",), "two cameras at least"),
         (("a.txt", "b.txt", "--size", "wide"), "--size: 'wide' is not WIDTHxHEIGHT"),
         (("p.csv", "a.txt"), "marked points are one file"),
+        (("a.txt", "b.txt", "--plan", "ground.json"), "the floor plan would be written there too"),
     ],
 )
 def test_what_cannot_be_a_walk_is_refused_in_a_line(

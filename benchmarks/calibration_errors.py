@@ -1,0 +1,103 @@
+"""How far off a calibration is: beside cameras that were drawn, or by people whose numbers are known."""
+
+from __future__ import annotations
+
+import json
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bestview import feet, person_heights, to_ground
+from bestview.calibrate import Walk, WalkCalibration
+from tracking.motchallenge import read_rows
+
+Floats = NDArray[np.float64]
+_EDGE = 3.0
+"""Pixels from the picture's edge within which a box may be cut."""
+
+
+@dataclass(frozen=True, slots=True)
+class Agreement:
+    """How far apart two cameras have people who are known to be the same.
+
+    Attributes:
+        median: in person heights.
+        most: the ninth decile.
+        right: the share whose nearest in the other camera is the same person.
+    """
+
+    median: float
+    most: float
+    right: float
+
+
+def error_of_known(found: WalkCalibration, truth: Mapping[str, Floats], walks: Sequence[Walk]) -> Floats:
+    """How far off all feet are, metres, after the best turn and shift of the whole floor."""
+    ours, theirs = [], []
+    matrices = {it.camera: it.homography for it in found.cameras}
+    for walk in walks:
+        if walk.camera in matrices:
+            image = np.concatenate([feet(it.boxes) for it in walk.tracks])
+            ours.append(to_ground(matrices[walk.camera], image) @ np.array([1, 1j]))
+            theirs.append(to_ground(truth[walk.camera], image) @ np.array([1, 1j]))
+    x, y = np.concatenate(ours), np.concatenate(theirs)
+    known = np.isfinite(x) & np.isfinite(y)
+    x, y = x[known] - x[known].mean(), y[known] - y[known].mean()
+    return np.abs(x * np.exp(1j * np.angle((np.conj(x) * y).sum())) - y)
+
+
+def agreement(ground: Path, truth: Path, size: tuple[int, int]) -> dict[tuple[str, str], Agreement]:
+    """Compare every two cameras of a file at the boxes of people who have one number in both."""
+    matrices = json.loads(ground.read_text(encoding="utf-8"))["homography"]
+    people = {name: _people(path, size) for name in matrices if (path := _file(truth, name)) is not None}
+    found = {}
+    for one, other in combinations(people, 2):
+        both = sorted(people[one].keys() & people[other].keys())
+        if both:
+            found[one, other] = _of_two(
+                np.array(matrices[one]), people[one], np.array(matrices[other]), people[other], both
+            )
+    return found
+
+
+_Boxes = Mapping[tuple[int, int], tuple[float, float, float, float]]
+"""By frame and person."""
+
+
+def _of_two(
+    one: Floats, here: _Boxes, other: Floats, there: _Boxes, both: Sequence[tuple[int, int]]
+) -> Agreement:
+    mine, its = (np.array([boxes[key] for key in both]) for boxes in (here, there))
+    tall = float(np.nanmedian(np.concatenate([person_heights(one, mine), person_heights(other, its)])))
+    at = to_ground(one, feet(mine))
+    apart = np.nan_to_num(np.hypot(*(at - to_ground(other, feet(its))).T) / tall, nan=np.inf)
+    by_frame = defaultdict(list)
+    for frame, person in there:
+        by_frame[frame].append(person)
+    places = dict(zip(there, to_ground(other, feet(np.array(list(there.values())))), strict=True))
+    right = 0
+    for (frame, person), place in zip(both, at, strict=True):
+        far = {it: np.hypot(*(places[frame, it] - place)) for it in by_frame[frame]}
+        right += min(far, key=lambda it: np.nan_to_num(far[it], nan=np.inf)) == person
+    return Agreement(float(np.median(apart)), float(np.quantile(apart, 0.9)), right / len(both))
+
+
+def _people(path: Path, size: tuple[int, int]) -> _Boxes:
+    """Give the whole boxes of a file."""
+    return {
+        (row.frame, row.id): row.box
+        for row in read_rows(path)
+        if row.confidence != 0.0
+        and row.box[0] > _EDGE
+        and row.box[2] < size[0] - _EDGE
+        and row.box[3] < size[1] - _EDGE
+    }
+
+
+def _file(folder: Path, name: str) -> Path | None:
+    return next((it for it in (folder / f"{name}.txt", folder / f"{name}.txt.gz") if it.is_file()), None)
