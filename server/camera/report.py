@@ -67,9 +67,10 @@ class Reporter:
 
 
 def _track(track: WindowTrack) -> Track:
+    # With short moments of hiding filled in: they are no reason to show somebody from elsewhere.
     return Track(
         id=track.id,
-        boxes=[_box(row) for row in track.boxes],
+        boxes=[_box(row) for row in track.bridged],
         histogram=[float(share) for share in track.histogram],
         confidence=float(track.confidence),
     )
