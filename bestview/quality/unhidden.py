@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview.quality.boxes import Floats, areas, shares
+from bestview.quality.boxes import Floats, shares
 
 _FEET = 0.05
 """Heights by which feet must be lower for somebody to be nearer for sure; boxes do not find feet better."""
@@ -29,40 +29,47 @@ def unhidden(boxes: Floats, pictures: NDArray[np.int64]) -> Floats:
     Returns:
         (B,) values in [0, 1].
     """
-    free = np.ones(len(boxes))
-    left, top, right, bottom = np.ascontiguousarray(boxes.T)
-    one, two = _side_by_side(left, right, pictures)
-    over = np.flatnonzero(np.minimum(bottom[one], bottom[two]) > np.maximum(top[one], top[two]))
+    if not len(boxes):
+        return np.ones(0)
+    order, end = _in_line(boxes, pictures)
+    left, top, right, bottom = np.ascontiguousarray(boxes[order].T)
+    one, two = _side_by_side(end)
+    over = np.flatnonzero((top[two] < bottom[one]) & (top[one] < bottom[two]) & (right[two] > left[one]))
     one, two = one[over], two[over]
-    height, area = bottom - top, areas(boxes)
-    columns = np.minimum(right[one], right[two]) - np.maximum(left[one], left[two])
+    height = bottom - top
+    area = height * (right - left)
+    columns = np.minimum(right[one], right[two]) - left[two]
     rows = np.minimum(bottom[one], bottom[two]) - np.maximum(top[one], top[two])
-    common = columns * rows
+    common = np.maximum(columns, 0.0) * rows
     lower = (bottom[two] - bottom[one]) / np.maximum(height[one], height[two])
     nearer = np.clip(0.5 + lower / (2.0 * _FEET), 0.0, 1.0)
+    free = np.ones(len(boxes))
     np.multiply.at(free, one, 1.0 - nearer * shares(common, area[one]))
     np.multiply.at(free, two, 1.0 - (1.0 - nearer) * shares(common, area[two]))
-    return np.minimum(free / _ENOUGH, 1.0)
+    values = np.empty(len(boxes))
+    values[order] = np.minimum(free / _ENOUGH, 1.0)
+    return values
 
 
-def _side_by_side(
-    left: Floats, right: Floats, pictures: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """List the pairs of boxes of one picture that share columns, each pair once: two (P,) indices.
-
-    Sorted by picture and left side, a box's partners are those right after it that begin before it ends.
-    """
-    if not len(left):
-        return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
-    # One axis for all pictures, each its own stretch of it: one sort and one search find all partners.
+def _in_line(boxes: Floats, pictures: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Put the boxes in line by picture and left side: their (B,) order, and where in it each one ends."""
+    left, right = boxes[:, 0], boxes[:, 2]
+    # One axis for all pictures, each its own stretch of it: one sort and one search do for all.
     low, high = left.min(), max(left.max(), right.max())
     stretch = pictures * (high - low + 1.0) - low
-    order = np.argsort(stretch + left, kind="stable")
-    begin, end = (stretch + left)[order], (stretch + right)[order]
-    here = np.arange(len(order))
-    # An empty box ends where it begins, or before.
-    last = np.maximum(np.searchsorted(begin, end), here + 1)
-    partners = last - here - 1
+    begin = stretch + left
+    order = np.argsort(begin, kind="stable")
+    return order, np.searchsorted(begin[order], (stretch + right)[order])
+
+
+def _side_by_side(end: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """List the pairs of boxes in line that share columns, each pair once: two (P,) places in the line.
+
+    A box's partners are those right after it that begin before it ends, at place `end`.
+    """
+    here = np.arange(len(end))
+    # A box without width ends where it begins, or before.
+    partners = np.maximum(end - here - 1, 0)
     one = np.repeat(here, partners)
-    two = np.arange(len(one)) - np.repeat(np.cumsum(partners) - partners, partners) + one + 1
-    return order[one], order[two]
+    two = np.arange(len(one)) + np.repeat(here + 1 - np.cumsum(partners) + partners, partners)
+    return one, two
