@@ -42,8 +42,8 @@ class IdentitySettings:
     memory: float = 0.95
     # Updates in which someone must be seen before they are given a number.
     confirm_updates: int = 4
-    # Frames after which someone whom no camera sees is said to be gone.
-    gone_after: int = 50
+    # Frames after which someone whom no camera sees is said to be gone (250: ten seconds at 25/s).
+    gone_after: int = 250
     # Frames within which someone lost may be found again by place alone.
     continuity: int = 50
     # Frames for which a track that is not heard of keeps its evidence.
