@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-_POINTS = 33
+POINTS = 33
 """Quantiles at which equalised CDFs are compared."""
 
 _PRIOR_TRACKS = 3.0
@@ -17,7 +17,7 @@ _PRIOR_TRACKS = 3.0
 With one person alone, a camera's mean is that person, and equalising by it would make everyone alike.
 """
 
-_KNOWN_PAIRS = 2000
+KNOWN_PAIRS = 2000
 """Pairs of different people remembered, to know how different people look here."""
 
 _ENOUGH_PAIRS = 10
@@ -33,24 +33,30 @@ class Appearances:
 
     def __init__(self) -> None:
         self._sums: dict[tuple[str, int], NDArray[np.float64]] = {}
-        self._different: deque[float] = deque(maxlen=_KNOWN_PAIRS)
+        self._different: deque[float] = deque(maxlen=KNOWN_PAIRS)
 
     def learn(self, camera: str, histogram: NDArray[np.float64]) -> None:
         """Count one more track of `camera` by its normalised (B,) histogram."""
         place = (camera, histogram.size)
         self._sums[place] = self._sums.get(place, np.zeros_like(histogram)) + histogram
 
-    def equalised(self, camera: str, histogram: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Cumulative histogram at equal steps of the camera's own greys: (B,) -> (33,), rising 0 to 1."""
-        prior = np.full(histogram.size, _PRIOR_TRACKS / histogram.size)
-        reference = np.cumsum(prior + self._sums.get((camera, histogram.size), 0.0))
+    def equalised(self, camera: str, histograms: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Cumulative histograms at equal steps of the camera's own greys: (N, B) -> (N, 33), rising to 1."""
+        bins = histograms.shape[1]
+        prior = np.full(bins, _PRIOR_TRACKS / bins)
+        reference = np.cumsum(prior + self._sums.get((camera, bins), 0.0))
         edges = np.concatenate([[0.0], reference / reference[-1]])
-        cumulative = np.concatenate([[0.0], np.cumsum(histogram)])
-        return np.asarray(np.interp(np.linspace(0.0, 1.0, _POINTS), edges, cumulative))
+        cumulative = np.cumsum(np.pad(histograms, ((0, 0), (1, 0))), axis=1)
+        # Where the steps lie between the edges is the same for all.
+        steps = np.linspace(0.0, 1.0, POINTS)
+        left = np.minimum(np.searchsorted(edges, steps, side="right") - 1, bins - 1)
+        slope = (cumulative[:, left + 1] - cumulative[:, left]) / (edges[left + 1] - edges[left])
+        inside = slope * (steps - edges[left]) + cumulative[:, left]
+        return np.asarray(np.where(steps < edges[-1], inside, cumulative[:, -1:]))
 
     def learn_different(self, distances: NDArray[np.float64]) -> None:
         """Remember distances between people who were seen side by side in one camera."""
-        self._different.extend(float(d) for d in distances)
+        self._different.extend(distances[-KNOWN_PAIRS:].tolist())
 
     def gate(self, most: float, share: float) -> float:
         """Distance below which two histograms are likely one person's.
@@ -63,20 +69,26 @@ class Appearances:
         return min(most, share * float(np.percentile(np.array(self._different), 25)))
 
 
-def distances(curves: Sequence[NDArray[np.float64] | None]) -> NDArray[np.float64]:
-    """Mean absolute difference between T cumulative histograms, every pair: (T, T).
+def distances(one: NDArray[np.float64], two: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Mean absolute differences between cumulative histograms: (..., 33) and (..., 33) -> (...).
 
     It is the earth mover's distance between the histograms, in units of the whole grey axis; NaN where
     there is no histogram.
     """
-    table = np.array([np.full(_POINTS, np.nan) if curve is None else curve for curve in curves])
-    table = table.reshape(len(curves), _POINTS)
-    return np.asarray(np.abs(table[:, None, :] - table[None, :, :]).mean(axis=-1))
+    return np.asarray(np.abs(one - two).mean(axis=-1))
 
 
-def normalised(histogram: NDArray[np.float64]) -> NDArray[np.float64] | None:
-    """Scale a histogram to sum 1; None when it holds nothing that can be compared."""
-    total = float(histogram.sum())
-    if not (np.isfinite(total) and total > 0 and histogram.min() >= 0):
-        return None
-    return np.asarray(histogram / total, dtype=np.float64)
+def normalised(histograms: Sequence[NDArray[np.float64]]) -> list[NDArray[np.float64] | None]:
+    """Scale (B,) histograms to sum 1; None for those that hold nothing that can be compared."""
+    answer: list[NDArray[np.float64] | None] = [None] * len(histograms)
+    by_size: dict[int, list[int]] = {}
+    for i, histogram in enumerate(histograms):
+        by_size.setdefault(histogram.size, []).append(i)
+    for size, places in by_size.items():
+        table = np.array([histograms[i] for i in places], dtype=np.float64).reshape(-1, size)
+        total = table.sum(axis=1)
+        holds = np.isfinite(total) & (total > 0) & (table.min(axis=1, initial=np.inf) >= 0)
+        scaled = np.divide(table, total[:, None], where=holds[:, None], out=np.zeros_like(table))
+        for i, look, good in zip(places, scaled, holds.tolist(), strict=True):
+            answer[i] = look if good else None
+    return answer

@@ -47,6 +47,7 @@ def to_ground(homography: NDArray[np.float64], points: NDArray[np.float64]) -> N
 
     A point on or above the horizon stands nowhere on the ground and becomes NaN, as does a NaN point.
     The ground is taken to lie below the horizon in the picture (a camera that is not upside down).
+    Here and below, the homography is one for all, (3, 3), or has leading axes that fit: (..., 3, 3).
     """
     mapped = _homogeneous(homography, points)
     depth = _depth(homography, mapped)
@@ -85,18 +86,19 @@ def _steps(homography: NDArray[np.float64], points: NDArray[np.float64]) -> NDAr
     mapped = _homogeneous(homography, points)
     w = np.where(_depth(homography, mapped) > 0, mapped[..., 2], np.nan)[..., None, None]
     # d(X/w) = (dX w - X dw) / w^2, both pixel axes at once.
-    return np.asarray((homography[:2, :2] * w - mapped[..., :2, None] * homography[2, :2]) / w**2)
+    across = homography[..., :2, :2] * w - mapped[..., :2, None] * homography[..., 2:, :2]
+    return np.asarray(across / w**2)
 
 
 def _homogeneous(homography: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
     # Sums of products in a fixed order: a BLAS may sum differently by batch size, and with it the result.
     x, y = points[..., 0:1], points[..., 1:2]
-    return np.asarray(homography[:, 0] * x + homography[:, 1] * y + homography[:, 2])
+    return np.asarray(homography[..., 0] * x + homography[..., 1] * y + homography[..., 2])
 
 
 def _depth(homography: NDArray[np.float64], mapped: NDArray[np.float64]) -> NDArray[np.float64]:
     """Homogeneous third coordinate, signed so that it is positive below the horizon."""
     # Far down the picture the y term rules the sign; a plan view (no y term) has no horizon.
-    down = homography[2, 1]
-    sign = np.sign(down) if down != 0 else np.sign(mapped[..., 2])
+    down = homography[..., 2, 1]
+    sign = np.where(down != 0, np.sign(down), np.sign(mapped[..., 2]))
     return np.asarray(mapped[..., 2] * sign)

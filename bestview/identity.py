@@ -8,20 +8,21 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview.appearance import Appearances, distances, normalised
+from bestview.appearance import KNOWN_PAIRS, Appearances, normalised
 from bestview.corrections import Corrections, Merge, Split
 from bestview.evidence import PairEvidence, TrackKey
+from bestview.finding import Finding
 from bestview.ground import checked_homography
 from bestview.grouping import GroupingProblem, group
+from bestview.heights import HeightScale
 from bestview.identity_settings import IdentitySettings
-from bestview.likeness import appearance_scores, ground_scores
+from bestview.likeness import WORST, Scores, appearance_scores
+from bestview.meeting import near_or_known
 from bestview.people import People
-from bestview.persons import Finding
-from bestview.sightings import FootError, HeightScale, LocalTrack, Sightings, line_up
-from bestview.succession import Heirs
-
-_SETTLED_UPDATES = 10
-"""Updates after which a mean histogram is more the person's than the moment's."""
+from bestview.persons import Person
+from bestview.settled import SettledLooks
+from bestview.sightings import FootError, LocalTrack, Sightings, line_up
+from bestview.succession import Heirs, Place
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +77,7 @@ class IdentityRegistry:
         self._camera = {camera: i for i, camera in enumerate(self._homographies)}
         self._scale = HeightScale()
         self._appearances = Appearances()
-        self._pairs = PairEvidence()
+        self._pairs = PairEvidence(WORST, settings.memory, settings.cap, settings.track_memory)
         self._people = People(settings)
         self._heirs = Heirs(settings.continuity)
         self._corrections = Corrections()
@@ -96,15 +97,15 @@ class IdentityRegistry:
         since = last_frame - seen.boxes.shape[1] if self._last_frame is None else self._last_frame
         self._last_frame = last_frame
         present = seen.present(since, last_frame)
-        given = {track.key: track for track in tracks}
-        looks = [normalised(given[key].histogram) for key in seen.keys]
         self._scale.learn(seen.heights)
 
         for key in seen.keys:
             self._people.meet(key, last_frame)
+        rows = np.flatnonzero(present).tolist()
+        places = seen.places(rows)
         self._gather(seen, present, last_frame)
-        merged = self._regroup(seen, self._inherit(seen, present))
-        self._remember(seen, looks, present)
+        merged = self._regroup(seen, self._inherit(seen, present, places))
+        self._remember({track.key: track for track in tracks}, [seen.keys[i] for i in rows], places)
         finding = Finding(self._settings, self._appearances, self._gate(), self._scale.height)
         born, found = self._people.confirm(finding, since)
         gone, returned = self._people.comings_and_goings(last_frame)
@@ -127,72 +128,67 @@ class IdentityRegistry:
         settings = self._settings
         return settings.gate if settings.gate is not None else settings.gate_heights * self._scale.height
 
-    def _unlike(self, seen: Sightings, present: NDArray[np.bool_]) -> NDArray[np.float64]:
-        """(T, T) appearance distances between the tracks present whose looks have settled; NaN: unknown.
+    def _gather(self, seen: Sightings, present: NDArray[np.bool_], last_frame: int) -> None:
+        """Count what this update says about pairs of tracks."""
+        keys = self._people.tracks_heard_since(last_frame - self._settings.track_memory)
+        self._pairs.follow(keys, np.array([self._camera[key.camera] for key in keys], dtype=np.int64))
+        rows = self._pairs.rows(seen.keys)
+        scores = Scores.joined([self._by_looks(seen, present), self._by_ground(seen, present, rows)])
+        stands = seen.stands & present[:, None]
+        self._pairs.add(last_frame, rows[scores.one], rows[scores.two], scores.score, rows, stands)
+        for camera in seen.cameras():
+            self._pairs.rivals.add(rows[camera], seen.side_by_side(camera))
+
+    def _by_ground(self, seen: Sightings, present: NDArray[np.bool_], rows: NDArray[np.int64]) -> Scores:
+        """Score the pairs of tracks that stand near each other, and those that something is known about."""
+        on_ground = present & np.array(
+            [self._homographies[key.camera] is not None for key in seen.keys], bool
+        )
+        return near_or_known(seen, on_ground, rows, self._pairs, self._gate())
+
+    def _by_looks(self, seen: Sightings, present: NDArray[np.bool_]) -> Scores:
+        """Score the pairs of tracks of two cameras that have no ground in common.
 
         Learns on the way how each camera renders people, and how much people differ.
         """
-        looks: list[NDArray[np.float64] | None] = []
-        for key, here in zip(seen.keys, present, strict=True):
-            person = self._people.person(key)
-            look = person.looks.get(key.camera)
-            settled = here and look is not None and look.count >= _SETTLED_UPDATES
-            looks.append(look.total / look.count if settled and look is not None else None)
-            # Once per track: somebody who stands about must not weigh more than who walks through.
-            if looks[-1] is not None and person.tracks.get(key, 0) == _SETTLED_UPDATES:
-                self._appearances.learn(key.camera, looks[-1])
-        apart = distances(
-            [
-                None if look is None else self._appearances.equalised(key.camera, look)
-                for key, look in zip(seen.keys, looks, strict=True)
-            ]
+        looks = SettledLooks(self._appearances, self._people, seen, present)
+        cameras = seen.cameras()
+        # Who was seen side by side, back from the last camera to what is remembered of it.
+        apart: list[NDArray[np.float64]] = []
+        for rows in reversed(cameras):
+            if sum(one.size for one in apart) < KNOWN_PAIRS:
+                within = looks.unlike(rows, rows)
+                apart.append(within[np.triu(seen.side_by_side(rows)) & ~np.isnan(within)])
+        self._appearances.learn_different(np.concatenate([np.zeros(0), *reversed(apart)]))
+        settings = self._settings
+        return appearance_scores(
+            cameras,
+            [self._homographies[seen.keys[rows.start].camera] is not None for rows in cameras],
+            looks.unlike,
+            self._appearances.gate(settings.appearance_gate, settings.appearance_share),
         )
-        self._appearances.learn_different(apart[np.triu(seen.side_by_side()) & ~np.isnan(apart)])
-        return apart
 
-    def _gather(
-        self,
-        seen: Sightings,
-        present: NDArray[np.bool_],
-        last_frame: int,
-    ) -> None:
-        """Count what this update says about every pair of tracks."""
-        cameras = [key.camera for key in seen.keys]
-        alike = appearance_scores(
-            self._unlike(seen, present),
-            np.array([self._camera[camera] for camera in cameras], dtype=np.int64),
-            self._appearances.gate(self._settings.appearance_gate, self._settings.appearance_share),
-        )
-        calibrated = np.array([self._homographies[camera] is not None for camera in cameras], dtype=bool)
-        on_ground = calibrated[:, None] & calibrated[None, :]
-        scores = np.where(on_ground, ground_scores(seen.distances(self._gate())), alike)
-        scores[seen.same_camera() | ~(present[:, None] & present[None, :])] = np.nan
-
-        keys = self._people.tracks_heard_since(last_frame - self._settings.track_memory)
-        self._pairs.follow(keys)
-        self._pairs.add(seen.keys, scores, seen.side_by_side(), self._settings.memory, self._settings.cap)
-
-    def _inherit(self, seen: Sightings, present: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    def _inherit(
+        self, seen: Sightings, present: NDArray[np.bool_], places: Sequence[tuple[Place, Place]]
+    ) -> NDArray[np.bool_]:
         """Note who is whose heir; (T,) who of those present stays so: whoever has an heir now does not."""
-        sighted = {seen.keys[i]: seen.places(i) for i in np.flatnonzero(present).tolist()}
+        row_of = {seen.keys[i]: i for i in np.flatnonzero(present).tolist()}
+        found = self._heirs.update(self._pairs.keys, dict(zip(row_of, places, strict=True)), seen.first)
+        heirs, lost = (self._pairs.rows(keys) for keys in ([f.heir for f in found], [f.lost for f in found]))
+        self._pairs.inherit(heirs, lost, self._settings.heir * np.array([f.score for f in found]))
         stays = present.copy()
-        for heir in self._heirs.update(self._pairs.keys, sighted, seen.first):
-            self._pairs.inherit(heir.heir, heir.lost, self._settings.heir * heir.score)
-            if heir.lost in sighted:
-                stays[seen.keys.index(heir.lost)] = False
+        stays[[row_of[f.lost] for f in found if f.lost in row_of]] = False
         return stays
 
     def _regroup(self, seen: Sightings, present: NDArray[np.bool_]) -> tuple[Merge, ...]:
         """Group the tracks present into persons anew."""
         keys = self._pairs.keys
         here = np.zeros(len(keys), dtype=bool)
-        here[self._pairs.places(seen.keys)] = present
+        here[self._pairs.rows(seen.keys)] = present
         if not here.any():
             return ()
         problem = GroupingProblem(
-            evidence=self._pairs.evidence,
-            rivals=self._pairs.rivals,
-            camera=np.array([self._camera[key.camera] for key in keys], dtype=np.int64),
+            pairs=self._pairs,
             person=self._people.serials(keys),
             present=here,
             hold=np.array([self._people.hold(key) for key in keys]),
@@ -202,19 +198,18 @@ class IdentityRegistry:
 
     def _remember(
         self,
-        seen: Sightings,
-        looks: Sequence[NDArray[np.float64] | None],
-        present: NDArray[np.bool_],
+        given: Mapping[TrackKey, LocalTrack],
+        keys: Sequence[TrackKey],
+        places: Sequence[tuple[Place, Place]],
     ) -> None:
         """Write down where each person was seen, and how they looked."""
-        counted = []
-        for i in np.flatnonzero(present).tolist():
-            key, look = seen.keys[i], looks[i]
-            first, last = seen.places(i)
+        looks = normalised([given[key].histogram for key in keys])
+        counted: dict[int, Person] = {}
+        for key, look, (first, last) in zip(keys, looks, places, strict=True):
             person = self._people.person(key)
             person.see(key, first, last)
             if look is not None:
                 person.look(key.camera, look)
-            if person not in counted:
-                person.updates += 1
-                counted.append(person)
+            counted[id(person)] = person
+        for person in counted.values():
+            person.updates += 1

@@ -1,13 +1,20 @@
-"""Scores for one update: how much each pair of tracks looks like one person, by ground and by greys."""
+"""Scores for one update: how much pairs of tracks look like one person, by ground and by greys."""
 
 from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-_WORST = -2.0
+WORST = -2.0
 """Least score of an update: feet 1.7 gates apart or 17 say the same."""
+
+GATES_TO_WORST = 3.0**0.5
+"""That many gates: where ``1 - distance^2`` is -2."""
 
 _APPEARANCE_WEIGHT = 0.5
 """Most that likeness may say in one update: half of what standing on the same ground says."""
@@ -16,39 +23,74 @@ _UNCLEAR = 0.4
 """Share of the gate by which any exchange of partners must be worse for a pair to count."""
 
 
+@dataclass(frozen=True, slots=True)
+class Scores:
+    """What an update says about P pairs of tracks of different cameras.
+
+    Attributes:
+        one: (P,) rows.
+        two: (P,) rows, above `one`.
+        score: (P,).
+    """
+
+    one: NDArray[np.int64]
+    two: NDArray[np.int64]
+    score: NDArray[np.float64]
+
+    @classmethod
+    def joined(cls, parts: Sequence[Scores]) -> Scores:
+        """Put together scores of different pairs."""
+        none = cls(np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros(0))
+        every = [none, *parts]
+        return cls(
+            np.concatenate([part.one for part in every]),
+            np.concatenate([part.two for part in every]),
+            np.concatenate([part.score for part in every]),
+        )
+
+
 def ground_scores(distances: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Score ``1 - distance^2``, at least -2: (T, T) in gates -> (T, T); NaN where the distance is."""
-    return np.asarray(np.maximum(1.0 - distances**2, _WORST))
+    """Score ``1 - distance^2``, at least -2: distances in gates; NaN where the distance is."""
+    return np.asarray(np.maximum(1.0 - distances**2, WORST))
 
 
 def appearance_scores(
-    unlike: NDArray[np.float64], camera: NDArray[np.int64], gate: float
-) -> NDArray[np.float64]:
-    """Score likeness of pairs of tracks in different cameras.
+    cameras: Sequence[slice],
+    calibrated: Sequence[bool],
+    unlike: Callable[[slice, slice], NDArray[np.float64]],
+    gate: float,
+) -> Scores:
+    """Score likeness of pairs of tracks of two cameras that do not share a ground.
 
     Two cameras' tracks are assigned to each other as a whole, the likest in total. Only a pair of that
     assignment speaks for one person, and only where no exchange of partners would be nearly as good; a
     pair further apart than the gate speaks against; the others say nothing new (0).
 
     Args:
-        unlike: (T, T) appearance distances of the tracks present; NaN: unknown.
-        camera: (T,) camera index of each track.
+        cameras: rows of each camera's tracks, rising.
+        calibrated: for each camera; two that are have the ground to compare by.
+        unlike: (A, B) appearance distances between two cameras' rows; NaN: unknown.
         gate: distance above which two looks are two people's.
 
     Returns:
-        (T, T) scores in [-0.5, 0.5]; NaN within a camera or where unknown.
+        Scores in [-0.5, 0.5] where likeness is known.
     """
+    parts = []
+    for (one, ground_one), (two, ground_two) in combinations(zip(cameras, calibrated, strict=True), 2):
+        if not (ground_one and ground_two):
+            score = _camera_pair(unlike(one, two), gate)
+            row, column = np.nonzero(~np.isnan(score))
+            parts.append(Scores(one.start + row, two.start + column, score[row, column]))
+    return Scores.joined(parts)
+
+
+def _camera_pair(unlike: NDArray[np.float64], gate: float) -> NDArray[np.float64]:
+    """Scores of (A, B) pairs; NaN where unknown."""
     share = np.full(unlike.shape, np.nan)
     np.divide(unlike, gate, out=share, where=~np.isnan(unlike) & (gate > 0))
-    score = np.clip(1.0 - share, -1.0, 0.0)
-    names = np.unique(camera)
-    for i, one in enumerate(names):
-        for two in names[i + 1 :]:
-            block = np.ix_(np.flatnonzero(camera == one), np.flatnonzero(camera == two))
-            clear = _clear_pairs(share[block])
-            score[block] = np.where(clear, 1.0 - share[block], score[block])
-            score[block[1].T, block[0].T] = score[block].T
-    score[camera[:, None] == camera[None, :]] = np.nan
+    if np.isnan(share).all():
+        return share
+    score = np.where(_clear_pairs(share), 1.0 - share, np.clip(1.0 - share, -1.0, 0.0))
     return _APPEARANCE_WEIGHT * score
 
 

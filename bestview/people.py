@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from itertools import takewhile
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bestview.corrections import Merge
 from bestview.evidence import PairEvidence, TrackKey
+from bestview.finding import Finding
 from bestview.identity_settings import IdentitySettings
-from bestview.persons import Finding, Person
+from bestview.persons import Person
 
 _TENURE_UPDATES = 10.0
 """Updates after which a track has half of the extra hold that rooted tracks have."""
@@ -26,6 +28,8 @@ class People:
         self._settings = settings
         self._persons: dict[int, Person] = {}
         self._serial_of: dict[TrackKey, int] = {}
+        self._tracks_of: dict[int, set[TrackKey]] = {}
+        # In the order in which they were heard of last: who was not for long comes first.
         self._heard: dict[TrackKey, int] = {}
         self._next_serial = 0
         self._next_number = 1
@@ -37,8 +41,16 @@ class People:
     def meet(self, key: TrackKey, frame: int) -> None:
         """Hear of a track; a new one is a person of its own at first."""
         if key not in self._serial_of:
-            self._serial_of[key] = self._new_serial()
+            self._assign(key, self._new_serial())
+        self._heard.pop(key, None)
         self._heard[key] = frame
+
+    def _assign(self, key: TrackKey, serial: int) -> None:
+        before = self._serial_of.get(key)
+        if before is not None:
+            self._tracks_of[before].discard(key)
+        self._serial_of[key] = serial
+        self._tracks_of[serial].add(key)
 
     def person(self, key: TrackKey) -> Person:
         """Whose track it is."""
@@ -55,7 +67,7 @@ class People:
 
     def tracks_heard_since(self, frame: int) -> list[TrackKey]:
         """List the tracks heard of since `frame`, sorted."""
-        return sorted(key for key, heard in self._heard.items() if heard >= frame)
+        return sorted(takewhile(lambda key: self._heard[key] >= frame, reversed(self._heard)))
 
     def hold(self, key: TrackKey) -> float:
         """How firmly a track sits in its person: who came last is the first to go."""
@@ -68,30 +80,33 @@ class People:
     def regroup(
         self, pairs: PairEvidence, grouped: NDArray[np.int64], present: NDArray[np.bool_]
     ) -> tuple[Merge, ...]:
-        """Carry out a grouping of the tracks of `pairs`: (T,) serials, unknown ones are new persons.
+        """Carry out a grouping of the tracks of `pairs`: (T,) serials; those nobody had are new persons.
 
         A person all of whose present tracks went to another is that other person, unless tracks of the
         two were once seen side by side: then they have only left the picture.
         """
         before = self.serials(pairs.keys)
-        serial: dict[int, int] = {}
-        for given in grouped.tolist():
-            serial.setdefault(given, given if given in self._persons else self._new_serial())
-        after = np.array([serial[given] for given in grouped.tolist()], dtype=np.int64)
-        for key, mine in zip(pairs.keys, after.tolist(), strict=True):
-            self._serial_of[key] = mine
-        emptied = [s for s in np.unique(before[present]).tolist() if not (after[present] == s).any()]
+        after = grouped.copy()
+        # New ones count on in the order of their first tracks. They may have a serial that somebody has who
+        # is remembered without a track here.
+        new, first = np.unique(np.where(np.isin(grouped, before), -1, grouped), return_index=True)
+        for given in new[np.argsort(first)].tolist():
+            if given >= 0:
+                after[grouped == given] = self._new_serial()
+        for row in np.flatnonzero(after != before).tolist():
+            self._assign(pairs.keys[row], int(after[row]))
+        emptied = np.setdiff1d(before[present], after[present]).tolist()
         merged = []
         for old in emptied:
-            target, count = np.unique(after[present & (before == old)], return_counts=True)
-            new = int(target[np.argmax(count)])
-            if old != new and old in self._persons and new in self._persons:
-                merged += self._unite(pairs, old, new)
+            targets, count = np.unique(after[present & (before == old)], return_counts=True)
+            target = int(targets[np.argmax(count)])
+            if old != target and old in self._persons and target in self._persons:
+                merged += self._unite(pairs, old, target)
         return tuple(merged)
 
     def _unite(self, pairs: PairEvidence, old: int, new: int) -> list[Merge]:
-        serials = self.serials(pairs.keys)
-        if pairs.rivals[np.ix_(serials == old, serials == new)].any():
+        tracks = [pairs.in_play(self._tracks_of[serial]) for serial in (old, new)]
+        if pairs.rivals.any_between(*tracks):
             return []
         # The lower number is the one people have known for longer.
         one, two = self._persons[old], self._persons[new]
@@ -103,9 +118,9 @@ class People:
 
     def _absorb(self, keep: int, lose: int) -> None:
         self._persons[keep].absorb(self._persons.pop(lose))
-        for key, serial in self._serial_of.items():
-            if serial == lose:
-                self._serial_of[key] = keep
+        for key in sorted(self._tracks_of[lose]):
+            self._assign(key, keep)
+        del self._tracks_of[lose]
 
     def confirm(self, finding: Finding, since: int) -> tuple[list[int], list[int]]:
         """Number those seen often enough: a new number, or that of the lost person they are.
@@ -162,13 +177,18 @@ class People:
             if not person.number and frame - person.last_frame > settings.gone_after
         }
         stale = frame - settings.forget_after
-        for key in [k for k, s in self._serial_of.items() if s in drop or self._heard[k] < stale]:
+        tracks = [key for serial in sorted(drop) for key in sorted(self._tracks_of[serial])]
+        tracks += list(takewhile(lambda key: self._heard[key] < stale, self._heard))
+        for key in dict.fromkeys(tracks):
             self.person(key).tracks.pop(key, None)
-            del self._serial_of[key], self._heard[key]
-        self._persons = {serial: person for serial, person in self._persons.items() if serial not in drop}
+            self._tracks_of[self._serial_of.pop(key)].discard(key)
+            del self._heard[key]
+        for serial in drop:
+            del self._persons[serial], self._tracks_of[serial]
 
     def _new_serial(self) -> int:
         serial = self._next_serial
         self._next_serial += 1
         self._persons[serial] = Person()
+        self._tracks_of[serial] = set()
         return serial

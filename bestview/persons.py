@@ -1,4 +1,4 @@
-"""The people remembered, and finding again who left."""
+"""The people remembered."""
 
 from __future__ import annotations
 
@@ -6,20 +6,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
 
-from bestview.appearance import Appearances
 from bestview.evidence import TrackKey
-from bestview.identity_settings import IdentitySettings
-from bestview.succession import Place, clearly_least, picture_cost
-
-_APPEARANCE_RATIO = 1.5
-"""How many times further the second likeliest must be before appearance alone decides."""
-
-_LOOSE = 2.0
-"""How many appearance gates apart two sightings may be that place already joins."""
-
-_NEVER = 1e6
+from bestview.succession import Place
 
 
 @dataclass(slots=True)
@@ -90,78 +79,3 @@ class Person:
         for key, updates in sorted(other.tracks.items()):
             self.tracks[key] = self.tracks.get(key, 0) + updates
         self.updates = max(self.updates, other.updates)
-
-
-@dataclass(frozen=True, slots=True)
-class Finding:
-    """What finding people again goes by.
-
-    Attributes:
-        settings: of identity.
-        appearances: to compare looks with.
-        gate: distance within which feet are the same, ground units (NaN: no ground yet).
-        height: of a person in ground units (NaN likewise).
-    """
-
-    settings: IdentitySettings
-    appearances: Appearances
-    gate: float
-    height: float
-
-    def match(self, found: list[Person], lost: list[Person]) -> list[int]:
-        """For each newly `found` person the index of the `lost` one they are, or -1.
-
-        Place decides for those lost a moment ago; appearance for the others, and only where nobody
-        else looks nearly as like: a wrong number is worse than a new one. One assignment.
-        """
-        if not found or not lost:
-            return [-1] * len(found)
-        cost = np.array([[self._place_cost(new, old) for old in lost] for new in found])
-        looks = np.array([[self._unlike(new, old) for old in lost] for new in found])
-        gate = self.appearances.gate(self.settings.appearance_gate, self.settings.appearance_share)
-        by_place = (cost <= 1.0) & ~(looks > _LOOSE * gate)
-        by_look = (
-            ~np.isfinite(cost) & (cost != np.inf) & (looks <= gate) & clearly_least(looks, _APPEARANCE_RATIO)
-        )
-        cost = np.where(by_place, cost, np.where(by_look, 1.0 + looks, _NEVER))
-        row, column = linear_sum_assignment(cost)
-        answer = [-1] * len(found)
-        for i, j in zip(row, column, strict=True):
-            if cost[i, j] < _NEVER:
-                answer[int(i)] = int(j)
-        return answer
-
-    def _place_cost(self, new: Person, old: Person) -> float:
-        """Distance between loss and finding in units of what is plausible; NaN: place says nothing."""
-        gap = new.first_frame - old.last_frame
-        if gap <= 0 and any(new.first[c].frame <= old.last[c].frame for c in new.first if c in old.last):
-            return float("inf")  # seen at the same time: two people
-        if gap > self.settings.continuity:
-            return float("nan")
-        gap = max(gap, 0)
-        costs = [self._ground_cost(a, b, gap) for a in new.first.values() for b in old.last.values()]
-        costs += [picture_cost(new.first[c], old.last[c]) for c in sorted(new.first) if c in old.last]
-        known = [cost for cost in costs if not np.isnan(cost)]
-        if not known:
-            return float("nan")
-        best = min(known)
-        return best if best <= 1.0 else float("inf")  # nobody is that fast
-
-    def _ground_cost(self, new: Place, old: Place, gap: int) -> float:
-        apart = float(np.hypot(*(new.ground - old.ground)))
-        return apart / (self.gate + self.settings.speed_heights * self.height * gap)
-
-    def _unlike(self, new: Person, old: Person) -> float:
-        """Appearance distance, in a common camera where there is one; NaN: unknown."""
-        common = [(c, c) for c in sorted(new.looks) if c in old.looks]
-        pairs = common or [(a, b) for a in sorted(new.looks) for b in sorted(old.looks)]
-        apart = [
-            float(np.abs(self._curve(new, a) - self._curve(old, b)).mean())
-            for a, b in pairs
-            if new.looks[a].total.size == old.looks[b].total.size
-        ]
-        return float(np.mean(apart)) if apart else float("nan")
-
-    def _curve(self, person: Person, camera: str) -> NDArray[np.float64]:
-        look = person.looks[camera]
-        return self.appearances.equalised(camera, look.total / look.count)

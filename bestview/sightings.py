@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bestview.evidence import TrackKey
 from bestview.ground import feet, foot_spread, person_heights, to_ground
+from bestview.strangers import MIN_COMMON_FRAMES
 from bestview.succession import Place
-
-_MIN_COMMON_FRAMES = 3
-"""Frames in which two tracks must both be seen before their places are compared."""
 
 _EDGE = 0.01
 """Share of the picture's height, on both sides of its lower edge, in which feet count as cut off."""
@@ -84,44 +82,61 @@ class Sightings:
         fresh = min(last_frame - since, self.boxes.shape[1])
         return np.asarray(self.visible[:, self.boxes.shape[1] - fresh :].any(axis=1))
 
-    def places(self, track: int) -> tuple[Place, Place]:
-        """Where a track (by row), seen at least once, was first and last seen."""
-        columns = np.flatnonzero(self.visible[track])[[0, -1]].tolist()
-        first, last = (Place(self.first + w, self.boxes[track, w], self.ground[track, w]) for w in columns)
-        return first, last
+    @property
+    def stands(self) -> NDArray[np.bool_]:
+        """(T, W): seen in that frame, and where on the ground."""
+        return np.asarray(~np.isnan(self.ground[..., 0] + self.spread[..., 0, 0]))
 
-    def same_camera(self) -> NDArray[np.bool_]:
-        """(T, T): tracks of one camera."""
-        names = sorted({key.camera for key in self.keys})
-        camera = np.array([names.index(key.camera) for key in self.keys], dtype=np.int64)
-        return np.asarray(camera[:, None] == camera[None, :])
+    def places(self, rows: Sequence[int]) -> list[tuple[Place, Place]]:
+        """Where tracks (by row), each seen at least once, were first and last seen."""
+        if not rows:
+            return []
+        visible = self.visible[rows]
+        first = visible.argmax(axis=1)
+        last = visible.shape[1] - 1 - visible[:, ::-1].argmax(axis=1)
+        return list(zip(self._places(rows, first), self._places(rows, last), strict=True))
 
-    def side_by_side(self) -> NDArray[np.bool_]:
-        """(T, T): two tracks of one camera, both seen in some frame: two people."""
-        seen = self.visible.astype(np.float64)
-        both = (seen @ seen.T > 0) & self.same_camera()
+    def _places(self, rows: Sequence[int], column: NDArray[np.int64]) -> list[Place]:
+        boxes, ground = self.boxes[rows, column], self.ground[rows, column]
+        # Copies: a place is remembered for long, and must not keep a whole update.
+        return [
+            Place(self.first + frame, box.copy(), at.copy())
+            for frame, box, at in zip(column.tolist(), boxes, ground, strict=True)
+        ]
+
+    def cameras(self) -> list[slice]:
+        """Rows of each camera, in order."""
+        names = [key.camera for key in self.keys]
+        starts = [i for i, name in enumerate(names) if i == 0 or names[i - 1] != name]
+        return [slice(start, end) for start, end in pairwise([*starts, len(names)])]
+
+    def side_by_side(self, rows: slice) -> NDArray[np.bool_]:
+        """(N, N) for one camera's N rows: both seen in some frame, two people."""
+        seen = self.visible[rows].astype(np.float32)
+        both = seen @ seen.T > 0
         np.fill_diagonal(both, val=False)
         return np.asarray(both)
 
-    def distances(self, gate: float) -> NDArray[np.float64]:
-        """Mean distance on the ground in gates, over the frames in which both are seen: (T, T).
+    def distances(self, one: NDArray[np.int64], two: NDArray[np.int64], gate: float) -> NDArray[np.float64]:
+        """Mean distance on the ground in gates, over the frames in which both are seen: (P,) pairs -> (P,).
 
         Where feet are uncertain the gate is stretched by their covariance: along the lines of sight.
         NaN: seen together in too few frames.
         """
-        tracks, frames = self.ground.shape[:2]
-        total, count = np.zeros((tracks, tracks)), np.zeros((tracks, tracks))
-        for frame in range(frames):
-            at, spread = self.ground[:, frame], self.spread[:, frame]
-            dx, dy = (at[:, None, axis] - at[None, :, axis] for axis in (0, 1))
-            xx, xy, yy = (spread[:, None, i, j] + spread[None, :, i, j] for i, j in ((0, 0), (0, 1), (1, 1)))
+        total, count = np.zeros(one.shape), np.zeros(one.shape, dtype=np.int64)
+        # (W, 5, T): what is read together lies together.
+        parts = [self.ground[..., 0], self.ground[..., 1]]
+        parts += [self.spread[..., i, j] for i, j in ((0, 0), (0, 1), (1, 1))]
+        for x, y, *about in np.ascontiguousarray(np.moveaxis(np.array(parts), (1, 2), (2, 0))):
+            dx, dy = x[one] - x[two], y[one] - y[two]
+            xx, xy, yy = (part[one] + part[two] for part in about)
             xx, yy = xx + gate**2, yy + gate**2
             # Length of (dx, dy) in the metric of the inverse covariance, the 2x2 inverse written out.
             squared = (yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy) / (xx * yy - xy * xy)
             known = ~np.isnan(squared)
             total += np.where(known, np.sqrt(np.maximum(squared, 0.0)), 0.0)
             count += known
-        return np.where(count >= _MIN_COMMON_FRAMES, total / np.maximum(count, 1), np.nan)
+        return np.where(count >= MIN_COMMON_FRAMES, total / np.maximum(count, 1), np.nan)
 
 
 def line_up(
@@ -139,27 +154,31 @@ def line_up(
         ValueError: a track given twice, boxes that are not (M, 4), rows beyond `last_frame`, a camera
             without an entry in `homographies`.
     """
-    ordered = sorted(tracks, key=lambda track: track.key)
-    for track in ordered:
+    for track in tracks:
         _check(track, homographies, last_frame)
-    keys = tuple(track.key for track in ordered)
-    if len(dict.fromkeys(keys)) < len(keys):
+    # Sorted by key: nothing below depends on the order in which tracks are given.
+    by_key = {track.key: track for track in tracks}
+    if len(by_key) < len(tracks):
         raise ValueError("one track is given twice in one update")
+    keys = tuple(sorted(by_key))
+    ordered = [by_key[key] for key in keys]
     width = max((last_frame + 1 - track.first for track in ordered), default=0)
     boxes = np.full((len(keys), width, 4), np.nan)
-    ground = np.full((len(keys), width, 2), np.nan)
-    spread = np.full((len(keys), width, 2, 2), np.nan)
-    heights = np.full((len(keys), width), np.nan)
     for i, track in enumerate(ordered):
         start = track.first - (last_frame + 1 - width)
         boxes[i, start : start + len(track.boxes)] = track.boxes
-        homography = homographies[track.camera]
-        if homography is not None:
-            cut = np.abs(boxes[i, :, 3:] / track.picture_height - 1.0) < _EDGE
-            whole = np.where(cut, np.nan, boxes[i])
-            ground[i] = to_ground(homography, feet(whole))
-            spread[i] = foot_spread(homography, whole, foot_error.sideways, foot_error.upwards)
-            heights[i] = person_heights(homography, whole)
+    ground = np.full((len(keys), width, 2), np.nan)
+    spread = np.full((len(keys), width, 2, 2), np.nan)
+    heights = np.full((len(keys), width), np.nan)
+    matrices = [homographies[key.camera] for key in keys]
+    rows = [i for i, matrix in enumerate(matrices) if matrix is not None]
+    if rows:
+        homography = np.array([matrices[i] for i in rows])[:, None]
+        edge = np.array([ordered[i].picture_height for i in rows])[:, None, None]
+        whole = np.where(np.abs(boxes[rows, :, 3:] / edge - 1.0) < _EDGE, np.nan, boxes[rows])
+        ground[rows] = to_ground(homography, feet(whole))
+        spread[rows] = foot_spread(homography, whole, foot_error.sideways, foot_error.upwards)
+        heights[rows] = person_heights(homography, whole)
     return Sightings(keys, last_frame + 1 - width, boxes, ground, spread, heights)
 
 
@@ -175,23 +194,3 @@ def _check(
         raise ValueError(f"{name}: the histogram has shape {track.histogram.shape}, not (B,)")
     if track.first + len(track.boxes) - 1 > last_frame:
         raise ValueError(f"{name} reaches beyond frame {last_frame}")
-
-
-class HeightScale:
-    """How long a person's height is in units of the ground plane, from the boxes seen so far."""
-
-    _REMEMBERED = 200
-
-    def __init__(self) -> None:
-        self._medians: deque[float] = deque(maxlen=self._REMEMBERED)
-
-    def learn(self, heights: NDArray[np.float64]) -> None:
-        """Take in guessed heights of any shape, NaN where unknown."""
-        known = heights[np.isfinite(heights) & (heights > 0)]
-        if known.size:
-            self._medians.append(float(np.median(known)))
-
-    @property
-    def height(self) -> float:
-        """Median of the updates' medians, in ground units; NaN before anybody was seen."""
-        return float(np.median(np.array(self._medians))) if self._medians else float("nan")

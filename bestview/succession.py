@@ -29,9 +29,16 @@ class Place:
 
 def picture_cost(new: Place, old: Place) -> float:
     """Distance between feet in one camera's picture, in units of what is plausible in the time between."""
-    apart = float(np.hypot(*(feet(new.box) - feet(old.box))))
-    height = max(float(old.box[3] - old.box[1]), float(new.box[3] - new.box[1]), 1.0)
-    return apart / height / (_START_HEIGHTS + _SPEED_HEIGHTS * max(new.frame - old.frame, 0))
+    return float(picture_costs([new], [old])[0])
+
+
+def picture_costs(new: Sequence[Place], old: Sequence[Place]) -> NDArray[np.float64]:
+    """Give the same for N pairs of places: (N,)."""
+    after, before = (np.array([place.box for place in places]).reshape(-1, 4) for places in (new, old))
+    apart = np.hypot(*(feet(after) - feet(before)).T)
+    height = np.maximum(np.maximum(before[:, 3] - before[:, 1], after[:, 3] - after[:, 1]), 1.0)
+    gap = np.array([max(n.frame - o.frame, 0) for n, o in zip(new, old, strict=True)])
+    return np.asarray(apart / height / (_START_HEIGHTS + _SPEED_HEIGHTS * gap))
 
 
 def clearly_least(cost: NDArray[np.float64], ratio: float) -> NDArray[np.bool_]:
@@ -90,23 +97,27 @@ class Heirs:
         self._first = {key: self._first[key] for key in keys if key in self._first}
         self._last = {key: self._last[key] for key in self._first}
         self._lost_of = {heir: lost for heir, lost in self._lost_of.items() if heir in self._first}
-        return [
-            heir
-            for camera in sorted({key.camera for key in self._first})
-            for heir in self._find(camera, since)
-        ]
-
-    def _find(self, camera: str, since: int) -> list[Heir]:
-        mine = [key for key in self._first if key.camera == camera]
+        begun = {
+            key.camera
+            for key, place in self._first.items()
+            if place.frame >= since and key not in self._lost_of
+        }
+        mine: dict[str, list[TrackKey]] = {camera: [] for camera in sorted(begun)}
+        for key in self._first:
+            if key.camera in mine:
+                mine[key.camera].append(key)
         taken = set(self._lost_of.values())
+        return [heir for here in mine.values() for heir in self._find(here, taken, since)]
+
+    def _find(self, mine: list[TrackKey], taken: set[TrackKey], since: int) -> list[Heir]:
         new = [key for key in mine if key not in self._lost_of and self._first[key].frame >= since]
         lost = [key for key in mine if key not in taken]
+        begins = [self._first[key] for key in new]
+        ends = [self._last[key] for key in lost]
         cost = np.full((len(new), len(lost)), np.inf)
-        for i, heir in enumerate(new):
-            for j, end in enumerate(lost):
-                gap = self._first[heir].frame - self._last[end].frame
-                if 0 < gap <= self._continuity:
-                    cost[i, j] = picture_cost(self._first[heir], self._last[end])
+        gap = np.array([p.frame for p in begins])[:, None] - np.array([p.frame for p in ends])[None, :]
+        i, j = np.nonzero((gap > 0) & (gap <= self._continuity))
+        cost[i, j] = picture_costs([begins[k] for k in i.tolist()], [ends[k] for k in j.tolist()])
         found = []
         for i, j in zip(*np.nonzero(clearly_least(cost, _RATIO) & (cost < 1)), strict=True):
             self._lost_of[new[i]] = lost[j]
