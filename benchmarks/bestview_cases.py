@@ -18,7 +18,8 @@ from server.camera.pipeline import CameraPipeline
 from server.camera.report import Reporter
 from server.camera.scene import Scene, write_recording
 from server.camera.sources import SourceEnded
-from server.run.evaluate_truth import Size, Truth, truth_of
+from server.run.evaluate_truth import Truth, truth_of
+from server.run.recorded import Size
 from server.wire.config import Config
 from server.wire.loading import build_config
 from server.wire.messages import CameraTracks

@@ -94,7 +94,7 @@ def calibrate_walks(
         person: how tall people are in the unit of the floor.
 
     Raises:
-        CalibrationError: no two cameras could be laid on one floor; the text says why.
+        CalibrationError: no two cameras could be laid on one floor, or not all at once; the text says why.
     """
     settings = settings or WalkSettings()
     if len(walks) < 2:  # noqa: PLR2004 — two cameras
@@ -147,7 +147,9 @@ def _off(group: Group, it: Matches, own: int) -> _Off:
 
 def _camera(name: str, floor: int, group: Group, own: int, errors: Floats, person: float) -> WalkedCamera:
     off = [_off(group, it, own) for it in group.matches if own in (it.one, it.other)]
-    image, place = (np.concatenate([getattr(it, name) for it in off]) for name in ("image", "place"))
+    image, place = np.concatenate([it.image for it in off]), np.concatenate([it.place for it in off])
+    if not len(image):
+        raise CalibrationError(f"{name}: on one floor with all others it agrees with none: try without it")
     tall = group.rig.cameras[own].heights(image)
     third = np.clip((3 * image[:, 0] / group.rig.cameras[own].size[0]).astype(int), 0, 2)
     left, middle, right = (float(it) for it in np.bincount(third, minlength=3) / max(1, len(third)))
@@ -166,7 +168,7 @@ def _camera(name: str, floor: int, group: Group, own: int, errors: Floats, perso
         heights=_spread([it.heights for it in off]),
         picture=_spread([it.picture for it in off]),
         thirds=(left, middle, right),
-        deep=float(np.quantile(tall, 0.95) / np.quantile(tall, 0.05)),
+        deep=float(np.nanquantile(tall, 0.95) / np.nanquantile(tall, 0.05)),
     )
 
 

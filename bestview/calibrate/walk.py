@@ -9,11 +9,6 @@ import numpy as np
 
 from bestview.calibrate.homography import Floats
 
-_MOST_GAP = 5
-"""Frames that somebody may be unseen for in the middle of a track; the boxes between are drawn straight."""
-_SMOOTH = 5
-"""Frames over which boxes are averaged: a foot that is lifted is no step aside."""
-
 
 @dataclass(frozen=True, slots=True)
 class Track:
@@ -67,9 +62,16 @@ class Walk:
 
 
 def make_walk(
-    camera: str, size: tuple[int, int], frames: Sequence[int], ids: Sequence[int], boxes: Floats
+    camera: str,
+    size: tuple[int, int],
+    frames: Sequence[int],
+    ids: Sequence[int],
+    boxes: Floats,
+    step: int = 5,
 ) -> Walk:
     """Put rows of a file together to tracks, without the boxes that the picture's edge cuts off.
+
+    Boxes are averaged over about a step: a foot that is lifted is no step aside.
 
     Args:
         camera: its name.
@@ -77,6 +79,8 @@ def make_walk(
         frames: the frame of each row, (N,).
         ids: the track of each row, (N,).
         boxes: left, top, right, bottom of each row in pixels, (N, 4).
+        step: frames in which nobody walks far, as in `WalkSettings`. Somebody may be unseen for as many in
+            the middle of a track; the boxes between are drawn straight.
     """
     at, who = np.asarray(frames, dtype=np.intp), np.asarray(ids, dtype=np.intp)
     whole = ~_cut(boxes, size)
@@ -85,8 +89,8 @@ def make_walk(
         mine = np.flatnonzero((who == number) & whole)
         mine = mine[np.argsort(at[mine], kind="stable")]
         # A gap that is long parts a track in two: who was hidden long may have come back as somebody else.
-        parts = np.split(mine, np.flatnonzero(np.diff(at[mine]) > _MOST_GAP) + 1)
-        tracks += [_track(at[part], boxes[part]) for part in parts if len(part) > 1]
+        parts = np.split(mine, np.flatnonzero(np.diff(at[mine]) > step) + 1)
+        tracks += [_track(at[part], boxes[part], step) for part in parts if len(part) > 1]
     return Walk(camera, size, tuple(sorted(tracks, key=lambda it: (it.first, it.end))))
 
 
@@ -100,15 +104,14 @@ def _cut(boxes: Floats, size: tuple[int, int]) -> np.ndarray:
     )
 
 
-def _track(frames: np.ndarray, boxes: Floats) -> Track:
+def _track(frames: np.ndarray, boxes: Floats, step: int) -> Track:
     every = np.arange(frames[0], frames[-1] + 1)
     filled = np.column_stack([np.interp(every, frames, side) for side in boxes.T])
-    return Track(int(frames[0]), _smoothed(filled))
+    return Track(int(frames[0]), _smoothed(filled, step // 2))
 
 
-def _smoothed(boxes: Floats) -> Floats:
-    """Average over a few frames, over fewer at the ends."""
-    half = _SMOOTH // 2
+def _smoothed(boxes: Floats, half: int) -> Floats:
+    """Average over `half` frames before and after, over fewer at the ends."""
     sums = np.concatenate([np.zeros((1, 4)), boxes.cumsum(axis=0)])
     index = np.arange(len(boxes))
     reach = np.minimum(half, np.minimum(index, len(boxes) - 1 - index))

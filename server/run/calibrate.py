@@ -22,7 +22,6 @@ from server.run.calibrate_points import read_points
 from server.run.calibrate_tracks import Walked
 from server.run.calibrate_words import details, in_words, missed
 from server.wire.errors import UserError
-from server.wire.output import whole_file
 
 _UNNAMED = "unit"
 
@@ -31,21 +30,16 @@ def calibrate_points(points: Path, out: Path, plan: Path, unit: str | None) -> l
     """Read the points, fit, and write the file and the plan; give the lines to say.
 
     Raises:
-        UserError: the file is no such file, its points contradict each other, or it cannot be written.
+        UserError: the file is no such file, or its points contradict each other.
     """
     given = read_points(points)
     unit = unit or given.unit or _UNNAMED
     with refusing(points):
         fits = fit_cameras(given.cameras)
     views = [PlanView(it.camera, fits[it.camera].homography, it.image, it.floor) for it in given.cameras]
-    with whole_file(plan) as draft:
-        plot_plan(views, unit, draft)
-        write_ground(
-            out,
-            unit,
-            {camera: fit.homography for camera, fit in fits.items()},
-            {"residuals": {camera: _rounded(fit) for camera, fit in fits.items()}},
-        )
+    plot_plan(views, unit, plan)
+    homographies = {camera: fit.homography for camera, fit in fits.items()}
+    write_ground(out, unit, homographies, {"residuals": {name: _rounded(fit) for name, fit in fits.items()}})
     return [_line(it, fits[it.camera], unit) for it in given.cameras]
 
 
@@ -55,7 +49,7 @@ def calibrate_from_walks(
     """Lay the cameras on one floor, and write the file and the plan; give the lines to say.
 
     Raises:
-        UserError: the walk says too little, or a file cannot be written.
+        UserError: the walk says too little.
     """
     with refusing("calibrate"):
         found = calibrate_walks(walked.walks, settings, person)
@@ -66,10 +60,9 @@ def calibrate_from_walks(
             f"calibrate: the walk covered too little: {worst.words} (--force writes it all the same)"
         )
     views = [PlanView(it.camera, it.homography, it.image, it.place, it.floor) for it in found.cameras]
-    with whole_file(plan) as draft:
-        plot_plan(views, "m", draft)
-        homographies = {it.camera: it.homography for it in found.cameras}
-        write_ground(out, "m", homographies, details(found, person))
+    plot_plan(views, "m", plan)
+    homographies = {it.camera: it.homography for it in found.cameras}
+    write_ground(out, "m", homographies, details(found, person))
     return [*in_words(walked, found, settings), *(it.words for it in missing)]
 
 

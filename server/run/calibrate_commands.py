@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from server.wire.errors import UserError
+from server.wire.output import whole_file
 
 
 def calibrate(
@@ -25,24 +26,21 @@ def calibrate(
     config: Annotated[Path | None, typer.Option("--config", help="Of videos: settings for tracking.")] = None,
     size: Annotated[str | None, typer.Option("--size", help="Of tracks: WIDTHxHEIGHT in pixels.")] = None,
     fps: Annotated[
-        float | None, typer.Option("--fps", min=1.0, help="Frames a second; 25 of tracks.")
+        float | None, typer.Option("--fps", min=1.0, max=1000.0, help="Frames a second; 25 of tracks.")
     ] = None,
     shift: Annotated[
-        float, typer.Option("--shift", min=0.0, help="Seconds that cameras may be out of step.")
+        float, typer.Option("--shift", min=0.0, max=60.0, help="Seconds that cameras may be out of step.")
     ] = 3.0,
-    person: Annotated[float, typer.Option("--person", min=0.1, help="How tall people are, metres.")] = 1.75,
+    person: Annotated[
+        float, typer.Option("--person", min=0.1, max=1000.0, help="How tall people are, metres.")
+    ] = 1.75,
     force: Annotated[bool, typer.Option("--force", help="Write even if the walk covered little.")] = False,
 ) -> None:
     """Find each camera's homography to the floor: from marked points, or from people who walk about."""
     from server.run.calibrate import calibrate_from_walks, calibrate_points
     from server.run.calibrate_points import ENDINGS
-    from server.run.calibrate_tracks import (
-        Picture,
-        is_tracks,
-        walk_settings,
-        walks_from_tracks,
-        walks_from_videos,
-    )
+    from server.run.calibrate_tracks import Picture, walk_settings, walks_of
+    from server.run.recorded import parse_size
 
     for path in given:
         if not path.exists():
@@ -50,29 +48,16 @@ def calibrate(
     plan = plan or out.with_suffix(".png")
     if plan.resolve() == out.resolve():
         raise UserError(f"--out: {out}: the floor plan would be written there too; name a .json, or --plan")
-    if any(path.suffix.lower() in ENDINGS for path in given):
-        if len(given) > 1:
-            raise UserError("calibrate: marked points are one file, with all cameras in it")
-        lines = calibrate_points(given[0], out, plan, unit)
-    else:
-        picture = Picture(_size(size), fps)
-        if all(is_tracks(path) for path in given):
-            walked = walks_from_tracks(given, picture)
+    picture = Picture(parse_size(size) if size else None, fps)
+    with whole_file(out) as ground, whole_file(plan) as drawn:  # both of them, or none
+        if any(path.suffix.lower() in ENDINGS for path in given):
+            if len(given) > 1:
+                raise UserError("calibrate: marked points are one file, with all cameras in it")
+            lines = calibrate_points(given[0], ground, drawn, unit)
         else:
-            walked = walks_from_videos(
-                given, config, picture, lambda name: typer.echo(f"tracking {name}", err=True)
-            )
-        settings = walk_settings(walked.fps, shift)
-        lines = calibrate_from_walks(walked, out, plan, settings, person, force=force)
+            walked = walks_of(given, config, picture, lambda name: typer.echo(f"tracking {name}", err=True))
+            settings = walk_settings(walked.fps, shift)
+            lines = calibrate_from_walks(walked, ground, drawn, settings, person, force=force)
     for line in lines:
         typer.echo(line)
     typer.echo(f"{out}: homographies; {plan}: the floor plan")
-
-
-def _size(text: str | None) -> tuple[int, int] | None:
-    if text is None:
-        return None
-    width, _, height = text.partition("x")
-    if not (width.isdecimal() and height.isdecimal() and int(width) and int(height)):
-        raise UserError(f"--size: {text!r} is not WIDTHxHEIGHT, such as 640x360")
-    return int(width), int(height)

@@ -8,18 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from bestview.calibrate import Floats
-from server.wire.output import whole_file
 
 
 def write_ground(
     out: Path, unit: str, homographies: Mapping[str, Floats], more: Mapping[str, Any] | None = None
 ) -> None:
-    """Write the homographies, (3, 3) each, by camera.
-
-    Raises:
-        UserError: the file cannot be written.
-    """
+    """Write the homographies, (3, 3) each, by camera."""
     matrices = {camera: matrix.tolist() for camera, matrix in homographies.items()}
-    with whole_file(out) as draft:
-        content = {"unit": unit, "homography": matrices, **(more or {})}
-        draft.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+    content = {"unit": unit, "homography": matrices, **(more or {})}
+    out.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")

@@ -58,7 +58,7 @@ def plot_plan(views: Sequence[PlanView], unit: str, out: Path) -> None:
         axis.set_ylabel(unit)
         axis.legend(title="camera", markerscale=3)
     figure.suptitle("Floor plan: what was covered, foot points, and how far they are off", fontsize="medium")
-    figure.savefig(out, dpi=100, format="png", metadata={"Software": None})
+    figure.savefig(out, dpi=100, format="png", bbox_inches="tight", metadata={"Software": None})
 
 
 def _draw(axis: Axes, view: PlanView, colour: str) -> None:

@@ -42,7 +42,7 @@ def read_points(path: Path) -> PointFile:
         UserError: it cannot be read, or is no such file; the line or pair is named.
     """
     try:
-        text = path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8-sig")  # spreadsheets begin a CSV with a byte order mark
     except OSError as error:
         raise UserError(f"{path}: cannot be read: {error.strerror}") from error
     except UnicodeDecodeError as error:
@@ -64,7 +64,13 @@ def _camera(name: str, pairs: Sequence[_Pair]) -> MarkedPoints:
 
 
 def _from_csv(text: str, name: str) -> Iterator[_Pair]:
-    rows = csv.DictReader(text.splitlines())
+    try:
+        yield from _from_rows(csv.DictReader(text.splitlines()), name)
+    except csv.Error as error:
+        raise UserError(f"{name}: is not CSV: {error}") from error
+
+
+def _from_rows(rows: csv.DictReader[str], name: str) -> Iterator[_Pair]:
     missing = [column for column in COLUMNS if column not in (rows.fieldnames or ())]
     if missing:
         raise UserError(
@@ -83,6 +89,8 @@ def _json(text: str, name: str) -> dict[str, Any]:
         content = json.loads(text)
     except json.JSONDecodeError as error:
         raise UserError(f"{name}:{error.lineno}: is not JSON: {error.msg}") from error
+    except (ValueError, RecursionError) as error:  # a number of thousands of digits, brackets in brackets
+        raise UserError(f"{name}: is not JSON that can be read: {error}") from error
     if not isinstance(content, dict) or not isinstance(content.get("cameras"), dict):
         raise UserError(
             f'{name}: has no {{"cameras": {{camera: [{{"image": [x, y], "floor": [x, y]}}, …]}}}}'
@@ -113,7 +121,7 @@ def _from_json(content: dict[str, Any], name: str) -> Iterator[_Pair]:
 def _four(values: Sequence[Any], where: str) -> tuple[float, float, float, float]:
     try:
         x, y, right, far = (float(value) for value in values)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise UserError(f"{where}: {', '.join(map(str, values))}: are not four numbers") from None
     if not all(map(math.isfinite, (x, y, right, far))):
         raise UserError(f"{where}: {', '.join(map(str, values))}: are not four finite numbers")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -11,46 +11,69 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from bestview.calibrate import Walk, WalkSettings, make_walk
-from server.camera.sources.opening import open_video
+from server.run.recorded import Size, look_at
 from server.run.setup import camera_name
-from server.run.track import track_one
+from server.run.track import loaded_for, track_one
 from server.wire.errors import UserError
-from server.wire.loading import read_content
 from tracking.motchallenge import MotRow, read_rows
 
 ENDINGS = (".txt", ".txt.gz")
 _FPS = 25.0
 _MOMENT_S = 0.2
 """Seconds between the moments at which cameras are compared: people walk a sixth of their height."""
+_SAME_RATE = 0.01
+"""Share by which the rates that files tell of may differ; they are rounded, and a walk is short."""
 
 
 @dataclass(frozen=True, slots=True)
 class Walked:
     """The cameras' walks, and how many frames there are in a second.
 
-    `guessed` are cameras whose picture's size is only guessed, from the boxes.
+    `guessed` are cameras whose picture's size is only guessed, from the boxes; `rate_guessed` is whether the
+    rate is only what is usual.
     """
 
     walks: tuple[Walk, ...]
     fps: float
     guessed: tuple[str, ...] = ()
+    rate_guessed: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class Picture:
     """What is known of the pictures: their size and rate, if the user has said so."""
 
-    size: tuple[int, int] | None
+    size: Size | None
     fps: float | None
 
 
 def walk_settings(fps: float, shift: float) -> WalkSettings:
     """Give the settings for recordings of so many frames a second, out of step by `shift` seconds at most."""
-    step = max(1, round(_MOMENT_S * fps))
-    return WalkSettings(shift=round(shift * fps), step=step)
+    return WalkSettings(shift=round(shift * fps), step=_moment(fps))
 
 
-def is_tracks(path: Path) -> bool:
+def _moment(fps: float) -> int:
+    return max(1, round(_MOMENT_S * fps))
+
+
+def walks_of(
+    given: Sequence[Path], config: Path | None, picture: Picture, progress: Callable[[str], None]
+) -> Walked:
+    """Read tracks, or track people in videos; ``progress`` is told which video is on.
+
+    Raises:
+        UserError: some are tracks and some videos, or as the two functions below.
+    """
+    tracks = [path for path in given if _is_tracks(path)]
+    if tracks and len(tracks) < len(given):
+        other = next(path for path in given if path not in tracks)
+        raise UserError(f"calibrate: {tracks[0]} is tracks and {other} is not; give one or the other for all")
+    return (
+        walks_from_tracks(given, picture) if tracks else walks_from_videos(given, config, picture, progress)
+    )
+
+
+def _is_tracks(path: Path) -> bool:
     """Tell whether this is a file of tracks, or a folder of such files (or with a folder `tracks/`)."""
     return path.name.endswith(ENDINGS) or (path.is_dir() and bool(_files(path)))
 
@@ -62,15 +85,16 @@ def walks_from_tracks(given: Sequence[Path], picture: Picture) -> Walked:
         UserError: a file cannot be read or has nobody in it, or two have one name.
     """
     files = [file for path in given for file in (_files(path) if path.is_dir() else [path])]
-    rows = {file: _rows(file) for file in files}
     names = [camera_name(Path(file.name.removesuffix(".gz"))) for file in files]
     _check_names(names)
+    rows = {file: _rows(file) for file in files}
+    fps = picture.fps or _FPS
     walks, guessed = [], []
     for name, file in zip(names, files, strict=True):
         size = picture.size or _size_of(rows[file])
         guessed += [name] if picture.size is None else []
-        walks.append(_walk(name, size, rows[file]))
-    return Walked(tuple(walks), picture.fps or _FPS, tuple(guessed))
+        walks.append(_walk(name, size, rows[file], fps))
+    return Walked(tuple(walks), fps, tuple(guessed), rate_guessed=picture.fps is None)
 
 
 def walks_from_videos(
@@ -79,34 +103,44 @@ def walks_from_videos(
     """Track people in each video first, as `myview track` does; the configuration's offsets are left out.
 
     Raises:
-        UserError: a video cannot be opened, nobody is in it, or two have one name.
+        UserError: a video cannot be opened, nobody is in it, two have one name, or their rates differ.
     """
     names = [camera_name(video) for video in videos]
     _check_names(names)
-    known = _offsets(config) if config else {}
-    walks, fps = [], picture.fps
+    # All that can be wrong is found out before the first of them is tracked, which takes a while.
+    seen = [look_at(video) for video in videos]
+    offsets = [loaded_for(video, None, config).cameras[0].offset for video in videos]
+    fps = picture.fps or _rate({name: it.fps for name, it in zip(names, seen, strict=True) if it.fps})
+    walks = []
     with TemporaryDirectory() as folder:
-        for name, video in zip(names, videos, strict=True):
+        for name, video, it, offset in zip(names, videos, seen, offsets, strict=True):
             progress(name)
             out = Path(folder) / f"{name}.txt"
             track_one(video, None, out, config, None, lambda _: None)
-            opened = open_video(str(video))
-            opened.container.close()
-            fps = fps or opened.fps
-            walks.append(_walk(name, opened.size, _rows(out, str(video)), known.get(name, 0)))
-    return Walked(tuple(walks), fps or _FPS)
+            # With an offset tracks count pulses, and not the video's own frames.
+            walks.append(_walk(name, it.size, _rows(out, str(video)), fps, offset))
+    return Walked(tuple(walks), fps)
 
 
-def _offsets(config: Path) -> dict[str, int]:
-    """Give the offsets that a configuration's cameras have; with them, tracks count pulses."""
-    cameras = read_content(config).get("cameras") or []
-    return {str(it["id"]): int(it.get("offset", 0)) for it in cameras if isinstance(it, dict) and "id" in it}
+def _rate(rates: Mapping[str, float]) -> float:
+    """Give the rate that all cameras have: frame n of all is one moment."""
+    first = next(iter(rates), None)
+    if first is None:
+        return _FPS
+    for name, fps in rates.items():
+        if abs(fps / rates[first] - 1.0) > _SAME_RATE:
+            raise UserError(
+                f"calibrate: {name} has {fps:g} frames a second and {first} {rates[first]:g}: bring them "
+                "to one rate, or say with --fps what it really is"
+            )
+    return rates[first]
 
 
-def _walk(name: str, size: tuple[int, int], rows: Sequence[MotRow], offset: int = 0) -> Walk:
+def _walk(name: str, size: Size, rows: Sequence[MotRow], fps: float, offset: int = 0) -> Walk:
     boxes = np.array([row.box for row in rows], dtype=np.float64).reshape(-1, 4)
     # Files count frames from 1, pulses from 0.
-    return make_walk(name, size, [row.frame - 1 - offset for row in rows], [row.id for row in rows], boxes)
+    frames = [row.frame - 1 - offset for row in rows]
+    return make_walk(name, size, frames, [row.id for row in rows], boxes, _moment(fps))
 
 
 def _rows(path: Path, name: str | None = None) -> list[MotRow]:
@@ -130,7 +164,7 @@ def _files(folder: Path) -> list[Path]:
     return sorted(path for path in within.iterdir() if path.name.endswith(ENDINGS))
 
 
-def _size_of(rows: Sequence[MotRow]) -> tuple[int, int]:
+def _size_of(rows: Sequence[MotRow]) -> Size:
     right = max(row.box[2] for row in rows)
     bottom = max(row.box[3] for row in rows)
     return math.ceil(right) + 1, math.ceil(bottom) + 1

@@ -58,6 +58,8 @@ def in_words(walked: Walked, found: WalkCalibration, settings: WalkSettings) -> 
     if walked.guessed:
         sizes = ", ".join(f"{it.camera} {it.size[0]}x{it.size[1]}" for it in walked.walks)
         lines.append(f"the pictures' size is guessed from the boxes ({sizes}); --size says it better")
+    if walked.rate_guessed:
+        lines.append(f"{walked.fps:g} frames a second are taken for granted; --fps says it better")
     if settings.shift:
         lines += _offsets(found, walked.fps)
     return lines

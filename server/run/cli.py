@@ -34,6 +34,7 @@ for command in (
 ):
     app.command()(command)
 
+_BAD_INPUT = UserError.code
 _INTERRUPTED = 130
 _TERMINATED = 143
 
@@ -49,6 +50,11 @@ def main() -> None:
     except UserError as error:
         typer.echo(f"myview: {error}", err=True)
         sys.exit(error.code)
+    except PermissionError as error:  # of a folder on the way, wherever it is first looked into
+        if error.filename is None:
+            raise
+        typer.echo(f"myview: {error.filename}: {error.strerror}", err=True)
+        sys.exit(_BAD_INPUT)
     except KeyboardInterrupt:
         sys.exit(_INTERRUPTED)
     except BrokenPipeError:  # whoever read our output has gone, e.g. `myview watch URL | head`

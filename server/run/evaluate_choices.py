@@ -62,16 +62,19 @@ def views_of(
     ``person_of`` says which of the ``people`` an object stands for.
 
     Raises:
-        UserError: a camera has no ground truth.
+        UserError: a camera is not among them, or all choices are of later frames.
     """
     camera_at = {camera: index for index, camera in enumerate(cameras)}
     person_at = {person: index for index, person in enumerate(people)}
     views = np.full((len(people), frames), NO_CAMERA, dtype=np.int64)
+    if choices and all(choice.frame > frames for choice in choices):
+        first = min(choice.frame for choice in choices)
+        raise UserError(f"--views: begins with frame {first}; the ground truth ends with frame {frames}")
     for choice in choices:
         if choice.camera not in camera_at:
             raise UserError(
-                f"--views: camera {choice.camera!r} has no ground truth; there is some of "
-                f"{', '.join(cameras)}"
+                f"--views: camera {choice.camera!r} is not among those that are scored "
+                f"({', '.join(cameras)}): it takes ground truth, and tracks where there are any"
             )
         person = person_of.get(choice.object)
         if person is not None and choice.frame <= frames:
@@ -83,6 +86,6 @@ def _choice(fields: Sequence[str], where: str) -> Choice:
     if len(fields) != len(_HEAD):
         raise UserError(f"{where}: expected {len(_HEAD)} fields, found {len(fields)}")
     frame, number, camera = fields
-    if not (frame.isdecimal() and number.isdecimal() and 1 <= int(frame) <= _LAST_FRAME):
+    if not (frame.isdecimal() and number.isdecimal() and 1 <= int(frame) <= _LAST_FRAME and int(number)):
         raise UserError(f"{where}: frame and object are whole numbers from 1, not {frame!r} and {number!r}")
     return Choice(int(frame), int(number), camera)

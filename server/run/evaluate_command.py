@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -48,19 +49,21 @@ def evaluate(asked: Asked) -> None:
     """
     _check(asked)
     content: dict[str, Any] = {"iou": asked.least_iou}
-    if asked.tracks:
-        recordings = read_recordings(asked.tracks, asked.truth)
-        scores = evaluate_recordings(recordings, asked.least_iou)
-        content |= content_of(scores)
-    else:
-        files = files_by_camera("--gt", asked.truth, "gt")
-        recordings = {camera: Recording(rows_of(path), []) for camera, path in files.items()}
-    judged = None
-    if asked.views is not None:
-        judged, content["views"] = _judge(asked, asked.views, recordings)
-    if asked.json_file is not None:
-        with whole_file(asked.json_file) as draft:
-            draft.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+    with ExitStack() as outputs:  # all of them, or none
+        numbers = outputs.enter_context(whole_file(asked.json_file)) if asked.json_file else None
+        plots = outputs.enter_context(whole_folder(asked.plots)) if asked.plots else None
+        if asked.tracks:
+            recordings = read_recordings(asked.tracks, asked.truth)
+            scores = evaluate_recordings(recordings, asked.least_iou)
+            content |= content_of(scores)
+        else:
+            files = files_by_camera("--gt", asked.truth, "gt")
+            recordings = {camera: Recording(rows_of(path), []) for camera, path in files.items()}
+        judged = None
+        if asked.views is not None:
+            judged, content["views"] = _judge(asked, asked.views, recordings, plots)
+        if numbers is not None:
+            numbers.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
     if asked.tracks:
         print_table(scores)
     if judged is not None:
@@ -75,7 +78,7 @@ def _check(asked: Asked) -> None:
 
 
 def _judge(
-    asked: Asked, choices_file: Path, recordings: dict[str, Recording]
+    asked: Asked, choices_file: Path, recordings: dict[str, Recording], plots: Path | None
 ) -> tuple[Judged, dict[str, Any]]:
     cameras = tuple(recordings)
     choices = read_choices(choices_file)
@@ -95,7 +98,6 @@ def _judge(
                 "ground truth; say who is who with --tracks"
             )
     judged = judge(truth, choices, person_of, facts)
-    if asked.plots is not None:
-        with whole_folder(asked.plots) as folder:
-            plot_views(folder, truth, judged, facts, videos)
+    if plots is not None:
+        plot_views(plots, truth, judged, facts, videos)
     return judged, content_of_views(judged, facts)

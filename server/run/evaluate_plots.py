@@ -40,6 +40,7 @@ def plot_views(
         axis.set_ylim(-0.5, len(truth.cameras) - 0.5)
         axis.set_ylabel(f"person {person}\nobject {judged.objects.get(person, '-')}")
     axes[-1].set_xlabel("seconds")
+    axes[-1].set_xlim(0.0, judged.views.shape[1] / facts.fps)
     lines = [Line2D([], [], color=colour, linewidth=4) for colour in (_CHOSEN, _BEST, _SEEN)]
     figure.legend(lines, ["chosen", "optimum", "visible"], loc="upper right", ncols=3)
     figure.suptitle("Camera chosen for each person", x=0.3)

@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from server.camera.sources.opening import open_video
+from server.run.recorded import Size, look_at, parse_size
 from server.run.setup import camera_name
-from server.run.site_file import SITE_FILE, SiteFacts, Size, read_site
+from server.run.site_file import SITE_FILE, SiteFacts, read_site
 from server.wire.config import View
 from server.wire.errors import UserError
 
@@ -53,9 +53,8 @@ def site_facts(
     sizes: dict[str, Size] = dict(told.sizes) if told else {}
     fps = told.fps if told else None
     for camera, path in videos.items():
-        opened = open_video(str(path))
-        opened.container.close()
-        sizes[camera], fps = opened.size, opened.fps
+        seen = look_at(path)
+        sizes[camera], fps = seen.size, seen.fps or fps
     if options.size is not None:
         sizes = dict.fromkeys(cameras, parse_size(options.size))
     fps = options.fps or fps
@@ -71,15 +70,3 @@ def site_facts(
     else:
         switch_cost_s = told.switch_cost_s if told else View().switch_cost_s
     return SiteFacts(fps, switch_cost_s, {camera: sizes[camera] for camera in cameras})
-
-
-def parse_size(text: str) -> Size:
-    """Read `WIDTHxHEIGHT`.
-
-    Raises:
-        UserError: it is not that.
-    """
-    width, _, height = text.partition("x")
-    if not (width.isdecimal() and height.isdecimal() and int(width) and int(height)):
-        raise UserError(f"--size: {text!r} is not WIDTHxHEIGHT, such as 640x360")
-    return int(width), int(height)

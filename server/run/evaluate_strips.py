@@ -15,7 +15,8 @@ from server.camera.sources import open_source
 from server.run.evaluate_truth import Truth
 from server.run.evaluate_views import Judged
 from server.run.plots import new_figure, save_figure
-from server.run.site_file import SiteFacts, Size
+from server.run.recorded import Size
+from server.run.site_file import SiteFacts
 from server.run.track import pictures
 from server.wire.config import Camera, Site
 

@@ -9,12 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bestview import NOBODY, ViewTruth, stands_for, true_views
+from server.run.recorded import Size
+from server.wire.errors import UserError
 from tracking.evaluation import Recording
 from tracking.evaluation.frames import line_up
 from tracking.motchallenge import MotRow
-
-Size = tuple[int, int]
-"""Width and height of a picture, pixels."""
 
 LEAST_SHOWN = 0.25
 """The share of a person that has to show for a view to show them."""
@@ -44,6 +43,9 @@ def truth_of(
     """Lay out the ground truth of several cameras that share their people's numbers.
 
     Rows of confidence 0 do not count, as in `tracking.evaluation`.
+
+    Raises:
+        UserError: somebody is twice in one frame of a camera.
     """
     counted = {camera: [row for row in found if row.confidence != 0.0] for camera, found in rows.items()}
     people = sorted({row.id for found in counted.values() for row in found})
@@ -51,8 +53,10 @@ def truth_of(
     place = {number: index for index, number in enumerate(people)}
     boxes = np.full((len(people), last, len(counted), 4), np.nan)
     shown = np.full(boxes.shape[:3], -1.0)
-    for camera, found in enumerate(counted.values()):
+    for camera, (name, found) in enumerate(counted.items()):
         for row in found:
+            if not np.isnan(boxes[place[row.id], row.frame - 1, camera, 0]):
+                raise UserError(f"--gt: camera {name}: person {row.id} is twice in frame {row.frame}")
             boxes[place[row.id], row.frame - 1, camera] = row.box
             shown[place[row.id], row.frame - 1, camera] = row.visible
     pictures = np.array([sizes[camera] for camera in counted], dtype=np.float64).reshape(-1, 2)

@@ -115,9 +115,10 @@ def evaluate(
         list[Path] | None, typer.Option("--videos", metavar="FILE…", help="The views, for --plots.")
     ] = None,
     size: Annotated[str | None, typer.Option(help="WIDTHxHEIGHT of the cameras' pictures.")] = None,
-    fps: Annotated[float | None, typer.Option(min=0.01, help="Frames per second.")] = None,
+    fps: Annotated[float | None, typer.Option(min=0.01, max=1000.0, help="Frames per second.")] = None,
     switch_cost: Annotated[
-        float | None, typer.Option(min=0.0, help="Seconds of not seeing somebody that a cut must save.")
+        float | None,
+        typer.Option(min=0.0, max=3600.0, help="Seconds of not seeing somebody that a cut must save."),
     ] = None,
     visible: Annotated[
         float, typer.Option(min=0.0, max=1.0, help="Share of somebody that shows where they are visible.")
@@ -152,12 +153,10 @@ def scene(
     """Write a synthetic multi-view recording with ground truth."""
     from server.camera.scene import Scene, write_recording
     from server.run.progress import bar
+    from server.run.recorded import parse_size
 
-    width, _, height = size.partition("x")
-    if not (width.isdecimal() and height.isdecimal()):
-        raise UserError(f"--size: {size!r} is not WIDTHxHEIGHT, such as 640x360")
     try:
-        drawn = Scene(name, cameras, objects, seed, int(width), int(height), fps)
+        drawn = Scene(name, cameras, objects, seed, *parse_size(size), fps)
         with bar("frames") as progress:
             task = progress.add_task("drawing", total=None)
             write_recording(

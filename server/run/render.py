@@ -9,7 +9,8 @@ from pathlib import Path
 from server.run.films import Films
 from server.run.offline import Batch, CameraWorkers
 from server.run.plots import plot_choices, plot_tracks
-from server.run.site_file import Size, write_site
+from server.run.recorded import Size
+from server.run.site_file import write_site
 from server.view.agreement import Agreement
 from server.view.align import Aligner
 from server.view.decide import Decider, GopDecision, homographies

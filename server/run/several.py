@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 
+from server.wire.errors import UserError
+
 
 def one_value_per_flag(words: Sequence[str], several: Mapping[str, Collection[str]]) -> list[str]:
     """Rewrite a command line so that each of its flags has one value, which is all that the parser knows.
@@ -17,6 +19,9 @@ def one_value_per_flag(words: Sequence[str], several: Mapping[str, Collection[st
 
     Returns:
         The same words, with such a flag in front of each of its values.
+
+    Raises:
+        UserError: a flag has no value; the parser would take the next option for one.
     """
     if not words:
         return []
@@ -27,8 +32,10 @@ def one_value_per_flag(words: Sequence[str], several: Mapping[str, Collection[st
     taking: str | None = None
     for word, following in zip(words[:end], [*words[1:end], "--"], strict=True):
         if _is_option(word):
+            if word in flags and _is_option(following):
+                raise UserError(f"{words[0]}: {word}: names no file")
             taking = word if word in alone else None
-            if taking is None or _is_option(following):  # without a value: the parser says so
+            if taking is None:
                 written.append(word)
         elif taking is not None:
             written += [taking, word]

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from server.run.recorded import Size
 from server.wire.config import Config
 from server.wire.errors import UserError
 
 SITE_FILE = "site.json"
-
-Size = tuple[int, int]
-"""Width and height of a picture, pixels."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,8 +56,12 @@ def read_site(path: Path) -> SiteFacts:
     try:
         content = json.loads(path.read_text(encoding="ascii"))
         sizes = {str(name): (int(width), int(height)) for name, (width, height) in content["sizes"].items()}
-        return SiteFacts(float(content["fps"]), float(content["switch_cost_s"]), sizes)
+        facts = SiteFacts(float(content["fps"]), float(content["switch_cost_s"]), sizes)
     except OSError as error:
         raise UserError(f"{path}: cannot be read: {error.strerror}") from error
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise UserError(f"{path}: is not what `myview render` writes: {error}") from error
+    sensible = 0 < facts.fps < math.inf and 0 <= facts.switch_cost_s < math.inf
+    if not sensible or any(side <= 0 for size in sizes.values() for side in size):
+        raise UserError(f"{path}: a rate, a size or a cost in it makes no sense")
+    return facts

@@ -67,6 +67,7 @@ def solver_for(config: Config, name: str | None) -> Solver:
 def loaded_for(video: Path | None, det: Path | None, config: Path | None) -> Config:
     """Give the configuration, with the video as its only camera."""
     base = read_content(config) if config else {}
+    base.pop("ground", None)  # one camera needs no floor; the file may be what `myview calibrate` is to make
     where, folder = str(config or "myview track"), config.parent if config else Path()
     if video is not None:
         return config_for_videos(

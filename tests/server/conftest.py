@@ -5,9 +5,10 @@ from __future__ import annotations
 import os
 
 import pytest
+from command_line import myview
 from halls import busy, hall
 
-__all__ = ["busy", "hall"]
+__all__ = ["busy", "hall", "myview"]
 
 
 @pytest.fixture(autouse=True)

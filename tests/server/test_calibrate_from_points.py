@@ -3,42 +3,24 @@
 from __future__ import annotations
 
 import json
-import signal
-import sys
-from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
+from command_line import Run
 
 from bestview import to_ground
-from server.run.cli import main
 from server.wire.loading import build_config
 
-Run = Callable[..., tuple[int, str, str]]
 FLOOR = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 3.0], [0.0, 3.0], [2.0, 1.0], [1.0, 2.0], [3.0, 2.5]])
 TO_IMAGE = np.array([[90.0, 30.0, 120.0], [-6.0, 20.0, 330.0], [-0.01, 0.12, 1.0]])
 
 
 @pytest.fixture
-def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Iterator[Run]:
-    """Give a function that runs `myview calibrate` in an empty folder: exit code, output, errors."""
-    before = signal.getsignal(signal.SIGTERM)
+def run(myview: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Run:
+    """Give a function that runs `myview calibrate` in an empty folder."""
     monkeypatch.chdir(tmp_path)
-
-    def command(*arguments: object) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["myview", "calibrate", *map(str, arguments)])
-        capsys.readouterr()
-        code = 0
-        try:
-            main()
-        except SystemExit as end:
-            code = int(end.code or 0)
-        told = capsys.readouterr()
-        return code, told.out, told.err
-
-    yield command
-    signal.signal(signal.SIGTERM, before)
+    return lambda *arguments: myview("calibrate", *arguments)
 
 
 def pairs() -> list[dict[str, list[float]]]:
@@ -73,6 +55,8 @@ def test_csv_and_json_say_the_same(run: Run, tmp_path: Path) -> None:
     assert run("a.json", "--out", "a.ground.json")[0] == 0
     assert run("b.csv", "--unit", "m", "--out", "b.ground.json")[0] == 0
     assert (tmp_path / "a.ground.json").read_bytes() == (tmp_path / "b.ground.json").read_bytes()
+    (tmp_path / "c.csv").write_bytes(b"\xef\xbb\xbf" + (tmp_path / "b.csv").read_bytes())
+    assert run("c.csv", "--unit", "m", "--out", "c.ground.json").code == 0
 
 
 @pytest.mark.parametrize(
@@ -81,6 +65,7 @@ def test_csv_and_json_say_the_same(run: Run, tmp_path: Path) -> None:
         ("p.json", "[1]", 'p.json: has no {"cameras"'),
         ("p.json", "{", "p.json:1: is not JSON"),
         ("p.json", '{"cameras": {}}', "p.json: has no pairs"),
+        ("p.json", "[" * 100_000, "p.json: is not JSON that can be read"),
         ("p.json", '{"cameras": {"c0": [{"image": [1, 2]}]}}', "p.json: camera c0: pair 1: is not {"),
         ("p.json", '{"cameras": {"c0": [{"image": [1, 2], "floor": [1, "x"]}]}}', "are not four numbers"),
         ("p.csv", "a,b\n1,2\n", "p.csv:1: has no column 'camera'"),

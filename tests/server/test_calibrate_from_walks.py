@@ -3,41 +3,25 @@
 from __future__ import annotations
 
 import json
-import signal
-import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+from command_line import Run, refusal
+from videos_by_hand import write_video
 
-from server.run.cli import main
 from server.wire.loading import build_config
 from tracking.motchallenge import MotRow, write_rows
 
-Run = Callable[..., tuple[int, str, str]]
 OFFSET = 6
 
 
 @pytest.fixture
-def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Iterator[Run]:
-    """Give a function that runs `myview calibrate` in an empty folder: exit code, output, errors."""
-    before = signal.getsignal(signal.SIGTERM)
+def run(myview: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Run:
+    """Give a function that runs `myview calibrate` in an empty folder."""
     monkeypatch.chdir(tmp_path)
-
-    def command(*arguments: object) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["myview", "calibrate", *map(str, arguments)])
-        capsys.readouterr()
-        code = 0
-        try:
-            main()
-        except SystemExit as end:
-            code = int(end.code or 0)
-        told = capsys.readouterr()
-        return code, told.out, told.err
-
-    yield command
-    signal.signal(signal.SIGTERM, before)
+    return lambda *arguments: myview("calibrate", *arguments)
 
 
 def camera(east: float, north: float) -> np.ndarray:
@@ -101,7 +85,7 @@ def test_a_walk_in_the_middle_alone_is_written_only_if_forced(run: Run, tmp_path
         return np.column_stack([0.7 * np.sin(frames / 23.0), 0.7 * np.sin(frames / 15.0 + 1)])
 
     write_walk(tmp_path / "tracks", 300, near_the_middle)
-    given = ("tracks", "--size", "640x360", "--shift", "0.4", "--out", "ground.json")
+    given = ("tracks", "--size", "640x360", "--shift", "0", "--out", "ground.json")
     code, _, err = run(*given)
     assert code == 2
     assert "the walk covered too little: walk also" in err
@@ -122,6 +106,7 @@ def test_a_walk_in_the_middle_alone_is_written_only_if_forced(run: Run, tmp_path
         (("a.txt",), "two cameras at least"),
         (("a.txt", "b.txt", "--size", "wide"), "--size: 'wide' is not WIDTHxHEIGHT"),
         (("p.csv", "a.txt"), "marked points are one file"),
+        (("a.txt", "film.mp4"), "a.txt is tracks and film.mp4 is not"),
         (("a.txt", "b.txt", "--plan", "ground.json"), "the floor plan would be written there too"),
     ],
 )
@@ -134,9 +119,21 @@ def test_what_cannot_be_a_walk_is_refused_in_a_line(
         ("det.txt", "1,-1,10,10,20,50,1,-1,-1,-1\n"),
         ("empty.txt", ""),
         ("p.csv", ""),
+        ("film.mp4", ""),
     ):
         (tmp_path / name).write_text(text)
     code, out, err = run(*arguments, "--out", "ground.json")
     assert (code, out, len(err.splitlines())) == (2, "", 1)
     assert words in err
     assert not (tmp_path / "ground.json").exists()
+
+
+def test_videos_are_tracked_first_and_must_have_one_rate(run: Run, tmp_path: Path) -> None:
+    write_video(tmp_path / "c0.mp4", 20)
+    write_video(tmp_path / "c1.mp4", 20, fps=30)
+    line = refusal(run("c0.mp4", "c1.mp4", "--out", "ground.json"))
+    assert "c1 has 30 frames a second and c0 25" in line
+    (tmp_path / "site.yaml").write_text("ground: ground.json\n")  # which is to be made
+    ended = run("c0.mp4", "c1.mp4", "--fps", "25", "--config", "site.yaml", "--out", "ground.json")
+    assert (ended.code, ended.err) == (2, "tracking c0\nmyview: c0.mp4: nobody is in it\n")
+    assert {it.name for it in tmp_path.iterdir()} == {"c0.mp4", "c1.mp4", "site.yaml"}

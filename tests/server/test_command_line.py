@@ -2,65 +2,22 @@
 
 from __future__ import annotations
 
-import signal
 import socket
-import sys
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 import yaml
+from command_line import Run, refusal
 from videos_by_hand import write_video
-
-from server.run.cli import main
-
-BAD_INPUT = 2
-
-
-@dataclass(frozen=True, slots=True)
-class Ended:
-    """How a command ended."""
-
-    code: int
-    out: str
-    err: str
-
-
-Run = Callable[..., Ended]
 
 
 @pytest.fixture
-def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Iterator[Run]:
-    """Give a function that runs `myview` in this process, in an empty folder."""
-    before = signal.getsignal(signal.SIGTERM)
+def run(myview: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Run:
+    """Give a function that runs `myview` in an empty folder."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.delenv("MYVIEW_HTTP__PORT", raising=False)
-
-    def command(*arguments: object) -> Ended:
-        monkeypatch.setattr(sys, "argv", ["myview", *map(str, arguments)])
-        capsys.readouterr()
-        code = 0
-        try:
-            main()
-        except SystemExit as end:
-            code = int(end.code or 0)
-        told = capsys.readouterr()
-        return Ended(code, told.out, told.err)
-
-    yield command
-    signal.signal(signal.SIGTERM, before)
-
-
-def refusal(ended: Ended) -> str:
-    """Give the one line that says what is wrong."""
-    assert ended.code == BAD_INPUT
-    assert ended.out == ""
-    lines = ended.err.splitlines()
-    assert len(lines) == 1, ended.err
-    assert lines[0].startswith("myview: ")
-    return lines[0]
+    return myview
 
 
 def written(folder: Path) -> set[str]:

@@ -9,48 +9,29 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from command_line import Run, refusal
 
-from server.run.cli import main
 from tracking.motchallenge import MotRow, format_rows
 
-BAD_INPUT = 2
-Run = Callable[..., str]
+Printed = Callable[..., str]
 
 
 @pytest.fixture
-def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Run:
+def run(myview: Run) -> Printed:
     """Give a function that runs `myview evaluate` and gives what it prints."""
 
     def command(*arguments: object) -> str:
-        monkeypatch.setattr(sys, "argv", ["myview", "evaluate", *map(str, arguments)])
-        capsys.readouterr()
-        code = 0
-        try:
-            main()
-        except SystemExit as end:
-            code = int(end.code or 0)
-        told = capsys.readouterr()
-        assert code == 0, told.err
-        return told.out
+        ended = myview("evaluate", *arguments)
+        assert ended.code == 0, ended.err
+        return ended.out
 
     return command
 
 
 @pytest.fixture
-def refused(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Run:
+def refused(myview: Run) -> Printed:
     """Give a function that runs `myview evaluate` and gives the one line that says what is wrong."""
-
-    def command(*arguments: object) -> str:
-        monkeypatch.setattr(sys, "argv", ["myview", "evaluate", *map(str, arguments)])
-        capsys.readouterr()
-        with pytest.raises(SystemExit) as end:
-            main()
-        told = capsys.readouterr()
-        assert (end.value.code, told.out) == (BAD_INPUT, "")
-        (line,) = told.err.splitlines()
-        return line
-
-    return command
+    return lambda *arguments: refusal(myview("evaluate", *arguments))
 
 
 def people(numbers: tuple[int, ...], frames: range = range(1, 6)) -> str:
@@ -72,7 +53,7 @@ def rows(printed: str) -> dict[str, list[str]]:
     return {line.split()[0]: line.split() for line in printed.splitlines() if line.strip()}
 
 
-def test_one_file_against_another(run: Run, tmp_path: Path) -> None:
+def test_one_file_against_another(run: Printed, tmp_path: Path) -> None:
     tracks = write(tmp_path / "street.txt", people((1, 2)))
     truth = write(tmp_path / "truth.txt", people((7, 8)))
     table = rows(run("--tracks", tracks, "--gt", truth))
@@ -81,7 +62,7 @@ def test_one_file_against_another(run: Run, tmp_path: Path) -> None:
     assert "joint" not in table
 
 
-def test_a_rendered_folder_against_packed_truth(run: Run, tmp_path: Path) -> None:
+def test_a_rendered_folder_against_packed_truth(run: Printed, tmp_path: Path) -> None:
     for camera, numbers in (("c0", (1, 2)), ("c1", (2, 1))):
         write(tmp_path / "seen" / "tracks" / f"{camera}.txt", people(numbers))
         write(tmp_path / "hall" / "gt" / f"{camera}.txt.gz", people((5, 6)))
@@ -98,25 +79,25 @@ def test_a_rendered_folder_against_packed_truth(run: Run, tmp_path: Path) -> Non
     assert numbers["joint"]["idf1"] == 0.5
 
 
-def test_nobody_found_is_a_score_too(run: Run, tmp_path: Path) -> None:
+def test_nobody_found_is_a_score_too(run: Printed, tmp_path: Path) -> None:
     tracks = write(tmp_path / "c0.txt", "")
     table = rows(run("--tracks", tracks, "--gt", write(tmp_path / "gt.txt", people((1,)))))
     assert table["c0"][4] == "0.0"
 
 
-def test_a_smaller_overlap_may_be_enough(run: Run, tmp_path: Path) -> None:
+def test_a_smaller_overlap_may_be_enough(run: Printed, tmp_path: Path) -> None:
     truth = write(tmp_path / "gt.txt", people((1,)))
     moved = write(tmp_path / "c0.txt", people((1,)).replace(",1,0.00,0.00,", ",1,16.00,0.00,"))
     assert rows(run("--tracks", moved, "--gt", truth))["c0"][6] == "0.0"
     assert rows(run("--tracks", moved, "--gt", truth, "--iou", 0.4))["c0"][6] == "100.0"
 
 
-def test_what_is_not_there_is_named(refused: Run, tmp_path: Path) -> None:
+def test_what_is_not_there_is_named(refused: Printed, tmp_path: Path) -> None:
     tracks = write(tmp_path / "c0.txt", people((1,)))
     assert refused("--tracks", tracks, "--gt", "nowhere.txt") == "myview: nowhere.txt: is not there"
 
 
-def test_several_files_belong_together_by_their_names_in_whatever_order(run: Run, tmp_path: Path) -> None:
+def test_several_files_belong_together_by_their_names_in_whatever_order(run: Printed, tmp_path: Path) -> None:
     found = [write(tmp_path / "seen" / f"c{it}.txt", people((it + 1,))) for it in range(3)]
     there = [write(tmp_path / "gt" / f"c{it}.txt.gz", people((it + 1,))) for it in (2, 0, 1)]
     once = rows(run("--gt", *there, "--tracks", *found))
@@ -126,7 +107,7 @@ def test_several_files_belong_together_by_their_names_in_whatever_order(run: Run
     assert rows(run(*repeated, "--tracks", tmp_path / "seen")) == once
 
 
-def test_files_of_other_names_belong_together_in_their_order(run: Run, tmp_path: Path) -> None:
+def test_files_of_other_names_belong_together_in_their_order(run: Printed, tmp_path: Path) -> None:
     found = [write(tmp_path / f"{name}.txt", people((1,))) for name in ("left", "right")]
     there = [write(tmp_path / name / "gt.txt", people((1,))) for name in ("a", "b")]
     assert list(rows(run("--gt", *there, "--tracks", *found))) == [
@@ -140,7 +121,7 @@ def test_files_of_other_names_belong_together_in_their_order(run: Run, tmp_path:
     assert list(table) == ["camera", "left", "right", "mean,", "joint"]
 
 
-def test_files_that_cannot_be_paired_are_refused(refused: Run, tmp_path: Path) -> None:
+def test_files_that_cannot_be_paired_are_refused(refused: Printed, tmp_path: Path) -> None:
     a, b, c = (write(tmp_path / f"{name}.txt", people((1,))) for name in "abc")
     b2, a2 = (write(tmp_path / "gt" / f"{name}.txt", people((1,))) for name in "ba")
     assert "1 files of tracks (a.txt) for 2 of ground truth" in refused("--tracks", a, "--gt", b2, c)
@@ -150,44 +131,44 @@ def test_files_that_cannot_be_paired_are_refused(refused: Run, tmp_path: Path) -
     assert "cannot tell the cameras apart" in refused("--tracks", a, a2, "--gt", b, b2)
 
 
-def test_folders_without_common_names_are_refused(refused: Run, tmp_path: Path) -> None:
+def test_folders_without_common_names_are_refused(refused: Printed, tmp_path: Path) -> None:
     write(tmp_path / "a" / "c0.txt", people((1,)))
     view = write(tmp_path / "b" / "view1.txt", people((1,)))
     assert "c0.txt here, view1.txt there" in refused("--tracks", tmp_path / "a", "--gt", tmp_path / "b")
     assert "c0.txt here, view1.txt there" in refused("--tracks", tmp_path / "a", "--gt", view)
 
 
-def test_a_folder_without_tracks_is_refused(refused: Run, tmp_path: Path) -> None:
+def test_a_folder_without_tracks_is_refused(refused: Printed, tmp_path: Path) -> None:
     (tmp_path / "empty").mkdir()
     assert "no .txt or .txt.gz files" in refused("--tracks", tmp_path / "empty", "--gt", tmp_path / "empty")
 
 
-def test_frames_that_never_meet_are_refused(refused: Run, tmp_path: Path) -> None:
+def test_frames_that_never_meet_are_refused(refused: Printed, tmp_path: Path) -> None:
     tracks = write(tmp_path / "c0.txt", people((1,)))
     truth = write(tmp_path / "gt.txt", people((1,), range(100, 121)))
     assert "frames 1 to 5 here, 100 to 120 there" in refused("--tracks", tracks, "--gt", truth)
 
 
-def test_truth_of_nobody_is_refused(refused: Run, tmp_path: Path) -> None:
+def test_truth_of_nobody_is_refused(refused: Printed, tmp_path: Path) -> None:
     tracks = write(tmp_path / "c0.txt", people((1,)))
     truth = write(tmp_path / "gt.txt", people((1,)).replace(",1.00,-1,", ",0,-1,"))
     assert "nobody is in it who counts" in refused("--tracks", tracks, "--gt", truth)
 
 
-def test_a_malformed_row_is_named(refused: Run, tmp_path: Path) -> None:
+def test_a_malformed_row_is_named(refused: Printed, tmp_path: Path) -> None:
     tracks = write(tmp_path / "c0.txt", people((1,)) + "6,1,left\n")
     truth = write(tmp_path / "gt.txt", people((1,)))
     assert f"{tracks}:6: " in refused("--tracks", tracks, "--gt", truth)
 
 
-def test_detections_are_not_tracks(refused: Run, tmp_path: Path) -> None:
+def test_detections_are_not_tracks(refused: Printed, tmp_path: Path) -> None:
     tracks = write(tmp_path / "det.txt", people((-1, -1)))
     truth = write(tmp_path / "gt.txt", people((1,)))
     assert "these are detections, not tracks" in refused("--tracks", tracks, "--gt", truth)
 
 
 def test_without_the_library_the_extra_is_named(
-    refused: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    refused: Printed, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for name in [*sys.modules]:
         if name.startswith(("tracking.evaluation", "server.run.evaluate", "motrics")):

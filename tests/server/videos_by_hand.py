@@ -14,10 +14,10 @@ STEP = 10
 """Grey levels between two frames."""
 
 
-def write_video(path: Path, frames: int, *, codec: str = "libx264", b_frames: int = 0) -> Path:
+def write_video(path: Path, frames: int, *, codec: str = "libx264", b_frames: int = 0, fps: int = 25) -> Path:
     """Write a video whose frame n has the grey STEP * n; a key frame every 10."""
     with av.open(str(path), "w") as container:
-        stream = container.add_stream(codec, rate=25)
+        stream = container.add_stream(codec, rate=fps)
         assert isinstance(stream, VideoStream)
         stream.width, stream.height = WIDTH, HEIGHT
         stream.pix_fmt = "yuvj420p" if codec == "mjpeg" else "yuv420p"
@@ -32,7 +32,7 @@ def write_video(path: Path, frames: int, *, codec: str = "libx264", b_frames: in
         for number in range(frames):
             picture = np.full((HEIGHT, WIDTH, 3), STEP * number, dtype=np.uint8)
             frame = av.VideoFrame.from_ndarray(picture, format="bgr24")
-            frame.pts, frame.time_base = number, Fraction(1, 25)
+            frame.pts, frame.time_base = number, Fraction(1, fps)
             container.mux(stream.encode(frame))
         container.mux(stream.encode(None))
     return path

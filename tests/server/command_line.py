@@ -1,0 +1,53 @@
+"""Running `myview` in the tests' own process."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+import pytest
+
+from server.run.cli import main
+
+BAD_INPUT = 2
+
+
+class Ended(NamedTuple):
+    """How a command ended."""
+
+    code: int
+    out: str
+    err: str
+
+
+def refusal(ended: Ended) -> str:
+    """Give the one line that says what is wrong with the input."""
+    assert (ended.code, ended.out) == (BAD_INPUT, ""), ended.err
+    (line,) = ended.err.splitlines()
+    assert line.startswith("myview: ")
+    return line
+
+
+Run = Callable[..., Ended]
+
+
+@pytest.fixture
+def myview(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Iterator[Run]:
+    """Give a function that runs `myview` with some arguments."""
+    before = signal.getsignal(signal.SIGTERM)
+
+    def command(*arguments: object) -> Ended:
+        monkeypatch.setattr(sys, "argv", ["myview", *map(str, arguments)])
+        capsys.readouterr()
+        code = 0
+        try:
+            main()
+        except SystemExit as end:
+            code = int(end.code or 0)
+        told = capsys.readouterr()
+        return Ended(code, told.out, told.err)
+
+    yield command
+    signal.signal(signal.SIGTERM, before)
