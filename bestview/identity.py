@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bestview.alignment import GroundAlignment
 from bestview.appearance import KNOWN_PAIRS, Appearances, normalised
 from bestview.corrections import Corrections, Merge, Split
 from bestview.evidence import PairEvidence, TrackKey
@@ -81,6 +82,7 @@ class IdentityRegistry:
         self._people = People(settings)
         self._heirs = Heirs(settings.continuity)
         self._corrections = Corrections()
+        self._alignment = GroundAlignment(settings.trust_ground)
         self._last_frame: int | None = None
 
     def update(self, tracks: Sequence[LocalTrack], last_frame: int) -> IdentityUpdate:
@@ -93,7 +95,8 @@ class IdentityRegistry:
         """
         if self._last_frame is not None and last_frame <= self._last_frame:
             raise ValueError(f"the update for frame {last_frame} comes after that for {self._last_frame}")
-        seen = line_up(tracks, self._homographies, last_frame, self._foot_error)
+        given = line_up(tracks, self._homographies, last_frame, self._foot_error)
+        seen = self._alignment.corrected(given)
         since = last_frame - seen.boxes.shape[1] if self._last_frame is None else self._last_frame
         self._last_frame = last_frame
         present = seen.present(since, last_frame)
@@ -105,6 +108,9 @@ class IdentityRegistry:
         places = seen.places(rows)
         self._gather(seen, present, last_frame)
         merged = self._regroup(seen, self._inherit(seen, present, places))
+        self._alignment.learn(
+            given, self._people.serials(seen.keys), present, self._gate(), self._scale.height
+        )
         self._remember({track.key: track for track in tracks}, [seen.keys[i] for i in rows], places)
         finding = Finding(self._settings, self._appearances, self._gate(), self._scale.height)
         born, found = self._people.confirm(finding, since)

@@ -24,6 +24,8 @@ class IdentitySettings:
     # not, which is along the line of sight.
     foot_sideways: float = 0.05
     foot_upwards: float = 0.2
+    # Sightings of people in two cameras that weigh as much as the homographies, which they correct.
+    trust_ground: float = 50.0
     # Fastest plausible walk in person heights per frame, for who was lost and found (0.06: 2.5 m/s at 25/s).
     speed_heights: float = 0.06
     # Histograms further apart than this (mean difference of their CDFs, 0..1) are two people's.
