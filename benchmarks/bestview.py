@@ -27,10 +27,11 @@ from pathlib import Path
 import cv2
 
 from benchmarks.bestview_calibrate import CannotCalibrateError, calibrated
-from benchmarks.bestview_cases import Case, Watched, auditorium, room, terrace
+from benchmarks.bestview_cases import Case, auditorium, room, terrace
 from benchmarks.bestview_join import own_tracks
 from benchmarks.bestview_plot import plot_sweeps, plot_ways
 from benchmarks.bestview_sweep import Swept, sweep, sweep_tables
+from benchmarks.bestview_watch import Watched
 from benchmarks.bestview_ways import Outcome, outcome, ways
 from benchmarks.bestview_why import Losses, losses
 from benchmarks.peer_environment import PeerEnvironment, PeersAwayError, default_folder, peer_environment

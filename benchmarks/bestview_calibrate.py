@@ -7,7 +7,8 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
-from benchmarks.bestview_cases import Case, Rows
+from benchmarks.bestview_cases import Case
+from benchmarks.bestview_watch import Rows
 from benchmarks.surroundings import ROOT, one_thread_environment
 from tracking.motchallenge import write_rows
 

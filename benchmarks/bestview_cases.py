@@ -2,68 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import count
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from benchmarks.observers import SURE, rows_of
+from benchmarks.bestview_watch import Rows, Watched, from_detections, from_pictures
 from benchmarks.surroundings import CannotRunError
 from benchmarks.views import Views, find_views
-from server.camera.observe import Observer
-from server.camera.pipeline import CameraPipeline
-from server.camera.report import Reporter
 from server.camera.scene import Scene, write_recording
-from server.camera.sources import SourceEnded
 from server.run.evaluate_truth import Truth, truth_of
 from server.run.recorded import Size
 from server.wire.config import Config
 from server.wire.loading import build_config
-from server.wire.messages import CameraTracks
-from tracking import Detections, OnlineTracker, solver_named
-from tracking.detectors import Image, MotFileDetector
 from tracking.motchallenge import MotRow, read_rows
-
-Messages = Mapping[str, list[CameraTracks]]
-"""What each camera said, epoch by epoch."""
-
-Rows = Mapping[str, list[MotRow]]
-"""Boxes of each camera."""
 
 _AUDITORIUM = ("HC3", "HC4", "IP2", "IP5")
 _AUDITORIUM_SIZE, _AUDITORIUM_FPS = (1920, 1080), 30.0
 _ROOM_SIZE, _ROOM_FPS, _ROOM_SEED = (640, 360), 25.0, 1
-_NO_PICTURE = np.empty((0, 0, 3), dtype=np.uint8)
-
-
-@dataclass(frozen=True, slots=True)
-class Watched:
-    """What the cameras of a scene made of it, each by itself.
-
-    Attributes:
-        messages: what each said.
-        boxes: the detections that other trackers get: those of a file, or what the detector is sure of.
-    """
-
-    messages: Messages
-    boxes: Rows
-
-
-class Listening:
-    """A detector that passes on what another finds, and keeps what it is sure of."""
-
-    def __init__(self, detector: Observer, kept: list[MotRow]) -> None:
-        self._detector, self._kept = detector, kept
-        self.bins = detector.bins
-
-    def detect(self, image: Image, frame: int | None = None) -> Detections:
-        """Give what the other finds."""
-        found = self._detector.detect(image, frame)
-        self._kept += (row for row in rows_of(frame or 0, found) if row.confidence >= SURE)
-        return found
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -114,13 +70,13 @@ class Case:
         if self.detections is not None:
             files = self.detections
             return Watched(
-                {camera: list(_from_detections(config, camera, files[camera])) for camera in self.gt},
+                {camera: list(from_detections(config, camera, files[camera])) for camera in self.gt},
                 {camera: read_rows(files[camera]) for camera in self.gt},
             )
         messages, boxes = {}, {}
         for camera in self.gt:
             boxes[camera] = found = list[MotRow]()
-            messages[camera] = list(_from_pictures(config, camera, found))
+            messages[camera] = list(from_pictures(config, camera, found))
         return Watched(messages, boxes)
 
 
@@ -174,35 +130,3 @@ def _content(views: Views) -> dict[str, Any]:
     if views.ground is not None:
         content["ground"] = str(views.ground.absolute())
     return content
-
-
-def _from_pictures(config: Config, camera: str, found: list[MotRow]) -> Iterator[CameraTracks]:
-    """Search a recording: what a camera's process would say, without encoding anything.
-
-    `found` takes up the detections.
-    """
-    pipeline = CameraPipeline(config, camera)
-    pipeline._detector = Listening(pipeline._detector, found)  # noqa: SLF001 — what it finds is nowhere told
-    for pulse in count():
-        try:
-            image = pipeline.take(pulse)
-        except SourceEnded:
-            break
-        message = pipeline.track(pulse, image)
-        if message is not None:
-            yield message
-    yield pipeline.finish(pulse)
-    pipeline.close()
-
-
-def _from_detections(config: Config, camera: str, path: Path) -> Iterator[CameraTracks]:
-    """Track detections without pictures, as `myview track --det` does."""
-    detector = MotFileDetector(path)
-    settings, site = config.track, config.site
-    tracker = OnlineTracker(settings.window, settings.costs, solver_named(settings.solver))
-    reporter = Reporter(camera, 0, (site.width, site.height), settings.window.stride)
-    for pulse in range(detector.last + 1):
-        result = tracker.push(pulse, detector.detect(_NO_PICTURE, pulse))
-        if result is not None:
-            yield reporter.regular(result)
-    yield reporter.closing(tracker.flush(), detector.last)

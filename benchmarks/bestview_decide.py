@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.bestview_cases import Messages, Rows
+from benchmarks.bestview_watch import Messages, Rows
 from bestview import NO_CAMERA, IdentityUpdate, LocalTrack, size_quality
 from server.run.evaluate_choices import Choice, read_choices
 from server.view.align import Aligner

@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from benchmarks.bestview_cases import Messages, Rows
+from benchmarks.bestview_watch import Messages, Rows
 from bestview import IdentitySettings, feet, person_heights, to_ground
 from tracking.boxes import Floats
 from tracking.evaluation import perfect_association

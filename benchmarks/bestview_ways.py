@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from benchmarks.bestview_cases import Case, Rows, Watched
+from benchmarks.bestview_cases import Case
 from benchmarks.bestview_decide import Rendering, decide, decide_given, largest
 from benchmarks.bestview_join import (
     boxes_by_truth,
@@ -17,6 +17,7 @@ from benchmarks.bestview_join import (
     own_tracks,
     tracks_by_truth,
 )
+from benchmarks.bestview_watch import Rows, Watched
 from benchmarks.peer_environment import PEERS, PeerEnvironment
 from bestview import ViewScore
 from server.run.evaluate_choices import Choice

@@ -20,11 +20,12 @@ import yaml
 from benchmarks.calibration_errors import Agreement, agreement, error_of_known
 from benchmarks.recordings import Recording, track
 from benchmarks.report import Report
-from benchmarks.surroundings import CannotRunError, finish, parser
+from benchmarks.surroundings import CannotRunError, parser
 from benchmarks.views import Views, find_views
 from bestview.calibrate import CalibrationError, Track, Walk, WalkCalibration, calibrate_walks
 from server.camera.scene import Scene, write_recording
-from server.run.calibrate_plan import PlanView, plot_plan
+from server.run.calibrate_file import write_ground
+from server.run.calibrate_plan import plan_of, plot_plan
 from server.run.calibrate_tracks import Picture, walk_settings, walks_from_tracks
 from server.run.evaluate import evaluate_recordings, read_recordings
 from server.run.render import render
@@ -113,8 +114,7 @@ def terrace_rows(report: Report, data: Path, folder: Path, out: Path) -> None:
     found = calibrate_walks(walked.walks, walk_settings(walked.fps, _SHIFT_S), _PERSON)
     _plot(found, out / "calibration_terrace.png")
     ours = folder / "terrace.json"
-    matrices = {it.camera: it.homography.tolist() for it in found.cameras}
-    ours.write_text(json.dumps({"homography": matrices}), encoding="utf-8")
+    write_ground(ours, "m", {it.camera: it.homography for it in found.cameras})
     assert views.ground is not None  # noqa: S101 — the recording has one
     rows = []
     for name, ground in (("published", views.ground), ("from its own tracks", ours)):
@@ -147,8 +147,7 @@ def auditorium_rows(report: Report, data: Path, folder: Path, out: Path) -> None
     found = calibrate_walks(walked.walks, walk_settings(walked.fps, 0.0), _PERSON)
     _plot(found, out / "calibration_auditorium.png")
     ground = folder / "auditorium.json"
-    matrices = {it.camera: it.homography.tolist() for it in found.cameras}
-    ground.write_text(json.dumps({"homography": matrices}), encoding="utf-8")
+    write_ground(ground, "m", {it.camera: it.homography for it in found.cameras})
     rows = [
         [f"{one}, {other}", *_cells(seen)]
         for (one, other), seen in agreement(ground, source / "gt", size).items()
@@ -168,22 +167,21 @@ def _cells(seen: Agreement) -> Sequence[str]:
 
 def _plot(found: WalkCalibration, path: Path) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
-    views = [PlanView(it.camera, it.homography, it.image, it.place, it.floor) for it in found.cameras]
-    plot_plan(views, "m", path)
+    plot_plan(plan_of(found), "m", path)
 
 
 def main() -> None:
     """Run it with the command line's options."""
     chosen = parser(__doc__, "calibration").parse_args()
     report = Report()
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
+    with tempfile.TemporaryDirectory() as work:
+        folder = Path(work)
         room_rows(report, folder, chosen.out)
-        try:
-            terrace_rows(report, chosen.data, folder, chosen.out)
-            auditorium_rows(report, chosen.data, folder, chosen.out)
-        except (CannotRunError, CalibrationError) as problem:
-            finish(CannotRunError(str(problem)), "calibration")
+        for name, rows in (("terrace", terrace_rows), ("auditorium", auditorium_rows)):
+            try:
+                rows(report, chosen.data, folder, chosen.out)
+            except (CannotRunError, CalibrationError) as problem:
+                report.say(f"{name}: left out: {problem}")
     report.save(chosen.out / "calibration.txt")
 
 

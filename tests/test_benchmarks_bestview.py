@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from benchmarks import bestview
-from benchmarks.bestview_cases import Case, Rows
+from benchmarks.bestview_cases import Case
 from benchmarks.bestview_decide import Rendering, decide_given, largest
 from benchmarks.bestview_join import (
     boxes_by_truth,
@@ -22,6 +22,7 @@ from benchmarks.bestview_join import (
     tracks_by_truth,
 )
 from benchmarks.bestview_sweep import DEFAULT_SWITCH_COST_S, STRIDE, Setting, sweep
+from benchmarks.bestview_watch import Rows
 from benchmarks.bestview_ways import Way, outcome, visible_rows
 from benchmarks.bestview_why import Losses, losses
 from server.run.evaluate_choices import Choice

@@ -17,7 +17,7 @@ from bestview.calibrate import (
     fit_cameras,
 )
 from server.run.calibrate_file import write_ground
-from server.run.calibrate_plan import PlanView, plot_plan
+from server.run.calibrate_plan import PlanView, plan_of, plot_plan
 from server.run.calibrate_points import read_points
 from server.run.calibrate_tracks import Walked
 from server.run.calibrate_words import details, in_words, missed
@@ -59,8 +59,7 @@ def calibrate_from_walks(
         raise UserError(
             f"calibrate: the walk covered too little: {worst.words} (--force writes it all the same)"
         )
-    views = [PlanView(it.camera, it.homography, it.image, it.place, it.floor) for it in found.cameras]
-    plot_plan(views, "m", plan)
+    plot_plan(plan_of(found), "m", plan)
     homographies = {it.camera: it.homography for it in found.cameras}
     write_ground(out, "m", homographies, details(found, person))
     return [*in_words(walked, found, settings), *(it.words for it in missing)]

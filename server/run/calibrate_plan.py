@@ -15,7 +15,7 @@ from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 
 from bestview import to_ground
-from bestview.calibrate import Floats
+from bestview.calibrate import Floats, WalkCalibration
 
 _COLOURS = ("#1b7f5c", "#c8501e", "#4a5fc1", "#a8327d", "#8a7a10", "#2b8fb3", "#7b4a2b", "#555555")
 _INCHES = 9.0
@@ -40,6 +40,11 @@ class PlanView:
     image: Floats
     place: Floats
     floor: int = 0
+
+
+def plan_of(found: WalkCalibration) -> list[PlanView]:
+    """Give what there is to draw of a calibration from walks."""
+    return [PlanView(it.camera, it.homography, it.image, it.place, it.floor) for it in found.cameras]
 
 
 def plot_plan(views: Sequence[PlanView], unit: str, out: Path) -> None:
