@@ -35,6 +35,11 @@ class Claims:
     seen: NDArray[np.bool_]
     worth: NDArray[np.float64]
 
+    def of(self, rows: NDArray[np.int64]) -> Claims:
+        """Give the claims of the tracks from the first to the last of `rows`."""
+        mine = slice(*np.searchsorted(self.track, [rows[0], rows[-1] + 1]).tolist())
+        return Claims(self.track[mine], self.person[mine], self.mine[mine], self.seen[mine], self.worth[mine])
+
 
 def claims(
     problem: GroupingProblem, links: Links, person: NDArray[np.int64], rows: NDArray[np.int64]
@@ -81,22 +86,21 @@ def _speaks(
     return np.asarray(problem.present[other] != own_camera)
 
 
-def settled_cameras(problem: GroupingProblem, every: Claims) -> NDArray[np.bool_]:
-    """Say of each camera whether its tracks' own persons are worth more to them than any other.
+def unsettled_cameras(problem: GroupingProblem, some: Claims) -> NDArray[np.bool_]:
+    """Say of each camera whether an assignment of its tracks might be better than each staying whose it is.
 
-    Then no assignment is better. `every` has the claims of all present tracks.
+    It cannot where their own persons are worth more to all of them than any other. `some` has all claims of
+    a camera's present tracks, or none.
     """
     tracks = problem.camera.size
-    own, best = np.full(tracks, FORBIDDEN), np.full(tracks, VACANT)
-    own[every.track[every.mine]] = every.worth[every.mine]
-    np.maximum.at(best, every.track[~every.mine], every.worth[~every.mine])
-    better = problem.present & (own <= best)
+    own, best = np.full(tracks, np.inf), np.full(tracks, VACANT)
+    own[some.track[some.mine]] = some.worth[some.mine]
+    np.maximum.at(best, some.track[~some.mine], some.worth[~some.mine])
+    unsettled = np.zeros(int(problem.camera.max(initial=-1)) + 1, dtype=np.bool_)
+    unsettled[problem.camera[own <= best]] = True
     # Two tracks of one camera cannot both stay with one person.
-    track, whom = every.track[every.mine], every.person[every.mine]
+    track, whom = some.track[some.mine], some.person[some.mine]
     order = np.lexsort((whom, problem.camera[track]))
     camera, whom = problem.camera[track][order], whom[order]
-    twice = (camera[1:] == camera[:-1]) & (whom[1:] == whom[:-1])
-    settled = np.ones(int(problem.camera.max(initial=-1)) + 1, dtype=np.bool_)
-    settled[problem.camera[better]] = False
-    settled[camera[1:][twice]] = False
-    return settled
+    unsettled[camera[1:][(camera[1:] == camera[:-1]) & (whom[1:] == whom[:-1])]] = True
+    return unsettled

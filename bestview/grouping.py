@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from bestview.claims import FORBIDDEN, VACANT, claims, settled_cameras
+from bestview.claims import FORBIDDEN, VACANT, Claims, claims, unsettled_cameras
 from bestview.grouping_problem import GroupingProblem, Links
 from bestview.merging import merge_wholes
 
@@ -44,32 +44,36 @@ def _sweep(problem: GroupingProblem, links: Links, person: NDArray[np.int64], gi
     Persons from `given` on are new.
     """
     present = np.flatnonzero(problem.present)
-    look = ~settled_cameras(problem, claims(problem, links, person, present))
+    every = claims(problem, links, person, present)
+    look, stale = unsettled_cameras(problem, every), np.zeros(int(problem.camera.max()) + 1, dtype=np.bool_)
     for camera in np.unique(problem.camera[present]).tolist():
-        if look[camera]:
-            rows = present[problem.camera[present] == camera]
-            touched = _assign_camera(problem, links, person, rows, max(given, int(person.max()) + 1))
-            # Whose claims say something else now: those persons' tracks, and all that they are linked to.
-            near = np.isin(person, touched)
-            near[links.other[near[links.track]]] = True
-            look[problem.camera[near]] = True
+        if not (look[camera] or stale[camera]):
+            continue
+        rows = present[problem.camera[present] == camera]
+        found = claims(problem, links, person, rows) if stale[camera] else every.of(rows)
+        if stale[camera] and not unsettled_cameras(problem, found)[camera]:
+            continue
+        touched = _assign_camera(problem, found, person, rows, max(given, int(person.max()) + 1))
+        # Whose claims say something else now: those persons' tracks, and all that they are linked to.
+        near = np.isin(person, touched)
+        near[links.other[near[links.track]]] = True
+        stale[problem.camera[near]] = True
 
 
 def _assign_camera(
     problem: GroupingProblem,
-    links: Links,
+    found: Claims,
     person: NDArray[np.int64],
     rows: NDArray[np.int64],
     fresh: int,
 ) -> NDArray[np.int64]:
     """Assign one camera's present tracks to the persons, best in total; changes `person` in place.
 
-    New ones begin at `fresh`.
+    `found` has their claims. New persons begin at `fresh`.
 
     Returns:
         The persons who have lost or won a track.
     """
-    found = claims(problem, links, person, rows)
     known, column = np.unique(found.person, return_inverse=True)
     row = np.searchsorted(rows, found.track)
     score = np.full((rows.size, known.size), FORBIDDEN)

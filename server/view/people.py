@@ -11,6 +11,7 @@ from bestview import IdentityRegistry, IdentitySettings, LocalTrack, Merge, Spli
 from server.view.align import Epoch
 from server.view.history import BoxHistory
 from server.view.locals import LocalNumbers
+from server.view.sight import read_boxes
 from server.wire.fit import Fit
 from server.wire.messages import Box, CameraTracks
 
@@ -48,19 +49,22 @@ class People:
     def update(self, epoch: Epoch) -> None:
         """Take over what all cameras said about an epoch."""
         tracks: list[LocalTrack] = []
+        seen: list[tuple[int, int]] = []
         for camera, message in epoch.tracks.items():
             local_of = self._locals.of(message)
             self._histories[camera].put(message, local_of)
             fit = self.fits.setdefault(camera, Fit(message.size, self._site_size))
-            tracks += _local_tracks(message, local_of, fit)
+            boxes = read_boxes(message)
+            tracks += _local_tracks(message, local_of, fit.boxes_to_own(boxes))
+            seen += _first_and_last(message.first, boxes)
         update = self._registry.update(tracks, epoch.last)
         for track in tracks:
             # Who has left a person for one not confirmed yet has no number for now.
             self._numbers.pop(track.key, None)
         self._numbers.update(update.numbers)
-        for track in tracks:
+        for track, (first, last) in zip(tracks, seen, strict=True):
             self._heard[track.key] = epoch.last
-            self._note_seen(track)
+            self._note_seen(self._numbers.get(track.key), first, last)
         self.away = (self.away | set(update.gone)) - set(update.returned)
         for merge in update.merged:
             self._merge(merge.kept, merge.lost)
@@ -114,12 +118,9 @@ class People:
         for history in self._histories.values():
             history.forget_before(pulse)
 
-    def _note_seen(self, track: LocalTrack) -> None:
-        number = self._numbers.get(track.key)
-        rows = np.flatnonzero(~np.isnan(track.boxes[:, 0]))
-        if number is None or not rows.size:
+    def _note_seen(self, number: int | None, first: int, last: int) -> None:
+        if number is None or last < first:
             return
-        first, last = track.first + int(rows[0]), track.first + int(rows[-1])
         self.first_seen[number] = min(first, self.first_seen.get(number, first))
         self.last_seen[number] = max(last, self.last_seen.get(number, last))
 
@@ -144,18 +145,28 @@ class People:
             self.merged = {old: new for old, new in self.merged.items() if new != number}
 
 
-def _local_tracks(message: CameraTracks, local_of: Mapping[int, int], fit: Fit) -> list[LocalTrack]:
-    """Give the tracks of a message with boxes in the camera's own picture."""
-    hidden = (np.nan,) * 4
+def _local_tracks(
+    message: CameraTracks, local_of: Mapping[int, int], boxes: NDArray[np.float64]
+) -> list[LocalTrack]:
+    """Give the tracks of a message, (T, F, 4) boxes in the camera's own picture."""
     return [
         LocalTrack(
             camera=message.camera,
             local=local_of[track.id],
             first=message.first,
-            boxes=fit.boxes_to_own(
-                np.array([box or hidden for box in track.boxes], dtype=np.float64).reshape(-1, 4)
-            ),
+            boxes=rows,
             histogram=np.array(track.histogram, dtype=np.float64),
         )
-        for track in message.tracks
+        for track, rows in zip(message.tracks, boxes, strict=True)
     ]
+
+
+def _first_and_last(first: int, boxes: NDArray[np.float64]) -> list[tuple[int, int]]:
+    """Give each of T tracks' first and last frame with a box, from (T, F, 4); the last is lower: none."""
+    there = ~np.isnan(boxes[:, :, 0])
+    if not there.size:
+        return [(first, first - 1)] * len(boxes)
+    begins = first + there.argmax(axis=1)
+    ends = first + boxes.shape[1] - 1 - there[:, ::-1].argmax(axis=1)
+    ends[~there.any(axis=1)] = first - 1
+    return list(zip(begins.tolist(), ends.tolist(), strict=True))
