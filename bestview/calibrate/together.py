@@ -40,7 +40,8 @@ def _doubts(it: Link, settings: WalkSettings) -> Iterator[tuple[bool, str]]:
     few = f"at only {it.places:.0f} steps of the walk people stand in one place"
     needed = f"{settings.least_places:.0f} are needed: walk longer where both see"
     yield it.places < settings.least_places, f"{few}; {needed}"
-    share = f"of what both should see they agree about {100 * it.share:.0f} % only"
+    enough = f"{100 * settings.least_share:.0f} % are needed"
+    share = f"of what both should see they agree about {100 * it.share:.1f} % only; {enough}"
     yield it.share < settings.least_share, share
     differs = f"where they have people differs by {it.error:.2f} person heights (median)"
     yield it.error > settings.most_error, f"{differs}: are feet hidden, or do people sit?"

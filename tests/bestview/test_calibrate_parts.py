@@ -177,6 +177,22 @@ def test_boxes_that_the_edge_cuts_are_left_out_and_long_gaps_part_a_track() -> N
     assert make_walk("a", SIZE, [0, 1], [1, 1], np.array([[0.0, 10, 40, 90]] * 2)).tracks == ()
 
 
+@settings(deadline=None, max_examples=20)
+@given(seeds, st.integers(1, 9))
+def test_a_walk_of_another_rate_is_averaged_over_the_same_time(
+    random: np.random.Generator, step: int
+) -> None:
+    boxes = np.array([100.0, 80, 140, 200]) + random.uniform(-9, 9, (30, 4))
+    (track,) = make_walk("a", SIZE, range(30), [1] * 30, boxes, step).tracks
+    half = step // 2
+    middle = [boxes[at - half : at + half + 1].mean(axis=0) for at in range(half, 30 - half)]
+    assert np.allclose(track.boxes[half : 30 - half], middle)
+    apart = make_walk(
+        "a", SIZE, [0, 1, 1 + step, 2 + step, 3 + 2 * step, 4 + 2 * step], [1] * 6, boxes[:6], step
+    )
+    assert [it.first for it in apart.tracks] == [0, 3 + 2 * step]
+
+
 def test_a_line_has_no_breadth() -> None:
     along = np.linspace(0, 9, 50)
     assert breadth(np.column_stack([along, 2 * along]), np.ones(50)) == pytest.approx(0.0, abs=1e-9)
