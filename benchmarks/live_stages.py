@@ -11,7 +11,7 @@ import json
 import os
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -75,8 +75,8 @@ def read_stages(folder: Path) -> dict[str, StageTimes]:
 class ThreadWatch:
     """Adds up each stage's own processor time, thread by thread: stages of two threads run side by side."""
 
-    def __init__(self) -> None:
-        self.seconds = dict.fromkeys(STAGES, 0.0)
+    def __init__(self, stages: Iterable[str] = STAGES) -> None:
+        self.seconds = dict.fromkeys(stages, 0.0)
         self._local = threading.local()
 
     def wrap(self, owner: type, method: str, stage: str, after: Callable[[], None] | None = None) -> None:
