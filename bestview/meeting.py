@@ -33,12 +33,19 @@ def near_or_known(
     seen_row = np.full(len(pairs.keys), -1)
     seen_row[rows[here]] = here
     known = seen_row[np.stack([pairs.one, pairs.two])]
-    known = known[:, (known >= 0).all(axis=0)]
+    known = _of_two_cameras(known[:, (known >= 0).all(axis=0)], pairs.camera[rows])
     near = here[np.stack(within_reach(seen.ground[here], seen.spread[here], gate, GATES_TO_WORST))]
-    both = np.concatenate([known, near], axis=1)
-    one, two = np.divmod(np.unique(both[0] * count + both[1]), max(count, 1))
-    other = pairs.camera[rows[one]] != pairs.camera[rows[two]]
-    one, two = one[other], two[other]
+    near = _of_two_cameras(near, pairs.camera[rows])
+    # Rows keep their order from one to the other, so that the known pairs are sorted as they were.
+    code, others = known[0] * count + known[1], near[0] * count + near[1]
+    at = np.minimum(np.searchsorted(code, others), max(code.size - 1, 0))
+    new = code[at] != others if code.size else np.ones(others.shape, dtype=np.bool_)
+    one, two = np.concatenate([known, near[:, new]], axis=1)
     score = ground_scores(seen.distances(one, two, gate))
     learned = ~np.isnan(score)
     return Scores(one[learned], two[learned], score[learned])
+
+
+def _of_two_cameras(pairs: NDArray[np.int64], camera: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Keep those of (2, P) pairs of tracks that two cameras see; `camera` is (S,)."""
+    return np.asarray(pairs[:, camera[pairs[0]] != camera[pairs[1]]])

@@ -49,10 +49,9 @@ def overlapping(
     axis = int(sweeps[1][1].sum() < sweeps[0][1].sum())
     order, counts = sweeps[axis]
     which, place = ranges(np.arange(1, order.size + 1), counts)
-    one, two = order[which], order[place]
-    other = 1 - axis
-    both = (low[one, other] <= high[two, other]) & (low[two, other] <= high[one, other])
-    one, two = one[both], two[both]
+    low, high = (np.ascontiguousarray(corner[order, 1 - axis]) for corner in (low, high))
+    both = np.flatnonzero((low[place] <= np.repeat(high, counts)) & (high[place] >= np.repeat(low, counts)))
+    one, two = order[which[both]], order[place[both]]
     return np.minimum(one, two), np.maximum(one, two)
 
 
