@@ -3,6 +3,7 @@
     python -m benchmarks.scaling_cameras SITE.yaml PER_CAMERA FIRST COUNT
 
 Pictures are one small GOP, encoded once, sent again and again: the best-view service never looks into them.
+So are small pictures of people, one for each track every second of frames.
 """
 
 from __future__ import annotations
@@ -22,10 +23,12 @@ from server.run.ending import end_with_parent
 from server.wire.bus import Bus
 from server.wire.config import Config
 from server.wire.loading import load_config
-from server.wire.messages import CameraTracks, FrameHead, Keys
+from server.wire.messages import CameraTracks, FrameHead, Keys, ThumbHead
 
-_QUEUE = 1000
-"""Pulses that may wait: on a busy machine cameras are late, and none is left out."""
+_THUMBS_EVERY = 5
+"""Epochs."""
+_THUMB = bytes(1500)
+"""As long as such a picture is; nobody looks at it."""
 
 
 async def serve(config: Config, hall: Hall, cameras: range) -> None:
@@ -50,7 +53,10 @@ async def serve(config: Config, hall: Hall, cameras: range) -> None:
                     epoch = pulse.number // STRIDE
                     places = hall.places(max(0, pulse.number + 1 - WINDOW), pulse.number)
                     for camera in cameras:
-                        _tracks(bus, keys, trackers[camera].message(epoch, places))
+                        message = trackers[camera].message(epoch, places)
+                        _tracks(bus, keys, message)
+                        if epoch % _THUMBS_EVERY == 0:
+                            _thumbnails(bus, keys, message)
                         # The bus's threads and the next pulse want their turn.
                         await asyncio.sleep(0)
     finally:
@@ -70,6 +76,12 @@ def _frames(
 
 def _tracks(bus: Bus, keys: Keys, message: CameraTracks) -> None:
     bus.publish(keys.camera(message.camera, "tracks"), msgspec.json.encode(message))
+
+
+def _thumbnails(bus: Bus, keys: Keys, message: CameraTracks) -> None:
+    for track in message.tracks:
+        head = ThumbHead(track=track.id, boot=message.boot, pulse=message.last)
+        bus.publish(keys.camera(message.camera, f"thumbs/{track.id}"), _THUMB, msgspec.json.encode(head))
 
 
 def main() -> None:

@@ -28,11 +28,13 @@ from server.view.people import People
 from server.view.service import BestViewService
 from server.view.sight import Sight
 from server.view.splice import Splicer
+from server.web.events import Events
 from server.wire.bus import Bus
 
+LISTS = "lists"
 STAGES = {
     "tracks in": "the cameras' windows out of JSON, checked, laid in line",
-    "frames in": "access units made into fragments, on the shelves",
+    "frames in": "access units made into fragments, on the shelves; small pictures",
     "align": "epochs taken out",
     "who is who": "identity over all cameras",
     "people": "messages to tracks, boxes by person",
@@ -42,6 +44,7 @@ STAGES = {
     "board": "what the page, programs and the bus are told",
     "publish": "that to JSON and onto the bus",
     "splice": "everybody's chosen GOP",
+    LISTS: "of people and cameras for the page, every second",
 }
 REST = "rest"
 """Of the process: zenoh's threads and router, copies off the bus, the event loop, pulses."""
@@ -57,6 +60,7 @@ class Times:
         process: processor time of the whole process.
         messages: that came, of all kinds.
         size: their bytes.
+        at: when this was, seconds by a clock that never steps.
     """
 
     epochs: int
@@ -64,6 +68,7 @@ class Times:
     process: float
     messages: int
     size: int
+    at: float
 
     @classmethod
     def read(cls, path: Path) -> Times | None:
@@ -79,15 +84,17 @@ def watch(path: Path) -> None:
     def told() -> None:
         count["epochs"] += 1
         part = path.with_suffix(".part")
-        now = {**count, "seconds": watched.seconds, "process": time.process_time()}
+        used = {"seconds": watched.seconds, "process": time.process_time()}
+        now = {**count, **used, "at": time.monotonic()}
         part.write_text(json.dumps(now), encoding="utf-8")
         part.replace(path)
 
-    for name in ("tracks", "video"):
+    for name in ("tracks", "video", "thumbnail"):
         _count(name, count)
     for owner, method, stage in (
         (Intake, "tracks", "tracks in"),
         (Intake, "video", "frames in"),
+        (Intake, "thumbnail", "frames in"),
         (Aligner, "ready", "align"),
         (IdentityRegistry, "update", "who is who"),
         (People, "update", "people"),
@@ -97,6 +104,7 @@ def watch(path: Path) -> None:
         (BestViewService, "_publish", "publish"),
         (Bus, "publish", "publish"),
         (Splicer, "decision", "splice"),
+        (Events, "_lists", LISTS),
     ):
         watched.wrap(owner, method, stage)
     watched.wrap(Decider, "step", "choose", told)

@@ -14,7 +14,7 @@ from pathlib import Path
 import yaml
 
 from benchmarks.scaling_hall import HEIGHT, STRIDE, WIDTH, Hall
-from benchmarks.scaling_service import REST, STAGES, Times
+from benchmarks.scaling_service import LISTS, REST, STAGES, Times
 from benchmarks.surroundings import ROOT, one_thread_environment
 from server.run.setup import free_port
 
@@ -74,6 +74,8 @@ def carry(hall: Hall, fps: float, folder: Path, settle: int, epochs: int) -> Loa
     frames = STRIDE * (stop.epochs - start.epochs)
     stages = {name: 1e3 * (stop.seconds[name] - start.seconds[name]) / frames for name in STAGES}
     stages[REST] = 1e3 * (stop.process - start.process) / frames - sum(stages.values())
+    # The lists are told by the clock, whatever the rate of the pulses.
+    stages[LISTS] *= frames / (25.0 * (stop.at - start.at))
     return Load(
         cameras=hall.cameras,
         people=hall.people,

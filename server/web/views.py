@@ -29,10 +29,10 @@ def site_info(service: BestViewService) -> SiteInfo:
 
 def objects_info(service: BestViewService) -> Objects:
     """List everybody who has a stream, in the order of their numbers."""
-    people = service.decider.people
+    people, pictures = service.decider.people, _thumbnails(service)
     objects = []
     for number, standing in sorted(service.board.standings.items()):
-        thumbnail = thumbnail_of(service, number)
+        thumbnail = _newest(service, number, pictures.get(number, []))
         objects.append(
             ObjectInfo(
                 object=number,
@@ -98,15 +98,23 @@ def choice_info(service: BestViewService, number: int) -> Choice | None:
 
 def thumbnail_of(service: BestViewService, number: int) -> Thumbnail | None:
     """Give the newest small picture of a person, from the chosen camera where it has a recent one."""
-    standing = service.board.standings.get(number)
-    chosen = standing.choice.camera if standing else None
-    own = [
-        (camera == chosen, thumbnail)
-        for (camera, boot, track), thumbnail in service.intake.thumbnails.items()
-        if service.decider.people.whose(camera, boot, track) == number
-    ]
+    return _newest(service, number, _thumbnails(service).get(number, []))
+
+
+def _thumbnails(service: BestViewService) -> dict[int, list[tuple[str, Thumbnail]]]:
+    """Give everybody's small pictures by number, each with its camera."""
+    found: dict[int, list[tuple[str, Thumbnail]]] = {}
+    for (camera, boot, track), thumbnail in service.intake.thumbnails.items():
+        number = service.decider.people.whose(camera, boot, track)
+        if number is not None:
+            found.setdefault(number, []).append((camera, thumbnail))
+    return found
+
+
+def _newest(service: BestViewService, number: int, own: list[tuple[str, Thumbnail]]) -> Thumbnail | None:
     if not own:
         return None
-    newest = max(thumbnail.pulse for _, thumbnail in own)
-    recent = newest - round(3 * service.config.site.fps)
-    return max(own, key=lambda it: (it[0] and it[1].pulse >= recent, it[1].pulse))[1]
+    standing = service.board.standings.get(number)
+    chosen = standing.choice.camera if standing else None
+    recent = max(thumbnail.pulse for _, thumbnail in own) - round(3 * service.config.site.fps)
+    return max(own, key=lambda it: (it[0] == chosen and it[1].pulse >= recent, it[1].pulse))[1]
