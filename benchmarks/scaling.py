@@ -43,7 +43,7 @@ def exponent(cameras: Sequence[int], values: Sequence[float]) -> float:
 def describe(report: Report, loads: Sequence[Load]) -> None:
     """Print the tables."""
     report.table(
-        "One best-view process; processor time and memory",
+        f"{_services(loads)}; processor time and memory",
         [
             "cameras",
             "people",
@@ -67,7 +67,7 @@ def describe(report: Report, loads: Sequence[Load]) -> None:
                 f"{it.megabytes:.1f}",
                 f"{it.memory:.0f}",
                 f"{it.late}",
-                f"of {it.epochs * it.cameras} windows",
+                f"of {it.epochs * it.cameras * it.services} windows",
             ]
             for it in loads
         ],
@@ -93,6 +93,11 @@ def describe(report: Report, loads: Sequence[Load]) -> None:
     report.say("messages and bytes are for 25 pulses a second; late: windows decided without their camera")
 
 
+def _services(loads: Sequence[Load]) -> str:
+    count = loads[0].services
+    return "One best-view process" if count == 1 else f"Each of {count} best-view processes of the site"
+
+
 def plot(loads: Sequence[Load], path: Path) -> None:
     """Draw what a frame costs over the number of cameras, by stage."""
     from matplotlib.figure import Figure  # noqa: PLC0415 — only after what is measured
@@ -105,7 +110,7 @@ def plot(loads: Sequence[Load], path: Path) -> None:
     axis.plot(cameras, [it.milliseconds for it in loads], marker="o", color="black", label="together")
     axis.axhline(1e3 / _FPS, color="black", linestyle="--", linewidth=1, label="one core at 25 a second")
     axis.set(xscale="log", yscale="log", xlabel="cameras", ylabel="processor ms a frame")
-    axis.set_title(f"One best-view process, about {loads[0].per_camera} people in each camera's view")
+    axis.set_title(f"{_services(loads)}, about {loads[0].per_camera} people in each camera's view")
     axis.set_xticks(cameras, [f"{it}" for it in cameras])
     axis.legend(ncols=2, fontsize="small")
     figure.savefig(path, dpi=110)
@@ -123,7 +128,7 @@ def measure(options: argparse.Namespace) -> None:
             fps = options.fps or max(1.0, round(_FPS * min(1.0, _EASY / cameras)))
             hall = Hall(cameras, options.people)
             settle, epochs = (_QUICK_SETTLE, _QUICK_EPOCHS) if quick else (_SETTLE, _EPOCHS)
-            loads.append(carry(hall, fps, Path(temporary) / f"{cameras}", settle, epochs))
+            loads.append(carry(hall, fps, Path(temporary) / f"{cameras}", settle, epochs, options.share))
             report.say(f"{cameras} cameras: {loads[-1].milliseconds:.1f} ms a frame")
     describe(report, loads)
     plot(loads, options.out / "scaling.png")
@@ -136,6 +141,7 @@ def main() -> None:
     options.add_argument("--quick", action="store_true", help="two small sites, for a short while")
     options.add_argument("--cameras", type=int, action="append", help="only so many; may be repeated")
     options.add_argument("--people", type=int, default=30, help="in each camera's view, on average")
+    options.add_argument("--share", type=int, default=1, help="best-view services that share the site")
     options.add_argument("--fps", type=float, help="pulses a second; without it, fewer for large sites")
     measure(options.parse_args())
 

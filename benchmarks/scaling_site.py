@@ -8,8 +8,9 @@ import sys
 import time
 import urllib.request
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import IO
 
 import yaml
 
@@ -31,6 +32,7 @@ class Load:
         cameras: of the site.
         people: in it.
         fps: pulses a second.
+        services: best-view services that share the site; what follows is the mean of them.
         per_camera: people in a camera's view, on average.
         stages: processor milliseconds a frame (of all cameras together) by stage, the rest too.
         messages: a second, at 25 pulses a second.
@@ -44,6 +46,7 @@ class Load:
     people: int
     per_camera: int
     fps: float
+    services: int
     stages: dict[str, float]
     messages: float
     megabytes: float
@@ -57,20 +60,36 @@ class Load:
         return sum(self.stages.values())
 
 
-def carry(hall: Hall, fps: float, folder: Path, settle: int, epochs: int) -> Load:
+@dataclass(frozen=True, slots=True)
+class _Service:
+    """One best-view process."""
+
+    process: subprocess.Popen[bytes]
+    times: Path
+    url: str
+
+
+def carry(hall: Hall, fps: float, folder: Path, settle: int, epochs: int, services: int = 1) -> Load:
     """Run the site for `settle` epochs, and measure over the `epochs` after them.
 
     Raises:
         RuntimeError: it did not come so far in time; what the processes said is in the text.
     """
     folder.mkdir(parents=True)
-    times = folder / "times.json"
-    with _running(hall, fps, folder, times) as (service, url):
-        start = _after(times, settle, folder)
-        late = _late(url)
-        stop = _after(times, start.epochs + epochs, folder)
-        late = _late(url) - late
-        memory = _resident(service.pid)
+    with _running(hall, fps, folder, services) as running:
+        starts = [_after(it.times, settle, folder) for it in running]
+        late = sum(_late(it.url) for it in running)
+        stops = [
+            _after(it.times, start.epochs + epochs, folder) for it, start in zip(running, starts, strict=True)
+        ]
+        late = sum(_late(it.url) for it in running) - late
+        memory = sum(_resident(it.process.pid) for it in running) / services
+    loads = [_load(hall, fps, start, stop, memory, late) for start, stop in zip(starts, stops, strict=True)]
+    stages = {name: sum(it.stages[name] for it in loads) / services for name in loads[0].stages}
+    return replace(loads[0], services=services, stages=stages)
+
+
+def _load(hall: Hall, fps: float, start: Times, stop: Times, memory: float, late: int) -> Load:
     frames = STRIDE * (stop.epochs - start.epochs)
     stages = {name: 1e3 * (stop.seconds[name] - start.seconds[name]) / frames for name in STAGES}
     stages[REST] = 1e3 * (stop.process - start.process) / frames - sum(stages.values())
@@ -81,6 +100,7 @@ def carry(hall: Hall, fps: float, folder: Path, settle: int, epochs: int) -> Loa
         people=hall.people,
         per_camera=hall.per_camera,
         fps=fps,
+        services=1,
         stages=stages,
         messages=25.0 * (stop.messages - start.messages) / frames,
         megabytes=25.0 * (stop.size - start.size) / frames / 1e6,
@@ -91,19 +111,16 @@ def carry(hall: Hall, fps: float, folder: Path, settle: int, epochs: int) -> Loa
 
 
 @contextlib.contextmanager
-def _running(
-    hall: Hall, fps: float, folder: Path, times: Path
-) -> Iterator[tuple[subprocess.Popen[bytes], str]]:
-    sync, bus, http = (free_port() for _ in range(3))
+def _running(hall: Hall, fps: float, folder: Path, services: int) -> Iterator[list[_Service]]:
+    sync, bus, *https = (free_port() for _ in range(2 + services))
     config = folder / "site.yaml"
     address = f"tcp/127.0.0.1:{bus}"
     content = {
         "site": {"name": "hall", "fps": fps, "width": WIDTH, "height": HEIGHT},
         "sync": {"port": sync, "start_timeout_s": 3.0},
         "zenoh": {"connect": address, "listen": address},
-        "http": {"port": http},
         # The rate is set to what is measured, not to what people would see: waiting is counted in frames.
-        "view": {"late_after_s": 12.5 / fps},
+        "view": {"late_after_s": 12.5 / fps, "share": {"of": services}},
         "cameras": [
             {"id": name, "source": f"rtsp://{name}/", "ground": ground.tolist()}
             for name, ground in zip(hall.ids, hall.grounds, strict=True)
@@ -111,24 +128,28 @@ def _running(
     }
     config.write_text(yaml.safe_dump(content), encoding="utf-8")
     halves = [range(hall.cameras // 2), range(hall.cameras // 2, hall.cameras)]
-    commands = [
-        ["server.run.cli", "sync", str(config)],
-        ["benchmarks.scaling_service", str(times), "bestview", str(config)],
-        *(
-            ["benchmarks.scaling_cameras", str(config), f"{hall.per_camera}", f"{it.start}", f"{len(it)}"]
-            for it in halves
-        ),
-    ]
-    environment = {**one_thread_environment(), "MYVIEW_SUPERVISED": "1"}
     with (folder / _LOG).open("wb") as log:
-        started = [
-            subprocess.Popen(
-                [sys.executable, "-m", *words], cwd=ROOT, env=environment, stdout=log, stderr=log
+        started = [_start(log, "server.run.cli", "sync", str(config))]
+        running = []
+        for index, port in enumerate(https):
+            times = folder / f"times{index}.json"
+            own = {"MYVIEW_VIEW__SHARE__INDEX": f"{index}", "MYVIEW_HTTP__PORT": f"{port}"}
+            words = ["benchmarks.scaling_service", str(times), "bestview", str(config)]
+            started.append(_start(log, *words, **own))
+            running.append(_Service(started[-1], times, f"http://127.0.0.1:{port}/"))
+        started += [
+            _start(
+                log,
+                "benchmarks.scaling_cameras",
+                str(config),
+                f"{hall.per_camera}",
+                f"{it.start}",
+                f"{len(it)}",
             )
-            for words in commands
+            for it in halves
         ]
         try:
-            yield started[1], f"http://127.0.0.1:{http}/"
+            yield running
         finally:
             for process in started:
                 process.terminate()
@@ -138,6 +159,11 @@ def _running(
                 except subprocess.TimeoutExpired:
                     process.kill()
                     process.wait()
+
+
+def _start(log: IO[bytes], *words: str, **own: str) -> subprocess.Popen[bytes]:
+    environment = {**one_thread_environment(), "MYVIEW_SUPERVISED": "1", **own}
+    return subprocess.Popen([sys.executable, "-m", *words], cwd=ROOT, env=environment, stdout=log, stderr=log)
 
 
 def _after(times: Path, epochs: int, folder: Path) -> Times:

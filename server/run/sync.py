@@ -9,13 +9,13 @@ import logging
 from camsync import PulseServer
 from server.wire.config import Config
 from server.wire.errors import UserError
-from server.wire.messages import PULSE_CLIENT
+from server.wire.messages import pulse_client
 
 log = logging.getLogger(__name__)
 
 
 async def sync_process(config: Config) -> None:
-    """Send pulses; pulse 0 waits for all cameras and the best-view service.
+    """Send pulses; pulse 0 waits for all cameras and best-view services.
 
     Raises:
         UserError: the port cannot be listened on.
@@ -23,7 +23,7 @@ async def sync_process(config: Config) -> None:
     sync = config.sync
     server = PulseServer(
         config.site.fps,
-        expect={*config.camera_ids, PULSE_CLIENT},
+        expect={*config.camera_ids, *map(pulse_client, range(config.view.share.of))},
         start_timeout=sync.start_timeout_s,
         host=sync.bind,
         port=sync.port,

@@ -11,15 +11,21 @@ from bestview import IdentityRegistry, IdentitySettings, LocalTrack, Merge, Spli
 from server.view.align import Epoch
 from server.view.history import BoxHistory
 from server.view.locals import LocalNumbers
+from server.view.share import served
 from server.view.sight import read_boxes
+from server.wire.config import Share
 from server.wire.fit import Fit
 from server.wire.messages import Box, CameraTracks
+
+ALL = Share()
+"""One service for everybody."""
 
 
 class People:
     """Joins the cameras' tracks epoch by epoch, and remembers who was where.
 
-    ``homographies`` map each camera's own picture to the ground; None where there is none.
+    ``homographies`` map each camera's own picture to the ground; None where there is none. ``share`` says
+    whom this service decides for; who is who is worked out for everybody, the same in every service.
     """
 
     def __init__(
@@ -28,10 +34,12 @@ class People:
         cameras: Sequence[str],
         homographies: Mapping[str, NDArray[np.float64] | None],
         site_size: tuple[int, int],
+        share: Share = ALL,
     ) -> None:
         self._registry = IdentityRegistry(settings, homographies)
         self._remembered = settings.forget_after
         self._site_size = site_size
+        self._share = share
         self._histories = {camera: BoxHistory() for camera in cameras}
         self._locals = LocalNumbers()
         self._numbers: dict[TrackKey, int] = {}
@@ -73,8 +81,14 @@ class People:
 
     @property
     def known(self) -> list[int]:
-        """Everybody's number, in order; those who are away too."""
-        return sorted(self.first_seen)
+        """Everybody's number whom this service decides for, in order; those who are away too."""
+        return served(sorted(self.first_seen), self.merged, self._share)
+
+    @property
+    def elsewhere(self) -> list[int]:
+        """The other people's numbers, in order: another service decides for them."""
+        mine = set(self.known)
+        return [number for number in sorted(self.first_seen) if number not in mine]
 
     def number(self, camera: str, local: int) -> int | None:
         """Give the person's number behind a camera's local one; None while it is not confirmed."""

@@ -22,7 +22,7 @@ from server.wire.bus import Bus
 from server.wire.config import Config
 from server.wire.errors import UserError
 from server.wire.inbox import Message
-from server.wire.messages import PULSE_CLIENT, GopChoices, Keys
+from server.wire.messages import GopChoices, Keys, pulse_client
 
 log = logging.getLogger(__name__)
 
@@ -59,12 +59,13 @@ class BestViewService:
         self._changed = asyncio.Event()
 
     def open(self) -> None:
-        """Open the bus, which the cameras connect to.
+        """Open the bus, which the cameras connect to; of several services the first one's.
 
         Raises:
             UserError: its address is in use.
         """
-        self._bus = bus = Bus.router(self.config.zenoh)
+        index = self.config.view.share.index
+        self._bus = bus = Bus.second(self.config.zenoh) if index else Bus.router(self.config.zenoh)
         handlers = {
             "video": self.intake.video,
             "tracks": self._tracks,
@@ -74,7 +75,7 @@ class BestViewService:
         for what, handler in handlers.items():
             bus.subscribe(self._keys.camera("*", what), handler)
         bus.watch_alive(self._keys.camera("*", "alive"), self._alive)
-        bus.declare_alive(self._keys.bestview("alive"))
+        bus.declare_alive(self._keys.bestview("alive", index))
 
     async def run(self) -> None:
         """Serve until every camera's recording is over.
@@ -122,7 +123,8 @@ class BestViewService:
 
     async def _follow_pulses(self) -> None:
         sync, fps = self.config.sync, self.config.site.fps
-        async with PulseClient(sync.host, sync.port, PULSE_CLIENT, fps_hint=fps) as pulses:
+        name = pulse_client(self.config.view.share.index)
+        async with PulseClient(sync.host, sync.port, name, fps_hint=fps) as pulses:
             async for pulse in pulses:
                 self.pulse = pulse.number
                 self.pulse0 = pulse.due - pulse.number / fps
@@ -149,7 +151,8 @@ class BestViewService:
         self.splicer.decision(decision)
         self.splicer.forget({*self.decider.people.known, *decision.merged})
         if self._bus is not None:
-            self._bus.publish(self._keys.bestview("choices"), msgspec.json.encode(choices))
+            key = self._keys.bestview("choices", self.config.view.share.index)
+            self._bus.publish(key, msgspec.json.encode(choices))
         if self._recorder is not None:
             self._recorder.write(decision)
             self._note_lost(self._recorder, decision)

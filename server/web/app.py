@@ -15,6 +15,7 @@ from server.web.api import problem
 from server.web.events import Events
 from server.web.keys import EVENTS, METRICS, SERVICE
 from server.web.metrics import registry
+from server.web.share import to_the_right_service
 from server.wire.config import Http
 from server.wire.errors import UserError
 
@@ -50,7 +51,7 @@ async def one_line_errors(
 
 def make_app(service: BestViewService) -> web.Application:
     """Give the application on top of a service."""
-    app = web.Application(middlewares=[one_line_errors])
+    app = web.Application(middlewares=[one_line_errors, to_the_right_service])
     app[SERVICE], app[EVENTS], app[METRICS] = service, Events(service), registry(service)
     for module in (api, video, openapi, page):
         app.add_routes(module.routes)

@@ -43,10 +43,20 @@ class ObjectInfo(msgspec.Struct, frozen=True):
     """Where a small picture is; the address changes with the picture."""
 
 
+class Elsewhere(msgspec.Struct, frozen=True):
+    """One person whom another best-view service of the site decides for."""
+
+    object: int
+    server: str | None
+    """Its base URL; null where the configuration does not say."""
+
+
 class Objects(msgspec.Struct, frozen=True):
     """Everybody who is known."""
 
     objects: list[ObjectInfo]
+    elsewhere: list[Elsewhere] = []
+    """Whom other services of the site show; empty where there are none."""
 
 
 class CameraInfo(msgspec.Struct, frozen=True):

@@ -7,7 +7,8 @@ import time
 from server.view.board import reason
 from server.view.intake import Thumbnail
 from server.view.service import BestViewService
-from server.web.schema import CameraInfo, Cameras, Choice, ObjectInfo, Objects, SiteInfo
+from server.view.share import server_of
+from server.web.schema import CameraInfo, Cameras, Choice, Elsewhere, ObjectInfo, Objects, SiteInfo
 
 
 def site_info(service: BestViewService) -> SiteInfo:
@@ -45,7 +46,8 @@ def objects_info(service: BestViewService) -> Objects:
                 thumbnail=None if thumbnail is None else f"objects/{number}/thumb.jpg?v={thumbnail.pulse}",
             )
         )
-    return Objects(objects)
+    share = service.config.view.share
+    return Objects(objects, [Elsewhere(it, server_of(it, share)) for it in people.elsewhere])
 
 
 def cameras_info(service: BestViewService) -> Cameras:

@@ -44,11 +44,27 @@ class Bus:
     def client(cls, settings: Zenoh) -> Self:
         """Open a session of the site's router; it need not be there yet, and may go and come back.
 
+        It hears the router's process, which is the best-view service, and is heard by it; not other clients.
+
         Raises:
             UserError: the address is not one that zenoh understands.
         """
-        config = _config(settings, "peer")
         # A peer, not a client: a client's session cannot be opened while the router is away.
+        return cls._connected(settings, "peer")
+
+    @classmethod
+    def second(cls, settings: Zenoh) -> Self:
+        """Open the like for a further best-view service, which hears all of the router's clients.
+
+        Raises:
+            UserError: the address is not one that zenoh understands.
+        """
+        # A router tells routers what it hears from peers, but no peer what it hears from another.
+        return cls._connected(settings, "router")
+
+    @classmethod
+    def _connected(cls, settings: Zenoh, mode: str) -> Self:
+        config = _config(settings, mode)
         config.insert_json5("connect/timeout_ms", "-1")  # keep trying in the background
         config.insert_json5("connect/exit_on_failure", "false")
         config.insert_json5("listen/endpoints", "[]")

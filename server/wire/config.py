@@ -17,6 +17,7 @@ from pydantic import (
     ConfigDict,
     Field,
     NonNegativeFloat,
+    NonNegativeInt,
     PositiveFloat,
     PositiveInt,
     ValidationInfo,
@@ -153,6 +154,28 @@ class Track(Section):
         return solver
 
 
+class Share(Section):
+    """Several best-view services of one site: each decides for the objects whose number leaves its index."""
+
+    of: PositiveInt = 1
+    """How many there are: an object's number modulo this is the index of its service."""
+    index: NonNegativeInt = 0
+    """Which of them this is; 0 is the router, which the others and the cameras connect to."""
+    servers: list[str] = []
+    """Base URLs of all, by index: where whoever asks for another's object is sent."""
+
+    @model_validator(mode="after")
+    def _fits(self) -> Self:
+        if self.index >= self.of:
+            raise ValueError(f"index is {self.index}, but of {self.of} services the last is {self.of - 1}")
+        if self.servers and len(self.servers) != self.of:
+            raise ValueError(f"servers names {len(self.servers)}, but there are {self.of}; name all or none")
+        for server in self.servers:
+            if not re.fullmatch(r"https?://[^\s/?#]+(/[^\s?#]*)?", server):
+                raise ValueError(f"servers: {server!r} is not an address such as http://127.0.0.1:8081/")
+        return self
+
+
 class View(Section):
     """The best-view service."""
 
@@ -172,6 +195,8 @@ class View(Section):
     quality: Annotated[QualitySettings, validated(QualitySettings)] = QualitySettings()
     """What makes a view good."""
     identity: Annotated[IdentitySettings, validated(IdentitySettings)] = IdentitySettings()
+    share: Share = Share()
+    """With other best-view services of the site."""
 
 
 class Http(Section):

@@ -13,7 +13,9 @@ key                                       payload                               
 ``myview/SITE/camera/ID/thumbs/LOCAL``    JPEG of one person                       :class:`ThumbHead`
 ``myview/SITE/camera/ID/alive``           liveliness token
 ``myview/SITE/bestview/choices``          :class:`GopChoices`
+``myview/SITE/bestview/INDEX/choices``    of a further service that shares the site
 ``myview/SITE/bestview/alive``            liveliness token
+``myview/SITE/bestview/INDEX/alive``      of a further service
 ========================================  =======================================  =====================
 """
 
@@ -168,8 +170,9 @@ class GopChoices(msgspec.Struct, frozen=True, kw_only=True):
 _CAMERA_PART = 3
 
 
-PULSE_CLIENT = "bestview"
-"""The best-view service's name at the pulse server, which waits for it before pulse 0."""
+def pulse_client(index: int) -> str:
+    """Name a best-view service at the pulse server, which waits for it before pulse 0."""
+    return "bestview" if index == 0 else f"bestview-{index}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,9 +185,9 @@ class Keys:
         """Name a camera's key; ``*`` as the id stands for all cameras."""
         return f"myview/{self.site}/camera/{camera_id}/{what}"
 
-    def bestview(self, what: str) -> str:
-        """Name a key of the best-view service."""
-        return f"myview/{self.site}/bestview/{what}"
+    def bestview(self, what: str, index: int = 0) -> str:
+        """Name a key of the best-view service, of several the one with this index."""
+        return f"myview/{self.site}/bestview/{f'{index}/' if index else ''}{what}"
 
 
 def camera_of(key: str) -> str:

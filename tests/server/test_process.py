@@ -23,7 +23,7 @@ from server.run.setup import free_port
 from server.view.service import BestViewService
 from server.wire.config import Config
 from server.wire.loading import build_config
-from server.wire.messages import PULSE_CLIENT, CameraStatus, CameraTracks, FrameHead, GopChoices
+from server.wire.messages import CameraStatus, CameraTracks, FrameHead, GopChoices, pulse_client
 
 PATIENCE = 40.0  # seconds until a test that awaits something has failed
 FPS = 50
@@ -57,7 +57,7 @@ class Running:
         self.config = config
         self.service = BestViewService(config, out)
         self._tasks: list[asyncio.Task[None]] = []
-        expect = {*config.camera_ids, PULSE_CLIENT}
+        expect = {*config.camera_ids, pulse_client(0)}
         self._pulses = PulseServer(FPS, expect=expect, start_timeout=PATIENCE, port=config.sync.port)
 
     def camera(self, camera: str) -> asyncio.Task[None]:
