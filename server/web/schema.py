@@ -55,7 +55,7 @@ class Objects(msgspec.Struct, frozen=True):
     """Everybody who is known."""
 
     objects: list[ObjectInfo]
-    elsewhere: list[Elsewhere] = []
+    elsewhere: list[Elsewhere]
     """Whom other services of the site show; empty where there are none."""
 
 
