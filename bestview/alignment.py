@@ -102,6 +102,7 @@ class GroundAlignment:
 
     def learn(
         self,
+        given: Sightings,
         seen: Sightings,
         person: NDArray[np.int64],
         present: NDArray[np.bool_],
@@ -111,7 +112,8 @@ class GroundAlignment:
         """Take in who is seen by several cameras at once.
 
         Args:
-            seen: the sightings as the homographies give them.
+            given: the sightings as the homographies give them.
+            seen: the same as `corrected` gives them.
             person: (T,) whose tracks they are.
             present: (T,) seen just now.
             gate: distance within which feet are the same, ground units.
@@ -119,7 +121,7 @@ class GroundAlignment:
         """
         if not (np.isfinite(self._trust) and gate > 0 and height > 0):
             return
-        believed = self.corrected(seen).ground
+        believed = seen.ground
         there = present[:, None] & ~np.isnan(believed[..., 0])
         _, row = np.unique(person, return_inverse=True)
         total = np.zeros((row.max(initial=-1) + 1, *believed.shape[1:]))
@@ -136,7 +138,7 @@ class GroundAlignment:
         target = elsewhere.sum(axis=1) / np.maximum(frames, 1)[:, None]
         own, place = (
             np.where(common[..., None], ground, 0.0).sum(axis=1) / np.maximum(frames, 1)[:, None]
-            for ground in (believed, seen.ground)
+            for ground in (believed, given.ground)
         )
         near = seen_twice & (np.hypot(*(target - own).T) <= _FAR * gate)
         self._take_in(seen, near, place, target - place)

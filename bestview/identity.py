@@ -108,9 +108,8 @@ class IdentityRegistry:
         places = seen.places(rows)
         self._gather(seen, present, last_frame)
         merged = self._regroup(seen, self._inherit(seen, present, places))
-        self._alignment.learn(
-            given, self._people.serials(seen.keys), present, self._gate(), self._scale.height
-        )
+        serials = self._people.serials(seen.keys)
+        self._alignment.learn(given, seen, serials, present, self._gate(), self._scale.height)
         self._remember({track.key: track for track in tracks}, [seen.keys[i] for i in rows], places)
         finding = Finding(self._settings, self._appearances, self._gate(), self._scale.height)
         born, found = self._people.confirm(finding, since)

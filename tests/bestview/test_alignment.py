@@ -34,7 +34,8 @@ def sightings(**ground: Floats) -> Sightings:
 
 
 def learn(alignment: GroundAlignment, seen: Sightings, person: NDArray[np.int64]) -> None:
-    alignment.learn(seen, person, np.ones(len(seen.keys), dtype=np.bool_), GATE, HEIGHT)
+    present = np.ones(len(seen.keys), dtype=np.bool_)
+    alignment.learn(seen, alignment.corrected(seen), person, present, GATE, HEIGHT)
 
 
 def apart(seen: Sightings) -> float:
