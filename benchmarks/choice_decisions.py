@@ -10,12 +10,13 @@ import numpy as np
 
 from benchmarks.stopwatch import Stopwatch
 from bestview import IdentityUpdate, LocalTrack, QualitySettings
-from server.view import decide, sight
+from server.view import decide
 from server.view.align import Epoch
 from server.view.board import Board
 from server.view.decide import Decider
 from server.view.outlook import Outlook
 from server.view.people import People
+from server.view.reading import Reader
 from server.view.sight import Sight
 from server.wire.config import Config
 from server.wire.epochs import end_of_epoch
@@ -106,7 +107,7 @@ def decision_times(crowd: Crowd, gop: int, epochs: int, *, all_terms: bool) -> S
     decider.people._registry = _Given()  # type: ignore[assignment]  # noqa: SLF001 — joining is measured elsewhere
     board, watch = Board(), Stopwatch()
     stages = (
-        (sight, "read_boxes", "reading"),
+        (Reader, "read", "reading"),
         (Sight, "put", "quality"),
         (Outlook, "__init__", "costs"),
         (Outlook, "part", "costs"),

@@ -91,10 +91,7 @@ class Decider:
         if self._next_gop is None:
             start = epoch.last - self._config.track.window.stride + 1
             self._next_gop = -(-start // gop) * gop
-        self.people.update(epoch)
-        self._sight.put(
-            {camera: (message, self.people.keys(message)) for camera, message in epoch.tracks.items()}
-        )
+        self._sight.put(self.people.update(epoch))
         last = epoch.last - lookahead + 1
         if self._next_gop > last:
             return []

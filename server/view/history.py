@@ -2,18 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-
-from server.wire.messages import Box, CameraTracks
-
-
-@dataclass(frozen=True, slots=True)
-class _Word:
-    """The boxes of a window, frame by frame from `first` on, by the tracks' local numbers."""
-
-    first: int
-    boxes: Mapping[int, Sequence[Box | None]]
+from bestview import TrackKey
+from server.view.reading import CameraWindow
+from server.wire.messages import Box
 
 
 class BoxHistory:
@@ -23,22 +14,25 @@ class BoxHistory:
     """
 
     def __init__(self) -> None:
-        self._words: dict[int, _Word] = {}
+        self._windows: dict[int, CameraWindow] = {}
 
-    def put(self, message: CameraTracks, local_of: Mapping[int, int]) -> None:
-        """Take over a window; ``local_of`` maps the tracker's numbers to local ones."""
-        word = _Word(message.first, {local_of[track.id]: track.boxes for track in message.tracks})
-        self._words.update(dict.fromkeys(range(message.first, message.last + 1), word))
+    def put(self, window: CameraWindow) -> None:
+        """Take over a window."""
+        self._windows.update(dict.fromkeys(range(window.first, window.message.last + 1), window))
 
-    def at(self, pulse: int) -> dict[int, Box]:
-        """Give the boxes of a frame by local number."""
-        word = self._words.get(pulse)
-        if word is None:
+    def at(self, pulse: int) -> dict[TrackKey, Box]:
+        """Give the boxes of a frame by track."""
+        window = self._windows.get(pulse)
+        if window is None:
             return {}
-        place = pulse - word.first
-        return {local: box for local, boxes in word.boxes.items() if (box := boxes[place]) is not None}
+        place = pulse - window.first
+        return {
+            key: box
+            for key, track in zip(window.keys, window.message.tracks, strict=True)
+            if (box := track.boxes[place]) is not None
+        }
 
     def forget_before(self, pulse: int) -> None:
         """Let go of the frames before a pulse."""
-        for old in [known for known in self._words if known < pulse]:
-            del self._words[old]
+        for old in [known for known in self._windows if known < pulse]:
+            del self._windows[old]

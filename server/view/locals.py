@@ -13,28 +13,37 @@ class LocalNumbers:
     """
 
     def __init__(self) -> None:
-        self._local: dict[tuple[str, int, int], int] = {}
-        self._origin: dict[TrackKey, tuple[str, int, int]] = {}
+        self._keys: dict[tuple[str, int], dict[int, TrackKey]] = {}
+        """Of each run of a camera, by the tracker's numbers."""
+        self._origin: dict[TrackKey, tuple[int, int]] = {}
+        """The run and the tracker's number."""
         self._counts: dict[str, int] = {}
 
-    def of(self, message: CameraTracks) -> dict[int, int]:
-        """Give the local number of every track in a message."""
-        return {track.id: self._number(message.camera, message.boot, track.id) for track in message.tracks}
+    def of(self, message: CameraTracks) -> tuple[TrackKey, ...]:
+        """Say what the tracks of a message are called here."""
+        keys = self._keys.setdefault((message.camera, message.boot), {})
+        for track in message.tracks:
+            if track.id not in keys:
+                keys[track.id] = self._new(message.camera, message.boot, track.id)
+        return tuple([keys[track.id] for track in message.tracks])
 
-    def known(self, camera: str, boot: int, track: int) -> int | None:
-        """Give the local number of a track that was in some message."""
-        return self._local.get((camera, boot, track))
+    def known(self, camera: str, boot: int, track: int) -> TrackKey | None:
+        """Say what a track that was in some message is called here."""
+        return self._keys.get((camera, boot), {}).get(track)
 
     def forget(self, key: TrackKey) -> None:
         """Let go of a track; should it come back it has a new number."""
         origin = self._origin.pop(key, None)
-        if origin is not None:
-            del self._local[origin]
+        if origin is None:
+            return
+        boot, track = origin
+        keys = self._keys[key.camera, boot]
+        del keys[track]
+        if not keys:
+            del self._keys[key.camera, boot]
 
-    def _number(self, camera: str, boot: int, track: int) -> int:
-        origin = (camera, boot, track)
-        if origin not in self._local:
-            self._counts[camera] = self._counts.get(camera, 0) + 1
-            self._local[origin] = self._counts[camera]
-            self._origin[TrackKey(camera, self._counts[camera])] = origin
-        return self._local[origin]
+    def _new(self, camera: str, boot: int, track: int) -> TrackKey:
+        self._counts[camera] = self._counts.get(camera, 0) + 1
+        key = TrackKey(camera, self._counts[camera])
+        self._origin[key] = boot, track
+        return key

@@ -111,5 +111,6 @@ class _Numbers:
             return None
         window = frame.window
         if id(window) not in self._known:
-            self._known[id(window)] = (window, self._people.numbers(window.keys))
-        return Numbered(frame, self._known[id(window)][1])
+            frames = len(window.quality)
+            self._known[id(window)] = window, self._people.numbers(window.keys, window.first, frames)
+        return Numbered(frame, self._known[id(window)][1][:, frame.place])

@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview import IdentityRegistry, IdentitySettings, LocalTrack, Merge, Split, TrackKey
+from bestview import IdentityRegistry, IdentitySettings, Merge, Split, TrackKey
 from server.view.align import Epoch
 from server.view.history import BoxHistory
-from server.view.locals import LocalNumbers
+from server.view.reading import CameraWindow, Reader
 from server.view.share import served
-from server.view.sight import read_boxes
 from server.wire.config import Share
 from server.wire.fit import Fit
-from server.wire.messages import Box, CameraTracks
+from server.wire.messages import Box
 
 ALL = Share()
 """One service for everybody."""
+
+NOBODY_YET = -1
+"""Stands for a person's number where a track is not confirmed to be anybody."""
 
 
 class People:
@@ -38,14 +41,11 @@ class People:
     ) -> None:
         self._registry = IdentityRegistry(settings, homographies)
         self._remembered = settings.forget_after
-        self._site_size = site_size
         self._share = share
         self._histories = {camera: BoxHistory() for camera in cameras}
-        self._locals = LocalNumbers()
+        self._reader = Reader(site_size)
         self._numbers: dict[TrackKey, int] = {}
         self._heard: dict[TrackKey, int] = {}
-        self.fits: dict[str, Fit] = {}
-        """How each camera's own picture lies in the site's; known from its first word on."""
         self.first_seen: dict[int, int] = {}
         self.last_seen: dict[int, int] = {}
         self.away: set[int] = set()
@@ -54,22 +54,18 @@ class People:
         """Numbers that turned out to be another's."""
         self._corrections: list[Merge | Split] = []
 
-    def update(self, epoch: Epoch) -> None:
-        """Take over what all cameras said about an epoch."""
-        tracks: list[LocalTrack] = []
-        seen: list[tuple[int, int]] = []
-        for camera, message in epoch.tracks.items():
-            local_of = self._locals.of(message)
-            self._histories[camera].put(message, local_of)
-            fit = self.fits.setdefault(camera, Fit(message.size, self._site_size))
-            boxes = read_boxes(message)
-            tracks += _local_tracks(message, local_of, fit.boxes_to_own(boxes))
-            seen += _first_and_last(message.first, boxes)
+    def update(self, epoch: Epoch) -> Sequence[CameraWindow]:
+        """Take over what all cameras said about an epoch; give it as it was read."""
+        windows = self._reader.read(epoch)
+        for window in windows:
+            self._histories[window.message.camera].put(window)
+        tracks = [track for window in windows for track in window.local_tracks()]
         update = self._registry.update(tracks, epoch.last)
         for track in tracks:
             # Who has left a person for one not confirmed yet has no number for now.
             self._numbers.pop(track.key, None)
         self._numbers.update(update.numbers)
+        seen = chain.from_iterable(window.seen() for window in windows)
         for track, (first, last) in zip(tracks, seen, strict=True):
             self._heard[track.key] = epoch.last
             self._note_seen(self._numbers.get(track.key), first, last)
@@ -78,6 +74,12 @@ class People:
             self._merge(merge.kept, merge.lost)
         self._corrections += [*update.merged, *update.split]
         self._forget(epoch.last)
+        return windows
+
+    @property
+    def fits(self) -> Mapping[str, Fit]:
+        """How each camera's own picture lies in the site's; known from its first word on."""
+        return self._reader.fits
 
     @property
     def known(self) -> list[int]:
@@ -90,33 +92,31 @@ class People:
         mine = set(self.known)
         return [number for number in sorted(self.first_seen) if number not in mine]
 
-    def number(self, camera: str, local: int) -> int | None:
-        """Give the person's number behind a camera's local one; None while it is not confirmed."""
-        return self._numbers.get(TrackKey(camera, local))
+    def number(self, camera: str, local: int, pulse: int) -> int | None:
+        """Give the person's number behind a camera's local one in a frame; None while it is not confirmed."""
+        number = int(self.numbers([TrackKey(camera, local)], pulse, 1)[0, 0])
+        return None if number == NOBODY_YET else number
 
     def boxes(self, camera: str, pulse: int) -> dict[int, Box]:
         """Give everybody's box in a camera's frame by the person's number, in the numbers' order."""
+        told = self._histories[camera].at(pulse)
         numbered: dict[int, Box] = {}
-        for local, box in self._histories[camera].at(pulse).items():
-            number = self.number(camera, local)
-            if number is not None:
+        for number, box in zip(self.numbers(list(told), pulse, 1)[:, 0].tolist(), told.values(), strict=True):
+            if number != NOBODY_YET:
                 numbered.setdefault(number, box)
         return dict(sorted(numbered.items()))
 
-    def whose(self, camera: str, boot: int, track: int) -> int | None:
-        """Give the person's number behind a tracker's number."""
-        local = self._locals.known(camera, boot, track)
-        return None if local is None else self.number(camera, local)
+    def whose(self, camera: str, boot: int, track: int, pulse: int) -> int | None:
+        """Give the person's number behind a tracker's number in a frame."""
+        key = self._reader.locals.known(camera, boot, track)
+        return None if key is None else self.number(key.camera, key.local, pulse)
 
-    def keys(self, message: CameraTracks) -> list[TrackKey]:
-        """Say what the tracks of a message are called here, once it was taken over."""
-        local_of = self._locals.of(message)
-        return [TrackKey(message.camera, local_of[track.id]) for track in message.tracks]
-
-    def numbers(self, keys: Sequence[TrackKey]) -> NDArray[np.int64]:
-        """Give the persons' numbers behind tracks, (T,); -1 where one is not confirmed."""
+    def numbers(self, keys: Sequence[TrackKey], first: int, frames: int) -> NDArray[np.int64]:
+        """Give the persons' numbers behind T tracks in frames from `first` on, (T, frames); -1: nobody yet."""
+        del first  # a track is one person's for as long as it is known
         known = self._numbers
-        return np.fromiter((known.get(key, -1) for key in keys), dtype=np.int64, count=len(keys))
+        numbers = np.fromiter((known.get(key, NOBODY_YET) for key in keys), dtype=np.int64, count=len(keys))
+        return np.broadcast_to(numbers[:, None], (len(keys), frames))
 
     def also(self, number: int) -> list[int]:
         """Give the other numbers that somebody once had, in order."""
@@ -152,35 +152,8 @@ class People:
         for key in [key for key, heard in self._heard.items() if heard < now - self._remembered]:
             del self._heard[key]
             self._numbers.pop(key, None)
-            self._locals.forget(key)
+            self._reader.locals.forget(key)
         for number in [number for number, last in self.last_seen.items() if last < now - self._remembered]:
             del self.first_seen[number], self.last_seen[number]
             self.away.discard(number)
             self.merged = {old: new for old, new in self.merged.items() if new != number}
-
-
-def _local_tracks(
-    message: CameraTracks, local_of: Mapping[int, int], boxes: NDArray[np.float64]
-) -> list[LocalTrack]:
-    """Give the tracks of a message, (T, F, 4) boxes in the camera's own picture."""
-    return [
-        LocalTrack(
-            camera=message.camera,
-            local=local_of[track.id],
-            first=message.first,
-            boxes=rows,
-            histogram=np.array(track.histogram, dtype=np.float64),
-        )
-        for track, rows in zip(message.tracks, boxes, strict=True)
-    ]
-
-
-def _first_and_last(first: int, boxes: NDArray[np.float64]) -> list[tuple[int, int]]:
-    """Give each of T tracks' first and last frame with a box, from (T, F, 4); the last is lower: none."""
-    there = ~np.isnan(boxes[:, :, 0])
-    if not there.size:
-        return [(first, first - 1)] * len(boxes)
-    begins = first + there.argmax(axis=1)
-    ends = first + boxes.shape[1] - 1 - there[:, ::-1].argmax(axis=1)
-    ends[~there.any(axis=1)] = first - 1
-    return list(zip(begins.tolist(), ends.tolist(), strict=True))

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bestview import TrackKey
 from bestview.quality import Looks, Quality, QualitySettings, Seen, view_quality
+from server.view.reading import CameraWindow
 from server.wire.config import Config
 from server.wire.fit import Fit
-from server.wire.messages import CameraTracks
 
 Floats = NDArray[np.float64]
-
-_HIDDEN = (np.nan,) * 4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,11 +23,13 @@ class SeenWindow:
 
     Attributes:
         keys: whose they are; T of them.
+        first: the pulse of the first frame.
         quality: (F, T), NaN where hidden.
         terms: (terms, F, T) what it is made of, NaN where hidden.
     """
 
     keys: tuple[TrackKey, ...]
+    first: int
     quality: Floats
     terms: Floats
 
@@ -59,25 +58,27 @@ class Sight:
         self._homographies, self._fits = homographies, fits
         self._frames: dict[str, dict[int, SeenFrame]] = {camera: {} for camera in config.camera_ids}
 
-    def put(self, messages: Mapping[str, tuple[CameraTracks, Sequence[TrackKey]]]) -> None:
-        """Take over what cameras said of an epoch, and whose each of their tracks is."""
-        told = {camera: it for camera, it in messages.items() if it[0].last >= it[0].first}
+    def put(self, windows: Iterable[CameraWindow]) -> None:
+        """Take over what cameras said of an epoch."""
+        told = [window for window in windows if window.boxes.shape[1]]
         if not told:
             return
-        first = min(message.first for message, _ in told.values())
-        quality = self._weigh([message for message, _ in told.values()], first)
+        first = min(window.first for window in told)
+        quality = self._weigh(told, first)
         # Frames first: the rows of one frame of one camera are what is asked for.
         values = np.where(np.isnan(quality.terms).all(axis=0), np.nan, quality.quality).transpose(2, 1, 0)
         terms = quality.terms.transpose(3, 0, 2, 1)
-        for column, (camera, (message, keys)) in enumerate(told.items()):
-            rows, tracks = slice(message.first - first, message.last - first + 1), len(keys)
-            window = SeenWindow(
-                tuple(keys),
+        for column, window in enumerate(told):
+            tracks, frames = window.boxes.shape[:2]
+            rows = slice(window.first - first, window.first - first + frames)
+            seen = SeenWindow(
+                window.keys,
+                window.first,
                 np.ascontiguousarray(values[column, rows, :tracks]),
                 np.ascontiguousarray(terms[column, :, rows, :tracks]),
             )
-            for place, pulse in enumerate(range(message.first, message.last + 1)):
-                self._frames[camera][pulse] = SeenFrame(window, place)
+            for place in range(frames):
+                self._frames[window.message.camera][window.first + place] = SeenFrame(seen, place)
 
     def at(self, camera: str, pulse: int) -> SeenFrame | None:
         """Give what was last said of a camera's frame; None: nothing."""
@@ -89,26 +90,25 @@ class Sight:
             for old in [known for known in frames if known < pulse]:
                 del frames[old]
 
-    def _weigh(self, messages: Sequence[CameraTracks], first: int) -> Quality:
+    def _weigh(self, windows: Sequence[CameraWindow], first: int) -> Quality:
         """Weigh the views of all windows at once; tracks and frames that one of them lacks are hidden."""
-        frames = max(message.last for message in messages) - first + 1
-        tracks = max(len(message.tracks) for message in messages)
-        boxes = np.full((len(messages), frames, tracks, 4), np.nan)
-        sure = np.zeros((tracks, len(messages)))
-        sharp = np.full((tracks, len(messages)), np.nan)
-        for column, message in enumerate(messages):
-            rows, count = slice(message.first - first, message.last - first + 1), len(message.tracks)
-            boxes[column, rows, :count] = read_boxes(message).transpose(1, 0, 2)
-            sharp[:count, column] = [
-                np.nan if track.sharpness is None else track.sharpness for track in message.tracks
-            ]
-            sure[:count, column] = np.clip([track.confidence for track in message.tracks], 0.0, 1.0)
+        frames = max(window.first + window.boxes.shape[1] for window in windows) - first
+        most = max(len(window.keys) for window in windows)
+        boxes = np.full((len(windows), frames, most, 4), np.nan)
+        sure = np.zeros((most, len(windows)))
+        sharp = np.full((most, len(windows)), np.nan)
+        for column, window in enumerate(windows):
+            tracks = window.message.tracks
+            rows, count = slice(window.first - first, window.message.last - first + 1), len(tracks)
+            boxes[column, rows, :count] = window.boxes.transpose(1, 0, 2)
+            sharp[:count, column] = [np.nan if it.sharpness is None else it.sharpness for it in tracks]
+            sure[:count, column] = np.clip([it.confidence for it in tracks], 0.0, 1.0)
         return view_quality(
             Seen(boxes.transpose(2, 1, 0, 3), sure, sharp),
             Looks(
                 self._size,
-                np.array([self._picture(message.camera) for message in messages]),
-                [self._ground(message.camera) for message in messages],
+                np.array([self._picture(window.message.camera) for window in windows]),
+                [self._ground(window.message.camera) for window in windows],
                 self._fps,
             ),
             self._settings,
@@ -127,11 +127,3 @@ class Sight:
         (left, top), scale = self._fits[camera].to_site(np.zeros(2)), self._fits[camera].scale
         to_own = np.array([[1.0, 0.0, -left], [0.0, 1.0, -top], [0.0, 0.0, scale]]) / scale
         return np.asarray(own @ to_own)
-
-
-def read_boxes(message: CameraTracks) -> Floats:
-    """Give the boxes of a message: (T, F, 4), NaN where hidden."""
-    frames = message.last - message.first + 1
-    boxes = [box or _HIDDEN for track in message.tracks for box in track.boxes]
-    flat = np.fromiter(chain.from_iterable(boxes), dtype=np.float64, count=4 * len(boxes))
-    return flat.reshape(len(message.tracks), frames, 4)

@@ -107,7 +107,7 @@ def _thumbnails(service: BestViewService) -> dict[int, list[tuple[str, Thumbnail
     """Give everybody's small pictures by number, each with its camera."""
     found: dict[int, list[tuple[str, Thumbnail]]] = {}
     for (camera, boot, track), thumbnail in service.intake.thumbnails.items():
-        number = service.decider.people.whose(camera, boot, track)
+        number = service.decider.people.whose(camera, boot, track, thumbnail.pulse)
         if number is not None:
             found.setdefault(number, []).append((camera, thumbnail))
     return found

@@ -6,6 +6,7 @@ import itertools
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+import numpy as np
 import pytest
 from cameras_by_hand import CAMERAS, GOP, LARGE, SMALL, STRIDE, TrackNumbers, epoch_of, small_config, word
 from hypothesis import given, settings
@@ -225,6 +226,17 @@ def test_a_shot_that_shows_nobody_may_be_short() -> None:
     here, gone = {A: {1: LARGE}, B: {1: SMALL}}, {A: {}, B: {1: SMALL}}
     it = decider(view={"min_shot_s": 2.0})
     assert shown(decide(it, [here, here, *[gone] * 4])) == [A, A, B, B, B]
+
+
+def test_a_track_that_becomes_another_person_inside_a_window_is_each_of_them_in_their_frames() -> None:
+    it = decider()
+    changes = STRIDE + 2
+    it.people.numbers = lambda keys, first, frames: np.where(  # type: ignore[method-assign]
+        first + np.arange(frames) < changes, 1, 2
+    )[None].repeat(len(keys), axis=0)
+    decisions = decide(it, [{A: {1: LARGE}, B: {}}] * 4)
+    assert [list(frame) for frame in decisions[1].boxes[A]] == [[1], [1], [2], [2], [2]]
+    assert decisions[1].why.of(1).views[A].seen == pytest.approx(2 / (2 * GOP))
 
 
 def test_how_far_away_everybody_is_makes_no_difference() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from cameras_by_hand import CAMERAS, HEIGHT, LARGE, SMALL, STRIDE, WIDTH, epoch_of, word
 
@@ -9,6 +10,7 @@ from bestview import IdentitySettings, IdentityUpdate, LocalTrack, Merge, Split,
 from server.view.history import BoxHistory
 from server.view.locals import LocalNumbers
 from server.view.people import People
+from server.view.reading import Reader
 
 
 def people(**settings: int) -> People:
@@ -27,6 +29,18 @@ class Dictated:
         return self._updates.pop(0)
 
 
+class Heard:
+    """An identity registry that notes what it is given."""
+
+    def __init__(self, heard: list[LocalTrack]) -> None:
+        self._heard = heard
+
+    def update(self, tracks: list[LocalTrack], last_frame: int) -> IdentityUpdate:
+        del last_frame
+        self._heard += tracks
+        return said({})
+
+
 def said(numbers: dict[tuple[str, int], int], *corrections: Merge | Split) -> IdentityUpdate:
     keys = {TrackKey(*key): number for key, number in numbers.items()}
     merged = tuple(it for it in corrections if isinstance(it, Merge))
@@ -41,22 +55,23 @@ def dictated(*updates: IdentityUpdate) -> People:
 
 
 def test_a_later_word_on_a_frame_replaces_an_earlier_one() -> None:
-    history = BoxHistory()
-    history.put(word("c0", 0, {7: SMALL}), {7: 1})
-    history.put(word("c0", 0, {7: LARGE, 8: None}), {7: 1, 8: 2})
-    assert history.at(0) == {1: LARGE}
+    history, reader = BoxHistory(), Reader((WIDTH, HEIGHT))
+    for told in (word("c0", 0, {7: SMALL}), word("c0", 0, {7: LARGE, 8: None})):
+        [window] = reader.read(epoch_of(0, told))
+        history.put(window)
+    assert history.at(0) == {TrackKey("c0", 1): LARGE}
     history.forget_before(3)
     assert history.at(2) == {}
-    assert history.at(3) == {1: LARGE}
+    assert history.at(3) == {TrackKey("c0", 1): LARGE}
 
 
 def test_a_restarted_cameras_first_track_is_not_its_former_first_track() -> None:
     numbers = LocalNumbers()
-    assert numbers.of(word("c0", 0, {1: SMALL, 2: SMALL})) == {1: 1, 2: 2}
-    assert numbers.of(word("c0", 1, {1: SMALL}, boot=2)) == {1: 3}
-    assert numbers.of(word("c1", 1, {1: SMALL})) == {1: 1}
-    assert numbers.known("c0", 1, 1) == 1
-    assert numbers.known("c0", 2, 1) == 3
+    assert numbers.of(word("c0", 0, {1: SMALL, 2: SMALL})) == (TrackKey("c0", 1), TrackKey("c0", 2))
+    assert numbers.of(word("c0", 1, {1: SMALL}, boot=2)) == (TrackKey("c0", 3),)
+    assert numbers.of(word("c1", 1, {1: SMALL})) == (TrackKey("c1", 1),)
+    assert numbers.known("c0", 1, 1) == TrackKey("c0", 1)
+    assert numbers.known("c0", 2, 1) == TrackKey("c0", 3)
 
 
 def test_a_forgotten_track_that_comes_back_has_a_new_number() -> None:
@@ -64,7 +79,17 @@ def test_a_forgotten_track_that_comes_back_has_a_new_number() -> None:
     numbers.of(word("c0", 0, {1: SMALL}))
     numbers.forget(TrackKey("c0", 1))
     assert numbers.known("c0", 1, 1) is None
-    assert numbers.of(word("c0", 5, {1: SMALL})) == {1: 2}
+    assert numbers.of(word("c0", 5, {1: SMALL})) == (TrackKey("c0", 2),)
+
+
+def test_feet_that_the_lower_edge_cuts_off_do_not_say_where_somebody_stands() -> None:
+    it = people()
+    heard: list[LocalTrack] = []
+    it._registry = Heard(heard)  # type: ignore[assignment]
+    it.update(epoch_of(0, word("c0", 0, {1: SMALL}, size=(WIDTH // 2, HEIGHT // 2))))
+    [track] = heard
+    assert track.picture_height == HEIGHT // 2, "of the camera's own picture, as its boxes"
+    np.testing.assert_allclose(track.boxes, np.tile(np.array(SMALL) / 2, (STRIDE, 1)))
 
 
 def test_people_are_where_their_tracks_are() -> None:
@@ -73,8 +98,8 @@ def test_people_are_where_their_tracks_are() -> None:
     first, second = it.known
     assert it.boxes("c0", 4) == {first: SMALL, second: LARGE}
     assert it.boxes("c1", 4) == {}
-    assert it.whose("c0", 1, 2) == second
-    assert it.whose("c0", 9, 2) is None
+    assert it.whose("c0", 1, 2, 0) == second
+    assert it.whose("c0", 9, 2, 0) is None
 
 
 def test_first_and_last_seen_are_the_frames_with_a_box() -> None:
@@ -90,8 +115,8 @@ def test_a_restarted_cameras_people_do_not_inherit_the_boxes_of_others() -> None
     it.update(epoch_of(0, word("c0", 0, {1: SMALL})))
     it.update(epoch_of(1, word("c0", 1, {1: LARGE}, boot=2)))
     [before], [after] = it.boxes("c0", 0), it.boxes("c0", STRIDE)
-    assert it.whose("c0", 1, 1) == before
-    assert it.whose("c0", 2, 1) == after
+    assert it.whose("c0", 1, 1, 0) == before
+    assert it.whose("c0", 2, 1, STRIDE) == after
 
 
 def test_a_merged_number_lives_on_as_the_others_and_chains_are_followed() -> None:
@@ -123,7 +148,7 @@ def test_who_has_left_a_person_for_one_not_confirmed_yet_has_no_number() -> None
     it.update(epoch_of(0, word("c0", 0, {1: SMALL})))
     it.update(epoch_of(1, word("c0", 1, {1: SMALL})))
     assert it.boxes("c0", STRIDE) == {}
-    assert it.number("c0", 1) is None
+    assert it.number("c0", 1, STRIDE) is None
 
 
 def test_two_tracks_of_one_person_in_one_picture_give_one_box() -> None:
@@ -143,7 +168,7 @@ def test_people_who_were_gone_for_long_are_forgotten_with_all_that_is_known_of_t
     it.update(epoch_of(9, word("c0", 9, {})))
     assert it.known == []
     assert it.away == set()
-    assert it.whose("c0", 1, 1) is None
+    assert it.whose("c0", 1, 1, 0) is None
     assert not it._numbers
     assert not it._heard
 

@@ -1,0 +1,97 @@
+"""What a camera said of an epoch, read once: its tracks' names, and their boxes as arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import chain
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bestview import LocalTrack, TrackKey
+from server.view.align import Epoch
+from server.view.locals import LocalNumbers
+from server.wire.fit import Fit
+from server.wire.messages import CameraTracks
+
+Floats = NDArray[np.float64]
+
+_HIDDEN = (np.nan,) * 4
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CameraWindow:
+    """One camera's T tracks over a window of F frames.
+
+    Attributes:
+        message: as it came.
+        keys: what the tracks are called here; T of them.
+        fit: how the camera's own picture lies in the site's.
+        boxes: (T, F, 4) pixels of the site's picture, NaN where hidden.
+    """
+
+    message: CameraTracks
+    keys: tuple[TrackKey, ...]
+    fit: Fit
+    boxes: Floats
+
+    @property
+    def first(self) -> int:
+        """The pulse of the first frame."""
+        return self.message.first
+
+    def local_tracks(self) -> list[LocalTrack]:
+        """Give the tracks as identity takes them, boxes in the camera's own picture."""
+        _, height = self.message.size
+        return [
+            LocalTrack(
+                camera=key.camera,
+                local=key.local,
+                first=self.first,
+                boxes=boxes,
+                histogram=np.array(track.histogram, dtype=np.float64),
+                picture_height=float(height),
+            )
+            for key, track, boxes in zip(
+                self.keys, self.message.tracks, self.fit.boxes_to_own(self.boxes), strict=True
+            )
+        ]
+
+    def seen(self) -> list[tuple[int, int]]:
+        """Give each track's first and last frame with a box; the last is lower: none."""
+        there = ~np.isnan(self.boxes[:, :, 0])
+        if not there.size:
+            return [(self.first, self.first - 1)] * len(self.keys)
+        begins = self.first + there.argmax(axis=1)
+        ends = self.first + there.shape[1] - 1 - there[:, ::-1].argmax(axis=1)
+        ends[~there.any(axis=1)] = self.first - 1
+        return list(zip(begins.tolist(), ends.tolist(), strict=True))
+
+
+class Reader:
+    """Reads epochs, and remembers what tracks are called and how each camera's picture lies in the site's."""
+
+    def __init__(self, site_size: tuple[int, int]) -> None:
+        self._site_size = site_size
+        self.locals = LocalNumbers()
+        self.fits: dict[str, Fit] = {}
+        """Of each camera, known from its first word on."""
+
+    def read(self, epoch: Epoch) -> Sequence[CameraWindow]:
+        """Give what all cameras said, in the order of the epoch."""
+        return [self._window(message) for message in epoch.tracks.values()]
+
+    def _window(self, message: CameraTracks) -> CameraWindow:
+        fit = self.fits.get(message.camera)
+        if fit is None:
+            fit = self.fits[message.camera] = Fit(message.size, self._site_size)
+        return CameraWindow(message, self.locals.of(message), fit, _boxes(message))
+
+
+def _boxes(message: CameraTracks) -> Floats:
+    """Give the boxes of a message: (T, F, 4), NaN where hidden."""
+    frames = max(0, message.last - message.first + 1)
+    boxes = [box or _HIDDEN for track in message.tracks for box in track.boxes]
+    flat = np.fromiter(chain.from_iterable(boxes), dtype=np.float64, count=4 * len(boxes))
+    return flat.reshape(len(message.tracks), frames, 4)
