@@ -112,7 +112,7 @@ class People:
         return None if key is None else self.number(key.camera, key.local, pulse)
 
     def numbers(self, keys: Sequence[TrackKey], first: int, frames: int) -> NDArray[np.int64]:
-        """Give the persons' numbers behind T tracks in frames from `first` on, (T, frames); -1: nobody yet."""
+        """Give the persons' numbers behind T tracks, frame by frame, (T, frames); -1: nobody yet."""
         del first  # a track is one person's for as long as it is known
         known = self._numbers
         numbers = np.fromiter((known.get(key, NOBODY_YET) for key in keys), dtype=np.int64, count=len(keys))
