@@ -6,49 +6,69 @@ import asyncio
 from collections import deque
 from collections.abc import AsyncIterator
 from dataclasses import dataclass
+from typing import Protocol
+
+
+class Piece(Protocol):
+    """A piece of a stream; viewers share the bytes."""
+
+    @property
+    def data(self) -> bytes:
+        """What is sent."""
+
+    @property
+    def start(self) -> bool:
+        """Whether a viewer may begin here."""
+
+    @property
+    def fills(self) -> bool:
+        """Whether it is a whole GOP in which there is nothing to show, and so of use to nobody who begins."""
 
 
 @dataclass(frozen=True, slots=True)
 class Chunk:
-    """A piece of a stream; viewers share the bytes."""
+    """A piece of a stream that is just bytes."""
 
     data: bytes
     start: bool
-    """A viewer may begin here."""
+    fills: bool = False
 
 
 class Viewer:
     """One viewer's place in a stream: iterate over it for the bytes to send."""
 
-    def __init__(self, backlog: list[Chunk], starts_max: int) -> None:
+    def __init__(self, backlog: list[Piece], starts_max: int) -> None:
         self._starts_max = starts_max
-        self._queue: deque[Chunk] = deque(backlog)
+        self._queue: deque[Piece] = deque(backlog)
         self._begun = bool(backlog)
         self._closed = False
         self._wake = asyncio.Event()
         self.lost = 0
         """GOPs lost because the viewer fell behind."""
 
-    def put(self, chunk: Chunk) -> None:
-        """Queue a chunk; whoever is too far behind loses all that waits and goes on with this start.
+    def put(self, piece: Piece) -> None:
+        """Queue a piece; whoever is too far behind loses all that waits and goes on with the next start.
 
         What comes before a viewer's first start is of no use to them: it is left out.
         """
-        self._begun |= chunk.start
+        self._begun |= piece.start
         if not self._begun:
             return
-        if chunk.start:
-            waiting = sum(queued.start for queued in self._queue)
+        if piece.start or piece.fills:
+            waiting = sum(queued.start or queued.fills for queued in self._queue)
             if waiting >= self._starts_max:
                 self._queue.clear()
                 self.lost += waiting
-        self._queue.append(chunk)
+                self._begun = piece.start
+                if not self._begun:
+                    return
+        self._queue.append(piece)
         self._wake.set()
 
-    def put_first(self, chunk: Chunk) -> None:
-        """Put a chunk before all that waits."""
-        self._begun |= chunk.start
-        self._queue.appendleft(chunk)
+    def put_first(self, piece: Piece) -> None:
+        """Put a piece before all that waits."""
+        self._begun |= piece.start
+        self._queue.appendleft(piece)
         self._wake.set()
 
     def close(self) -> None:
@@ -58,9 +78,14 @@ class Viewer:
 
     async def __aiter__(self) -> AsyncIterator[bytes]:
         """Give the bytes in order until the stream ends."""
+        async for piece in self.pieces():
+            yield piece.data
+
+    async def pieces(self) -> AsyncIterator[Piece]:
+        """Give the pieces in order until the stream ends."""
         while True:
             while self._queue:
-                yield self._queue.popleft().data
+                yield self._queue.popleft()
             if self._closed:
                 return
             self._wake.clear()
@@ -68,12 +93,15 @@ class Viewer:
 
 
 class Channel:
-    """Hands every chunk to every viewer; whoever comes begins with the newest ``starts_kept`` starts."""
+    """Hands every piece to every viewer; whoever comes begins with the newest ``starts_kept`` starts.
+
+    Where nothing could be shown for ``queue_starts`` GOPs, whoever comes waits for the next start instead.
+    """
 
     def __init__(self, *, starts_kept: int = 1, queue_starts: int = 8) -> None:
         self._starts_kept = starts_kept
         self._queue_starts = queue_starts
-        self._kept: deque[Chunk] = deque()
+        self._kept: deque[Piece] = deque()
         self._viewers: set[Viewer] = set()
         self._closed = False
 
@@ -82,18 +110,20 @@ class Channel:
         """How many are watching."""
         return len(self._viewers)
 
-    def publish(self, chunk: Chunk) -> None:
-        """Send a chunk to everybody."""
-        self._kept.append(chunk)
+    def publish(self, piece: Piece) -> None:
+        """Send a piece to everybody."""
+        self._kept.append(piece)
         starts = sum(kept.start for kept in self._kept)
         while starts > self._starts_kept or (self._kept and not self._kept[0].start):
             starts -= self._kept.popleft().start
-        self.tell(chunk)
+        if piece.fills and sum(kept.fills for kept in self._kept) > self._queue_starts:
+            self._kept.clear()
+        self.tell(piece)
 
-    def tell(self, chunk: Chunk) -> None:
-        """Send a chunk to everybody who is here now, and to nobody who comes later."""
+    def tell(self, piece: Piece) -> None:
+        """Send a piece to everybody who is here now, and to nobody who comes later."""
         for viewer in self._viewers:
-            viewer.put(chunk)
+            viewer.put(piece)
 
     def join(self) -> Viewer:
         """Let somebody in; call :meth:`leave` in the end."""

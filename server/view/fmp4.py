@@ -9,6 +9,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 
 from server.view.h264 import ParameterSets
 
@@ -32,6 +33,8 @@ class Sample:
     data: bytes
     """NAL units behind their lengths."""
     key: bool
+    lasts: int = 1
+    """Pulses that it is shown for."""
 
 
 def ticks(pulse: int, fps: float) -> int:
@@ -77,7 +80,8 @@ def init_segment(parameters: ParameterSets, width: int, height: int) -> bytes:
 
 def fragment(samples: Sequence[Sample], first: int, fps: float) -> bytes:
     """Give ``moof`` and ``mdat`` of consecutive frames, the first of them shown at pulse ``first``."""
-    edges = [ticks(first + number, fps) for number in range(len(samples) + 1)]
+    pulses = list(accumulate((sample.lasts for sample in samples), initial=first))
+    edges = [ticks(pulse, fps) for pulse in pulses]
     entries = b"".join(
         struct.pack(
             ">3I",
@@ -126,3 +130,9 @@ def rebased(frame: bytes, by: int) -> bytes:
     """Move a fragment of :func:`fragment` in time by ``by`` ticks."""
     (time,) = struct.unpack_from(">Q", frame, _TFDT_AT)
     return frame[:_TFDT_AT] + struct.pack(">Q", time + by) + frame[_TFDT_AT + 8 :]
+
+
+def sample_of(frame: bytes) -> bytes:
+    """Give the sample of a fragment of :func:`fragment` that has one."""
+    (moof_bytes,) = struct.unpack_from(">I", frame)
+    return frame[moof_bytes + 8 :]

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 _START_CODE = re.compile(b"\x00\x00\x01")
 
+NAL_SLICE = 1
 NAL_IDR = 5
 NAL_SPS = 7
 NAL_PPS = 8

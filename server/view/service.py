@@ -41,7 +41,7 @@ class BestViewService:
         self.agreement = Agreement()
         self.shelves = {camera: Shelf(config.site.fps, frames, self.agreement) for camera in cameras}
         self.aligner = Aligner(cameras, stride, grace)
-        self.splicer = Splicer(self.shelves, config.http)
+        self.splicer = Splicer(self.shelves, self.agreement, config)
         self.intake = Intake(self.shelves, self.aligner, self.splicer.frame)
         self.decider = Decider(
             config, homographies(config), lambda camera, pulse: self.shelves[camera].has(pulse)

@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import TypeAlias
 
 from server.view.agreement import Agreement
 from server.view.fmp4 import Sample, fragment
+from server.view.footage import Picture
 from server.view.h264 import nal_units, parameter_sets, sample
 
-
-@dataclass(frozen=True, slots=True)
-class Shelved:
-    """One frame, ready to be sent to anybody."""
-
-    key: bool
-    boot: int
-    fragment: bytes
+Shelved: TypeAlias = Picture
+"""One frame, ready to be sent to anybody."""
 
 
 class Shelf:
@@ -40,7 +35,8 @@ class Shelf:
         units = nal_units(access_unit)
         if key:
             self._agreement.check(parameter_sets(units))
-        shelved = Shelved(key, boot, fragment([Sample(sample(units), key)], pulse, self._fps))
+        made = fragment([Sample(sample(units), key)], pulse, self._fps)
+        shelved = Shelved(pulse, key, made, boot)
         self._shelved[pulse] = shelved
         self.newest = max(self.newest, pulse)
         while len(self._shelved) > self._frames:
@@ -60,6 +56,10 @@ class Shelf:
     def get(self, pulse: int) -> Shelved | None:
         """Give one frame."""
         return self._shelved.get(pulse)
+
+    def pictures(self, first: int, frames: int) -> list[Shelved]:
+        """Give those of some consecutive frames that are here."""
+        return [self._shelved[pulse] for pulse in range(first, first + frames) if pulse in self._shelved]
 
     def gop(self, first: int, frames: int) -> bytes:
         """Give the fragments of consecutive frames in one piece; all of them must be here."""

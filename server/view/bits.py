@@ -1,0 +1,83 @@
+"""Bits of H.264's syntax, read and written (ITU-T H.264, 7.2, 7.4.1 and 9.1)."""
+
+from __future__ import annotations
+
+import re
+
+_ESCAPED = re.compile(b"\x00\x00\x03")
+_TO_ESCAPE = re.compile(b"\x00\x00(?=[\x00-\x03])")
+
+
+def payload_of(unit: bytes) -> bytes:
+    """Give a NAL unit's payload: without its head, and without the bytes that keep start codes out."""
+    return _ESCAPED.sub(b"\x00\x00", unit[1:])
+
+
+def unit_of(head: int, payload: bytes) -> bytes:
+    """Give the NAL unit of a payload, escaped so that no start code is in it."""
+    return bytes([head]) + _TO_ESCAPE.sub(b"\x00\x00\x03", payload)
+
+
+class BitReader:
+    """Reads a payload from its first bit on.
+
+    Raises:
+        ValueError: in every method, when the bits are at an end.
+    """
+
+    def __init__(self, payload: bytes) -> None:
+        self._bits = "".join(f"{byte:08b}" for byte in payload)
+        self._at = 0
+
+    def u(self, count: int) -> int:
+        """Read an unsigned number of so many bits."""
+        taken = self._bits[self._at : self._at + count]
+        if len(taken) < count:
+            raise ValueError("the bits are at an end")
+        self._at += count
+        return int(taken, 2) if count else 0
+
+    def ue(self) -> int:
+        """Read an unsigned Exp-Golomb number."""
+        one = self._bits.find("1", self._at)
+        if one < 0:
+            raise ValueError("the bits are at an end")
+        zeros = one - self._at
+        self._at = one
+        return self.u(zeros + 1) - 1
+
+    def se(self) -> int:
+        """Read a signed Exp-Golomb number."""
+        code = self.ue()
+        return (code + 1) // 2 if code % 2 else -(code // 2)
+
+
+class BitWriter:
+    """Writes a payload bit by bit."""
+
+    def __init__(self) -> None:
+        self._bits: list[str] = []
+        self._count = 0
+
+    def u(self, count: int, value: int) -> None:
+        """Write an unsigned number in so many bits."""
+        self._bits.append(f"{value:0{count}b}")
+        self._count += count
+
+    def ue(self, value: int) -> None:
+        """Write an unsigned Exp-Golomb number."""
+        self.u(2 * (value + 1).bit_length() - 1, value + 1)
+
+    def se(self, value: int) -> None:
+        """Write a signed Exp-Golomb number."""
+        self.ue(2 * value - 1 if value > 0 else -2 * value)
+
+    def align(self, bit: int) -> None:
+        """Fill the last byte with ones or zeros."""
+        while self._count % 8:
+            self.u(1, bit)
+
+    def done(self) -> bytes:
+        """Give all whole bytes; call :meth:`align` before."""
+        bits = "".join(self._bits)
+        return bytes(int(bits[at : at + 8], 2) for at in range(0, len(bits), 8))
