@@ -103,11 +103,13 @@ def run(options: argparse.Namespace) -> None:
         ],
         rows,
     )
-    report.say("decision: quality, costs, choice and what is kept of them, from boxes to everybody's camera.")
     report.say(
-        "Beside it: reading boxes out of messages, keeping who is who (here by given numbers), and writing"
+        "decision: reading, quality, costs, choice and what is kept of them, from messages to everybody's"
     )
-    report.say("choices and boxes down for the files, the bus and the page.")
+    report.say(
+        "camera. Beside it: keeping who is who (here by given numbers), and writing choices and boxes down"
+    )
+    report.say("for the files, the bus and the page.")
     options.out.mkdir(parents=True, exist_ok=True)
     plot({"objects": (_MORE_PEOPLE, people), "cameras": (_MORE_CAMERAS, cameras)}, options.out / "choice.png")
     report.save(options.out / "choice.txt")

@@ -14,7 +14,7 @@ from server.view import decide
 from server.view.align import Epoch
 from server.view.board import Board
 from server.view.decide import Decider
-from server.view.outlook import Outlook
+from server.view.outlook import Outlook, Part
 from server.view.people import People
 from server.view.reading import Reader
 from server.view.sight import Sight
@@ -85,8 +85,8 @@ class Spent:
 
     @property
     def decision(self) -> float:
-        """From boxes to everybody's camera."""
-        return self.quality + self.costs + self.choice + self.rest
+        """From messages to everybody's camera."""
+        return self.reading + self.quality + self.costs + self.choice + self.rest
 
 
 class _Given:
@@ -111,7 +111,8 @@ def decision_times(crowd: Crowd, gop: int, epochs: int, *, all_terms: bool) -> S
         (Sight, "put", "quality"),
         (Outlook, "__init__", "costs"),
         (Outlook, "part", "costs"),
-        (decide, "choose_views", "choice"),
+        (Part, "gops", "costs"),
+        (decide, "choose_by_gops", "choice"),
         (Decider, "step", "rest"),
         (People, "update", "people"),
         (People, "boxes", "telling"),

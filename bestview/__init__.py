@@ -1,6 +1,8 @@
 """View qualities in, view choices out: the sliding-window DP, identity across cameras, view quality."""
 
-from bestview.choice import NO_CAMERA, NO_VIEW_COST, Choices, choose_views
+from bestview.choice import NO_CAMERA, NO_VIEW_COST, Choices, choose_by_gops, choose_views
+from bestview.choice_program import Gops
+from bestview.choice_seen import SeenViews
 from bestview.corrections import Merge, Split
 from bestview.evidence import TrackKey
 from bestview.ground import checked_homography, feet, foot_spread, person_heights, to_ground
@@ -18,18 +20,21 @@ __all__ = [
     "NO_CAMERA",
     "NO_VIEW_COST",
     "Choices",
+    "Gops",
     "IdentityRegistry",
     "IdentitySettings",
     "IdentityUpdate",
     "LocalTrack",
     "Merge",
     "QualitySettings",
+    "SeenViews",
     "Split",
     "TrackKey",
     "ViewScore",
     "ViewTruth",
     "best_views",
     "checked_homography",
+    "choose_by_gops",
     "choose_views",
     "cuts_of",
     "feet",

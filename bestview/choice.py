@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from bestview.choice_program import NO_CAMERA, NO_VIEW_COST, Gops, solve
 from bestview.choice_shots import solve_with_shots
 
-__all__ = ["NO_CAMERA", "NO_VIEW_COST", "Choices", "choose_views"]
+__all__ = ["NO_CAMERA", "NO_VIEW_COST", "Choices", "choose_by_gops", "choose_views"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,17 +90,32 @@ def choose_views(
     costs = _go_on(cost[:, :running], lasting[:running], previous, views) if running else np.zeros(objects)
     if starts.size:
         gops = _gops(cost, lasting, starts, blind=least_shot > 1)
-        count = starts.size if asked is None else min(asked, starts.size)
-        if least_shot > 1:
-            ages = np.full(objects, least_shot) if held is None else np.clip(held, 1, least_shot)
-            shown, ahead = solve_with_shots(gops, previous, ages, switch_cost, least_shot, count)
-        else:
-            shown, ahead = solve(gops, previous, switch_cost, count)
-        lengths = np.diff(starts, append=frames)[:count]
+        shown, ahead = choose_by_gops(gops, previous, switch_cost, least_shot, held, asked)
+        lengths = np.diff(starts, append=frames)[: len(shown)]
         views = views[:, : running + int(lengths.sum())]
         views[:, running:] = np.repeat(shown, lengths, axis=0).T
         costs += ahead
     return Choices(views, costs)
+
+
+def choose_by_gops(
+    gops: Gops,
+    previous: NDArray[np.int64],
+    switch_cost: float,
+    least_shot: int = 0,
+    held: NDArray[np.int64] | None = None,
+    asked: int | None = None,
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Choose where the costs of whole GOPs are known; arguments as above.
+
+    Returns:
+        (asked, K) cameras of the first GOPs, -1 where none is possible, and (K,) what the window costs.
+    """
+    count = len(gops.cost) if asked is None else min(asked, len(gops.cost))
+    if least_shot > 1:
+        ages = np.full(len(previous), least_shot) if held is None else np.clip(held, 1, least_shot)
+        return solve_with_shots(gops, previous, ages, switch_cost, least_shot, count)
+    return solve(gops, previous, switch_cost, count)
 
 
 def _check(

@@ -28,6 +28,11 @@ class Gops:
     frames: NDArray[np.float64]
     blind: Sequence[NDArray[np.bool_] | None]
 
+    def of(self, people: NDArray[np.int64]) -> Gops:
+        """Give the same for some of the people, by index."""
+        blind = [None if it is None else it[:, people] for it in self.blind]
+        return Gops([it[:, people] for it in self.cost], self.frames, blind)
+
 
 def solve(
     gops: Gops, previous: NDArray[np.int64], switch_cost: float, asked: int

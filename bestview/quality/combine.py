@@ -38,27 +38,29 @@ class Looks:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Seen:
-    """K objects, or tracks of each camera, over a window of N frames in C cameras.
+    """T tracks, each of one camera, over a window of N frames.
 
     Attributes:
-        boxes: (K, N, C, 4) pixels, NaN where hidden.
-        sure: (K, C) in [0, 1], how surely each track is there.
-        sharp: (K, C) in [0, 1], how sharp its picture is; NaN where nobody has measured it: counts as 1.
+        boxes: (T, N, 4) pixels, NaN where hidden.
+        camera: (T,) whose each track is, by index.
+        sure: (T,) in [0, 1], how surely each track is there.
+        sharp: (T,) in [0, 1], how sharp its picture is; NaN where nobody has measured it: counts as 1.
     """
 
     boxes: Floats
+    camera: NDArray[np.int64]
     sure: Floats
     sharp: Floats
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Quality:
-    """How well each view shows each object.
+    """How well each view shows whom it follows.
 
     Attributes:
-        quality: (K, N, C) in [0, 1]; 0 where hidden.
+        quality: (T, N) in [0, 1]; NaN where hidden.
         names: the terms that weigh something.
-        terms: (T, K, N, C) in [0, 1], each of them; NaN where hidden.
+        terms: (terms, T, N) in [0, 1], each of them; NaN where hidden.
     """
 
     quality: Floats
@@ -76,75 +78,65 @@ def view_quality(seen: Seen, looks: Looks, settings: QualitySettings) -> Quality
         ValueError: shapes that do not fit.
     """
     _check(seen, looks)
-    there = ~np.isnan(seen.boxes[..., 0])
-    rows = _Rows(seen, looks, np.nonzero(there), seen.boxes[there])
+    # Each side of all boxes in one stretch of memory: every term reads side by side.
+    sides = np.ascontiguousarray(np.moveaxis(seen.boxes, 2, 0))
+    rows = _Rows(seen, looks, np.moveaxis(sides, 0, 2))
     weights = settings.weights
-    terms = np.full((len(settings.terms), *there.shape), np.nan)
-    quality = np.zeros(there.shape)
-    product = np.ones(len(rows.boxes))
+    terms = np.empty((len(settings.terms), *rows.boxes.shape[:2]))
+    quality = np.ones(rows.boxes.shape[:2])
     for place, name in enumerate(settings.terms):
-        term = _TERMS[name](rows)
-        product *= 1.0 - weights[name] * (1.0 - term)
-        terms[place][there] = term
-    quality[there] = product
+        terms[place] = _TERMS[name](rows)
+        quality *= 1.0 - weights[name] * (1.0 - terms[place])
+    hidden = np.isnan(sides[0])
+    if hidden.any():
+        quality[hidden] = terms[:, hidden] = np.nan
     return Quality(quality, settings.terms, terms)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Rows:
-    """The B boxes that are there; `places` are their (object, frame, camera) indices, (B,) each."""
+    """What the terms are worked out from; `boxes` are those of `seen`, the sides apart in memory."""
 
     seen: Seen
     looks: Looks
-    places: tuple[NDArray[np.int64], ...]
     boxes: Floats
 
     @property
     def pictures(self) -> Floats:
-        return self.looks.pictures[self.places[2]]
-
-
-def _unhidden(rows: _Rows) -> Floats:
-    _, frame, camera = rows.places
-    return unhidden(rows.boxes, frame * len(rows.looks.pictures) + camera)
+        """(T, 1, 4): where the picture of each track's camera lies."""
+        return self.looks.pictures[self.seen.camera][:, None]
 
 
 def _facing(rows: _Rows) -> Floats:
-    objects, _, camera = rows.places
-    whole_window = np.full((rows.seen.boxes.shape[0], len(rows.looks.pictures)), NEUTRAL)
+    camera = rows.seen.camera
+    whole_window = np.full(len(camera), NEUTRAL)
     for column, homography in enumerate(rows.looks.homographies):
         if homography is not None:
-            whole_window[:, column] = facing(rows.seen.boxes[:, :, column], homography, rows.looks.fps)
-    return np.asarray(whole_window[objects, camera])
-
-
-def _sharp(rows: _Rows) -> Floats:
-    objects, _, camera = rows.places
-    return np.nan_to_num(rows.seen.sharp[objects, camera], nan=1.0)
-
-
-def _sure(rows: _Rows) -> Floats:
-    objects, _, camera = rows.places
-    return np.asarray(rows.seen.sure[objects, camera])
+            mine = camera == column
+            whole_window[mine] = facing(rows.seen.boxes[mine], homography, rows.looks.fps)
+    return whole_window[:, None]
 
 
 _TERMS: dict[str, Callable[[_Rows], Floats]] = {
     "size": lambda rows: size_quality(rows.boxes, *rows.looks.size),
     "whole": lambda rows: whole(rows.boxes, rows.pictures),
-    "unhidden": _unhidden,
+    "unhidden": lambda rows: unhidden(rows.boxes, rows.seen.camera),
     "central": lambda rows: central(rows.boxes, rows.pictures),
-    "sharp": _sharp,
+    "sharp": lambda rows: np.nan_to_num(rows.seen.sharp, nan=1.0)[:, None],
     "facing": _facing,
-    "sure": _sure,
+    "sure": lambda rows: rows.seen.sure[:, None],
 }
+"""Each (T, N), or (T, 1) where it is the same in all frames; anything where hidden."""
 
 
 def _check(seen: Seen, looks: Looks) -> None:
     shape, cameras = seen.boxes.shape, len(looks.pictures)
-    if len(shape) != 4 or shape[2:] != (cameras, _SIDES):  # noqa: PLR2004 — objects, frames, cameras, sides
-        raise ValueError(f"boxes have shape {shape}, not (objects, frames, {cameras}, 4)")
-    for name, values in (("sure", seen.sure), ("sharp", seen.sharp)):
-        if values.shape != (shape[0], cameras):
-            raise ValueError(f"{name} has shape {values.shape}, not ({shape[0]}, {cameras})")
+    if len(shape) != 3 or shape[2] != _SIDES:  # noqa: PLR2004 — tracks, frames, sides
+        raise ValueError(f"boxes have shape {shape}, not (tracks, frames, 4)")
+    for name, values in (("camera", seen.camera), ("sure", seen.sure), ("sharp", seen.sharp)):
+        if values.shape != shape[:1]:
+            raise ValueError(f"{name} has shape {values.shape}, not ({shape[0]},)")
+    if shape[0] and not 0 <= seen.camera.min() <= seen.camera.max() < cameras:
+        raise ValueError(f"a track is of a camera outside 0 .. {cameras - 1}")
     if len(looks.homographies) != cameras:
         raise ValueError(f"there are {len(looks.homographies)} homographies for {cameras} cameras")

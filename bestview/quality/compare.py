@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bestview.quality.boxes import Floats
 
@@ -30,3 +31,20 @@ def compared(quality: Floats, axis: int) -> Floats:
     """
     best = quality.max(axis=axis, keepdims=True)
     return np.asarray(quality / np.where(best > 0, best, 1.0))
+
+
+def compared_views(quality: Floats, moment: NDArray[np.int64], moments: int) -> Floats:
+    """Do the same for a list of views.
+
+    Args:
+        quality: (R,) of views, in [0, 1].
+        moment: (R,) object and frame of each view, as one number from 0 to `moments` - 1.
+        moments: how many there are.
+
+    Returns:
+        (R,) in [0, 1].
+    """
+    best = np.zeros(moments)
+    np.maximum.at(best, moment, quality)
+    of = best[moment]
+    return np.asarray(quality / np.where(of > 0, of, 1.0))

@@ -36,11 +36,15 @@ class Board:
     def put(self, decision: GopDecision) -> GopChoices:
         """Take a decision over; give it as the message that is published and sent to the page."""
         cuts = []
+        seen_by: dict[int, list[str]] = {}
+        for camera, frames in decision.boxes.items():
+            for number, *_ in frames[-1] if frames else ():
+                seen_by.setdefault(number, []).append(camera)
         for choice in decision.choices:
             cut = _cut(choice, decision.first)
             if cut is not None:
                 cuts.append(cut)
-            self._stand(decision, choice)
+            self._stand(decision, choice, tuple(seen_by.get(choice.number, ())))
         numbers = {choice.number for choice in decision.choices}
         self.standings = {number: it for number, it in self.standings.items() if number in numbers}
         self.merged, self._why = decision.merged, decision.why
@@ -49,10 +53,7 @@ class Board:
             first=decision.first,
             frames=decision.frames,
             choices={choice.number: choice.camera for choice in decision.choices if choice.camera},
-            boxes={
-                camera: [[(number, *box) for number, box in frame.items()] for frame in frames]
-                for camera, frames in decision.boxes.items()
-            },
+            boxes=decision.boxes,
             cuts=cuts,
             merged=[
                 Merged(kept=it.kept, lost=it.lost) for it in decision.corrections if isinstance(it, Merge)
@@ -78,7 +79,7 @@ class Board:
             raise KeyError(number)
         return self._why.of(number)
 
-    def _stand(self, decision: GopDecision, choice: ObjectChoice) -> None:
+    def _stand(self, decision: GopDecision, choice: ObjectChoice, cameras: tuple[str, ...]) -> None:
         known = self.standings.get(choice.number)
         stays = known is not None and known.choice.camera == choice.camera
         self.standings[choice.number] = Standing(
@@ -86,9 +87,7 @@ class Board:
             first=decision.first,
             frames=decision.frames,
             since=known.since if known is not None and stays else decision.first,
-            cameras=tuple(
-                camera for camera, frames in decision.boxes.items() if frames and choice.number in frames[-1]
-            ),
+            cameras=cameras,
         )
 
 

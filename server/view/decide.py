@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview import NO_CAMERA, Merge, Split, choose_views
+from bestview import NO_CAMERA, Merge, Split, choose_by_gops
 from server.view.align import Epoch
 from server.view.outlook import Outlook
 from server.view.people import People
@@ -16,7 +16,7 @@ from server.view.shots import Shots
 from server.view.sight import Sight
 from server.view.why import Why
 from server.wire.config import Config
-from server.wire.messages import Box
+from server.wire.messages import NumberedBox
 
 Floats = NDArray[np.float64]
 
@@ -44,8 +44,8 @@ class GopDecision:
     first: int
     frames: int
     choices: tuple[ObjectChoice, ...]
-    boxes: dict[str, list[dict[int, Box]]]
-    """Per camera and frame: everybody's final box by number."""
+    boxes: dict[str, list[list[NumberedBox]]]
+    """Per camera and frame: everybody's final box, by rising number."""
     merged: dict[int, int]
     """Numbers that turned out to be another's, up to now."""
     corrections: tuple[Merge | Split, ...]
@@ -129,22 +129,13 @@ class Decider:
         known = np.fromiter((people.first_seen[it] for it in everybody.tolist()), np.int64, len(everybody))
         part = outlook.part(first, lookahead, known < first + frames)
         before = self._shots.of(part.numbers)
-        views = choose_views(
-            part.cost,
-            before.cameras,
-            self.switch_cost,
-            np.arange(lookahead) % self._config.encode.gop == 0,
-            self.least_shot,
-            before.held,
-            weight,
-            asked=1,
-        ).views[:, 0]
+        gops = part.gops(np.arange(lookahead) % self._config.encode.gop == 0, weight)
+        (views,), _ = choose_by_gops(
+            gops, before.cameras, self.switch_cost, self.least_shot, before.held, asked=1
+        )
         self._shots = before.then(views)
         self._next_gop = first + self._config.encode.gop
-        boxes = {
-            camera: [people.boxes(camera, pulse) for pulse in range(first, first + frames)]
-            for camera in self._cameras
-        }
+        boxes = {camera: people.boxes(camera, first, frames) for camera in self._cameras}
         self._sight.forget_before(self._next_gop)
         people.forget_boxes_before(self._next_gop)
         names = [*self._cameras, None]  # NO_CAMERA is the last of them

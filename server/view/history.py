@@ -1,38 +1,47 @@
-"""Who was where: one camera's boxes by pulse, the newest word on each frame."""
+"""What was said last of every frame of one camera."""
 
 from __future__ import annotations
 
-from bestview import TrackKey
-from server.view.reading import CameraWindow
-from server.wire.messages import Box
+from dataclasses import dataclass, replace
+from typing import Generic, TypeVar
+
+Window = TypeVar("Window")
 
 
-class BoxHistory:
-    """Keeps for every frame of one camera the window that spoke of it last.
+@dataclass(frozen=True, slots=True)
+class Stretch(Generic[Window]):
+    """Frames that one window spoke of last: the pulses from `first` to `last`."""
 
-    Boxes are looked up when they are asked for: most windows are replaced before anybody does.
-    """
+    window: Window
+    first: int
+    last: int
+
+
+class History(Generic[Window]):
+    """Keeps for every frame of one camera the window that spoke of it last."""
 
     def __init__(self) -> None:
-        self._windows: dict[int, CameraWindow] = {}
+        self._stretches: list[Stretch[Window]] = []
+        """In order; no frame is in two of them."""
 
-    def put(self, window: CameraWindow) -> None:
-        """Take over a window."""
-        self._windows.update(dict.fromkeys(range(window.first, window.message.last + 1), window))
+    def put(self, window: Window, first: int, last: int) -> None:
+        """Take over what a window says of the frames from `first` to `last`."""
+        if last < first:
+            return
+        before = [replace(it, last=min(it.last, first - 1)) for it in self._stretches if it.first < first]
+        after = [replace(it, first=max(it.first, last + 1)) for it in self._stretches if it.last > last]
+        self._stretches = [*before, Stretch(window, first, last), *after]
 
-    def at(self, pulse: int) -> dict[TrackKey, Box]:
-        """Give the boxes of a frame by track."""
-        window = self._windows.get(pulse)
-        if window is None:
-            return {}
-        place = pulse - window.first
-        return {
-            key: box
-            for key, track in zip(window.keys, window.message.tracks, strict=True)
-            if (box := track.boxes[place]) is not None
-        }
+    def over(self, first: int, last: int) -> list[Stretch[Window]]:
+        """Give what is known of the frames from `first` to `last`, in order; frames may be missing."""
+        return [
+            Stretch(it.window, max(it.first, first), min(it.last, last))
+            for it in self._stretches
+            if it.first <= last and it.last >= first
+        ]
 
     def forget_before(self, pulse: int) -> None:
         """Let go of the frames before a pulse."""
-        for old in [known for known in self._windows if known < pulse]:
-            del self._windows[old]
+        self._stretches = [
+            replace(it, first=max(it.first, pulse)) for it in self._stretches if it.last >= pulse
+        ]

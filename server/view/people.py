@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 
 from bestview import IdentityRegistry, IdentitySettings, Merge, Split, TrackKey
 from server.view.align import Epoch
-from server.view.history import BoxHistory
+from server.view.history import History
+from server.view.numbered import numbered_boxes
 from server.view.reading import CameraWindow, Reader
 from server.view.share import served
 from server.wire.config import Share
 from server.wire.fit import Fit
-from server.wire.messages import Box
+from server.wire.messages import NumberedBox
 
 ALL = Share()
 """One service for everybody."""
@@ -42,7 +43,7 @@ class People:
         self._registry = IdentityRegistry(settings, homographies)
         self._remembered = settings.forget_after
         self._share = share
-        self._histories = {camera: BoxHistory() for camera in cameras}
+        self._histories = {camera: History[CameraWindow]() for camera in cameras}
         self._reader = Reader(site_size)
         self._numbers: dict[TrackKey, int] = {}
         self._heard: dict[TrackKey, int] = {}
@@ -58,7 +59,7 @@ class People:
         """Take over what all cameras said about an epoch; give it as it was read."""
         windows = self._reader.read(epoch)
         for window in windows:
-            self._histories[window.message.camera].put(window)
+            self._histories[window.message.camera].put(window, window.first, window.message.last)
         tracks = [track for window in windows for track in window.local_tracks()]
         update = self._registry.update(tracks, epoch.last)
         for track in tracks:
@@ -97,14 +98,10 @@ class People:
         number = int(self.numbers([TrackKey(camera, local)], pulse, 1)[0, 0])
         return None if number == NOBODY_YET else number
 
-    def boxes(self, camera: str, pulse: int) -> dict[int, Box]:
-        """Give everybody's box in a camera's frame by the person's number, in the numbers' order."""
-        told = self._histories[camera].at(pulse)
-        numbered: dict[int, Box] = {}
-        for number, box in zip(self.numbers(list(told), pulse, 1)[:, 0].tolist(), told.values(), strict=True):
-            if number != NOBODY_YET:
-                numbered.setdefault(number, box)
-        return dict(sorted(numbered.items()))
+    def boxes(self, camera: str, first: int, frames: int) -> list[list[NumberedBox]]:
+        """Give everybody's box in each of a camera's frames from `first` on, in the numbers' order."""
+        told = self._histories[camera].over(first, first + frames - 1)
+        return numbered_boxes(told, self.numbers, first, frames)
 
     def whose(self, camera: str, boot: int, track: int, pulse: int) -> int | None:
         """Give the person's number behind a tracker's number in a frame."""

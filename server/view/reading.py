@@ -27,12 +27,14 @@ class CameraWindow:
     Attributes:
         message: as it came.
         keys: what the tracks are called here; T of them.
+        locals: (T,) their numbers.
         fit: how the camera's own picture lies in the site's.
         boxes: (T, F, 4) pixels of the site's picture, NaN where hidden.
     """
 
     message: CameraTracks
     keys: tuple[TrackKey, ...]
+    locals: NDArray[np.int64]
     fit: Fit
     boxes: Floats
 
@@ -86,12 +88,17 @@ class Reader:
         fit = self.fits.get(message.camera)
         if fit is None:
             fit = self.fits[message.camera] = Fit(message.size, self._site_size)
-        return CameraWindow(message, self.locals.of(message), fit, _boxes(message))
+        keys = self.locals.of(message)
+        locals_ = np.array([key.local for key in keys], dtype=np.int64)
+        return CameraWindow(message, keys, locals_, fit, _boxes(message))
 
 
 def _boxes(message: CameraTracks) -> Floats:
     """Give the boxes of a message: (T, F, 4), NaN where hidden."""
     frames = max(0, message.last - message.first + 1)
-    boxes = [box or _HIDDEN for track in message.tracks for box in track.boxes]
-    flat = np.fromiter(chain.from_iterable(boxes), dtype=np.float64, count=4 * len(boxes))
-    return flat.reshape(len(message.tracks), frames, 4)
+    tracks = [
+        track.boxes if all(track.boxes) else [box or _HIDDEN for box in track.boxes]
+        for track in message.tracks
+    ]
+    sides = chain.from_iterable(chain.from_iterable(tracks))  # type: ignore[arg-type]  # none is None now
+    return np.fromiter(sides, dtype=np.float64, count=len(tracks) * frames * 4).reshape(-1, frames, 4)

@@ -11,6 +11,7 @@ import numpy as np
 from bestview import Merge, Split
 from server.view.decide import GopDecision
 from server.wire.fit import Fit
+from server.wire.messages import NumberedBox
 from tracking.motchallenge import MotRow, format_row
 
 CHOICES_HEAD = "frame,object,camera\n"
@@ -40,7 +41,8 @@ class Recorder:
         """Write one decision."""
         for camera, frames in decision.boxes.items():
             for place, boxes in enumerate(frames):
-                self._write_tracks(camera, decision.first + place + 1, boxes)
+                if boxes:
+                    self._write_tracks(camera, decision.first + place + 1, boxes)
         for place in range(decision.frames):
             for choice in decision.choices:
                 if choice.camera is not None and not choice.away:
@@ -62,9 +64,9 @@ class Recorder:
         for file in (*self._tracks.values(), self._choices, self._corrections, self._late):
             file.close()
 
-    def _write_tracks(self, camera: str, frame: int, boxes: Mapping[int, Sequence[float]]) -> None:
-        for number, box in boxes.items():
-            left, top, right, bottom = self._fits[camera].boxes_to_own(np.asarray(box, dtype=np.float64))
+    def _write_tracks(self, camera: str, frame: int, boxes: Sequence[NumberedBox]) -> None:
+        own = self._fits[camera].boxes_to_own(np.array([box for _, *box in boxes], dtype=np.float64))
+        for (number, *_), (left, top, right, bottom) in zip(boxes, own.tolist(), strict=True):
             row = MotRow(frame, number, left, top, right - left, bottom - top)
             self._tracks[camera].write(format_row(row) + "\n")
 

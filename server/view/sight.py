@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview import TrackKey
 from bestview.quality import Looks, Quality, QualitySettings, Seen, view_quality
+from server.view.history import History, Stretch
 from server.view.reading import CameraWindow
 from server.wire.config import Config
 from server.wire.fit import Fit
@@ -19,27 +19,17 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SeenWindow:
-    """One camera's tracks over one window of F frames, and how well each shows whom it follows.
+    """How well one camera's window of F frames shows whom its T tracks follow.
 
     Attributes:
-        keys: whose they are; T of them.
-        first: the pulse of the first frame.
+        window: the tracks.
         quality: (F, T), NaN where hidden.
         terms: (terms, F, T) what it is made of, NaN where hidden.
     """
 
-    keys: tuple[TrackKey, ...]
-    first: int
+    window: CameraWindow
     quality: Floats
     terms: Floats
-
-
-@dataclass(frozen=True, slots=True)
-class SeenFrame:
-    """One frame of a camera: a place in the window that spoke of it last."""
-
-    window: SeenWindow
-    place: int
 
 
 class Sight:
@@ -56,55 +46,43 @@ class Sight:
         self._size = (float(config.site.width), float(config.site.height))
         self._fps = config.site.fps
         self._homographies, self._fits = homographies, fits
-        self._frames: dict[str, dict[int, SeenFrame]] = {camera: {} for camera in config.camera_ids}
+        self._histories = {camera: History[SeenWindow]() for camera in config.camera_ids}
 
-    def put(self, windows: Iterable[CameraWindow]) -> None:
+    def put(self, windows: Sequence[CameraWindow]) -> None:
         """Take over what cameras said of an epoch."""
-        told = [window for window in windows if window.boxes.shape[1]]
-        if not told:
+        if not windows:
             return
-        first = min(window.first for window in told)
-        quality = self._weigh(told, first)
-        # Frames first: the rows of one frame of one camera are what is asked for.
-        values = np.where(np.isnan(quality.terms).all(axis=0), np.nan, quality.quality).transpose(2, 1, 0)
-        terms = quality.terms.transpose(3, 0, 2, 1)
-        for column, window in enumerate(told):
-            tracks, frames = window.boxes.shape[:2]
-            rows = slice(window.first - first, window.first - first + frames)
-            seen = SeenWindow(
-                window.keys,
-                window.first,
-                np.ascontiguousarray(values[column, rows, :tracks]),
-                np.ascontiguousarray(terms[column, :, rows, :tracks]),
-            )
-            for place in range(frames):
-                self._frames[window.message.camera][window.first + place] = SeenFrame(seen, place)
+        start = min(window.first for window in windows)
+        weighed = self._weigh(windows, start)
+        quality, terms = weighed.quality.T, weighed.terms.transpose(0, 2, 1)
+        ends = np.cumsum([len(window.keys) for window in windows]).tolist()
+        for window, end in zip(windows, ends, strict=True):
+            count, frames = window.boxes.shape[:2]
+            rows, tracks = slice(window.first - start, window.first - start + frames), slice(end - count, end)
+            seen = SeenWindow(window, quality[rows, tracks], terms[:, rows, tracks])
+            history = self._histories[window.message.camera]
+            history.put(seen, window.first, window.first + frames - 1)
 
-    def at(self, camera: str, pulse: int) -> SeenFrame | None:
-        """Give what was last said of a camera's frame; None: nothing."""
-        return self._frames[camera].get(pulse)
+    def over(self, camera: str, first: int, last: int) -> list[Stretch[SeenWindow]]:
+        """Give what was last said of a camera's frames from `first` to `last`."""
+        return self._histories[camera].over(first, last)
 
     def forget_before(self, pulse: int) -> None:
         """Let go of the frames before a pulse."""
-        for frames in self._frames.values():
-            for old in [known for known in frames if known < pulse]:
-                del frames[old]
+        for history in self._histories.values():
+            history.forget_before(pulse)
 
-    def _weigh(self, windows: Sequence[CameraWindow], first: int) -> Quality:
-        """Weigh the views of all windows at once; tracks and frames that one of them lacks are hidden."""
-        frames = max(window.first + window.boxes.shape[1] for window in windows) - first
-        most = max(len(window.keys) for window in windows)
-        boxes = np.full((len(windows), frames, most, 4), np.nan)
-        sure = np.zeros((most, len(windows)))
-        sharp = np.full((most, len(windows)), np.nan)
-        for column, window in enumerate(windows):
-            tracks = window.message.tracks
-            rows, count = slice(window.first - first, window.message.last - first + 1), len(tracks)
-            boxes[column, rows, :count] = window.boxes.transpose(1, 0, 2)
-            sharp[:count, column] = [np.nan if it.sharpness is None else it.sharpness for it in tracks]
-            sure[:count, column] = np.clip([it.confidence for it in tracks], 0.0, 1.0)
+    def _weigh(self, windows: Sequence[CameraWindow], start: int) -> Quality:
+        """Weigh the views of all windows at once, track after track; frames that one lacks are hidden."""
+        tracks = [track for window in windows for track in window.message.tracks]
         return view_quality(
-            Seen(boxes.transpose(2, 1, 0, 3), sure, sharp),
+            Seen(
+                _side_by_side(windows, start),
+                np.repeat(np.arange(len(windows)), [len(window.keys) for window in windows]),
+                np.clip(np.array([it.confidence for it in tracks], dtype=np.float64), 0.0, 1.0),
+                # None becomes NaN: nobody has measured it.
+                np.array([it.sharpness for it in tracks], dtype=np.float64),
+            ),
             Looks(
                 self._size,
                 np.array([self._picture(window.message.camera) for window in windows]),
@@ -127,3 +105,17 @@ class Sight:
         (left, top), scale = self._fits[camera].to_site(np.zeros(2)), self._fits[camera].scale
         to_own = np.array([[1.0, 0.0, -left], [0.0, 1.0, -top], [0.0, 0.0, scale]]) / scale
         return np.asarray(own @ to_own)
+
+
+def _side_by_side(windows: Sequence[CameraWindow], start: int) -> Floats:
+    """Give the boxes of all tracks over the frames of all windows from `start` on: (T, N, 4)."""
+    frames = max(window.first + window.boxes.shape[1] for window in windows) - start
+    if all(window.boxes.shape[1] == frames for window in windows):
+        return np.concatenate([window.boxes for window in windows])
+    boxes = np.full((sum(len(window.keys) for window in windows), frames, 4), np.nan)
+    end = 0
+    for window in windows:
+        count, own = window.boxes.shape[:2]
+        boxes[end : end + count, window.first - start : window.first - start + own] = window.boxes
+        end += count
+    return boxes

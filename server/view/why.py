@@ -71,46 +71,35 @@ class Why:
         Raises:
             KeyError: the GOP was not decided for this person.
         """
-        rows = np.flatnonzero(self.part.numbers == number)
-        if not rows.size:
-            raise KeyError(number)
-        each = self.part.cost[int(rows[0])]
+        views, cameras = self.part.views(number), self.part.outlook.cameras
+        columns = self.part.outlook.views.camera[views]
+        each = self.part.cost(number)
         cost, mean = (each * self.weight[:, None]).sum(axis=0), each.mean(axis=0)
-        before = int(self.before[int(rows[0])])
+        before = int(self.before[self.part.numbers == number][0])
         stay = np.inf if before == NO_CAMERA else cost[before]
         other = np.where(np.arange(len(cost)) == before, np.inf, cost)
         best = int(np.argmin(other))
         cut = other[best] + (0.0 if before == NO_CAMERA else self.switch_cost)
         return Explanation(
-            frames=len(self.part.frames),
+            frames=self.part.frames,
             views={
-                name: self._view(number, place, mean[place]) for place, name in enumerate(self.part.cameras)
+                name: self._view(views[columns == place], mean[place]) for place, name in enumerate(cameras)
             },
             weights={name: self.settings.weights[name] for name in self.settings.terms},
             stay=_finite(stay),
             cut=_finite(cut),
-            cut_to=self.part.cameras[best] if np.isfinite(cut) else None,
+            cut_to=cameras[best] if np.isfinite(cut) else None,
             switch_cost=self.switch_cost,
         )
 
-    def _view(self, number: int, column: int, mean: float) -> ViewReason:
-        """Look up what one camera had to say of a person."""
-        frames = len(self.part.frames)
-        quality, terms = [], []
-        for row in self.part.frames:
-            numbered = row[column]
-            if numbered is None:
-                continue
-            window, place = numbered.frame.window, numbered.frame.place
-            here = (numbered.numbers == number) & ~np.isnan(window.quality[place])
-            if here.any():
-                track = int(np.argmax(here))  # the first, as in the costs
-                quality.append(window.quality[place, track])
-                terms.append(window.terms[:, place, track])
+    def _view(self, views: NDArray[np.int64], mean: float) -> ViewReason:
+        """Tell what one camera had to say of a person in these views."""
+        outlook = self.part.outlook
+        terms = [outlook.terms(int(view)) for view in views]
         return ViewReason(
             cost=_finite(mean),
-            seen=len(quality) / frames,
-            quality=float(np.mean(quality)) if quality else None,
+            seen=len(views) / self.part.frames,
+            quality=float(np.mean(outlook.quality[views])) if terms else None,
             terms=dict(zip(self.settings.terms, np.mean(terms, axis=0).tolist(), strict=True))
             if terms
             else {},

@@ -36,6 +36,9 @@ Number = Annotated[int, msgspec.Meta(ge=0, le=2**62)]
 Box = tuple[float, float, float, float]
 """Left, top, right, bottom in pixels of the site's picture."""
 
+NumberedBox = tuple[int, float, float, float, float]
+"""A person's number, and their box: left, top, right, bottom in pixels of the site's picture."""
+
 
 class FrameHead(msgspec.Struct, frozen=True, kw_only=True):
     """What one access unit is. Times are unix seconds by the camera's clock."""
@@ -159,7 +162,7 @@ class GopChoices(msgspec.Struct, frozen=True, kw_only=True):
     first: int
     frames: int
     choices: dict[int, str]
-    boxes: dict[str, list[list[tuple[int, float, float, float, float]]]]
+    boxes: dict[str, list[list[NumberedBox]]]
     """Per camera and frame: object, left, top, right, bottom."""
     cuts: list[Cut]
     merged: list[Merged] = []

@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import msgspec
 import numpy as np
 
-from bestview import IdentityUpdate, LocalTrack, QualitySettings
+from bestview import IdentityUpdate, LocalTrack
 from server.camera.encode import AccessUnit, Encoder
 from server.view.align import Epoch
-from server.view.outlook import Part
 from server.view.service import BestViewService
 from server.view.why import Why
 from server.wire.config import Config, Encode, Site
@@ -27,10 +26,7 @@ GOP = STRIDE = 5
 CAMERAS = ("c0", "c1")
 SMALL: Box = (10.0, 10.0, 16.0, 28.0)
 LARGE: Box = (20.0, 4.0, 36.0, 44.0)
-_NOBODY = np.zeros(0, dtype=np.int64)
-NO_REASON = Why(
-    Part(CAMERAS, _NOBODY, np.zeros((0, 1, len(CAMERAS))), []), _NOBODY, np.ones(1), 0.0, QualitySettings()
-)
+NO_REASON = cast("Why", None)
 """Of decisions that a test makes up: nobody will ask why."""
 
 

@@ -81,8 +81,8 @@ def test_views_change_only_where_gops_begin_and_boxes_are_of_the_gops_frames() -
     assert [it.first for it in decisions] == [n * GOP for n in range(6)]
     for it in decisions:
         assert all(len(frames) == it.frames for frames in it.boxes.values())
-    assert decisions[0].boxes[A] == [{1: LARGE}] * GOP
-    assert decisions[3].boxes[A] == [{}] * GOP
+    assert decisions[0].boxes[A] == [[(1, *LARGE)]] * GOP
+    assert decisions[3].boxes[A] == [[]] * GOP
 
 
 def test_a_camera_of_which_a_frame_is_missing_is_not_chosen_for_that_gop() -> None:
@@ -235,7 +235,7 @@ def test_a_track_that_becomes_another_person_inside_a_window_is_each_of_them_in_
         first + np.arange(frames) < changes, 1, 2
     )[None].repeat(len(keys), axis=0)
     decisions = decide(it, [{A: {1: LARGE}, B: {}}] * 4)
-    assert [list(frame) for frame in decisions[1].boxes[A]] == [[1], [1], [2], [2], [2]]
+    assert [[number for number, *_ in frame] for frame in decisions[1].boxes[A]] == [[1], [1], [2], [2], [2]]
     assert decisions[1].why.of(1).views[A].seen == pytest.approx(2 / (2 * GOP))
 
 

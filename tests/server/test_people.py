@@ -5,12 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from cameras_by_hand import CAMERAS, HEIGHT, LARGE, SMALL, STRIDE, WIDTH, epoch_of, word
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from bestview import IdentitySettings, IdentityUpdate, LocalTrack, Merge, Split, TrackKey
-from server.view.history import BoxHistory
+from server.view.history import History
 from server.view.locals import LocalNumbers
 from server.view.people import People
-from server.view.reading import Reader
+from server.wire.messages import Box
 
 
 def people(**settings: int) -> People:
@@ -27,6 +29,14 @@ class Dictated:
     def update(self, tracks: list[LocalTrack], last_frame: int) -> IdentityUpdate:
         del tracks, last_frame
         return self._updates.pop(0)
+
+
+def boxes(it: People, camera: str, pulse: int) -> dict[int, Box]:
+    """Give everybody's box in one frame by number."""
+    [rows] = it.boxes(camera, pulse, 1)
+    numbers = [number for number, *_ in rows]
+    assert numbers == sorted(set(numbers))
+    return {number: (left, top, right, bottom) for number, left, top, right, bottom in rows}
 
 
 class Heard:
@@ -54,15 +64,16 @@ def dictated(*updates: IdentityUpdate) -> People:
     return it
 
 
-def test_a_later_word_on_a_frame_replaces_an_earlier_one() -> None:
-    history, reader = BoxHistory(), Reader((WIDTH, HEIGHT))
-    for told in (word("c0", 0, {7: SMALL}), word("c0", 0, {7: LARGE, 8: None})):
-        [window] = reader.read(epoch_of(0, told))
-        history.put(window)
-    assert history.at(0) == {TrackKey("c0", 1): LARGE}
-    history.forget_before(3)
-    assert history.at(2) == {}
-    assert history.at(3) == {TrackKey("c0", 1): LARGE}
+@settings(deadline=None, max_examples=100)
+@given(st.lists(st.tuples(st.integers(0, 12), st.integers(-1, 6)), max_size=6), st.integers(0, 15))
+def test_the_newest_word_on_a_frame_counts(words: list[tuple[int, int]], old: int) -> None:
+    history, expected = History[int](), dict[int, int]()
+    for number, (first, more) in enumerate(words):
+        history.put(number, first, first + more)
+        expected |= dict.fromkeys(range(first, first + more + 1), number)
+    history.forget_before(old)
+    told = [(pulse, it.window) for it in history.over(2, 14) for pulse in range(it.first, it.last + 1)]
+    assert told == sorted((pulse, it) for pulse, it in expected.items() if max(old, 2) <= pulse <= 14)
 
 
 def test_a_restarted_cameras_first_track_is_not_its_former_first_track() -> None:
@@ -96,8 +107,8 @@ def test_people_are_where_their_tracks_are() -> None:
     it = people()
     it.update(epoch_of(0, word("c0", 0, {1: SMALL, 2: LARGE}), word("c1", 0, {1: None})))
     first, second = it.known
-    assert it.boxes("c0", 4) == {first: SMALL, second: LARGE}
-    assert it.boxes("c1", 4) == {}
+    assert boxes(it, "c0", 4) == {first: SMALL, second: LARGE}
+    assert boxes(it, "c1", 4) == {}
     assert it.whose("c0", 1, 2, 0) == second
     assert it.whose("c0", 9, 2, 0) is None
 
@@ -114,7 +125,7 @@ def test_a_restarted_cameras_people_do_not_inherit_the_boxes_of_others() -> None
     it = people()
     it.update(epoch_of(0, word("c0", 0, {1: SMALL})))
     it.update(epoch_of(1, word("c0", 1, {1: LARGE}, boot=2)))
-    [before], [after] = it.boxes("c0", 0), it.boxes("c0", STRIDE)
+    [before], [after] = boxes(it, "c0", 0), boxes(it, "c0", STRIDE)
     assert it.whose("c0", 1, 1, 0) == before
     assert it.whose("c0", 2, 1, STRIDE) == after
 
@@ -129,7 +140,7 @@ def test_a_merged_number_lives_on_as_the_others_and_chains_are_followed() -> Non
         it.update(epoch_of(epoch, word("c0", epoch, {1: SMALL, 2: None}), word("c1", epoch, {1: LARGE})))
     assert it.known == [1]
     assert it.merged == {3: 1, 2: 1}
-    assert it.boxes("c1", 0) == {1: LARGE}, "in frames past, too"
+    assert boxes(it, "c1", 0) == {1: LARGE}, "in frames past, too"
     assert it.also(1) == [2, 3]
 
 
@@ -147,14 +158,14 @@ def test_who_has_left_a_person_for_one_not_confirmed_yet_has_no_number() -> None
     it = dictated(said({("c0", 1): 1}), said({}))
     it.update(epoch_of(0, word("c0", 0, {1: SMALL})))
     it.update(epoch_of(1, word("c0", 1, {1: SMALL})))
-    assert it.boxes("c0", STRIDE) == {}
+    assert boxes(it, "c0", STRIDE) == {}
     assert it.number("c0", 1, STRIDE) is None
 
 
 def test_two_tracks_of_one_person_in_one_picture_give_one_box() -> None:
     it = dictated(said({("c0", 1): 1, ("c0", 2): 1}))
     it.update(epoch_of(0, word("c0", 0, {1: SMALL, 2: LARGE})))
-    assert it.boxes("c0", 0) == {1: SMALL}
+    assert boxes(it, "c0", 0) == {1: SMALL}
 
 
 def test_people_who_were_gone_for_long_are_forgotten_with_all_that_is_known_of_them() -> None:
@@ -175,4 +186,4 @@ def test_people_who_were_gone_for_long_are_forgotten_with_all_that_is_known_of_t
 
 @pytest.mark.parametrize("pulse", [-1, 0, 4, 1000])
 def test_nothing_is_known_of_frames_that_nobody_spoke_of(pulse: int) -> None:
-    assert people().boxes("c0", pulse) == {}
+    assert boxes(people(), "c0", pulse) == {}

@@ -17,7 +17,7 @@ from server.view.record import Recorder
 from server.view.shelf import Shelf
 from server.wire.config import Site
 from server.wire.fit import Fit
-from server.wire.messages import Box
+from server.wire.messages import NumberedBox
 
 A, B = CAMERAS
 SITE = Site(width=WIDTH, height=HEIGHT, fps=FPS)
@@ -28,9 +28,9 @@ def decision(
     *choices: ObjectChoice,
     frames: int = GOP,
     corrections: tuple[Merge | Split, ...] = (),
-    **boxes: list[dict[int, Box]],
+    **boxes: list[list[NumberedBox]],
 ) -> GopDecision:
-    nobody: list[dict[int, Box]] = [{}] * frames
+    nobody: list[list[NumberedBox]] = [[]] * frames
     shown = {it: boxes.get(it, nobody) for it in CAMERAS}
     return GopDecision(gop * GOP, frames, choices, shown, {}, corrections, NO_REASON)
 
@@ -38,11 +38,13 @@ def decision(
 def test_the_files_are_these_bytes(tmp_path: Path) -> None:
     fits = {A: Fit((2 * WIDTH, 2 * HEIGHT), (WIDTH, HEIGHT)), B: Fit((WIDTH, HEIGHT), (WIDTH, HEIGHT))}
     recorder = Recorder(tmp_path / "out", CAMERAS, fits)
-    boxes: list[dict[int, Box]] = [{1: SMALL}, {1: SMALL, 2: LARGE}]
+    boxes: list[list[NumberedBox]] = [[(1, *SMALL)], [(1, *SMALL), (2, *LARGE)]]
     recorder.write(decision(0, choice(1, A), choice(2, None), frames=2, c0=boxes))
     turned_out = (Merge(kept=1, lost=3), Split(kept=1, parted=2, camera=B))
     recorder.write(
-        decision(1, choice(1, B), choice(2, A, away=True), frames=1, corrections=turned_out, c1=[{2: LARGE}])
+        decision(
+            1, choice(1, B), choice(2, A, away=True), frames=1, corrections=turned_out, c1=[[(2, *LARGE)]]
+        )
     )
     recorder.late(B, range(3, 5), "tracks late")
     recorder.close()
