@@ -15,6 +15,7 @@ from server.view.align import Aligner, Epoch
 from server.view.board import Board
 from server.view.decide import Decider, GopDecision, homographies
 from server.view.intake import Intake
+from server.view.past.past import Past
 from server.view.record import Recorder
 from server.view.shelf import Shelf
 from server.view.splice import Splicer
@@ -47,6 +48,7 @@ class BestViewService:
             config, homographies(config), lambda camera, pulse: self.shelves[camera].has(pulse)
         )
         self.board = Board()
+        self.past = Past(config, self.shelves, self.agreement, frames)
         self.pulse = -1
         self.pulse0: float | None = None
         """When pulse 0 was due, unix seconds; None before the first pulse."""
@@ -85,6 +87,7 @@ class BestViewService:
         """
         if self._out is not None:  # not before all ports are listened on: a failed start leaves no files
             self._recorder = self._record(self._out)
+        self.past.open()
         follow = asyncio.create_task(self._follow_pulses(), name="pulses")
         follow.add_done_callback(lambda _: self._changed.set())
         try:
@@ -116,6 +119,7 @@ class BestViewService:
     def close(self) -> None:
         """End all streams and let go of the bus and the files."""
         self.splicer.close()
+        self.past.close()
         if self._recorder is not None:
             self._recorder.close()
         if self._bus is not None:
@@ -146,6 +150,7 @@ class BestViewService:
     def _publish(self, decision: GopDecision) -> None:
         """Say which boxes go with the frames before the frames are sent."""
         choices = self.board.put(decision)
+        self.past.put(choices, self.pulse0)
         for tell in self.on_decision:
             tell(choices)
         self.splicer.decision(decision)

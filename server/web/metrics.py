@@ -29,7 +29,23 @@ class ServiceCollector(Collector):
             "Windows decided without a camera that was there.",
             value=service.late_epochs,
         )
+        yield from self._recording()
         yield from self._cameras()
+
+    def _recording(self) -> Iterable[Metric]:
+        past = self._service.past
+        size, writer = past.store.bytes if past.store else 0, past.writer
+        well = writer is not None and not writer.trouble
+        yield GaugeMetricFamily("myview_recording", "What is streamed is being recorded.", value=float(well))
+        yield GaugeMetricFamily("myview_recorded_bytes", "Recorded, on the disk.", value=size)
+        yield CounterMetricFamily(
+            "myview_recorded_gops", "GOPs recorded.", value=writer.written if writer else 0
+        )
+        yield CounterMetricFamily(
+            "myview_unrecorded_gops",
+            "GOPs not recorded though they should be.",
+            value=writer.lost if writer else 0,
+        )
 
     def _cameras(self) -> Iterable[Metric]:
         live = GaugeMetricFamily("myview_camera_live", "The camera delivers frames.", labels=["camera"])

@@ -210,6 +210,19 @@ class Http(Section):
     """A viewer that falls behind by more loses whole GOPs."""
 
 
+class Record(Section):
+    """What was streamed, kept on the disk."""
+
+    folder: Path | None = None
+    """Where; none: nothing is recorded."""
+    keep_s: PositiveFloat = 86_400.0
+    """Seconds after which it is taken away."""
+    most_mb: PositiveFloat = 10_000.0
+    """Megabytes that it takes on the disk at most; the oldest goes first."""
+    segment_s: PositiveFloat = 60.0
+    """Seconds in a file: only whole files are taken away."""
+
+
 class Config(BaseSettings):
     """A whole site."""
 
@@ -232,6 +245,7 @@ class Config(BaseSettings):
     track: Track = Track()
     view: View = View()
     http: Http = Http()
+    record: Record = Record()
 
     @classmethod
     def settings_customise_sources(

@@ -1,0 +1,146 @@
+"""The cameras' files: whole GOPs as fragments behind one header, written and found again."""
+
+from __future__ import annotations
+
+import os
+import struct
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from server.view.fmp4 import TIMESCALE
+
+_HEAD = 8
+"""Bytes of a box's size and kind."""
+_TIMES_WITHIN = 128
+"""Bytes of a fragment in which its decode time and its first sample's flags stand."""
+_NOT_SYNC = 0x00010000
+"""sample_is_non_sync_sample (ISO/IEC 14496-12, 8.8.3.1)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Gop:
+    """Consecutive frames of one camera that begin with a key frame."""
+
+    first: int
+    fragments: tuple[bytes, ...]
+
+    @property
+    def end(self) -> int:
+        """The pulse after its last frame."""
+        return self.first + len(self.fragments)
+
+
+class CameraFile:
+    """One camera's file: the header, then GOPs.
+
+    A process that is killed in the middle of a GOP leaves a file that plays: until a GOP is there as a
+    whole, it is a ``free`` box, which players pass over, and eight bytes at once make it what it is.
+
+    Raises:
+        OSError: the disk does not take it.
+    """
+
+    def __init__(self, path: Path, header: bytes) -> None:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        self._handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
+        self.size = 0
+        try:
+            write_at(self._handle, header, 0)
+        except OSError:
+            self.close()
+            path.unlink(missing_ok=True)
+            raise
+        self.size = len(header)
+
+    def append(self, gop: Gop) -> tuple[int, int]:
+        """Append a GOP; give where it is: offset and length.
+
+        Raises:
+            OSError: the disk does not take it; the file is as before.
+        """
+        data = b"".join(gop.fragments)
+        try:
+            write_at(self._handle, struct.pack(">I4s", len(data), b"free") + data[_HEAD:], self.size)
+            write_at(self._handle, data[:_HEAD], self.size)
+        except OSError:
+            os.ftruncate(self._handle, self.size)
+            raise
+        place = (self.size, len(data))
+        self.size += len(data)
+        return place
+
+    def close(self) -> None:
+        """Close the file."""
+        os.close(self._handle)
+
+
+def write_at(handle: int, data: bytes, offset: int) -> None:
+    """Write all of it.
+
+    Raises:
+        OSError: the disk does not take it; part of it may be there.
+    """
+    view = memoryview(data)
+    while view:
+        written = os.pwrite(handle, view, offset)
+        view, offset = view[written:], offset + written
+
+
+def pulse_of(fragment: bytes, fps: float) -> int:
+    """Give the pulse of a fragment's first frame; -1 where it does not say."""
+    at = fragment.find(b"tfdt", 0, _TIMES_WITHIN)
+    if at < 0 or len(fragment) < at + 16:
+        return -1
+    time: int = struct.unpack_from(">Q", fragment, at + 8)[0]
+    return round(time * fps / TIMESCALE)
+
+
+def gops(path: Path, offset: int, length: int, fps: float) -> Iterator[Gop]:
+    """Read the GOPs of a piece of a camera's file.
+
+    Raises:
+        OSError: the file cannot be read: retention may have taken it away.
+    """
+    with path.open("rb") as file:
+        file.seek(offset)
+        waiting: list[bytes] = []
+        for fragment in _fragments(file.read, length):
+            if _is_key(fragment) and waiting:
+                yield Gop(pulse_of(waiting[0], fps), tuple(waiting))
+                waiting = []
+            waiting.append(fragment)
+        if waiting:
+            yield Gop(pulse_of(waiting[0], fps), tuple(waiting))
+
+
+def _fragments(read: Callable[[int], bytes], length: int) -> Iterator[bytes]:
+    """Give the fragments among the boxes of the next ``length`` bytes."""
+    moof = b""
+    while length >= _HEAD:
+        head = read(_HEAD)
+        if len(head) < _HEAD:
+            return
+        size, kind = struct.unpack(">I4s", head)
+        if not _HEAD <= size <= length:
+            return
+        body = read(size - _HEAD)
+        length -= size
+        if kind == b"moof":
+            moof = head + body
+        elif kind == b"mdat" and moof:
+            yield moof + head + body
+
+
+def _is_key(fragment: bytes) -> bool:
+    """Read the flags of a fragment's first sample."""
+    at = fragment.find(b"trun", 0, _TIMES_WITHIN)
+    if at < 0 or len(fragment) < at + 28:
+        return False
+    (flags,) = struct.unpack_from(">I", fragment, at + 24)
+    return not flags & _NOT_SYNC
+
+
+def joined(parts: Sequence[Gop]) -> bytes:
+    """Give the bytes of GOPs."""
+    return b"".join(fragment for gop in parts for fragment in gop.fragments)

@@ -1,0 +1,109 @@
+"""What the best-view service keeps of the past: a moment in memory, more on the disk where configured."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Mapping
+
+from server.view.agreement import Agreement
+from server.view.fmp4 import init_segment
+from server.view.past.recent import Recent
+from server.view.past.run import Run, RunHead
+from server.view.past.store import Bounds, Piece, Store
+from server.view.past.stretch import Tape
+from server.view.past.writer import Writer
+from server.view.shelf import Shelf
+from server.wire.config import Config
+from server.wire.errors import UserError
+from server.wire.messages import GopChoices
+
+log = logging.getLogger(__name__)
+
+
+class Past:
+    """Takes every decision over as it is made, and finds it again. ``frames`` is what the shelves keep."""
+
+    def __init__(
+        self, config: Config, shelves: Mapping[str, Shelf], agreement: Agreement, frames: int
+    ) -> None:
+        self._config, self._agreement = config, agreement
+        self.recent = Recent(shelves, config.encode.gop, frames)
+        self.pulse0: float | None = None
+        self.viewers = 0
+        """How many are watching the past."""
+        record = config.record
+        self.store: Store | None = None
+        self.writer: Writer | None = None
+        if record.folder is not None:
+            bounds = Bounds(record.keep_s, record.most_mb, record.segment_s)
+            self.store = store = Store(record.folder, bounds)
+            most = max(4, frames // config.encode.gop)  # no more than the shelves hold anyway
+            self.writer = Writer(self._write, store.abandon, store.close, most)
+
+    def open(self) -> None:
+        """Begin to record, where that is configured.
+
+        Raises:
+            UserError: the folder cannot be written, or another process records there.
+        """
+        if self.store is None or self.writer is None:
+            return
+        try:
+            self.store.open()
+        except BlockingIOError as error:
+            raise UserError(f"record.folder: {self.store.folder}: another process records there") from error
+        except OSError as error:
+            raise UserError(
+                f"record.folder: {self.store.folder}: cannot write there: {error.strerror}"
+            ) from error
+        self.writer.start()
+        log.info("recording to %s", self.store.folder)
+
+    def put(self, choices: GopChoices, pulse0: float | None) -> None:
+        """Take a decision over; never waits."""
+        self.pulse0 = pulse0
+        self.recent.put(choices)
+        if self.writer is None:
+            return
+        delivered = {
+            camera: self.recent.delivered(camera, choices.first, choices.frames)
+            for camera in self._config.camera_ids
+        }
+        self.writer.put(Piece(choices, {camera: gop for camera, gop in delivered.items() if gop is not None}))
+
+    def close(self) -> None:
+        """End the recording."""
+        if self.writer is not None:
+            self.writer.close()
+
+    @property
+    def run(self) -> Run | None:
+        """What this service has recorded; None: nothing."""
+        return None if self.store is None else self.store.run
+
+    def tape(self, number: int) -> Tape | None:
+        """Give what is recorded of somebody; None: nothing."""
+        playlist = self.run.objects.get(number) if self.run is not None else None
+        return None if playlist is None else playlist.tape
+
+    def camera_tape(self, camera: str) -> Tape | None:
+        """Give what is recorded of a camera; None: nothing."""
+        return None if self.run is None else self.run.cameras[camera].tape
+
+    def _write(self, piece: Piece) -> None:
+        """Write a piece, in the writer's thread."""
+        parameters, site = self._agreement.parameters, self._config.site
+        if self.store is None or parameters is None:
+            return
+        head = RunHead(
+            site=site.name,
+            fps=site.fps,
+            width=site.width,
+            height=site.height,
+            codec=parameters.codec,
+            cameras=list(self._config.camera_ids),
+            began=time.time(),
+            pulse0=self.pulse0,
+        )
+        self.store.write(piece, head, init_segment(parameters, site.width, site.height))

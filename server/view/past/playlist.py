@@ -1,0 +1,137 @@
+"""A stream's playlist on the disk: references into the cameras' files (RFC 8216, HTTP Live Streaming).
+
+It ends with EXT-X-ENDLIST at every moment, so that any player plays what is there and stops; what is added
+is written over that line. The title of each entry says which pulses it is.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+from collections.abc import Iterable
+from datetime import UTC, datetime
+from pathlib import Path
+
+from server.view.past.media import write_at
+from server.view.past.stretch import Stretch, Tape
+
+_END = "#EXT-X-ENDLIST\n"
+_ENTRY = re.compile(
+    r"#EXTINF:[0-9.]+,p([0-9]+)\+([0-9]+)\n"
+    r"#EXT-X-BYTERANGE:([0-9]+)@([0-9]+)\n"
+    r"(?:[^\n]*/)?([^/\n]+)/([0-9]+)\.mp4\n"
+)
+_NAME_DIGITS = 12
+
+
+def file_name(pulse: int) -> str:
+    """Name a camera's file by its first pulse, so that names sort as pulses do."""
+    return f"{pulse:0{_NAME_DIGITS}}.mp4"
+
+
+class Playlist:
+    """One stream's references, in memory and on the disk.
+
+    ``cameras`` is the way from the playlist to the folder of the cameras; ``pulse0`` is when pulse 0 was due
+    (unix seconds), None where nobody knows.
+    """
+
+    def __init__(self, path: Path, cameras: str, fps: float, pulse0: float | None, longest_s: float) -> None:
+        self.path = path
+        self._cameras = cameras
+        self._fps = fps
+        self._pulse0 = pulse0
+        self._longest_s = longest_s
+        self.tape = Tape()
+        self._tail: int | None = None
+        """Where the end line begins in the file; None: there is no file yet."""
+        self._end: int | None = None
+
+    @property
+    def bytes(self) -> int:
+        """Bytes on the disk, roughly."""
+        return self._tail or 0
+
+    def read(self) -> None:
+        """Take over what the file says."""
+        text = self.path.read_text(encoding="utf-8", errors="replace")
+        self.tape = Tape(_parsed(text))
+        stretches = self.tape.all
+        self._end = stretches[-1].end if stretches else None
+
+    def append(self, stretch: Stretch) -> None:
+        """Add to the file, then to what is known.
+
+        Raises:
+            OSError: the disk does not take it; file and memory are as before.
+        """
+        if self._tail is None:
+            self._replace([*self.tape.all, stretch])
+        else:
+            entry = self._entry(stretch, self._end)
+            handle = os.open(self.path, os.O_WRONLY)
+            try:
+                write_at(handle, (entry + _END).encode(), self._tail)
+            except OSError:
+                self._tail = None  # it may be half there: written anew next time
+                raise
+            finally:
+                os.close(handle)
+            self._tail += len(entry.encode())
+        self.tape.add(stretch)
+        self._end = stretch.end
+
+    def tidy(self) -> None:
+        """Write the file anew, with as few entries as there are stretches; none: no file.
+
+        Raises:
+            OSError: the disk does not take it; the file is as before.
+        """
+        stretches = self.tape.all
+        if stretches:
+            self._replace(stretches)
+        else:
+            self.path.unlink(missing_ok=True)
+            self._tail = None
+
+    def _replace(self, stretches: Iterable[Stretch]) -> None:
+        stretches = list(stretches)
+        longest = max([self._longest_s, *(it.frames / self._fps for it in stretches)])
+        text = (
+            "#EXTM3U\n#EXT-X-VERSION:7\n"
+            f"#EXT-X-TARGETDURATION:{math.ceil(longest)}\n"
+            "#EXT-X-MEDIA-SEQUENCE:0\n#EXT-X-INDEPENDENT-SEGMENTS\n"
+            f'#EXT-X-MAP:URI="{self._cameras}init.mp4"\n'
+        )
+        end = None
+        for stretch in stretches:
+            text += self._entry(stretch, end)
+            end = stretch.end
+        draft = self.path.with_suffix(".new")
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            draft.write_text(text + _END, encoding="utf-8", newline="\n")
+            draft.replace(self.path)
+        except OSError:
+            draft.unlink(missing_ok=True)
+            raise
+        self._tail = len(text.encode())
+
+    def _entry(self, stretch: Stretch, end: int | None) -> str:
+        hole = "" if end in (None, stretch.first) else "#EXT-X-DISCONTINUITY\n"
+        date = ""
+        if end != stretch.first and self._pulse0 is not None:
+            moment = datetime.fromtimestamp(self._pulse0 + stretch.first / self._fps, UTC)
+            date = f"#EXT-X-PROGRAM-DATE-TIME:{moment.strftime('%Y-%m-%dT%H:%M:%S.%f')[:-3]}Z\n"
+        return (
+            f"{hole}{date}#EXTINF:{stretch.frames / self._fps:.6f},p{stretch.first}+{stretch.frames}\n"
+            f"#EXT-X-BYTERANGE:{stretch.length}@{stretch.offset}\n"
+            f"{self._cameras}{stretch.camera}/{file_name(stretch.file)}\n"
+        )
+
+
+def _parsed(text: str) -> Iterable[Stretch]:
+    for found in _ENTRY.finditer(text):
+        first, frames, length, offset, camera, file = found.groups()
+        yield Stretch(camera, int(file), int(offset), int(length), int(first), int(frames))

@@ -1,0 +1,140 @@
+"""One run of the service on the disk: the cameras' files, everybody's playlists, and who was where.
+
+Pulses and people's numbers may begin anew when a service does; so every run has a folder of its own.
+
+====================================  ====================================================================
+``RUN/run.json``                      :class:`RunHead`
+``RUN/cameras/init.mp4``              what a player needs before the first fragment, the same for all
+``RUN/cameras/c0/000000001250.mp4``   a camera's frames from pulse 1250 on
+``RUN/cameras/c0.m3u8``               all of that camera
+``RUN/objects/3.m3u8``                the best view of object 3
+``RUN/index/000000001250.jsonl``      a line per GOP from pulse 1250 on: choices, boxes, cuts
+====================================  ====================================================================
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from pathlib import Path
+
+import msgspec
+
+from server.view.past.playlist import Playlist, file_name
+
+HEAD = "run.json"
+
+
+class RunHead(msgspec.Struct, frozen=True, kw_only=True):
+    """What holds for a whole run."""
+
+    site: str
+    fps: float
+    width: int
+    height: int
+    codec: str
+    cameras: list[str]
+    began: float
+    """When the first GOP was written, unix seconds."""
+    pulse0: float | None
+    """When pulse 0 was due, unix seconds; null where it is not known."""
+
+
+@dataclass(slots=True)
+class Segment:
+    """The files that begin with one pulse: one per camera, and their index."""
+
+    first: int
+    bytes: int
+    written: float
+    """When something was last added, unix seconds."""
+
+
+class Run:
+    """The folder of one run, this service's or an earlier one's. ``longest_s``: of a segment."""
+
+    def __init__(self, folder: Path, head: RunHead, longest_s: float) -> None:
+        self.folder, self.head = folder, head
+        self._longest_s = longest_s
+        self.segments: list[Segment] = []
+        self.objects: dict[int, Playlist] = {}
+        self.cameras = {
+            camera: self._playlist(folder / "cameras" / f"{camera}.m3u8") for camera in head.cameras
+        }
+
+    @classmethod
+    def begin(cls, folder: Path, head: RunHead, header: bytes, longest_s: float) -> Run:
+        """Make the folder of a new run; ``header`` is ``ftyp`` and ``moov``.
+
+        Raises:
+            OSError: it cannot be made.
+        """
+        for part in ("cameras", "objects", "index"):
+            (folder / part).mkdir(parents=True, exist_ok=True)
+        (folder / "cameras" / "init.mp4").write_bytes(header)
+        (folder / HEAD).write_bytes(msgspec.json.format(msgspec.json.encode(head)) + b"\n")
+        return cls(folder, head, longest_s)
+
+    @classmethod
+    def found(cls, folder: Path, longest_s: float) -> Run:
+        """Take over what an earlier service left.
+
+        Raises:
+            OSError, msgspec.DecodeError: it is no such folder.
+        """
+        run = cls(folder, msgspec.json.decode((folder / HEAD).read_bytes(), type=RunHead), longest_s)
+        for playlist in run.cameras.values():
+            if playlist.path.exists():
+                playlist.read()
+        for path in sorted((folder / "objects").glob("*.m3u8")):
+            if path.stem.isdecimal():
+                run.object(int(path.stem)).read()
+        for path in sorted((folder / "index").glob("*.jsonl")):
+            if path.stem.isdecimal():
+                first = int(path.stem)
+                size = sum(it.stat().st_size for it in run.files(first) if it.exists())
+                run.segments.append(Segment(first, size, path.stat().st_mtime))
+        return run
+
+    @property
+    def bytes(self) -> int:
+        """Bytes on the disk."""
+        playlists = [*self.cameras.values(), *self.objects.values()]
+        return sum(it.bytes for it in self.segments) + sum(it.bytes for it in playlists)
+
+    def object(self, number: int) -> Playlist:
+        """Give somebody's playlist, a new one where there is none."""
+        if number not in self.objects:
+            self.objects[number] = self._playlist(self.folder / "objects" / f"{number}.m3u8", "../cameras/")
+        return self.objects[number]
+
+    def camera_file(self, camera: str, first: int) -> Path:
+        """Say where a camera's frames from a pulse on are."""
+        return self.folder / "cameras" / camera / file_name(first)
+
+    def index_file(self, first: int) -> Path:
+        """Say where the choices from a pulse on are."""
+        return (self.folder / "index" / file_name(first)).with_suffix(".jsonl")
+
+    def files(self, first: int) -> list[Path]:
+        """List a segment's files; of cameras that were away there is none."""
+        return [*(self.camera_file(camera, first) for camera in self.head.cameras), self.index_file(first)]
+
+    def drop(self, segments: Collection[Segment]) -> None:
+        """Take segments away, and what refers to them: first from the playlists, then from the disk.
+
+        Raises:
+            OSError: a file cannot be written or taken away.
+        """
+        files = {segment.first for segment in segments}
+        self.segments = [segment for segment in self.segments if segment.first not in files]
+        for playlist in [*self.cameras.values(), *self.objects.values()]:
+            if playlist.tape.drop(files):
+                playlist.tidy()
+        self.objects = {number: it for number, it in self.objects.items() if it.tape.all}
+        for first in sorted(files):
+            for path in self.files(first):
+                path.unlink(missing_ok=True)
+
+    def _playlist(self, path: Path, cameras: str = "") -> Playlist:
+        return Playlist(path, cameras, self.head.fps, self.head.pulse0, self._longest_s)

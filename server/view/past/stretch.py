@@ -1,0 +1,95 @@
+"""What is recorded of one stream: pieces of the cameras' files, in order."""
+
+from __future__ import annotations
+
+import threading
+from bisect import bisect_right
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass, replace
+
+
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """Consecutive frames of one camera, in one piece of one of its files."""
+
+    camera: str
+    file: int
+    """The first pulse of the file, which is its name."""
+    offset: int
+    length: int
+    """Bytes."""
+    first: int
+    frames: int
+
+    @property
+    def end(self) -> int:
+        """The pulse after its last frame."""
+        return self.first + self.frames
+
+    def goes_on_in(self, other: Stretch) -> bool:
+        """Tell whether the other one is the very next piece of the same file."""
+        return (other.camera, other.file, other.offset, other.first) == (
+            self.camera,
+            self.file,
+            self.offset + self.length,
+            self.end,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """Frames of a stream without a hole: ``first … end - 1``."""
+
+    first: int
+    end: int
+
+
+class Tape:
+    """The stretches of one stream by pulse. One thread adds to it and takes away, others look."""
+
+    def __init__(self, stretches: Iterable[Stretch] = ()) -> None:
+        self._lock = threading.Lock()
+        self._stretches: list[Stretch] = []
+        for stretch in stretches:
+            self.add(stretch)
+
+    def add(self, new: Stretch) -> None:
+        """Add what follows all that is there; what goes on in the same file becomes one stretch."""
+        with self._lock:
+            last = self._stretches[-1] if self._stretches else None
+            if last is not None and last.goes_on_in(new):
+                self._stretches[-1] = replace(
+                    last, length=last.length + new.length, frames=last.frames + new.frames
+                )
+            else:
+                self._stretches.append(new)
+
+    def drop(self, files: Collection[int]) -> bool:
+        """Take away what is in these files; tell whether there was anything."""
+        with self._lock:
+            before = len(self._stretches)
+            self._stretches = [it for it in self._stretches if it.file not in files]
+            return len(self._stretches) < before
+
+    def at_or_after(self, pulse: int) -> Stretch | None:
+        """Give the stretch that holds a pulse, or the next one; None where nothing follows."""
+        with self._lock:
+            place = bisect_right(self._stretches, pulse, key=lambda it: it.end)
+            return self._stretches[place] if place < len(self._stretches) else None
+
+    @property
+    def all(self) -> tuple[Stretch, ...]:
+        """All stretches in order."""
+        with self._lock:
+            return tuple(self._stretches)
+
+
+def spans(stretches: Iterable[Stretch | Span]) -> list[Span]:
+    """Join what follows without a hole; in order, and nothing twice."""
+    joined: list[Span] = []
+    for it in sorted(stretches, key=lambda it: it.first):
+        if joined and it.first <= joined[-1].end:
+            joined[-1] = Span(joined[-1].first, max(joined[-1].end, it.end))
+        else:
+            joined.append(Span(it.first, it.end))
+    return joined

@@ -1,0 +1,91 @@
+"""A recording whose every GOP a test decides."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from functools import cache
+from pathlib import Path
+
+import av
+import numpy as np
+from cameras_by_hand import CAMERAS, FPS, GOP, HEIGHT, WIDTH, encoded
+from numpy.typing import NDArray
+
+from server.view.agreement import Agreement
+from server.view.fmp4 import init_segment
+from server.view.past.media import Gop
+from server.view.past.run import RunHead
+from server.view.past.store import Bounds, Piece, Store
+from server.view.shelf import Shelf
+from server.wire.messages import GopChoices
+
+A, B = CAMERAS
+FRAMES = 200
+PULSE0 = 1_763_700_000.0
+AMPLE = Bounds(keep_s=1e6, most_mb=1e6, segment_s=1.0)
+"""Nothing is taken away; five GOPs in a segment."""
+
+Picture = NDArray[np.uint8]
+
+
+@cache
+def filled() -> tuple[dict[str, Shelf], bytes]:
+    """Give a shelf per camera with all its frames, and what every file begins with."""
+    agreement = Agreement()
+    shelves = {camera: Shelf(FPS, FRAMES, agreement) for camera in CAMERAS}
+    for seed, camera in enumerate(CAMERAS):
+        for unit in encoded(seed, FRAMES):
+            shelves[camera].put(unit.pulse, 1, unit.data, key=unit.key)
+    assert agreement.parameters is not None
+    return shelves, init_segment(agreement.parameters, WIDTH, HEIGHT)
+
+
+@cache
+def own_pictures(camera: str) -> list[Picture]:
+    """Decode a camera's own stream: the picture of every pulse in YUV 4:2:0."""
+    decoder = av.VideoCodecContext.create("h264", "r")
+    units = encoded(CAMERAS.index(camera), FRAMES)
+    return [
+        frame.to_ndarray(format="yuv420p") for unit in units for frame in decoder.decode(av.Packet(unit.data))
+    ]
+
+
+def head(began: float = PULSE0) -> RunHead:
+    return RunHead(
+        site="hall",
+        fps=FPS,
+        width=WIDTH,
+        height=HEIGHT,
+        codec="avc1",
+        cameras=list(CAMERAS),
+        began=began,
+        pulse0=PULSE0,
+    )
+
+
+def piece(
+    gop: int, choices: Mapping[int, str], cameras: tuple[str, ...] = CAMERAS, frames: int = GOP
+) -> Piece:
+    """Give a GOP as it was decided; ``frames``: as many of it have come."""
+    first = gop * GOP
+    delivered = {}
+    for camera in cameras:
+        taken = [filled()[0][camera].get(pulse) for pulse in range(first, first + frames)]
+        delivered[camera] = Gop(first, tuple(it.fragment for it in taken if it is not None))
+    boxes = {camera: [[(1, 1.0, 2.0, 3.0, 4.0)]] * GOP for camera in cameras}
+    return Piece(GopChoices(first=first, frames=GOP, choices=dict(choices), boxes=boxes, cuts=[]), delivered)
+
+
+def written(store: Store, pieces: list[Piece], began: float = PULSE0) -> Store:
+    """Open a store and write the pieces."""
+    store.open()
+    for it in pieces:
+        store.write(it, head(began), filled()[1])
+    return store
+
+
+def pictures(path: Path) -> Iterator[tuple[int, Picture]]:
+    """Play a file or playlist from the disk: pulse and picture, frame by frame."""
+    with av.open(str(path), "r") as container:
+        for frame in container.decode(video=0):
+            yield round(float(frame.time or 0) * FPS), frame.to_ndarray(format="yuv420p")

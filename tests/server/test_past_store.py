@@ -1,0 +1,260 @@
+"""What is recorded plays from the disk by itself, goes in order, and takes no more than it may."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import resource
+import shutil
+import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cameras_by_hand import FPS, GOP
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from recorded_by_hand import AMPLE, PULSE0, A, B, filled, head, own_pictures, pictures, piece, written
+
+from server.view.past.media import CameraFile, gops
+from server.view.past.store import Bounds, Store
+
+needs_ffmpeg = pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="needs ffmpeg")
+
+
+def only_run(folder: Path) -> Path:
+    (run,) = (it for it in folder.iterdir() if it.is_dir())
+    return run
+
+
+def plays_without_a_word(path: Path) -> None:
+    done = subprocess.run(
+        ["ffmpeg", "-v", "error", "-i", str(path), "-f", "null", "-"], capture_output=True, check=True
+    )
+    assert not done.stderr, f"{path}: {done.stderr.decode()}"
+
+
+def everything_that_plays(folder: Path) -> list[Path]:
+    return [it for it in sorted([*folder.rglob("*.m3u8"), *folder.rglob("*.mp4")]) if it.name != "init.mp4"]
+
+
+def test_a_persons_playlist_is_the_chosen_cameras_pictures_pixel_for_pixel_across_cuts(
+    tmp_path: Path,
+) -> None:
+    choices = [A, A, B, B, A, B, A, A, A, B, B, A]
+    store = written(Store(tmp_path, AMPLE), [piece(gop, {1: camera}) for gop, camera in enumerate(choices)])
+    during = list(pictures(only_run(tmp_path) / "objects" / "1.m3u8"))
+    store.close()
+    after = list(pictures(only_run(tmp_path) / "objects" / "1.m3u8"))
+    for played in (during, after):
+        assert [pulse for pulse, _ in played] == list(range(len(choices) * GOP))
+        for pulse, picture in played:
+            np.testing.assert_array_equal(picture, own_pictures(choices[pulse // GOP])[pulse])
+
+
+def test_a_camera_is_written_once_however_many_people_it_shows(tmp_path: Path) -> None:
+    few = written(Store(tmp_path / "few", AMPLE), [piece(gop, {1: A}) for gop in range(4)])
+    many = written(
+        Store(tmp_path / "many", AMPLE), [piece(gop, dict.fromkeys(range(50), A)) for gop in range(4)]
+    )
+    few.close()
+    many.close()
+    sizes = [sum(it.stat().st_size for it in folder.rglob("*.mp4")) for folder in tmp_path.iterdir()]
+    assert sizes[0] == sizes[1]
+
+
+@needs_ffmpeg
+def test_ffmpeg_plays_every_file_and_playlist_without_a_word_even_with_holes(tmp_path: Path) -> None:
+    pieces = [piece(gop, {1: A, 2: B} if gop % 4 else {1: A}) for gop in range(12) if gop != 7]
+    written(Store(tmp_path, AMPLE), pieces).close()
+    files = everything_that_plays(tmp_path)
+    assert len(files) == 2 + 2 + 3 * 2, "two people, two cameras, three files each"
+    for path in files:
+        plays_without_a_word(path)
+
+
+def test_a_playlist_keeps_to_the_rules(tmp_path: Path) -> None:
+    written(Store(tmp_path, AMPLE), [piece(gop, {1: B if gop == 3 else A}) for gop in range(7) if gop != 5])
+    text = (only_run(tmp_path) / "objects" / "1.m3u8").read_text()
+    lines = text.splitlines()
+    assert lines[0] == "#EXTM3U"
+    assert lines[-1] == "#EXT-X-ENDLIST"
+    assert text.count("#EXT-X-ENDLIST") == 1
+    target = next(int(it.partition(":")[2]) for it in lines if it.startswith("#EXT-X-TARGETDURATION"))
+    assert all(round(float(it[8:].split(",")[0])) <= target for it in lines if it.startswith("#EXTINF:"))
+    assert lines.count("#EXT-X-DISCONTINUITY") == 1, "where GOP 5 is missing"
+    assert "#EXT-X-PROGRAM-DATE-TIME:2025-11-21T04:40:00.000Z" in lines
+    for place, line in enumerate(lines):
+        if line.startswith("#EXT-X-BYTERANGE:"):
+            length, offset = map(int, line.partition(":")[2].split("@"))
+            data = (only_run(tmp_path) / "objects" / lines[place + 1]).read_bytes()[offset : offset + length]
+            assert data[4:8] == b"moof"
+            assert len(data) == length
+
+
+def test_the_index_says_who_was_where(tmp_path: Path) -> None:
+    written(Store(tmp_path, AMPLE), [piece(gop, {1: A}) for gop in range(7)]).close()
+    first, second = sorted((only_run(tmp_path) / "index").iterdir())
+    lines = [json.loads(line) for path in (first, second) for line in path.read_text().splitlines()]
+    assert [line["first"] for line in lines] == [gop * GOP for gop in range(7)]
+    assert lines[0]["choices"] == {"1": A}
+    assert lines[0]["boxes"][B][0] == [[1, 1.0, 2.0, 3.0, 4.0]]
+
+
+def test_of_a_gop_that_did_not_come_whole_the_beginning_is_kept_and_shown_to_nobody(tmp_path: Path) -> None:
+    pieces = [piece(0, {1: A}), piece(1, {1: A}, frames=3), piece(2, {1: A})]
+    run = written(Store(tmp_path, AMPLE), pieces).run
+    assert run is not None
+    assert [pulse for pulse, _ in pictures(run.cameras[A].path)] == [
+        0,
+        1,
+        2,
+        3,
+        4,
+        5,
+        6,
+        7,
+        10,
+        11,
+        12,
+        13,
+        14,
+    ]
+    assert [(it.first, it.end) for it in run.objects[1].tape.all] == [(0, 5), (10, 15)]
+
+
+def test_a_service_that_begins_again_goes_on_beside_what_is_there(tmp_path: Path) -> None:
+    written(Store(tmp_path, AMPLE), [piece(gop, {1: A}) for gop in range(3)]).close()
+    second = written(Store(tmp_path, AMPLE), [piece(gop, {1: B}) for gop in range(3)])
+    assert len([it for it in tmp_path.iterdir() if it.is_dir()]) == 2
+    (earlier,) = second.earlier
+    assert [(it.first, it.end) for it in earlier.objects[1].tape.all] == [(0, 15)]
+    for run, camera in ((earlier, A), (second.run, B)):
+        assert run is not None
+        for pulse, picture in pictures(run.objects[1].path):
+            np.testing.assert_array_equal(picture, own_pictures(camera)[pulse])
+
+
+def test_pulses_that_begin_anew_are_another_run(tmp_path: Path) -> None:
+    store = written(Store(tmp_path, AMPLE), [piece(gop, {1: A}) for gop in (5, 6, 0, 1)])
+    assert store.run is not None
+    assert [(it.first, it.end) for it in store.run.objects[1].tape.all] == [(0, 10)]
+    assert [(it.first, it.end) for it in store.earlier[0].objects[1].tape.all] == [(25, 35)]
+
+
+def test_two_processes_do_not_record_into_one_folder(tmp_path: Path) -> None:
+    store = written(Store(tmp_path, AMPLE), [])
+    with pytest.raises(BlockingIOError):
+        Store(tmp_path, AMPLE).open()
+    store.close()
+    Store(tmp_path, AMPLE).open()
+
+
+def test_what_is_too_old_goes_in_whole_segments_with_what_refers_to_it(tmp_path: Path) -> None:
+    now = [PULSE0]
+    store = Store(tmp_path, Bounds(keep_s=3.0, most_mb=1e6, segment_s=1.0), lambda: now[0])
+    store.open()
+    for gop in range(40):
+        now[0] = PULSE0 + gop * GOP / FPS
+        store.write(piece(gop, {1: A, 2 if gop < 10 else 3: B}), head(), filled()[1])
+    store.close()
+    run = store.run
+    assert run is not None
+    assert [it.first for it in run.segments] == [100, 125, 150, 175]
+    assert sorted(run.objects) == [1, 3]
+    assert not (run.folder / "objects" / "2.m3u8").exists()
+    kept = sorted(int(it.stem) for it in (run.folder / "cameras" / A).iterdir())
+    assert kept == [100, 125, 150, 175] == sorted(int(it.stem) for it in (run.folder / "index").iterdir())
+    assert [pulse for pulse, _ in pictures(run.objects[1].path)] == list(range(100, 200))
+
+
+@settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    st.lists(st.dictionaries(st.integers(1, 4), st.sampled_from([A, B])), min_size=1, max_size=40), st.data()
+)
+def test_the_disk_takes_no_more_than_it_may_and_what_is_found_again_is_what_was_known(
+    tmp_path_factory: pytest.TempPathFactory, shown: list[dict[int, str]], data: st.DataObject
+) -> None:
+    folder = tmp_path_factory.mktemp("bounded")
+    most_mb = data.draw(st.sampled_from([0.05, 0.1, 1.0]))
+    store = Store(folder, Bounds(keep_s=1e6, most_mb=most_mb, segment_s=0.4))
+    store.open()
+    slack = 2 * 8_000  # bytes: a GOP of both cameras, its line, its references
+    for gop, choices in enumerate(shown):
+        store.write(piece(gop, choices), head(), filled()[1])
+        on_disk = sum(it.stat().st_size for it in folder.rglob("*") if it.is_file())
+        assert on_disk <= most_mb * 1e6 + slack
+    store.close()
+    again = Store(folder, AMPLE)
+    again.open()
+    assert store.run is not None
+    found = {number: it.tape.all for run in again.earlier for number, it in run.objects.items()}
+    assert found == {number: it.tape.all for number, it in store.run.objects.items()}
+    for number, tape in found.items():
+        expected = [gop for gop, choices in enumerate(shown) if number in choices]
+        kept = [pulse // GOP for it in tape for pulse in range(it.first, it.end, GOP)]
+        assert kept == expected[len(expected) - len(kept) :], "the newest, without a hole of our own"
+        for it in tape:
+            path = again.earlier[0].camera_file(it.camera, it.file)
+            assert [gop.first for gop in gops(path, it.offset, it.length, FPS)] == list(
+                range(it.first, it.end, GOP)
+            )
+    again.close()
+
+
+@contextmanager
+def files_of_at_most(size: int) -> Iterator[None]:
+    """Let the system refuse what is written beyond, as a full disk does."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+@needs_ffmpeg
+def test_when_the_disk_is_full_what_is_there_plays_and_later_it_goes_on(tmp_path: Path) -> None:
+    store = written(Store(tmp_path, AMPLE), [piece(gop, {1: A}) for gop in range(2)])
+    assert store.run is not None
+    size = store.run.camera_file(A, 0).stat().st_size
+    with files_of_at_most(size + 300), pytest.raises(OSError, match="large") as refused:
+        store.write(piece(2, {1: A}), head(), filled()[1])
+    assert refused.value.errno == errno.EFBIG
+    store.abandon()
+    assert store.run.camera_file(A, 0).stat().st_size == size
+    store.write(piece(4, {1: A}), head(), filled()[1])
+    store.close()
+    assert [pulse // GOP for pulse, _ in pictures(store.run.objects[1].path)][::GOP] == [0, 1, 4]
+    for path in everything_that_plays(tmp_path):
+        plays_without_a_word(path)
+
+
+@needs_ffmpeg
+@pytest.mark.parametrize("share", [0.0, 0.001, 0.3, 0.9])
+def test_a_writer_killed_in_the_middle_of_a_gop_leaves_a_file_that_plays(
+    tmp_path: Path, share: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    gop_of = piece(0, {}).cameras[A], piece(1, {}).cameras[A]
+    path = tmp_path / "0.mp4"
+    file = CameraFile(path, filled()[1])
+    file.append(gop_of[0])
+
+    class KilledError(BaseException):
+        pass
+
+    real = os.pwrite
+
+    def killed(handle: int, data: bytes, offset: int) -> int:
+        real(handle, bytes(data)[: max(8, round(len(data) * share))], offset)
+        raise KilledError
+
+    monkeypatch.setattr(os, "pwrite", killed)
+    with pytest.raises(KilledError):
+        file.append(gop_of[1])
+    file.close()
+    plays_without_a_word(path)
+    assert [pulse for pulse, _ in pictures(path)] == list(range(GOP))
