@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import TYPE_CHECKING
 
 import av
 import numpy as np
@@ -11,7 +12,10 @@ from av.video.codeccontext import VideoCodecContext
 from av.video.frame import PictureType, VideoFrame
 from numpy.typing import NDArray
 
-from server.wire.config import Encode, Site
+from server.wire.drawing import Canvas
+
+if TYPE_CHECKING:  # a drawing process encodes too, and has no second to load the configuration's libraries
+    from server.wire.config import Encode, Site
 
 _CLOCK = Fraction(1, 90_000)
 _FAR = 1_000_000
@@ -34,7 +38,7 @@ class Encoder:
     decoder takes a cut between cameras for an ordinary GOP boundary.
     """
 
-    def __init__(self, site: Site, settings: Encode) -> None:
+    def __init__(self, site: Site | Canvas, settings: Encode | Canvas) -> None:
         self._gop = settings.gop
         self._fps = site.fps
         self._last: int | None = None

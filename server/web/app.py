@@ -9,11 +9,12 @@ from contextlib import asynccontextmanager
 
 from aiohttp import web
 
+from server.view.pictures import Pictures
 from server.view.service import BestViewService
-from server.web import api, openapi, page, video
+from server.web import api, openapi, page, pictures, video
 from server.web.api import problem
 from server.web.events import Events
-from server.web.keys import EVENTS, METRICS, SERVICE
+from server.web.keys import EVENTS, METRICS, PICTURES, SERVICE
 from server.web.metrics import registry
 from server.web.share import to_the_right_service
 from server.wire.config import Http
@@ -52,8 +53,9 @@ async def one_line_errors(
 def make_app(service: BestViewService) -> web.Application:
     """Give the application on top of a service."""
     app = web.Application(middlewares=[one_line_errors, to_the_right_service])
-    app[SERVICE], app[EVENTS], app[METRICS] = service, Events(service), registry(service)
-    for module in (api, video, openapi, page):
+    app[SERVICE], app[EVENTS], app[PICTURES] = service, Events(service), Pictures(service)
+    app[METRICS] = registry(service, app[PICTURES])
+    for module in (api, video, pictures, openapi, page):
         app.add_routes(module.routes)
     app.cleanup_ctx.append(_telling)
     app.on_shutdown.append(_end_streams)
@@ -93,3 +95,4 @@ async def _telling(app: web.Application) -> AsyncIterator[None]:
 async def _end_streams(app: web.Application) -> None:
     app[EVENTS].close()
     app[SERVICE].splicer.close()
+    await app[PICTURES].close()

@@ -5,9 +5,11 @@ from __future__ import annotations
 from aiohttp import web
 from prometheus_client import CollectorRegistry
 
+from server.view.pictures import Pictures
 from server.view.service import BestViewService
 from server.web.events import Events
 
 SERVICE = web.AppKey("service", BestViewService)
 EVENTS = web.AppKey("events", Events)
+PICTURES = web.AppKey("pictures", Pictures)
 METRICS = web.AppKey("metrics", CollectorRegistry)

@@ -8,6 +8,7 @@ from prometheus_client import CollectorRegistry, Metric, ProcessCollector
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily
 from prometheus_client.registry import Collector
 
+from server.view.pictures import Pictures
 from server.view.service import BestViewService
 
 
@@ -70,9 +71,33 @@ class ServiceCollector(Collector):
         return [live, frames, missed, shed, bad, offset]
 
 
-def registry(service: BestViewService) -> CollectorRegistry:
+class PicturesCollector(Collector):
+    """Gives the numbers of the streams that are decoded."""
+
+    def __init__(self, pictures: Pictures) -> None:
+        self._pictures = pictures
+
+    def collect(self) -> Iterable[Metric]:
+        """Give all metrics as they are now."""
+        pictures = self._pictures
+        yield GaugeMetricFamily(
+            "myview_pictures", "People and cameras that are decoded now.", value=len(pictures.sources)
+        )
+        yield GaugeMetricFamily(
+            "myview_pictures_viewers", "Streams of pictures being watched.", value=pictures.viewers
+        )
+        yield CounterMetricFamily(
+            "myview_pictures_restarts", "Drawing processes that died.", value=pictures.restarts
+        )
+        yield CounterMetricFamily(
+            "myview_pictures_lost_gops", "GOPs that came too fast to be drawn.", value=pictures.lost
+        )
+
+
+def registry(service: BestViewService, pictures: Pictures) -> CollectorRegistry:
     """Give the metrics of a service and its process."""
     metrics = CollectorRegistry()
     metrics.register(ServiceCollector(service))
+    metrics.register(PicturesCollector(pictures))
     ProcessCollector(registry=metrics)
     return metrics

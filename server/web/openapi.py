@@ -24,13 +24,26 @@ _JSON = {
 _OTHER = {
     "/objects/{object}/best.mp4": "video/mp4",
     "/cameras/{camera}/live.mp4": "video/mp4",
+    "/objects/{object}/best.mjpeg": "multipart/x-mixed-replace",
+    "/cameras/{camera}/live.mjpeg": "multipart/x-mixed-replace",
+    "/objects/{object}/best.jpg": "image/jpeg",
+    "/cameras/{camera}/live.jpg": "image/jpeg",
     "/objects/{object}/thumb.jpg": "image/jpeg",
     "/api/events": "text/event-stream",
     "/healthz": "text/plain",
     "/readyz": "text/plain",
     "/metrics": "text/plain",
 }
-_UNAVAILABLE = {"/objects/{object}/best.mp4", "/cameras/{camera}/live.mp4", "/readyz"}
+_UNAVAILABLE = {"/objects/{object}/best.mp4", "/cameras/{camera}/live.mp4", "/readyz"} | {
+    path for path in _OTHER if path.endswith((".mjpeg", "best.jpg", "live.jpg"))
+}
+_OVERLAY = _UNAVAILABLE - {"/readyz", "/cameras/{camera}/live.mp4"}
+_SCHEMAS: dict[str, Any] = {
+    "object": {"type": "integer", "minimum": 0},
+    "camera": {"type": "string"},
+    "overlay": {"enum": [0, 1], "default": 0, "description": "1: boxes are burnt in."},
+    "fps": {"type": "number", "exclusiveMinimum": 0, "description": "Pictures a second; the site's at most."},
+}
 
 
 def describe(app: web.Application) -> dict[str, Any]:
@@ -65,8 +78,9 @@ def _operation(path: str, summary: str) -> dict[str, Any]:
         responses["404"] = {"description": "There is none of this name.", "content": error}
     if path in _UNAVAILABLE:
         responses["503"] = {"description": "Not now; try again later."}
-    schemas = {"object": {"type": "integer", "minimum": 0}, "camera": {"type": "string"}}
-    parameters = [{"name": name, "in": "path", "required": True, "schema": schemas[name]} for name in names]
+    parameters = [{"name": name, "in": "path", "required": True, "schema": _SCHEMAS[name]} for name in names]
+    queries = ["overlay"] * (path in _OVERLAY) + ["fps"] * path.endswith(".mjpeg")
+    parameters += [{"name": it, "in": "query", "required": False, "schema": _SCHEMAS[it]} for it in queries]
     return {"summary": summary.splitlines()[0], "parameters": parameters, "responses": responses}
 
 

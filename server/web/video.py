@@ -8,6 +8,7 @@ from server.view.channel import Channel
 from server.view.fmp4 import init_segment
 from server.web.api import problem
 from server.web.keys import SERVICE
+from server.web.pictures import best_with_boxes, wants_boxes
 from server.web.streams import send_stream
 
 routes = web.RouteTableDef()
@@ -18,6 +19,8 @@ _RETRY_S = "5"
 @routes.get("/objects/{object:[0-9]{1,9}}/best.mp4")
 async def get_best(request: web.Request) -> web.StreamResponse:
     """Stream the best view of a person as fragmented MP4; it goes on across every cut."""
+    if wants_boxes(request):
+        return await best_with_boxes(request)
     service = request.app[SERVICE]
     number = int(request.match_info["object"])
     channel = service.splicer.objects.get(service.board.resolve(number))

@@ -208,6 +208,13 @@ class Http(Section):
     """Streams served at once; one more gets 503."""
     viewer_queue_gops: PositiveInt = 8
     """A viewer that falls behind by more loses whole GOPs."""
+    hls_segment_s: PositiveFloat = 1.0
+    """As many whole GOPs as fit are a segment of HLS, at least one."""
+    hls_window_s: PositiveFloat = 6.0
+    """Segments that a playlist of HLS lists; twice as many are kept."""
+    pictures_max: PositiveInt = 8
+    """People and cameras whose pictures are decoded at once: JPEG, and boxes burnt in. One more gets 503."""
+    jpeg_quality: Annotated[int, Field(ge=1, le=100)] = 80
 
 
 class Record(Section):

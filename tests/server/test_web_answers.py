@@ -17,6 +17,11 @@ from server.web.app import make_app
     [
         ("/api/objects/99/choice", "there is no object 99"),
         ("/objects/99/best.mp4", "there is no object 99"),
+        ("/objects/99/best.mp4?overlay=1", "there is no object 99"),
+        ("/objects/99/best.mjpeg", "there is no object 99"),
+        ("/objects/99/best.jpg", "there is no object 99"),
+        ("/cameras/c9/live.mjpeg", "there is no camera 'c9'; there are c0, c1"),
+        ("/cameras/c9/live.jpg?overlay=1", "there is no camera 'c9'; there are c0, c1"),
         ("/objects/99/thumb.jpg", "there is no picture of object 99"),
         ("/cameras/c9/live.mp4", "there is no camera 'c9'; there are c0, c1"),
         ("/api/nothing", "there is nothing at /api/nothing"),
@@ -74,6 +79,11 @@ async def test_a_mistake_of_the_servers_own_is_500_without_a_traceback(
         ("/api/site", "application/json"),
         ("/objects/1/best.mp4", "video/mp4"),
         ("/cameras/c0/live.mp4", "video/mp4"),
+        ("/objects/1/best.mp4?overlay=1", "video/mp4"),
+        ("/objects/1/best.mjpeg", "multipart/x-mixed-replace"),
+        ("/cameras/c0/live.mjpeg?overlay=1", "multipart/x-mixed-replace"),
+        ("/objects/1/best.jpg", "image/jpeg"),
+        ("/cameras/c0/live.jpg", "image/jpeg"),
         ("/api/events", "text/event-stream"),
         ("/", "text/html"),
     ],
@@ -94,7 +104,8 @@ async def test_the_description_has_every_route_that_is_not_the_page(busy: Hall) 
     assert set(described["paths"]) == routes - {"/", "/page/{file}", "/api", "/api/openapi.json"}
     for path, item in described["paths"].items():
         assert item["get"]["summary"], path
-        assert {it["name"] for it in item["get"]["parameters"]} == set(re.findall(r"\{(\w+)\}", path))
+        inside = {it["name"] for it in item["get"]["parameters"] if it["in"] == "path"}
+        assert inside == set(re.findall(r"\{(\w+)\}", path))
 
 
 async def test_every_answer_is_as_the_description_says(busy: Hall) -> None:

@@ -1,0 +1,190 @@
+"""Pictures over HTTP: multipart JPEG, single JPEG, and the best view with its boxes burnt in."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Awaitable, Callable
+from functools import wraps
+
+from aiohttp import web
+
+from server.view.pictures import (
+    CameraView,
+    FullError,
+    NoPictureError,
+    PersonView,
+    Series,
+    Subject,
+)
+from server.view.pictures.multipart import BEGIN, CONTENT_TYPE, PULSE, part
+from server.web.api import problem
+from server.web.keys import PICTURES, SERVICE
+from server.web.streams import send_stream, send_viewer
+from server.wire.drawing import Still
+
+routes = web.RouteTableDef()
+
+_RETRY_S = "5"
+_EXPOSED = {"Access-Control-Expose-Headers": PULSE}
+
+Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
+
+
+class _RefusedError(Exception):
+    """There is another answer."""
+
+    def __init__(self, status: int, error: str) -> None:
+        super().__init__(error)
+        self.answer = problem(status, error)
+        if status == web.HTTPServiceUnavailable.status_code:
+            self.answer.headers["Retry-After"] = _RETRY_S
+
+
+def _or_refused(handler: Handler) -> Handler:
+    @wraps(handler)
+    async def run(request: web.Request) -> web.StreamResponse:
+        try:
+            return await handler(request)
+        except _RefusedError as refused:
+            return refused.answer
+        except FullError:
+            return _RefusedError(
+                503, "as many pictures as this server makes (http.pictures_max) are being made"
+            ).answer
+        except NoPictureError:
+            return _RefusedError(503, "no picture came in time").answer
+
+    return run
+
+
+@routes.get("/objects/{object:[0-9]{1,9}}/best.mjpeg")
+@_or_refused
+async def get_best_mjpeg(request: web.Request) -> web.StreamResponse:
+    """Stream the best view of a person as multipart JPEG, for whatever shows pictures but no video."""
+    return await _mjpeg(request, _person(request))
+
+
+@routes.get("/cameras/{camera}/live.mjpeg")
+@_or_refused
+async def get_live_mjpeg(request: web.Request) -> web.StreamResponse:
+    """Stream one camera as multipart JPEG."""
+    return await _mjpeg(request, _camera(request))
+
+
+@routes.get("/objects/{object:[0-9]{1,9}}/best.jpg")
+@_or_refused
+async def get_best_still(request: web.Request) -> web.StreamResponse:
+    """Give the newest picture of the best view of a person."""
+    return await _still(request, _person(request))
+
+
+@routes.get("/cameras/{camera}/live.jpg")
+@_or_refused
+async def get_live_still(request: web.Request) -> web.StreamResponse:
+    """Give one camera's newest picture."""
+    return await _still(request, _camera(request))
+
+
+def wants_boxes(request: web.Request) -> bool:
+    """Tell whether ``overlay=1`` is asked for; anything but 0 and 1 is as good as nothing."""
+    return request.query.get("overlay") == "1"
+
+
+@_or_refused
+async def best_with_boxes(request: web.Request) -> web.StreamResponse:
+    """Stream the best view of a person as fragmented MP4 with the boxes burnt in."""
+    headers = {"Content-Type": "video/mp4"}
+    subject = _person(request)
+    _newest(request, subject)
+    if request.method == "HEAD":
+        return _headers_only(headers)
+    _check_viewers(request)
+    with request.app[PICTURES].using(subject) as source:
+        film = source.film
+        film.wanted += 1
+        try:
+            head = await source.film_head()
+            return await send_stream(request, film.channel, head, headers)
+        finally:
+            film.wanted -= 1
+
+
+async def _mjpeg(request: web.Request, subject: Subject) -> web.StreamResponse:
+    headers = {"Content-Type": CONTENT_TYPE}
+    series = Series(_rate(request), wants_boxes(request))
+    pulse = _newest(request, subject)
+    if request.method == "HEAD":
+        return _headers_only(headers)
+    _check_viewers(request)
+    with request.app[PICTURES].using(subject) as source:
+        first = await source.still(_kind(request), pulse)
+        viewer = source.series.join(series)
+        try:
+            return await send_viewer(request, viewer, BEGIN + part(first), headers)
+        finally:
+            source.series.leave(series, viewer)
+
+
+async def _still(request: web.Request, subject: Subject) -> web.StreamResponse:
+    pulse = _newest(request, subject)
+    if request.method == "HEAD":
+        return _headers_only({"Content-Type": "image/jpeg", PULSE: str(pulse)})
+    with request.app[PICTURES].using(subject) as source:
+        picture = await source.still(_kind(request), pulse)
+    answer = _headers_only({"Content-Type": "image/jpeg", PULSE: str(picture.pulse)})
+    answer.body = picture.data
+    return answer
+
+
+def _headers_only(headers: dict[str, str]) -> web.Response:
+    always = {"Cache-Control": "no-store", "Access-Control-Allow-Origin": "*", **_EXPOSED}
+    return web.Response(headers={**always, **headers})
+
+
+def _person(request: web.Request) -> Subject:
+    service, number = request.app[SERVICE], int(request.match_info["object"])
+    known = service.board.resolve(number)
+    if known not in service.splicer.objects:
+        raise _RefusedError(404, f"there is no object {number}")
+    return PersonView(known)
+
+
+def _camera(request: web.Request) -> Subject:
+    service, camera = request.app[SERVICE], request.match_info["camera"]
+    if camera not in service.shelves:
+        raise _RefusedError(404, f"there is no camera {camera!r}; there are {', '.join(service.shelves)}")
+    return CameraView(camera, decided=wants_boxes(request))
+
+
+def _newest(request: web.Request, subject: Subject) -> int:
+    try:
+        pulse = request.app[PICTURES].newest(subject)
+    except KeyError:
+        pulse = None
+    if pulse is None:
+        raise _RefusedError(503, f"there is no picture of {subject} now")
+    return pulse
+
+
+def _kind(request: web.Request) -> Still:
+    return "boxed" if wants_boxes(request) else "plain"
+
+
+def _rate(request: web.Request) -> float:
+    """Give the pictures a second that are asked for, at most the site's."""
+    most, asked = request.app[SERVICE].config.site.fps, request.query.get("fps")
+    if asked is None:
+        return most
+    try:
+        rate = float(asked)
+    except ValueError:
+        rate = math.nan
+    if not 0 < rate < math.inf:
+        raise _RefusedError(400, f"fps={asked}: must be a number above 0, such as fps=5")
+    return min(rate, most)
+
+
+def _check_viewers(request: web.Request) -> None:
+    service = request.app[SERVICE]
+    if service.splicer.viewers + request.app[PICTURES].viewers >= service.config.http.viewers_max:
+        raise _RefusedError(503, "as many viewers as this server takes (http.viewers_max) are watching")

@@ -1,0 +1,93 @@
+"""What the best-view service and a drawing process say to each other, over the process's pipes.
+
+One request, one answer, each a msgpack message behind its length. The first message, which has no answer, is
+:class:`Canvas`. This module loads nothing of the configuration: a drawing process must be there at once.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import msgspec
+
+Boxes = list[list[tuple[int, float, float, float, float]]]
+"""For every frame of a GOP: object, left, top, right, bottom; as in ``GopChoices``."""
+
+Still = Literal["plain", "boxed"]
+
+LENGTH_BYTES = 4
+"""The length before every message, big-endian."""
+
+
+class Canvas(msgspec.Struct, frozen=True, kw_only=True):
+    """What all pictures of a site share; all that shapes the parameter sets of H.264 is the cameras' own."""
+
+    width: int
+    height: int
+    fps: float
+    gop: int
+    preset: str
+    crf: float
+    jpeg_quality: int
+    """0 to 100."""
+
+
+class Draw(msgspec.Struct, frozen=True, kw_only=True):
+    """Frames to decode, and what is wanted of them."""
+
+    fragments: bytes = b""
+    """MP4 fragments of consecutive frames; of the first request, they begin with a key frame."""
+    first: int = 0
+    """The pulse that ``boxes`` begin with."""
+    boxes: Boxes = []
+    chosen: int | None = None
+    """The object whose box stands out."""
+    film: bool = False
+    """Wanted: the frames with boxes, encoded."""
+    plain: list[float] = []
+    """Wanted: JPEG at these rates, a second (:func:`belongs`)."""
+    boxed: list[float] = []
+    """Wanted: JPEG with boxes, likewise."""
+    still: Still | None = None
+    """Wanted: JPEG of the last frame that was decoded, in this request or before."""
+
+
+class Unit(msgspec.Struct, frozen=True):
+    """One encoded frame, Annex B; a key one carries SPS and PPS."""
+
+    pulse: int
+    key: bool
+    data: bytes
+
+
+class Jpeg(msgspec.Struct, frozen=True):
+    """One JPEG."""
+
+    pulse: int
+    data: bytes
+
+
+class Drawn(msgspec.Struct, frozen=True, kw_only=True):
+    """The answer to :class:`Draw`."""
+
+    newest: int
+    """The last frame that was decoded, now or before; -1: none."""
+    film: list[Unit] = []
+    plain: list[Jpeg] = []
+    boxed: list[Jpeg] = []
+    still: Jpeg | None = None
+
+
+def belongs(pulse: int, rate: float, fps: float) -> bool:
+    """Tell whether a frame belongs to a series of ``rate`` pictures a second out of ``fps``.
+
+    It depends on the pulse alone, so that series share pictures, and a slower one is part of a faster one
+    whose rate is a multiple.
+    """
+    return rate >= fps or int(pulse * rate / fps) != int((pulse - 1) * rate / fps)
+
+
+def framed(message: msgspec.Struct) -> bytes:
+    """Give a message as it goes through a pipe."""
+    body = msgspec.msgpack.encode(message)
+    return len(body).to_bytes(LENGTH_BYTES, "big") + body
