@@ -78,16 +78,16 @@ def view_quality(seen: Seen, looks: Looks, settings: QualitySettings) -> Quality
         ValueError: shapes that do not fit.
     """
     _check(seen, looks)
-    # Each side of all boxes in one stretch of memory: every term reads side by side.
-    sides = np.ascontiguousarray(np.moveaxis(seen.boxes, 2, 0))
-    rows = _Rows(seen, looks, np.moveaxis(sides, 0, 2))
+    # In memory sides are apart, and in each of them frames: it is how the terms read them.
+    sides = np.ascontiguousarray(seen.boxes.transpose(2, 1, 0))
+    rows = _Rows(seen, looks, sides.transpose(2, 1, 0))
     weights = settings.weights
-    terms = np.empty((len(settings.terms), *rows.boxes.shape[:2]))
-    quality = np.ones(rows.boxes.shape[:2])
+    terms = np.empty((len(settings.terms), *sides.shape[1:])).transpose(0, 2, 1)
+    quality = np.ones(sides.shape[1:]).T
     for place, name in enumerate(settings.terms):
         terms[place] = _TERMS[name](rows)
         quality *= 1.0 - weights[name] * (1.0 - terms[place])
-    hidden = np.isnan(sides[0])
+    hidden = np.isnan(rows.boxes[..., 0])
     if hidden.any():
         quality[hidden] = terms[:, hidden] = np.nan
     return Quality(quality, settings.terms, terms)
@@ -95,7 +95,7 @@ def view_quality(seen: Seen, looks: Looks, settings: QualitySettings) -> Quality
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Rows:
-    """What the terms are worked out from; `boxes` are those of `seen`, the sides apart in memory."""
+    """What the terms are worked out from; `boxes` are those of `seen`."""
 
     seen: Seen
     looks: Looks

@@ -26,57 +26,63 @@ def unhidden(boxes: Floats, cameras: Ints) -> Floats:
     of the two boxes.
 
     Args:
-        boxes: (T, N, 4) pixels over N frames, NaN where hidden; fastest where each side is contiguous.
+        boxes: (T, N, 4) pixels over N frames, NaN where hidden. Fastest where tracks are innermost in memory,
+            then frames.
         cameras: (T,) in whose pictures the boxes of each track are.
 
     Returns:
         (T, N) values in [0, 1]; 1 where hidden.
     """
-    sides = [np.ascontiguousarray(boxes[..., side]) for side in range(4)]
-    first, second = _near(boxes, cameras)
-    left, top, right, bottom = sides
-    over = (left[second] < right[first]) & (left[first] < right[second])
-    over &= (top[second] < bottom[first]) & (top[first] < bottom[second])
-    pair, frame = np.nonzero(over)
-    one, two = (tracks[pair] * boxes.shape[1] + frame for tracks in (first, second))
-    left, top, right, bottom = (side.reshape(-1) for side in sides)
-    height = bottom - top
-    area = height * (right - left)
-    columns = np.minimum(right[one], right[two]) - np.maximum(left[one], left[two])
-    rows = np.minimum(bottom[one], bottom[two]) - np.maximum(top[one], top[two])
-    common = columns * rows
+    tracks, frames = boxes.shape[:2]
+    if not boxes.size:
+        return np.ones((tracks, frames))
+    left, top, right, bottom = sides = np.ascontiguousarray(boxes.transpose(2, 1, 0))
+    first, second = _near(sides, cameras)
+    columns = np.minimum(right[:, first], right[:, second]) - np.maximum(left[:, first], left[:, second])
+    rows = np.minimum(bottom[:, first], bottom[:, second]) - np.maximum(top[:, first], top[:, second])
+    over = np.flatnonzero((columns > 0.0) & (rows > 0.0))
+    common = columns.reshape(-1)[over] * rows.reshape(-1)[over]
+    frame, pair = np.divmod(over, len(first))
+    one, two = frame * tracks + first[pair], frame * tracks + second[pair]
+    height = (bottom - top).reshape(-1)
+    area, bottom = height * (right - left).reshape(-1), bottom.reshape(-1)
     lower = (bottom[two] - bottom[one]) / np.maximum(height[one], height[two])
     nearer = np.clip(0.5 + lower / (2.0 * _FEET), 0.0, 1.0)
     free = np.ones(area.shape)
     # Pairs are in line by their first track, then their second: who comes before a box, then who comes after.
     np.multiply.at(free, two, 1.0 - (1.0 - nearer) * shares(common, area[two]))
     np.multiply.at(free, one, 1.0 - nearer * shares(common, area[one]))
-    return np.asarray(np.minimum(free / _ENOUGH, 1.0).reshape(boxes.shape[:2]))
+    return np.asarray(np.minimum(free / _ENOUGH, 1.0).reshape(frames, tracks).T)
 
 
-def _near(boxes: Floats, cameras: Ints) -> tuple[Ints, Ints]:
+def _near(sides: Floats, cameras: Ints) -> tuple[Ints, Ints]:
     """List the pairs of tracks of one camera that may overlap: two (P,), each pair once, lower index first.
 
     They do where what each covers in all frames together overlaps. People hardly move in a window, so that
     these are few, and tracks are far fewer than boxes. Pairs are in line by the first, then by the second.
+
+    Args:
+        sides: (4, N, T) of the boxes, NaN where hidden.
+        cameras: (T,).
     """
-    some = np.flatnonzero(~np.isnan(boxes[..., 0]).all(axis=1))
+    tracks = sides.shape[2]
+    some = np.flatnonzero(~np.isnan(sides[0]).all(axis=0))
     if not some.size:
         return some, some
-    low = np.fmin.reduce(boxes[..., :2], axis=1)
-    high = np.fmax.reduce(boxes[..., 2:], axis=1)
+    left, top = np.fmin.reduce(sides[:2], axis=1)
+    right, bottom = np.fmax.reduce(sides[2:], axis=1)
     # One axis for all cameras, each its own stretch of it: one sort and one search do for all.
-    start = low[some, 0].min()
-    stretch = cameras[some] * (max(low[some, 0].max(), high[some, 0].max()) - start + 1.0) - start
-    begin = stretch + low[some, 0]
+    start = left[some].min()
+    stretch = cameras[some] * (max(left[some].max(), right[some].max()) - start + 1.0) - start
+    begin = stretch + left[some]
     order = np.argsort(begin, kind="stable")
-    one, two = _side_by_side(np.searchsorted(begin[order], (stretch + high[some, 0])[order], side="right"))
+    one, two = _side_by_side(np.searchsorted(begin[order], (stretch + right[some])[order], side="right"))
     line = some[order]
     one, two = line[one], line[two]
-    over = (low[two, 1] < high[one, 1]) & (low[one, 1] < high[two, 1])
-    one, two = np.minimum(one, two)[over], np.maximum(one, two)[over]
-    lined = np.sort(one * len(boxes) + two)
-    return lined // len(boxes), lined % len(boxes)
+    over = np.flatnonzero((top[two] < bottom[one]) & (top[one] < bottom[two]))
+    one, two = one[over], two[over]
+    lined = np.sort(np.minimum(one, two) * tracks + np.maximum(one, two))
+    return lined // tracks, lined % tracks
 
 
 def _side_by_side(end: Ints) -> tuple[Ints, Ints]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 Window = TypeVar("Window")
@@ -28,8 +28,7 @@ class History(Generic[Window]):
         """Take over what a window says of the frames from `first` to `last`."""
         if last < first:
             return
-        before = [replace(it, last=min(it.last, first - 1)) for it in self._stretches if it.first < first]
-        after = [replace(it, first=max(it.first, last + 1)) for it in self._stretches if it.last > last]
+        before, after = self.over(self._earliest, first - 1), self.over(last + 1, self._latest)
         self._stretches = [*before, Stretch(window, first, last), *after]
 
     def over(self, first: int, last: int) -> list[Stretch[Window]]:
@@ -42,6 +41,12 @@ class History(Generic[Window]):
 
     def forget_before(self, pulse: int) -> None:
         """Let go of the frames before a pulse."""
-        self._stretches = [
-            replace(it, first=max(it.first, pulse)) for it in self._stretches if it.last >= pulse
-        ]
+        self._stretches = self.over(pulse, self._latest)
+
+    @property
+    def _earliest(self) -> int:
+        return self._stretches[0].first if self._stretches else 0
+
+    @property
+    def _latest(self) -> int:
+        return self._stretches[-1].last if self._stretches else -1

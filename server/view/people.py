@@ -62,14 +62,15 @@ class People:
             self._histories[window.message.camera].put(window, window.first, window.message.last)
         tracks = [track for window in windows for track in window.local_tracks()]
         update = self._registry.update(tracks, epoch.last)
-        for track in tracks:
+        keys = [key for window in windows for key in window.keys]
+        for key in keys:
             # Who has left a person for one not confirmed yet has no number for now.
-            self._numbers.pop(track.key, None)
+            self._numbers.pop(key, None)
         self._numbers.update(update.numbers)
         seen = chain.from_iterable(window.seen() for window in windows)
-        for track, (first, last) in zip(tracks, seen, strict=True):
-            self._heard[track.key] = epoch.last
-            self._note_seen(self._numbers.get(track.key), first, last)
+        for key, (first, last) in zip(keys, seen, strict=True):
+            self._heard[key] = epoch.last
+            self._note_seen(self._numbers.get(key), first, last)
         self.away = (self.away | set(update.gone)) - set(update.returned)
         for merge in update.merged:
             self._merge(merge.kept, merge.lost)

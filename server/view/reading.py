@@ -4,20 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bestview import LocalTrack, TrackKey
 from server.view.align import Epoch
+from server.view.boxes import boxes_array
 from server.view.locals import LocalNumbers
 from server.wire.fit import Fit
 from server.wire.messages import CameraTracks
 
 Floats = NDArray[np.float64]
-
-_HIDDEN = (np.nan,) * 4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -89,16 +87,7 @@ class Reader:
         if fit is None:
             fit = self.fits[message.camera] = Fit(message.size, self._site_size)
         keys = self.locals.of(message)
+        frames = max(0, message.last - message.first + 1)
+        boxes = boxes_array(track.boxes for track in message.tracks)
         locals_ = np.array([key.local for key in keys], dtype=np.int64)
-        return CameraWindow(message, keys, locals_, fit, _boxes(message))
-
-
-def _boxes(message: CameraTracks) -> Floats:
-    """Give the boxes of a message: (T, F, 4), NaN where hidden."""
-    frames = max(0, message.last - message.first + 1)
-    tracks = [
-        track.boxes if all(track.boxes) else [box or _HIDDEN for box in track.boxes]
-        for track in message.tracks
-    ]
-    sides = chain.from_iterable(chain.from_iterable(tracks))  # type: ignore[arg-type]  # none is None now
-    return np.fromiter(sides, dtype=np.float64, count=len(tracks) * frames * 4).reshape(-1, frames, 4)
+        return CameraWindow(message, keys, locals_, fit, boxes.reshape(len(keys), frames, 4))
