@@ -80,8 +80,18 @@ def init_segment(parameters: ParameterSets, width: int, height: int) -> bytes:
 
 def fragment(samples: Sequence[Sample], first: int, fps: float) -> bytes:
     """Give ``moof`` and ``mdat`` of consecutive frames, the first of them shown at pulse ``first``."""
-    pulses = list(accumulate((sample.lasts for sample in samples), initial=first))
-    edges = [ticks(pulse, fps) for pulse in pulses]
+    pulses = accumulate((sample.lasts for sample in samples), initial=first)
+    return _fragment(samples, first, [ticks(pulse, fps) for pulse in pulses])
+
+
+def still(samples: Sequence[Sample], first: int, until: int, fps: float) -> bytes:
+    """Give a fragment that shows the last of some frames: those before it pass in a tick each."""
+    begin = ticks(first, fps)
+    return _fragment(samples, first, [*(begin + place for place in range(len(samples))), ticks(until, fps)])
+
+
+def _fragment(samples: Sequence[Sample], first: int, edges: Sequence[int]) -> bytes:
+    """Give the fragment of samples, each shown from its edge to the next, in ticks."""
     entries = b"".join(
         struct.pack(
             ">3I",

@@ -3,33 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
-from server.view.fmp4 import sample_of
-
-
-@dataclass(frozen=True, slots=True)
-class Picture:
-    """One picture, ready as an MP4 fragment."""
-
-    pulse: int
-    key: bool
-    fragment: bytes
-    boot: int
-    """Which run of the camera's process it is from; pictures of two runs do not build on each other."""
-    lasts: int = 1
-    """Pulses that it is shown for."""
-
-    @property
-    def until(self) -> int:
-        """The first pulse after it."""
-        return self.pulse + self.lasts
-
-    @property
-    def sample(self) -> bytes:
-        """Its NAL units, each behind its length."""
-        return sample_of(self.fragment)
+from server.view.picture import Picture
+from server.view.ts import Counters, pack
 
 
 class Footage:
@@ -38,8 +15,11 @@ class Footage:
     Each form is made when it is first asked for, and then shared by all who are given this piece.
     """
 
-    def __init__(self, pictures: Sequence[Picture], *, fills: bool = False) -> None:
+    def __init__(
+        self, pictures: Sequence[Picture], fps: float, counters: Counters, *, fills: bool = False
+    ) -> None:
         self.pictures = tuple(pictures)
+        self._fps, self._counters = fps, counters
         self.start = self.pictures[0].key
         self.fills = fills
 
@@ -57,3 +37,8 @@ class Footage:
     def data(self) -> bytes:
         """The pictures as fragments of MP4."""
         return b"".join(picture.fragment for picture in self.pictures)
+
+    @cached_property
+    def ts(self) -> bytes:
+        """The pictures as an MPEG transport stream."""
+        return pack(self.pictures, self._fps, self._counters)

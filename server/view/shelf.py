@@ -6,8 +6,8 @@ from typing import TypeAlias
 
 from server.view.agreement import Agreement
 from server.view.fmp4 import Sample, fragment
-from server.view.footage import Picture
 from server.view.h264 import nal_units, parameter_sets, sample
+from server.view.picture import Picture
 
 Shelved: TypeAlias = Picture
 """One frame, ready to be sent to anybody."""

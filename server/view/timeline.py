@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from server.view.agreement import Agreement
 from server.view.fmp4 import Sample, fragment
-from server.view.footage import Picture
+from server.view.picture import Picture
 from server.view.skip import Continuing, UnfitError, continuing
 
 _LONG_S = 2

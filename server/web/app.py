@@ -11,8 +11,9 @@ from aiohttp import web
 
 from server.view.pictures import Pictures
 from server.view.service import BestViewService
-from server.web import api, openapi, page, pictures, video
+from server.web import api, hls, openapi, page, pictures, video
 from server.web.api import problem
+from server.web.cors import preflight
 from server.web.events import Events
 from server.web.keys import EVENTS, METRICS, PICTURES, SERVICE
 from server.web.metrics import registry
@@ -52,10 +53,10 @@ async def one_line_errors(
 
 def make_app(service: BestViewService) -> web.Application:
     """Give the application on top of a service."""
-    app = web.Application(middlewares=[one_line_errors, to_the_right_service])
+    app = web.Application(middlewares=[one_line_errors, preflight, to_the_right_service])
     app[SERVICE], app[EVENTS], app[PICTURES] = service, Events(service), Pictures(service)
     app[METRICS] = registry(service, app[PICTURES])
-    for module in (api, video, pictures, openapi, page):
+    for module in (api, video, hls, pictures, openapi, page):
         app.add_routes(module.routes)
     app.cleanup_ctx.append(_telling)
     app.on_shutdown.append(_end_streams)

@@ -24,6 +24,14 @@ _JSON = {
 _OTHER = {
     "/objects/{object}/best.mp4": "video/mp4",
     "/cameras/{camera}/live.mp4": "video/mp4",
+    "/objects/{object}/best.ts": "video/mp2t",
+    "/cameras/{camera}/live.ts": "video/mp2t",
+    "/objects/{object}/hls/index.m3u8": "application/vnd.apple.mpegurl",
+    "/objects/{object}/hls/init.mp4": "video/mp4",
+    "/objects/{object}/hls/{segment}.m4s": "video/mp4",
+    "/cameras/{camera}/hls/index.m3u8": "application/vnd.apple.mpegurl",
+    "/cameras/{camera}/hls/init.mp4": "video/mp4",
+    "/cameras/{camera}/hls/{segment}.m4s": "video/mp4",
     "/objects/{object}/best.mjpeg": "multipart/x-mixed-replace",
     "/cameras/{camera}/live.mjpeg": "multipart/x-mixed-replace",
     "/objects/{object}/best.jpg": "image/jpeg",
@@ -35,12 +43,15 @@ _OTHER = {
     "/metrics": "text/plain",
 }
 _UNAVAILABLE = {"/objects/{object}/best.mp4", "/cameras/{camera}/live.mp4", "/readyz"} | {
-    path for path in _OTHER if path.endswith((".mjpeg", "best.jpg", "live.jpg"))
+    path for path in _OTHER if path.endswith((".ts", ".m3u8", ".mjpeg", "best.jpg", "live.jpg"))
 }
-_OVERLAY = _UNAVAILABLE - {"/readyz", "/cameras/{camera}/live.mp4"}
+_OVERLAY = {"/objects/{object}/best.mp4"} | {
+    path for path in _OTHER if path.endswith((".ts", ".m3u8", ".mjpeg", "best.jpg", "live.jpg"))
+}
 _SCHEMAS: dict[str, Any] = {
     "object": {"type": "integer", "minimum": 0},
     "camera": {"type": "string"},
+    "segment": {"type": "integer", "minimum": 0},
     "overlay": {"enum": [0, 1], "default": 0, "description": "1: boxes are burnt in."},
     "fps": {"type": "number", "exclusiveMinimum": 0, "description": "Pictures a second; the site's at most."},
 }

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 from aiohttp import web
 
-from server.view.channel import Channel, Viewer
+from server.view.channel import Channel, Piece, Viewer
 
 log = logging.getLogger(__name__)
 
@@ -18,34 +18,43 @@ _STREAM_HEADERS = {
 }
 
 
+Form = Callable[[Piece], bytes]
+"""How the pieces of a stream become bytes."""
+
+
+def plain(piece: Piece) -> bytes:
+    """Give a piece's own bytes."""
+    return piece.data
+
+
 async def send_stream(
-    request: web.Request, channel: Channel, head: bytes, headers: Mapping[str, str]
+    request: web.Request, channel: Channel, head: bytes, headers: Mapping[str, str], form: Form = plain
 ) -> web.StreamResponse:
     """Send ``head`` and then the channel for as long as both live."""
     viewer = channel.join()
     try:
-        return await send_viewer(request, viewer, head, headers)
+        return await send_viewer(request, viewer, head, headers, form)
     finally:
         channel.leave(viewer)
 
 
 async def send_viewer(
-    request: web.Request, viewer: Viewer, head: bytes, headers: Mapping[str, str]
+    request: web.Request, viewer: Viewer, head: bytes, headers: Mapping[str, str], form: Form = plain
 ) -> web.StreamResponse:
     """Send ``head`` and what a viewer is given, from a place that the caller took and will give up."""
     response = web.StreamResponse(headers={**_STREAM_HEADERS, **headers})
     await response.prepare(request)
     if request.method == "HEAD":
         return response
-    return await _send(response, viewer, head)
+    return await _send(response, viewer, head, form)
 
 
-async def _send(response: web.StreamResponse, viewer: Viewer, head: bytes) -> web.StreamResponse:
+async def _send(response: web.StreamResponse, viewer: Viewer, head: bytes, form: Form) -> web.StreamResponse:
     try:
         if head:
             await response.write(head)
-        async for data in viewer:
-            await response.write(data)
+        async for piece in viewer.pieces():
+            await response.write(form(piece))
         await response.write_eof()
     except (ConnectionError, TimeoutError) as error:
         log.debug("a viewer has gone: %s", error)

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Awaitable, Callable
+
 from aiohttp import web
 
-from server.view.channel import Channel
+from server.view.channel import Channel, Piece
 from server.view.fmp4 import init_segment
+from server.view.footage import Footage
 from server.web.api import problem
 from server.web.keys import SERVICE
 from server.web.pictures import best_with_boxes, wants_boxes
 from server.web.streams import send_stream
 
 routes = web.RouteTableDef()
+
+Sender = Callable[[web.Request, Channel], Awaitable[web.StreamResponse]]
 
 _RETRY_S = "5"
 
@@ -21,37 +26,80 @@ async def get_best(request: web.Request) -> web.StreamResponse:
     """Stream the best view of a person as fragmented MP4; it goes on across every cut."""
     if wants_boxes(request):
         return await best_with_boxes(request)
-    service = request.app[SERVICE]
-    number = int(request.match_info["object"])
-    channel = service.splicer.objects.get(service.board.resolve(number))
-    if channel is None:
-        return problem(404, f"there is no object {number}")
-    return await _mp4(request, channel)
+    return await _best(request, _mp4)
+
+
+@routes.get("/objects/{object:[0-9]{1,9}}/best.ts")
+async def get_best_ts(request: web.Request) -> web.StreamResponse:
+    """Stream the best view of a person as an MPEG transport stream, likewise."""
+    return await _best(request, _ts)
 
 
 @routes.get("/cameras/{camera}/live.mp4")
 async def get_live(request: web.Request) -> web.StreamResponse:
     """Stream one camera as fragmented MP4."""
+    return await _live(request, _mp4)
+
+
+@routes.get("/cameras/{camera}/live.ts")
+async def get_live_ts(request: web.Request) -> web.StreamResponse:
+    """Stream one camera as an MPEG transport stream."""
+    return await _live(request, _ts)
+
+
+async def _best(request: web.Request, send: Sender) -> web.StreamResponse:
+    service = request.app[SERVICE]
+    number = int(request.match_info["object"])
+    channel = service.splicer.objects.get(service.board.resolve(number))
+    if channel is None:
+        return problem(404, f"there is no object {number}")
+    return await send(request, channel)
+
+
+async def _live(request: web.Request, send: Sender) -> web.StreamResponse:
     service = request.app[SERVICE]
     camera = request.match_info["camera"]
     channel = service.splicer.cameras.get(camera)
     if channel is None:
         return problem(404, f"there is no camera {camera!r}; there are {', '.join(service.shelves)}")
-    return await _mp4(request, channel)
+    return await send(request, channel)
 
 
 async def _mp4(request: web.Request, channel: Channel) -> web.StreamResponse:
     service = request.app[SERVICE]
     parameters, site = service.agreement.parameters, service.config.site
     if parameters is None:
-        return _not_now("no camera has delivered a picture yet")
-    if service.splicer.viewers >= service.config.http.viewers_max:
-        return _not_now("as many viewers as this server takes (http.viewers_max) are watching")
+        return not_now("no camera has delivered a picture yet")
+    full = _full(request, channel)
+    if full is not None:
+        return full
     head = init_segment(parameters, site.width, site.height)
     return await send_stream(request, channel, head, {"Content-Type": "video/mp4"})
 
 
-def _not_now(error: str) -> web.Response:
+async def _ts(request: web.Request, channel: Channel) -> web.StreamResponse:
+    full = _full(request, channel)
+    if full is not None:
+        return full
+    return await send_stream(request, channel, b"", {"Content-Type": "video/mp2t"}, _as_ts)
+
+
+def _as_ts(piece: Piece) -> bytes:
+    return piece.ts if isinstance(piece, Footage) else piece.data
+
+
+def _full(request: web.Request, channel: Channel) -> web.Response | None:
+    service = request.app[SERVICE]
+    limits = service.config.http
+    if service.splicer.viewers >= limits.viewers_max:
+        return not_now("as many viewers as this server takes (http.viewers_max) are watching")
+    if channel.viewers >= limits.viewers_per_object:
+        return not_now("as many viewers as one stream takes (http.viewers_per_object) are watching")
+    return None
+
+
+def not_now(error: str) -> web.Response:
+    """Say why not, and when to try again."""
     response = problem(503, error)
     response.headers["Retry-After"] = _RETRY_S
     return response

@@ -206,6 +206,8 @@ class Http(Section):
     port: Annotated[int, Field(ge=0, le=65535)] = 8080
     viewers_max: PositiveInt = 1000
     """Streams served at once; one more gets 503."""
+    viewers_per_object: PositiveInt = 1000
+    """The same of one object, or of one camera."""
     viewer_queue_gops: PositiveInt = 8
     """A viewer that falls behind by more loses whole GOPs."""
     hls_segment_s: PositiveFloat = 1.0

@@ -1,0 +1,30 @@
+"""One picture of a stream."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from server.view.fmp4 import sample_of
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """One picture, ready as an MP4 fragment."""
+
+    pulse: int
+    key: bool
+    fragment: bytes
+    boot: int
+    """Which run of the camera's process it is from; pictures of two runs do not build on each other."""
+    lasts: int = 1
+    """Pulses that it is shown for."""
+
+    @property
+    def until(self) -> int:
+        """The first pulse after it."""
+        return self.pulse + self.lasts
+
+    @property
+    def sample(self) -> bytes:
+        """Its NAL units, each behind its length."""
+        return sample_of(self.fragment)

@@ -1,0 +1,120 @@
+"""The newest GOPs of a stream as segments, for players that fetch (HLS): references, not copies.
+
+Which segment a GOP is in follows from its pulse alone, and so does the segment's number. So nothing has to be
+remembered about who watches, and after a restart of the service the numbers go on where they were.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import takewhile
+
+from server.view.fmp4 import Sample, still
+from server.view.footage import Footage
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """How a site's streams are cut into segments."""
+
+    fps: float
+    frames: int
+    """Pulses in a segment: whole GOPs."""
+    listed: int
+    """Segments in a playlist."""
+
+    @property
+    def target_s(self) -> int:
+        """What no segment is longer than, when rounded: the seconds of EXT-X-TARGETDURATION."""
+        return max(1, int(self.frames / self.fps + 0.5))
+
+
+def plan(fps: float, gop: int, segment_s: float, window_s: float) -> Plan:
+    """Plan segments of as many whole GOPs as fit, at least one, and a window of at least three of them."""
+    frames = gop * max(1, int(segment_s * fps / gop + 1e-9))
+    return Plan(fps, frames, max(3, -(-int(window_s * fps) // frames)))
+
+
+class Segment:
+    """Consecutive GOPs. It can be decoded without any other segment."""
+
+    def __init__(self, number: int, plan: Plan, lead: Footage) -> None:
+        self.number = number
+        self._plan = plan
+        self._lead = lead
+        """What the first GOP repeats the last picture of, if it repeats one."""
+        self._footage: list[Footage] = []
+
+    def add(self, footage: Footage) -> None:
+        """Take the next GOP, which has been sent."""
+        self._footage.append(footage)
+
+    @property
+    def first(self) -> int:
+        """The first pulse."""
+        return self._footage[0].first
+
+    @property
+    def seconds(self) -> float:
+        """How long it is."""
+        return (self._footage[-1].until - self.first) / self._plan.fps
+
+    @property
+    def whole(self) -> bool:
+        """Whether nothing will be added to it."""
+        return self._footage[-1].until >= (self.number + 1) * self._plan.frames
+
+    @property
+    def data(self) -> bytes:
+        """The segment as fragments of MP4."""
+        standing = list(takewhile(lambda it: not it.start, self._footage))
+        rest = b"".join(it.data for it in self._footage[len(standing) :])
+        return self._stand(standing[-1].until) + rest if standing else rest
+
+    def _stand(self, until: int) -> bytes:
+        """Show the lead's last picture until a pulse: what it is decoded by passes within a few ticks."""
+        samples = [Sample(picture.sample, picture.key) for picture in self._lead.pictures]
+        return still(samples, self.first, until, self._plan.fps)
+
+
+class Reel:
+    """The last segments of one stream: those in the playlist, and those that were until a moment ago."""
+
+    def __init__(self, plan: Plan) -> None:
+        self.plan = plan
+        self.ended = False
+        self._segments: dict[int, Segment] = {}
+        self._lead: Footage | None = None
+        self.until = 0
+        """The first pulse that is not here yet."""
+
+    def put(self, footage: Footage) -> None:
+        """Take the next GOP."""
+        if footage.start:
+            self._lead = footage
+        if self._lead is None:
+            return
+        if footage.first != self.until:
+            self._segments.clear()  # the pulses began anew
+        self.until = footage.until
+        number = footage.first // self.plan.frames
+        if number not in self._segments:
+            self._segments[number] = Segment(number, self.plan, self._lead)
+        self._segments[number].add(footage)
+        # RFC 8216, 6.2.2: what leaves the playlist stays available for as long as the playlist was.
+        while next(iter(self._segments)) < number - 2 * self.plan.listed:
+            del self._segments[next(iter(self._segments))]
+
+    def get(self, number: int) -> Segment | None:
+        """Give a segment that is or was in the playlist."""
+        segment = self._segments.get(number)
+        return segment if segment is not None and self._is_listed(segment) else None
+
+    @property
+    def listed(self) -> Sequence[Segment]:
+        """The segments of the playlist, in order."""
+        return [it for it in self._segments.values() if self._is_listed(it)][-self.plan.listed :]
+
+    def _is_listed(self, segment: Segment) -> bool:
+        return segment.whole or self.ended

@@ -1,0 +1,108 @@
+"""The two kinds of streams: a camera's, picture by picture, and one that is decided GOP by GOP."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from server.view.channel import Channel
+from server.view.footage import Footage
+from server.view.picture import Picture
+from server.view.reel import Reel
+from server.view.shelf import Shelf
+from server.view.timeline import Timeline
+from server.view.ts import Counters, packets
+
+
+class LiveStream:
+    """A camera's own stream: every picture at once."""
+
+    def __init__(self, channel: Channel, time: Timeline, fps: float) -> None:
+        self.channel = channel
+        self._time, self._fps = time, fps
+        self._tables = self._packets = 0
+
+    def take(self, frame: Picture) -> None:
+        """Send a picture, after what bridges a hole before it."""
+        for picture in self._time.take(frame):
+            self._send([picture], fills=False)
+
+    def fill(self, until: int) -> None:
+        """Repeat the last picture, if there is one, up to a pulse."""
+        self._send(self._time.fill(until), fills=True)
+
+    def _send(self, pictures: list[Picture], *, fills: bool) -> None:
+        if not pictures:
+            return
+        counters = Counters(self._tables, self._packets, whole=False)
+        self._tables += pictures[0].key
+        self._packets += sum(packets(picture) for picture in pictures)
+        self.channel.publish(Footage(pictures, self._fps, counters, fills=fills))
+
+
+class DecidedStream:
+    """A stream of whole GOPs, each of one camera; those that many streams show are put together once.
+
+    ``reel`` keeps the newest of them.
+    """
+
+    def __init__(self, channel: Channel, time: Timeline, reel: Reel) -> None:
+        self.channel, self.reel = channel, reel
+        self._time = time
+        self._camera: str | None = None
+
+    def show(self, camera: str | None, gop: Gop) -> None:
+        """Send a camera's GOP, or what bridges it where it is not whole or there is none."""
+        self._fill(gop.first, gop)
+        whole = None if camera is None else gop.whole(camera)
+        self._camera = camera or self._camera
+        if whole is None:
+            came = [] if self._camera is None else gop.pictures(self._camera)
+            pictures = [shown for picture in came for shown in self._time.take(picture)]
+            self._send(pictures + self._time.fill(gop.until), gop)
+            return
+        for picture in whole.pictures:
+            self._time.take(picture)
+        self._publish(whole)
+
+    def _fill(self, until: int, gop: Gop) -> None:
+        self._send(self._time.fill(until), gop)
+
+    def _send(self, pictures: list[Picture], gop: Gop) -> None:
+        if pictures:
+            self._publish(gop.footage(pictures))
+
+    def _publish(self, footage: Footage) -> None:
+        self.reel.put(footage)
+        self.channel.publish(footage)
+
+    def close(self) -> None:
+        """End the stream."""
+        self.reel.ended = True
+        self.channel.close()
+
+
+class Gop:
+    """What the cameras have of the frames ``first … first + frames - 1``; ``tables`` counts GOPs."""
+
+    def __init__(
+        self, shelves: Mapping[str, Shelf], first: int, frames: int, fps: float, tables: int
+    ) -> None:
+        self.first, self.until = first, first + frames
+        self._shelves, self._fps, self._tables = shelves, fps, tables
+        self._whole: dict[str, Footage | None] = {}
+
+    def pictures(self, camera: str) -> list[Picture]:
+        """Give the pictures that have come."""
+        return self._shelves[camera].pictures(self.first, self.until - self.first)
+
+    def whole(self, camera: str) -> Footage | None:
+        """Give a camera's GOP, the same to all who ask; None where a picture is missing."""
+        if camera not in self._whole:
+            pictures = self.pictures(camera)
+            is_whole = len(pictures) == self.until - self.first and pictures[0].key
+            self._whole[camera] = self.footage(pictures) if is_whole else None
+        return self._whole[camera]
+
+    def footage(self, pictures: list[Picture]) -> Footage:
+        """Put pictures of these frames together."""
+        return Footage(pictures, self._fps, Counters(self._tables), fills=not pictures[0].key)
