@@ -17,6 +17,8 @@ from server.web.views import cameras_info, choice_info, objects_info, site_info,
 
 routes = web.RouteTableDef()
 
+_RETRY_S = "5"
+
 
 def answer(content: Any, status: int = 200) -> web.Response:
     """Give a JSON answer."""
@@ -31,6 +33,13 @@ def answer(content: Any, status: int = 200) -> web.Response:
 def problem(status: int, error: str) -> web.Response:
     """Say in one line why there is no answer."""
     return answer(Problem(error), status)
+
+
+def not_now(error: str) -> web.Response:
+    """Say why not, and when to try again."""
+    response = problem(503, error)
+    response.headers["Retry-After"] = _RETRY_S
+    return response
 
 
 def _service(request: web.Request) -> BestViewService:

@@ -11,7 +11,7 @@ from aiohttp import web
 
 from server.view.pictures import Pictures
 from server.view.service import BestViewService
-from server.web import api, hls, openapi, page, pictures, video
+from server.web import api, hls, openapi, page, past, pictures, video
 from server.web.api import problem
 from server.web.cors import preflight
 from server.web.events import Events
@@ -56,7 +56,7 @@ def make_app(service: BestViewService) -> web.Application:
     app = web.Application(middlewares=[one_line_errors, preflight, to_the_right_service])
     app[SERVICE], app[EVENTS], app[PICTURES] = service, Events(service), Pictures(service)
     app[METRICS] = registry(service, app[PICTURES])
-    for module in (api, video, hls, pictures, openapi, page):
+    for module in (api, video, past, hls, pictures, openapi, page):
         app.add_routes(module.routes)
     app.cleanup_ctx.append(_telling)
     app.on_shutdown.append(_end_streams)

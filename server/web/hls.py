@@ -8,9 +8,8 @@ from aiohttp import web
 
 from server.view.fmp4 import init_segment
 from server.view.reel import Plan, Reel, Segment
-from server.web.api import problem
+from server.web.api import not_now, problem
 from server.web.keys import SERVICE
-from server.web.video import not_now
 
 routes = web.RouteTableDef()
 

@@ -11,7 +11,7 @@ from typing import Any
 import msgspec
 from aiohttp import web
 
-from server.web.schema import Cameras, Choice, Objects, Problem, SiteInfo
+from server.web.schema import Cameras, Choice, Objects, Past, Problem, SiteInfo
 
 routes = web.RouteTableDef()
 
@@ -20,6 +20,8 @@ _JSON = {
     "/api/objects": Objects,
     "/api/cameras": Cameras,
     "/api/objects/{object}/choice": Choice,
+    "/api/objects/{object}/past": Past,
+    "/api/cameras/{camera}/past": Past,
 }
 _OTHER = {
     "/objects/{object}/best.mp4": "video/mp4",
@@ -38,6 +40,7 @@ _OTHER = {
     "/cameras/{camera}/live.jpg": "image/jpeg",
     "/objects/{object}/thumb.jpg": "image/jpeg",
     "/api/events": "text/event-stream",
+    "/api/past": "application/x-ndjson",
     "/healthz": "text/plain",
     "/readyz": "text/plain",
     "/metrics": "text/plain",

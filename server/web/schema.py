@@ -118,6 +118,23 @@ class Choice(msgspec.Struct, frozen=True):
     reason: str
 
 
+class PastSpan(msgspec.Struct, frozen=True):
+    """Frames without a hole."""
+
+    first: int
+    """Pulse."""
+    frames: int
+    begins: str | None
+    """When that was: UTC, ISO 8601; null before the first pulse."""
+    ends: str | None
+
+
+class Past(msgspec.Struct, frozen=True):
+    """What can be seen again."""
+
+    spans: list[PastSpan]
+
+
 class Problem(msgspec.Struct, frozen=True):
     """Why there is no answer."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import AsyncIterable, Callable, Mapping
 
 from aiohttp import web
 
@@ -42,19 +42,22 @@ async def send_viewer(
     request: web.Request, viewer: Viewer, head: bytes, headers: Mapping[str, str], form: Form = plain
 ) -> web.StreamResponse:
     """Send ``head`` and what a viewer is given, from a place that the caller took and will give up."""
+    return await send_bytes(request, (form(piece) async for piece in viewer.pieces()), head, headers)
+
+
+async def send_bytes(
+    request: web.Request, data: AsyncIterable[bytes], head: bytes, headers: Mapping[str, str]
+) -> web.StreamResponse:
+    """Send ``head`` and all of ``data``; of HEAD, neither."""
     response = web.StreamResponse(headers={**_STREAM_HEADERS, **headers})
     await response.prepare(request)
     if request.method == "HEAD":
         return response
-    return await _send(response, viewer, head, form)
-
-
-async def _send(response: web.StreamResponse, viewer: Viewer, head: bytes, form: Form) -> web.StreamResponse:
     try:
         if head:
             await response.write(head)
-        async for piece in viewer.pieces():
-            await response.write(form(piece))
+        async for some in data:
+            await response.write(some)
         await response.write_eof()
     except (ConnectionError, TimeoutError) as error:
         log.debug("a viewer has gone: %s", error)

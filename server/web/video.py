@@ -9,8 +9,9 @@ from aiohttp import web
 from server.view.channel import Channel, Piece
 from server.view.fmp4 import init_segment
 from server.view.footage import Footage
-from server.web.api import problem
+from server.web.api import not_now, problem
 from server.web.keys import SERVICE
+from server.web.past import asks_for_the_past, best_of_the_past, camera_of_the_past
 from server.web.pictures import best_with_boxes, wants_boxes
 from server.web.streams import send_stream
 
@@ -18,12 +19,12 @@ routes = web.RouteTableDef()
 
 Sender = Callable[[web.Request, Channel], Awaitable[web.StreamResponse]]
 
-_RETRY_S = "5"
-
 
 @routes.get("/objects/{object:[0-9]{1,9}}/best.mp4")
 async def get_best(request: web.Request) -> web.StreamResponse:
     """Stream the best view of a person as fragmented MP4; it goes on across every cut."""
+    if asks_for_the_past(request):
+        return await best_of_the_past(request)
     if wants_boxes(request):
         return await best_with_boxes(request)
     return await _best(request, _mp4)
@@ -38,6 +39,8 @@ async def get_best_ts(request: web.Request) -> web.StreamResponse:
 @routes.get("/cameras/{camera}/live.mp4")
 async def get_live(request: web.Request) -> web.StreamResponse:
     """Stream one camera as fragmented MP4."""
+    if asks_for_the_past(request):
+        return await camera_of_the_past(request)
     return await _live(request, _mp4)
 
 
@@ -96,10 +99,3 @@ def _full(request: web.Request, channel: Channel) -> web.Response | None:
     if channel.viewers >= limits.viewers_per_object:
         return not_now("as many viewers as one stream takes (http.viewers_per_object) are watching")
     return None
-
-
-def not_now(error: str) -> web.Response:
-    """Say why not, and when to try again."""
-    response = problem(503, error)
-    response.headers["Retry-After"] = _RETRY_S
-    return response

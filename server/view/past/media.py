@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import io
 import os
 import struct
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -29,6 +30,11 @@ class Gop:
     def end(self) -> int:
         """The pulse after its last frame."""
         return self.first + len(self.fragments)
+
+    @property
+    def data(self) -> bytes:
+        """Its bytes."""
+        return b"".join(self.fragments)
 
 
 class CameraFile:
@@ -59,7 +65,7 @@ class CameraFile:
         Raises:
             OSError: the disk does not take it; the file is as before.
         """
-        data = b"".join(gop.fragments)
+        data = gop.data
         try:
             write_at(self._handle, struct.pack(">I4s", len(data), b"free") + data[_HEAD:], self.size)
             write_at(self._handle, data[:_HEAD], self.size)
@@ -96,7 +102,7 @@ def pulse_of(fragment: bytes, fps: float) -> int:
     return round(time * fps / TIMESCALE)
 
 
-def gops(path: Path, offset: int, length: int, fps: float) -> Iterator[Gop]:
+def gops(path: Path, offset: int, length: int, fps: float) -> Generator[Gop, None, None]:
     """Read the GOPs of a piece of a camera's file.
 
     Raises:
@@ -106,12 +112,26 @@ def gops(path: Path, offset: int, length: int, fps: float) -> Iterator[Gop]:
         file.seek(offset)
         waiting: list[bytes] = []
         for fragment in _fragments(file.read, length):
-            if _is_key(fragment) and waiting:
+            if is_key(fragment) and waiting:
                 yield Gop(pulse_of(waiting[0], fps), tuple(waiting))
                 waiting = []
             waiting.append(fragment)
         if waiting:
             yield Gop(pulse_of(waiting[0], fps), tuple(waiting))
+
+
+def fragments(data: bytes) -> list[bytes]:
+    """Cut a piece of a stream into its fragments."""
+    return list(_fragments(io.BytesIO(data).read, len(data)))
+
+
+def is_key(fragment: bytes) -> bool:
+    """Tell whether a fragment begins with a key frame."""
+    at = fragment.find(b"trun", 0, _TIMES_WITHIN)
+    if at < 0 or len(fragment) < at + 28:
+        return False
+    (flags,) = struct.unpack_from(">I", fragment, at + 24)
+    return not flags & _NOT_SYNC
 
 
 def _fragments(read: Callable[[int], bytes], length: int) -> Iterator[bytes]:
@@ -130,17 +150,3 @@ def _fragments(read: Callable[[int], bytes], length: int) -> Iterator[bytes]:
             moof = head + body
         elif kind == b"mdat" and moof:
             yield moof + head + body
-
-
-def _is_key(fragment: bytes) -> bool:
-    """Read the flags of a fragment's first sample."""
-    at = fragment.find(b"trun", 0, _TIMES_WITHIN)
-    if at < 0 or len(fragment) < at + 28:
-        return False
-    (flags,) = struct.unpack_from(">I", fragment, at + 24)
-    return not flags & _NOT_SYNC
-
-
-def joined(parts: Sequence[Gop]) -> bytes:
-    """Give the bytes of GOPs."""
-    return b"".join(fragment for gop in parts for fragment in gop.fragments)

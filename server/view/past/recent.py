@@ -30,6 +30,10 @@ class Recent:
         """The pulse after the newest decided frame; 0 before the first."""
         return self._choices[-1].first + self._choices[-1].frames if self._choices else 0
 
+    def end_of_camera(self, camera: str) -> int:
+        """Give the pulse after a camera's newest frame."""
+        return self._shelves[camera].newest + 1
+
     def choices(self, pulse: int) -> list[GopChoices]:
         """Give the decisions about a pulse and those after it."""
         return [it for it in self._choices if it.first + it.frames > pulse]

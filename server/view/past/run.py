@@ -116,6 +116,16 @@ class Run:
         """Say where the choices from a pulse on are."""
         return (self.folder / "index" / file_name(first)).with_suffix(".jsonl")
 
+    def index_of(self, start: int, end: int) -> list[Path]:
+        """List the indexes in which something may stand about pulses ``start … end - 1``, in order."""
+        firsts = [segment.first for segment in tuple(self.segments)]
+        afters = [*firsts[1:], None]
+        return [
+            self.index_file(first)
+            for first, after in zip(firsts, afters, strict=True)
+            if first < end and (after is None or after > start)
+        ]
+
     def files(self, first: int) -> list[Path]:
         """List a segment's files; of cameras that were away there is none."""
         return [*(self.camera_file(camera, first) for camera in self.head.cameras), self.index_file(first)]

@@ -1,0 +1,144 @@
+"""Playing the past: GOP after GOP from the disk and from memory, up to the present."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import AsyncGenerator, Generator, Sequence
+from dataclasses import dataclass
+from itertools import islice
+from typing import Protocol
+
+from server.view.past.media import Gop, gops
+from server.view.past.past import Past
+from server.view.past.run import Run
+from server.view.past.stretch import Span, Stretch, Tape, spans
+
+_AT_ONCE = 8
+"""GOPs read from the disk in one go."""
+
+
+class Source(Protocol):
+    """One stream's past."""
+
+    @property
+    def tapes(self) -> Sequence[Tape]:
+        """What is recorded of it."""
+
+    def recall(self, pulse: int) -> Gop | None:
+        """Give the GOP in memory that holds a pulse, or the next one; None where nothing follows."""
+
+    @property
+    def end(self) -> int:
+        """The pulse after the newest frame."""
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectPast:
+    """Somebody's past. ``numbers``: theirs now, and the one that was asked for."""
+
+    past: Past
+    numbers: tuple[int, ...]
+
+    @property
+    def tapes(self) -> Sequence[Tape]:
+        """What is recorded of them."""
+        return [tape for number in self.numbers if (tape := self.past.tape(number)) is not None]
+
+    def recall(self, pulse: int) -> Gop | None:
+        """Give their GOP in memory that holds a pulse, or the next one."""
+        found = [gop for it in self.numbers if (gop := self.past.recent.of_object(it, pulse)) is not None]
+        return min(found, key=lambda gop: gop.first, default=None)
+
+    @property
+    def end(self) -> int:
+        """The pulse after the newest decided frame."""
+        return self.past.recent.end
+
+
+@dataclass(frozen=True, slots=True)
+class CameraPast:
+    """A camera's past."""
+
+    past: Past
+    camera: str
+
+    @property
+    def tapes(self) -> Sequence[Tape]:
+        """What is recorded of it."""
+        tape = self.past.camera_tape(self.camera)
+        return [] if tape is None else [tape]
+
+    def recall(self, pulse: int) -> Gop | None:
+        """Give its GOP in memory that holds a pulse, or the next one, as far as it has come."""
+        return self.past.recent.of_camera(self.camera, pulse)
+
+    @property
+    def end(self) -> int:
+        """The pulse after its newest frame."""
+        return self.past.recent.end_of_camera(self.camera)
+
+
+def known(source: Source) -> list[Span]:
+    """Say what there is, on the disk and in memory."""
+    found: list[Stretch | Span] = [it for tape in source.tapes for it in tape.all]
+    gop = source.recall(0)
+    while gop is not None:
+        found.append(Span(gop.first, gop.end))
+        gop = source.recall(gop.end)
+    return spans(found)
+
+
+async def play(source: Source, run: Run | None, start: int) -> AsyncGenerator[Gop, None]:
+    """Give the GOPs from the one that holds pulse ``start`` to the newest; nothing is given twice.
+
+    Between its last GOP and its end nothing is awaited: whoever joins the stream at once misses nothing.
+    """
+    at = start
+    fresh = True
+    while True:
+        stretch = _next_on_disk(source, at)
+        gop = source.recall(at)
+        if gop is not None and (stretch is None or gop.first <= max(at, stretch.first)):
+            yield gop if fresh else _from(gop, at)
+            at, fresh = gop.end, False
+        elif stretch is not None and run is not None:
+            async with contextlib.aclosing(_read(run, stretch, at)) as reading:
+                async for gop in reading:
+                    yield gop
+                    at, fresh = gop.end, False
+            at = max(at, stretch.end)  # also where retention has just taken the file away
+        else:
+            return
+
+
+def _next_on_disk(source: Source, pulse: int) -> Stretch | None:
+    found = [it for tape in source.tapes if (it := tape.at_or_after(pulse)) is not None]
+    return min(found, key=lambda it: max(it.first, pulse), default=None)
+
+
+def _from(gop: Gop, pulse: int) -> Gop:
+    """Leave out what has been given already of a GOP that was not whole yet."""
+    return Gop(max(gop.first, pulse), gop.fragments[max(0, pulse - gop.first) :])
+
+
+async def _read(run: Run, stretch: Stretch, pulse: int) -> AsyncGenerator[Gop, None]:
+    path = run.camera_file(stretch.camera, stretch.file)
+    reading = gops(path, stretch.offset, stretch.length, run.head.fps)
+    try:
+        while some := await asyncio.to_thread(_some, reading, pulse):
+            for gop in some:
+                yield gop
+    finally:
+        with contextlib.suppress(
+            ValueError
+        ):  # whoever left did so while it was being read: it closes by itself
+            reading.close()
+
+
+def _some(reading: Generator[Gop, None, None], pulse: int) -> list[Gop]:
+    """Read some GOPs that end after a pulse; none where there are no more."""
+    try:
+        return list(islice((gop for gop in reading if gop.end > pulse), _AT_ONCE))
+    except FileNotFoundError:
+        return []

@@ -1,0 +1,41 @@
+"""What was said about the past: who was where, and which camera showed whom."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import msgspec
+
+from server.view.past.past import Past
+from server.wire.messages import GopChoices
+
+
+async def told(past: Past, start: int, end: int) -> AsyncIterator[bytes]:
+    """Give the choices about pulses ``start … end - 1`` in order, each as a line of JSON (event ``gop``)."""
+    at, run = start, past.run
+    for path in run.index_of(start, end) if run is not None else []:
+        for line, choices in await asyncio.to_thread(_lines, path, at, end):
+            yield line
+            at = choices.first + choices.frames
+    for choices in past.recent.choices(at):
+        if choices.first < end:
+            yield msgspec.json.encode(choices) + b"\n"
+
+
+def _lines(path: Path, start: int, end: int) -> list[tuple[bytes, GopChoices]]:
+    """Read an index; a line that is not whole is being written now."""
+    found = []
+    try:
+        data = path.read_bytes()
+    except FileNotFoundError:  # retention has just taken it away
+        return []
+    for line in data.splitlines(keepends=True):
+        try:
+            choices = msgspec.json.decode(line, type=GopChoices)
+        except msgspec.DecodeError:
+            continue
+        if choices.first + choices.frames > start and choices.first < end:
+            found.append((line, choices))
+    return found

@@ -1,0 +1,155 @@
+"""The past over HTTP: streams that begin in it, what there is of it, and what was said about it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import aclosing
+
+from aiohttp import web
+
+from server.view.channel import Channel
+from server.view.fmp4 import init_segment
+from server.view.past.moment import MomentError, moment_of, pulse_at
+from server.view.past.play import CameraPast, ObjectPast, Source, known
+from server.view.past.stream import PastStream, Wish
+from server.view.past.told import told
+from server.view.service import BestViewService
+from server.view.timeline import Timeline
+from server.web.api import answer, not_now, problem
+from server.web.keys import SERVICE
+from server.web.schema import Past, PastSpan
+from server.web.streams import send_bytes
+
+routes = web.RouteTableDef()
+
+
+def asks_for_the_past(request: web.Request) -> bool:
+    """Tell whether a stream is to begin in the past."""
+    return "from" in request.query or "to" in request.query
+
+
+async def best_of_the_past(request: web.Request) -> web.StreamResponse:
+    """Stream the best view of a person from a moment on."""
+    service = request.app[SERVICE]
+    number = int(request.match_info["object"])
+    source = _object_past(service, number)
+
+    def live() -> Channel | None:
+        return service.splicer.objects.get(service.board.resolve(number))
+
+    if live() is None and not known(source):
+        return problem(404, f"there is no object {number}")
+    return await _stream(request, source, f"object {number}", live)
+
+
+async def camera_of_the_past(request: web.Request) -> web.StreamResponse:
+    """Stream one camera from a moment on."""
+    service = request.app[SERVICE]
+    camera = request.match_info["camera"]
+    if camera not in service.shelves:
+        return problem(404, f"there is no camera {camera!r}; there are {', '.join(service.shelves)}")
+    source = CameraPast(service.past, camera)
+    return await _stream(request, source, f"camera {camera}", lambda: service.splicer.cameras.get(camera))
+
+
+@routes.get("/api/objects/{object:[0-9]{1,9}}/past")
+async def get_object_past(request: web.Request) -> web.Response:
+    """Say from when to when a person's best view can be seen again."""
+    service = request.app[SERVICE]
+    number = int(request.match_info["object"])
+    source = _object_past(service, number)
+    if not known(source):
+        return problem(404, f"nothing is kept of object {number}")
+    return answer(_past(service, source))
+
+
+@routes.get("/api/cameras/{camera}/past")
+async def get_camera_past(request: web.Request) -> web.Response:
+    """Say from when to when a camera can be seen again."""
+    service = request.app[SERVICE]
+    camera = request.match_info["camera"]
+    if camera not in service.shelves:
+        return problem(404, f"there is no camera {camera!r}; there are {', '.join(service.shelves)}")
+    return answer(_past(service, CameraPast(service.past, camera)))
+
+
+@routes.get("/api/past")
+async def get_told(request: web.Request) -> web.StreamResponse:
+    """Tell again who was where and which camera showed whom, a line for each GOP; from= and to= say when."""
+    service = request.app[SERVICE]
+    try:
+        wish = _wish(request, service, service.past.recent.end)
+    except MomentError as error:
+        return problem(400, str(error))
+    end = service.past.recent.end if wish.end is None else wish.end
+    lines = told(service.past, wish.start, end)
+    return await send_bytes(request, lines, b"", {"Content-Type": "application/x-ndjson"})
+
+
+def _object_past(service: BestViewService, number: int) -> ObjectPast:
+    now = service.board.resolve(number)
+    return ObjectPast(service.past, (number,) if number == now else (now, number))
+
+
+def _wish(request: web.Request, service: BestViewService, now: int) -> Wish:
+    """Read from= and to=.
+
+    Raises:
+        MomentError: they are no moments, or the second is not after the first.
+    """
+    fps, pulse0 = service.config.site.fps, service.pulse0
+    moments: dict[str, int] = {}
+    for name in ("from", "to"):
+        if name in request.query:
+            try:
+                moments[name] = pulse_at(request.query[name], now=now, fps=fps, pulse0=pulse0)
+            except MomentError as error:
+                raise MomentError(f"{name}: {error}") from error
+    if "from" not in moments:
+        raise MomentError("from: is missing; it says from when on, such as ?from=-60")
+    start, end = moments["from"], moments.get("to")
+    if end is not None and end <= start:
+        raise MomentError(f"to: p{end} is not after from, which is p{start}")
+    return Wish(start, end)
+
+
+async def _stream(
+    request: web.Request, source: Source, what: str, live: Callable[[], Channel | None]
+) -> web.StreamResponse:
+    service, past = request.app[SERVICE], request.app[SERVICE].past
+    parameters, site = service.agreement.parameters, service.config.site
+    if parameters is None:
+        return not_now("no camera has delivered a picture yet")
+    if service.splicer.viewers + past.viewers >= service.config.http.viewers_max:
+        return not_now("as many viewers as this server takes (http.viewers_max) are watching")
+    if request.query.get("overlay", "0") != "0":
+        return problem(400, "overlay: boxes are not burnt into the past; /api/past tells where they are")
+    try:
+        wish = _wish(request, service, source.end)
+    except MomentError as error:
+        return problem(400, str(error))
+    there = known(source)
+    if not any(it.end > wish.start and (wish.end is None or it.first < wish.end) for it in there):
+        kept = ", ".join(f"p{it.first} to p{it.end - 1}" for it in there) or "nothing"
+        return problem(416, f"of {what} nothing is kept from p{wish.start} on; there is {kept}")
+    timeline = Timeline(service.agreement, site.fps, service.config.encode.gop)
+    stream = PastStream(source, past.run, timeline, site.fps, live)
+    past.viewers += 1
+    try:
+        head = init_segment(parameters, site.width, site.height)
+        async with aclosing(stream.send(wish)) as data:
+            return await send_bytes(request, data, head, {"Content-Type": "video/mp4"})
+    finally:
+        past.viewers -= 1
+
+
+def _past(service: BestViewService, source: Source) -> Past:
+    fps, pulse0 = service.config.site.fps, service.pulse0
+    return Past(
+        [
+            PastSpan(
+                it.first, it.end - it.first, moment_of(it.first, fps, pulse0), moment_of(it.end, fps, pulse0)
+            )
+            for it in known(source)
+        ]
+    )

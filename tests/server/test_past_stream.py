@@ -1,0 +1,308 @@
+"""A stream that begins in the past: from the disk, then from memory, then live, without a hole."""
+
+from __future__ import annotations
+
+import asyncio
+import io
+import json
+from collections.abc import AsyncIterator, Mapping
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+from cameras_by_hand import CAMERAS, GOP, LARGE, SMALL, Box
+from halls import Hall, opened
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from recorded_by_hand import AMPLE, FPS, A, B, Picture, filled, own_pictures, piece, written
+
+from server.view.agreement import Agreement
+from server.view.past import stream as past_stream
+from server.view.past.media import fragments, pulse_of
+from server.view.past.moment import MomentError, pulse_at
+from server.view.past.play import known
+from server.view.past.store import Store
+from server.view.past.stream import PastStream, Wish
+from server.view.past.stretch import Span, Tape
+from server.view.timeline import Timeline
+
+MOMENT = "say seconds back (-60), a pulse (p1250) or a time (2026-11-21T16:13:36Z)"
+IN_A: Mapping[str, Mapping[int, Box | None]] = {A: {1: LARGE}, B: {1: SMALL}}
+IN_B: Mapping[str, Mapping[int, Box | None]] = {A: {1: SMALL}, B: {1: LARGE}}
+
+
+@pytest.fixture
+async def recorded(tmp_path: Path) -> AsyncIterator[Hall]:
+    """Six GOPs of person 1, in c0, then in c1; all but the last two are on the disk alone."""
+    async for hall in opened(record={"folder": str(tmp_path / "kept"), "segment_s": 0.4}):
+        hall.service.past.recent._frames = GOP
+        hall.service.past.open()
+        hall.service.come(*CAMERAS)
+        for epoch in range(7):
+            hall.service.feed(epoch, IN_A if epoch < 3 else IN_B)
+        await until_written(hall, 6)
+        yield hall
+
+
+async def until_written(hall: Hall, gops: int) -> None:
+    while hall.service.past.writer is not None and hall.service.past.writer.written < gops:  # noqa: ASYNC110
+        await asyncio.sleep(0.001)
+
+
+def decoded(data: bytes) -> list[tuple[int, Picture]]:
+    with av.open(io.BytesIO(data), "r") as container:
+        return [
+            (round(float(frame.time or 0) * FPS), frame.to_ndarray(format="yuv420p"))
+            for frame in container.decode(video=0)
+        ]
+
+
+async def read(hall: Hall, path: str) -> list[tuple[int, Picture]]:
+    async with hall.session.get(path) as answer:
+        assert answer.status == 200, await answer.text()
+        assert answer.content_type == "video/mp4"
+        return decoded(await answer.read())
+
+
+async def read_up_to(hall: Hall, path: str, pulse: int, then: int) -> list[tuple[int, Picture]]:
+    """Read a stream; when a pulse has come, feed one more epoch, and read that too."""
+    data, fed = b"", False
+    async with hall.session.get(path) as answer:
+        while True:
+            data += await answer.content.readany()
+            newest = max((pulse_of(it, FPS) for it in fragments(data)), default=-1)
+            if not fed and newest >= pulse - 1:
+                hall.service.feed(then, IN_B)
+                fed = True
+            if newest >= pulse + GOP - 1:
+                return decoded(data)
+
+
+async def test_somebodys_past_goes_over_into_the_present_without_a_hole(recorded: Hall) -> None:
+    camera = {
+        pulse: choices.choices[1]
+        for choices in recorded.service.past.recent.choices(0)
+        for pulse in range(choices.first, choices.first + GOP)
+    }
+    assert min(camera) >= 4 * GOP, "the beginning is on the disk alone"
+    shown = await read_up_to(recorded, "/objects/1/best.mp4?from=p7", 6 * GOP, 7)
+    assert [pulse for pulse, _ in shown] == list(range(GOP, 7 * GOP))
+    used = set()
+    for pulse, picture in shown:
+        (equal,) = [it for it in CAMERAS if np.array_equal(picture, own_pictures(it)[pulse])]
+        assert camera.get(pulse, equal) == equal
+        used.add(equal)
+    assert used == {A, B}
+
+
+async def test_a_cameras_past_goes_over_into_the_present_without_a_hole(recorded: Hall) -> None:
+    shown = await read_up_to(recorded, "/cameras/c0/live.mp4?from=p0", 7 * GOP, 7)
+    assert [pulse for pulse, _ in shown] == list(range(8 * GOP))
+    for pulse, picture in shown:
+        np.testing.assert_array_equal(picture, own_pictures(A)[pulse])
+
+
+@pytest.mark.parametrize(
+    ("query", "pulses"),
+    [
+        ("from=p0&to=p13", range(13)),
+        ("from=p12&to=p24", range(10, 24)),
+        ("from=-0.4&to=p30", range(20, 30)),
+        ("from=2025-11-21T04:40:00.200Z&to=2025-11-21T05:40:00.8%2B01:00", range(5, 20)),
+    ],
+)
+async def test_with_an_end_it_is_a_download_of_these_frames(
+    recorded: Hall, query: str, pulses: range
+) -> None:
+    recorded.service.pulse0 = 1_763_700_000.0
+    shown = await read(recorded, f"/objects/1/best.mp4?{query}")
+    assert [pulse for pulse, _ in shown] == list(pulses)
+
+
+async def test_an_end_that_is_yet_to_come_is_waited_for(recorded: Hall) -> None:
+    reading = asyncio.create_task(read(recorded, "/objects/1/best.mp4?from=p20&to=p33"))
+    while not recorded.service.splicer.viewers:  # noqa: ASYNC110
+        await asyncio.sleep(0.001)
+    recorded.service.feed(7, IN_B)
+    assert [pulse for pulse, _ in await reading] == list(range(20, 33))
+
+
+async def test_without_a_recording_the_memory_is_the_past(busy: Hall) -> None:
+    assert [pulse for pulse, _ in await read(busy, "/objects/1/best.mp4?from=p0&to=p9")] == list(range(9))
+
+
+@pytest.mark.parametrize(
+    ("path", "status", "error"),
+    [
+        ("/objects/9/best.mp4?from=-60", 404, "there is no object 9"),
+        ("/cameras/c9/live.mp4?from=-60", 404, "there is no camera 'c9'; there are c0, c1"),
+        ("/objects/1/best.mp4?from=p99", 416, "of object 1 nothing is kept from p99 on; there is p0 to p29"),
+        (
+            "/cameras/c0/live.mp4?from=p99",
+            416,
+            "of camera c0 nothing is kept from p99 on; there is p0 to p34",
+        ),
+        (
+            "/objects/1/best.mp4?from=yesterday",
+            400,
+            f"from: 'yesterday' is no moment; {MOMENT}",
+        ),
+        ("/objects/1/best.mp4?from=p9&to=p9", 400, "to: p9 is not after from, which is p9"),
+        ("/objects/1/best.mp4?to=p9", 400, "from: is missing; it says from when on, such as ?from=-60"),
+        (
+            "/objects/1/best.mp4?from=2025-11-21",
+            400,
+            "from: the time of no pulse is known yet; say seconds back (-60) or a pulse (p1250)",
+        ),
+        ("/api/objects/9/past", 404, "nothing is kept of object 9"),
+    ],
+)
+async def test_what_cannot_be_played_is_told_in_one_line(
+    recorded: Hall, path: str, status: int, error: str
+) -> None:
+    assert await recorded.get(path) == (status, {"error": error})
+
+
+async def test_it_is_said_what_there_is(recorded: Hall) -> None:
+    recorded.service.pulse0 = 1_763_700_000.0
+    span = {
+        "begins": "2025-11-21T04:40:00.000Z",
+        "ends": "2025-11-21T04:40:01.200Z",
+        "first": 0,
+        "frames": 30,
+    }
+    assert await recorded.get_json("/api/objects/1/past") == {"spans": [span]}
+    assert (await recorded.get_json("/api/cameras/c1/past"))["spans"][0]["frames"] == 35
+
+
+async def test_it_is_told_again_who_was_where(recorded: Hall) -> None:
+    async with recorded.session.get("/api/past?from=p7&to=p24") as answer:
+        assert answer.content_type == "application/x-ndjson"
+        lines = [json.loads(line) async for line in answer.content]
+    assert [line["first"] for line in lines] == [5, 10, 15, 20]
+    assert lines[0]["choices"] == {"1": A}
+    assert lines[0]["boxes"][A][0][0][0] == 1
+
+
+async def test_who_watches_the_past_takes_a_viewers_place_and_gives_it_back(recorded: Hall) -> None:
+    past = recorded.service.past
+    async with recorded.session.get("/objects/1/best.mp4?from=p0") as answer:
+        await answer.content.readany()
+        assert past.viewers == 1
+        answer.close()
+    while past.viewers or recorded.service.splicer.viewers:  # noqa: ASYNC110
+        await asyncio.sleep(0.001)
+    assert (await recorded.get("/objects/1/best.mp4?from=p0", "HEAD"))[0] == 200
+
+
+class OnDisk:
+    """A source with nothing in memory."""
+
+    def __init__(self, *tapes: Tape, end: int) -> None:
+        self.tapes, self.end = tapes, end
+
+    def recall(self, pulse: int) -> None:
+        del pulse
+
+
+def site_of(store: Store) -> tuple[Agreement, bytes]:
+    del store
+    shelves, header = filled()
+    return shelves[A]._agreement, header
+
+
+@settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    st.lists(st.sampled_from([A, B, None]), min_size=1, max_size=20),
+    st.integers(0, 20 * GOP),
+    st.integers(1, 20 * GOP),
+)
+async def test_any_part_of_any_past_is_played_without_a_hole(
+    tmp_path_factory: pytest.TempPathFactory, shown: list[str | None], start: int, frames: int
+) -> None:
+    folder = tmp_path_factory.mktemp("part")
+    pieces = [piece(gop, {} if camera is None else {1: camera}) for gop, camera in enumerate(shown)]
+    store = written(Store(folder, AMPLE), pieces)
+    assert store.run is not None
+    tapes = [store.run.objects[1].tape] if 1 in store.run.objects else []
+    source = OnDisk(*tapes, end=len(shown) * GOP)
+    agreement, header = site_of(store)
+    stream = PastStream(source, store.run, Timeline(agreement, FPS, GOP), FPS, lambda: None)
+    data = b"".join([data async for data in stream.send(Wish(start, start + frames))])
+    store.close()
+    kept = [gop for gop, camera in enumerate(shown) if camera is not None]
+    wanted = [gop for gop in kept if (gop + 1) * GOP > start and gop * GOP < start + frames]
+    if not wanted:
+        assert not data
+        return
+    last = min(start + frames, (wanted[-1] + 1) * GOP)
+    played = decoded(header + data)
+    assert [pulse for pulse, _ in played] == list(range(wanted[0] * GOP, last))
+    for pulse, picture in played:
+        camera = shown[pulse // GOP]
+        if camera is not None:
+            np.testing.assert_array_equal(picture, own_pictures(camera)[pulse])
+    assert all(any(it.first <= gop * GOP < it.end for it in known(source)) for gop in wanted)
+
+
+async def test_what_retention_takes_away_meanwhile_is_left_out(tmp_path: Path) -> None:
+    store = written(Store(tmp_path, AMPLE), [piece(gop, {1: A}) for gop in range(12)])
+    assert store.run is not None
+    store.run.camera_file(A, 25).unlink()
+    source = OnDisk(store.run.objects[1].tape, end=60)
+    agreement, header = site_of(store)
+    stream = PastStream(source, store.run, Timeline(agreement, FPS, GOP), FPS, lambda: None)
+    data = b"".join([data async for data in stream.send(Wish(0, 60))])
+    assert [pulse for pulse, _ in decoded(header + data)] == list(range(60)), "bridged, as live"
+    assert known(source) == [Span(0, 60)]
+
+
+async def test_a_few_seconds_come_at_once_and_the_rest_in_real_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store = written(Store(tmp_path, AMPLE), [piece(gop, {1: A}) for gop in range(40)])
+    assert store.run is not None
+    now, loop = [100.0], asyncio.get_running_loop()
+
+    async def slept(seconds: float) -> None:
+        now[0] += seconds
+
+    monkeypatch.setattr(loop, "time", lambda: now[0])
+    monkeypatch.setattr(past_stream.asyncio, "sleep", slept)
+    agreement, _ = site_of(store)
+    source = OnDisk(store.run.objects[1].tape, end=200)
+    stream = PastStream(source, store.run, Timeline(agreement, FPS, GOP), FPS, lambda: None)
+    arrived = [now[0] - 100.0 async for _ in stream.send(Wish(0))]
+    lead = 4.0
+    for gop, at in enumerate(arrived):
+        assert at == pytest.approx(max(0.0, gop * GOP / FPS - lead))
+    store.close()
+
+
+@pytest.mark.parametrize(
+    ("text", "pulse"),
+    [
+        ("-60", 3500),
+        ("-0.04", 4999),
+        ("-100000", 0),
+        ("p1250", 1250),
+        ("2025-11-21T04:40:10Z", 250),
+        ("2025-11-21T05:40:10+01:00", 250),
+        ("2025-11-21T05:40:10 01:00", 250),
+        ("2025-11-21T04:40:10.199", 254),
+        ("2025-11-21", 0),
+    ],
+)
+def test_moments(text: str, pulse: int) -> None:
+    assert pulse_at(text, now=5000, fps=FPS, pulse0=1_763_700_000.0) == pulse
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.text(max_size=30))
+def test_any_text_is_a_moment_or_told_in_one_line(text: str) -> None:
+    try:
+        pulse = pulse_at(text, now=5000, fps=FPS, pulse0=0.0)
+    except MomentError as error:
+        pulse = 1 - len(str(error).splitlines())
+    assert pulse >= 0
