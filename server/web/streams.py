@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import socket
 from collections.abc import AsyncIterable, Callable, Mapping
 
 from aiohttp import web
@@ -11,6 +12,8 @@ from server.view.channel import Channel, Piece, Viewer
 
 log = logging.getLogger(__name__)
 
+_WAITING_BYTES = 65_536
+"""What of a stream may wait in the system: else it would keep a minute for who reads too slowly, unseen."""
 _STREAM_HEADERS = {
     "Cache-Control": "no-store",
     "Access-Control-Allow-Origin": "*",
@@ -53,6 +56,7 @@ async def send_bytes(
     await response.prepare(request)
     if request.method == "HEAD":
         return response
+    _keep_little_waiting(request)
     try:
         if head:
             await response.write(head)
@@ -62,3 +66,11 @@ async def send_bytes(
     except (ConnectionError, TimeoutError) as error:
         log.debug("a viewer has gone: %s", error)
     return response
+
+
+def _keep_little_waiting(request: web.Request) -> None:
+    """Let the system take no more than can be sent soon: who is slow is to lose GOPs, not to fall behind."""
+    option = getattr(socket, "TCP_NOTSENT_LOWAT", None)  # not on every system
+    connection = request.get_extra_info("socket")
+    if option is not None and connection is not None:
+        connection.setsockopt(socket.IPPROTO_TCP, option, _WAITING_BYTES)
