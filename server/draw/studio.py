@@ -80,7 +80,7 @@ class Studio:
 
     def _paintings(self, request: Draw) -> Iterator[Painting]:
         for unit in frames(request.fragments, self._canvas.fps):
-            self._whole |= unit.key
+            self._whole = (self._whole or unit.key) and bool(unit.data)  # nothing would mean the end
             if not self._whole:
                 continue
             packet = av.Packet(unit.data)

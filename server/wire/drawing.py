@@ -84,7 +84,7 @@ def belongs(pulse: int, rate: float, fps: float) -> bool:
     It depends on the pulse alone, so that series share pictures, and a slower one is part of a faster one
     whose rate is a multiple.
     """
-    return rate >= fps or int(pulse * rate / fps) != int((pulse - 1) * rate / fps)
+    return rate >= fps or pulse * rate // fps != (pulse - 1) * rate // fps
 
 
 def framed(message: msgspec.Struct) -> bytes:

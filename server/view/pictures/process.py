@@ -77,6 +77,8 @@ class DrawProcess:
                 raise ProcessDiedError(f"gave no answer within {_ANSWER_S:g} s") from error
             except (OSError, asyncio.IncompleteReadError) as error:
                 raise ProcessDiedError("died") from error
+            except msgspec.DecodeError as error:
+                raise ProcessDiedError(f"gave no sense: {error}") from error
 
     async def end(self) -> None:
         """End it: it has nothing to save."""

@@ -147,10 +147,10 @@ class Source:
             for task in finished:
                 task.result()
         finally:
-            self.pid = None
             for task in tasks:
                 task.cancel()
             await process.end()
+            self.pid = None
             await asyncio.gather(*tasks, return_exceptions=True)
 
     async def _feed(self, process: DrawProcess) -> None:

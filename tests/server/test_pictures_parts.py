@@ -1,0 +1,151 @@
+"""What the service does with what is drawn: pace, films that survive their process, boxes by pulse."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
+
+import pytest
+from cameras_by_hand import FPS, GOP, encoded
+from hypothesis import given
+from hypothesis import strategies as st
+from test_draw import CANVAS, fragments
+
+from server.view.agreement import Agreement
+from server.view.channel import Viewer
+from server.view.pictures.decided import NOTHING, Decided
+from server.view.pictures.film import Film
+from server.view.pictures.pace import Pace
+from server.view.pictures.series import AllSeries, Series
+from server.view.shelf import Shelf
+from server.wire.drawing import Drawn, Jpeg, Unit
+from server.wire.messages import GopChoices
+
+EVERY = Series(FPS, boxed=False)
+
+
+@given(st.lists(st.tuples(st.floats(0, 2), st.integers(1, 40)), max_size=30), st.floats(0.2, 2))
+def test_no_picture_is_shown_before_it_is_there_nor_kept_back_too_long(
+    steps: list[tuple[float, int]], most: float
+) -> None:
+    pace, now, pulse, last = Pace(FPS, most), 0.0, 0, 0.0
+    for wait, step in steps:
+        now, pulse = now + wait, pulse + step
+        due = pace.due(pulse, now)
+        assert now - 1e-6 <= due <= now + most + 1e-6
+        if due > last and wait == 0:
+            assert due - last <= step / FPS + 1e-6
+        last = due
+
+
+@given(st.integers(0, 10**6), st.lists(st.floats(0, 0.3), min_size=5, max_size=5))
+def test_gops_that_come_unevenly_are_shown_evenly_once_the_latest_has_come(
+    first: int, late: list[float]
+) -> None:
+    pace = Pace(FPS, 4 * GOP / FPS)
+    worst = late.index(max(late))
+    shown = [
+        (pulse, pace.due(pulse, number * GOP / FPS + delay))
+        for number, delay in enumerate(late)
+        for pulse in range(first + number * GOP, first + (number + 1) * GOP)
+    ]
+    after = shown[worst * GOP :]
+    for (pulse, at), (following, then) in pairwise(after):
+        assert then - at == pytest.approx((following - pulse) / FPS, abs=1e-6)
+
+
+def units(first: int, count: int) -> list[Unit]:
+    return [Unit(it.pulse, it.key, it.data) for it in encoded(0)[first : first + count]]
+
+
+def pulses_sent(viewer: Viewer) -> bytes:
+    return b"".join(piece.data for piece in viewer._queue)
+
+
+def test_a_film_goes_on_at_the_first_gop_that_nobody_has_seen() -> None:
+    film = Film(CANVAS, 8)
+    assert film.head is None
+    viewer = film.channel.join()
+    film.put(units(0, GOP))
+    assert film.head is not None
+    film.put(units(GOP, GOP))
+    film.interrupted()
+    film.put(units(GOP, GOP))
+    film.put(units(2 * GOP + 1, GOP - 1))
+    film.put(units(3 * GOP, GOP))
+    assert pulses_sent(viewer).count(b"mdat") >= 3 * GOP
+    assert pulses_sent(viewer).startswith(fragments(0, 2 * GOP))
+    assert pulses_sent(viewer).endswith(fragments(3 * GOP, GOP))
+
+
+def test_a_viewer_of_pictures_has_the_newest_waiting_and_no_other() -> None:
+    series = AllSeries(CANVAS, live=True)
+    viewer = series.join(EVERY)
+    slow = series.join(Series(1.0, boxed=False))
+    for pulse in range(30):
+        series.put(Drawn(newest=pulse, plain=[Jpeg(pulse, b"picture %d." % pulse)]), now=0.0)
+        assert series.show(0.0) is None
+    assert [b"picture 29." in piece.data for piece in viewer._queue] == [True]
+    assert [b"picture 25." in piece.data for piece in slow._queue] == [True]
+    assert series.rates(boxed=False) == [1.0, FPS]
+    series.leave(EVERY, viewer)
+    assert series.rates(boxed=False) == [1.0]
+    assert series.rates(boxed=True) == []
+
+
+def test_pictures_that_come_together_are_passed_on_each_at_its_moment() -> None:
+    series = AllSeries(CANVAS, live=False)
+    series.join(EVERY)
+    series.put(Drawn(newest=4, plain=[Jpeg(pulse, b"") for pulse in range(5)]), now=10.0)
+    moments = [10.0]
+    while (following := series.show(moments[-1])) is not None:
+        moments.append(following)
+    assert moments == pytest.approx([10.0 + place / FPS for place in range(5)])
+
+
+def choices(first: int, camera: str = "c0", number: int = 1) -> GopChoices:
+    boxes = [[(number, float(pulse), 0.0, 1.0, 1.0)] for pulse in range(first, first + GOP)]
+    return GopChoices(first=first, frames=GOP, choices={number: camera}, boxes={camera: boxes}, cuts=[])
+
+
+def decided(resolve: Callable[[int], int] = lambda number: number, gops: int = 3) -> Decided:
+    shelf = Shelf(FPS, 100, Agreement())
+    for unit in encoded(0):
+        shelf.put(unit.pulse, 1, unit.data, key=unit.key)
+    return Decided({"c0": shelf}, resolve, FPS, gops)
+
+
+def test_boxes_are_found_by_the_pulse_of_the_frames() -> None:
+    known = decided()
+    for first in range(0, 5 * GOP, GOP):
+        known.put(choices(first))
+    told = known.of_person(1, fragments(3 * GOP, GOP))
+    assert told.first == 3 * GOP
+    assert told.chosen == 1
+    assert [boxes[0][1] for boxes in told.boxes] == list(range(3 * GOP, 4 * GOP))
+    assert known.of_person(1, fragments(0, GOP)) is NOTHING, "too long ago to be waiting anywhere"
+    assert known.of_person(2, fragments(3 * GOP, GOP)) is NOTHING
+    assert known.of_camera("c0", fragments(3 * GOP + 2, 1)).boxes == told.boxes
+
+
+def test_a_merged_number_has_the_boxes_of_whom_it_is() -> None:
+    known = decided({5: 1}.get)  # type: ignore[arg-type]
+    known.put(choices(0, number=5))
+    known.put(choices(GOP, number=1))
+    assert known.of_person(5, fragments(0, GOP)).chosen == 5
+    assert known.of_person(5, fragments(GOP, GOP)).chosen == 1
+
+
+def test_a_cameras_decided_stream_begins_with_its_newest_gop() -> None:
+    known = decided()
+    assert known.newest("c0") is None
+    known.put(choices(0))
+    known.put(choices(GOP))
+    assert known.newest("c0") == 2 * GOP - 1
+    viewer = known.camera("c0").join()
+    known.put(choices(2 * GOP))
+    known.put(choices(100 * GOP))
+    assert known.newest("c0") is None, "its frames did not come"
+    assert pulses_sent(viewer) == fragments(GOP, 2 * GOP)
+    known.leave("c0")
+    assert viewer._closed
