@@ -26,6 +26,7 @@ class Painting:
     """One decoded frame; what is not asked for is not made."""
 
     pulse: int
+    lasts: int
     frame: VideoFrame
     boxes: Sequence[tuple[int, float, float, float, float]]
     chosen: int | None
@@ -95,14 +96,14 @@ class Studio:
                 pulse = unit.pulse if frame.pts is None else frame.pts
                 place = pulse - request.first
                 boxes = request.boxes[place] if 0 <= place < len(request.boxes) else []
-                yield Painting(pulse, frame, boxes, request.chosen)
+                yield Painting(pulse, unit.lasts, frame, boxes, request.chosen)
 
     def _encoded(self, painting: Painting) -> Unit:
         if self._encoder is None or painting.pulse <= self._encoded_last:  # it goes back: begun anew
             self._encoder = Encoder(self._canvas, self._canvas)
         self._encoded_last = painting.pulse
         unit = self._encoder.encode(painting.pulse, painting.boxed)
-        return Unit(unit.pulse, unit.key, unit.data)
+        return Unit(unit.pulse, unit.key, unit.data, painting.lasts)
 
     def _jpeg(self, pulse: int, image: Image) -> Jpeg:
         _, jpeg = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, self._canvas.jpeg_quality])

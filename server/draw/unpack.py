@@ -13,6 +13,8 @@ _INSIDE = frozenset({b"moof", b"traf"})
 """Boxes that hold boxes."""
 _TFDT_TIME = 4
 """Bytes of version and flags before the time."""
+_TRUN_DURATION = 12
+"""Bytes of version and flags, the number of samples and where they are, before the first one's duration."""
 _NAL_IDR = 5
 _START_CODE = b"\x00\x00\x00\x01"
 
@@ -24,19 +26,24 @@ class Frame:
     pulse: int
     key: bool
     data: bytes
+    lasts: int
+    """Pulses that it is shown for."""
 
 
 def frames(fragments: bytes, fps: float) -> Iterator[Frame]:
     """Give the frames of fragments in order."""
-    pulse = -1
+    pulse, lasts = -1, 1
     for kind, start, end in _boxes(fragments, 0, len(fragments)):
-        if kind == b"tfdt":
+        if kind == b"tfdt" and end - start >= _TFDT_TIME + 8:
             (ticks,) = struct.unpack_from(">Q", fragments, start + _TFDT_TIME)
             pulse = round(ticks * fps / _TIMESCALE)
+        elif kind == b"trun" and end - start >= _TRUN_DURATION + 4:
+            (ticks,) = struct.unpack_from(">I", fragments, start + _TRUN_DURATION)
+            lasts = max(1, round(ticks * fps / _TIMESCALE))
         elif kind == b"mdat":
             units = list(_units(fragments, start, end))
             key = any(unit[0] & 0x1F == _NAL_IDR for unit in units)
-            yield Frame(pulse, key, b"".join(_START_CODE + unit for unit in units))
+            yield Frame(pulse, key, b"".join(_START_CODE + unit for unit in units), lasts)
 
 
 def _boxes(data: bytes, start: int, end: int) -> Iterator[tuple[bytes, int, int]]:

@@ -17,14 +17,14 @@ from server.view.pictures import (
     Subject,
 )
 from server.view.pictures.multipart import BEGIN, CONTENT_TYPE, PULSE, part
-from server.web.api import problem
+from server.web.api import not_now, problem
 from server.web.keys import PICTURES, SERVICE
 from server.web.streams import send_stream, send_viewer
 from server.wire.drawing import Still
 
 routes = web.RouteTableDef()
 
-_RETRY_S = "5"
+_NOT_NOW = web.HTTPServiceUnavailable.status_code
 _EXPOSED = {"Access-Control-Expose-Headers": PULSE}
 
 Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
@@ -35,9 +35,7 @@ class _RefusedError(Exception):
 
     def __init__(self, status: int, error: str) -> None:
         super().__init__(error)
-        self.answer = problem(status, error)
-        if status == web.HTTPServiceUnavailable.status_code:
-            self.answer.headers["Retry-After"] = _RETRY_S
+        self.answer = not_now(error) if status == _NOT_NOW else problem(status, error)
 
 
 def _or_refused(handler: Handler) -> Handler:

@@ -58,6 +58,8 @@ class Unit(msgspec.Struct, frozen=True):
     pulse: int
     key: bool
     data: bytes
+    lasts: int = 1
+    """Pulses that it is shown for."""
 
 
 class Jpeg(msgspec.Struct, frozen=True):

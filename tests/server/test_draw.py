@@ -65,11 +65,13 @@ def test_a_slower_series_is_part_of_one_that_is_a_multiple(rate: float, times: i
 units_of_a_frame = st.lists(st.binary(min_size=1, max_size=40), min_size=1, max_size=3)
 
 
-@given(st.lists(units_of_a_frame, min_size=1, max_size=4), st.integers(0, 2**40))
-def test_frames_come_out_of_fragments_as_they_went_in(content: list[list[bytes]], first: int) -> None:
+@given(st.lists(units_of_a_frame, min_size=1, max_size=4), st.integers(0, 2**40), st.integers(1, 10**5))
+def test_frames_come_out_of_fragments_as_they_went_in(
+    content: list[list[bytes]], first: int, lasts: int
+) -> None:
     data = b"".join(
         fragment(
-            [Sample(b"".join(len(unit).to_bytes(4, "big") + unit for unit in units), key=False)],
+            [Sample(b"".join(len(unit).to_bytes(4, "big") + unit for unit in units), key=False, lasts=lasts)],
             first + place,
             FPS,
         )
@@ -77,6 +79,7 @@ def test_frames_come_out_of_fragments_as_they_went_in(content: list[list[bytes]]
     )
     found = list(frames(data, FPS))
     assert [frame.pulse for frame in found] == list(range(first, first + len(content)))
+    assert {frame.lasts for frame in found} == {lasts}
     assert [frame.data for frame in found] == [
         b"".join(b"\x00\x00\x00\x01" + unit for unit in units) for units in content
     ]

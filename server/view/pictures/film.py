@@ -3,22 +3,26 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
 
+from server.view.agreement import Agreement
 from server.view.channel import Channel, Chunk
 from server.view.fmp4 import Sample, fragment, init_segment
 from server.view.h264 import nal_units, parameter_sets, sample
+from server.view.picture import Picture
+from server.view.timeline import Timeline
 from server.wire.drawing import Canvas, Unit
 
 
 class Film:
-    """Takes GOPs as they are encoded. It survives the process that encodes: times never go back."""
+    """Takes frames as they are encoded. Processes come and go: its time has no hole and never goes back."""
 
     def __init__(self, canvas: Canvas, queue_gops: int) -> None:
         self._canvas = canvas
-        self._last = -1
-        self._whole = False
-        """What comes next can be decoded after what went before."""
+        self._agreement = Agreement()
+        self._time = Timeline(self._agreement, canvas.fps, canvas.gop)
+        self._process = 0
         self.channel = Channel(queue_starts=queue_gops)
         self.wanted = 0
         """How many watch, or wait for its beginning."""
@@ -28,29 +32,34 @@ class Film:
         """There is a head, or there will never be one."""
 
     def put(self, units: Sequence[Unit]) -> None:
-        """Pass on encoded frames of one request."""
-        fragments = [self._fragment(unit) for unit in units if self._goes_on(unit)]
-        if fragments:
-            self.channel.publish(Chunk(b"".join(fragments), start=True))
+        """Pass on encoded frames of one request, after what bridges a hole before them."""
+        pictures = [shown for unit in units for shown in self._time.take(self._picture(unit))]
+        for gop in _gops(pictures):
+            data = b"".join(picture.fragment for picture in gop)
+            self.channel.publish(Chunk(data, start=gop[0].key))
 
     def interrupted(self) -> None:
-        """Another process goes on from here: what it encodes is of use from its first new key frame on."""
-        self._whole = False
+        """Another process goes on from here: what it encodes builds on nothing that was before."""
+        self._process += 1
 
     def close(self) -> None:
         """End it for everybody."""
         self.channel.close()
         self.begun.set()
 
-    def _goes_on(self, unit: Unit) -> bool:
-        new = unit.pulse > self._last
-        self._whole = new and (self._whole or unit.key)
-        return self._whole
-
-    def _fragment(self, unit: Unit) -> bytes:
+    def _picture(self, unit: Unit) -> Picture:
         units, canvas = nal_units(unit.data), self._canvas
-        self._last = unit.pulse
-        if self.head is None and (parameters := parameter_sets(units)) is not None:
-            self.head = init_segment(parameters, canvas.width, canvas.height)
+        if unit.key:
+            self._agreement.check(parameter_sets(units))
+        if self.head is None and self._agreement.parameters is not None:
+            self.head = init_segment(self._agreement.parameters, canvas.width, canvas.height)
             self.begun.set()
-        return fragment([Sample(sample(units), unit.key)], unit.pulse, canvas.fps)
+        made = fragment([Sample(sample(units), unit.key, unit.lasts)], unit.pulse, canvas.fps)
+        return Picture(unit.pulse, unit.key, made, self._process, unit.lasts)
+
+
+def _gops(pictures: Sequence[Picture]) -> Iterator[Sequence[Picture]]:
+    """Part pictures where key frames are: a viewer may begin there."""
+    starts = [place for place, picture in enumerate(pictures) if picture.key or not place]
+    for start, end in pairwise([*starts, len(pictures)]):
+        yield pictures[start:end]
