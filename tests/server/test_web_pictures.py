@@ -135,7 +135,7 @@ async def test_pictures_of_a_person_are_shown_one_by_one_though_they_come_by_gop
     async with drawn.session.get(f"/objects/{SOMEBODY}/best.mjpeg?overlay=1") as answer:
         async for part in parts(answer):
             came[part.pulse] = loop.time()
-            if len(came) > 6 * GOP:
+            if len(came) > 4 * GOP:
                 break
     going.cancel()
     steps = np.diff(sorted(came))[GOP:]
