@@ -1,6 +1,6 @@
 """The viewer: MyView over HTTP from Python, and (in ``page/``) from a browser."""
 
-from client.api import cameras, choice, objects, site
+from client.api import cameras, choice, objects, past, site, spans
 from client.events import events
 from client.http import (
     AwayError,
@@ -10,7 +10,7 @@ from client.http import (
     NotFoundError,
     RefusedError,
 )
-from client.model import Box, Camera, Cameras, Choice, Cut, Event, Gop, Objects, SeenObject, Site
+from client.model import Box, Camera, Cameras, Choice, Cut, Event, Gop, Objects, SeenObject, Site, Span
 from client.player import Progress, Watched, record, watch
 
 __all__ = [
@@ -31,12 +31,15 @@ __all__ = [
     "RefusedError",
     "SeenObject",
     "Site",
+    "Span",
     "Watched",
     "cameras",
     "choice",
     "events",
     "objects",
+    "past",
     "record",
     "site",
+    "spans",
     "watch",
 ]

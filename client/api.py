@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
-from client.http import HttpSettings, get_json, server_url
-from client.model import Camera, Cameras, Choice, Objects, SeenObject, Site
+from collections.abc import AsyncIterator
+
+import msgspec
+
+from client.http import ContractError, HttpSettings, get, get_json, server_url
+from client.model import Camera, Cameras, Choice, Gop, Objects, Past, SeenObject, Site, Span
 
 _DEFAULT = HttpSettings()
 
@@ -35,3 +39,32 @@ async def choice(url: str, number: int, settings: HttpSettings = _DEFAULT) -> Ch
         NotFoundError: there is no such object.
     """
     return await get_json(server_url(url) / f"api/objects/{number}/choice", Choice, settings)
+
+
+async def spans(url: str, number: int, settings: HttpSettings = _DEFAULT) -> tuple[Span, ...]:
+    """Give what can be seen again of object ``number``; errors as ``choice``."""
+    return (await get_json(server_url(url) / f"api/objects/{number}/past", Past, settings)).spans
+
+
+async def past(
+    url: str, start: str, end: str | None = None, settings: HttpSettings = _DEFAULT
+) -> AsyncIterator[Gop]:
+    """Give what was said from one moment to another, or up to now; errors as ``site``.
+
+    Moments are seconds back (``-60``), pulses (``p1250``) or times (ISO 8601).
+
+    Raises:
+        RefusedError: they are none.
+    """
+    query = {"from": start} if end is None else {"from": start, "to": end}
+    async with get(
+        (server_url(url) / "api/past").with_query(query), settings, "application/x-ndjson"
+    ) as answer:
+        rest = b""
+        async for data in answer.content.iter_any():  # lines of a crowd are longer than aiohttp's
+            *lines, rest = (rest + data).split(b"\n")
+            for line in lines:
+                try:
+                    yield msgspec.json.decode(line, type=Gop)
+                except msgspec.DecodeError as error:
+                    raise ContractError(f"/api/past is not understood: {error}") from error

@@ -1,51 +1,107 @@
-"""Which camera a stream shows, from the events beside it."""
+"""Which camera a stream shows and who is where in it, from the events beside it."""
 
 from __future__ import annotations
 
 import asyncio
 import logging
-from collections import deque
-from collections.abc import AsyncIterator
+from bisect import bisect_right, insort
+from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager
+from dataclasses import dataclass
 
+import msgspec
+
+from client.api import past, site
 from client.events import events
 from client.http import ClientError, HttpSettings
-from client.model import Event, Gop, Site
+from client.model import Box, Event, Gop, Site
 
 _log = logging.getLogger(__name__)
-_GOPS = 64  # remembered: far more than the picture is behind the events
+_GOPS = 64  # remembered where nothing is recorded: far more than the picture is behind the events
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """What is known of one frame of a stream."""
+
+    pulse: int
+    camera: str
+    boxes: tuple[Box, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class _Shown:
+    frames: int
+    camera: str | None
+    boxes: bytes
+    """Packed: an hour of them is a few megabytes."""
 
 
 class Commentary:
-    """Remembers the last choices for one object."""
+    """Remembers the choices for one object and the boxes in its pictures: the last ones, or all of them."""
 
-    def __init__(self, number: int) -> None:
-        self._number = number
-        self._fps: float | None = None
-        self._gops: deque[Gop] = deque(maxlen=_GOPS)
+    def __init__(self, number: int, *, keep: bool = False) -> None:
+        self.number = number
+        self.site: Site | None = None
+        self._keep = keep
+        self._firsts: list[int] = []
+        self._shown: dict[int, _Shown] = {}
 
     def take(self, event: Event) -> None:
         """Take what an event says about the object."""
         if isinstance(event, Site):
-            self._fps = event.fps
+            self.site = event
         elif isinstance(event, Gop):
-            self._gops.append(event)
+            self._take_gop(event)
 
     def camera_at(self, media_time: float | None) -> str | None:
         """Give the camera shown at ``media_time`` (seconds: pulse / fps); None if it is not known."""
-        if media_time is None or self._fps is None:
+        if media_time is None or self.site is None:
             return None
-        pulse = round(media_time * self._fps)
-        for gop in reversed(self._gops):
-            if gop.first <= pulse < gop.first + gop.frames:
-                return gop.choices.get(self._number)
-        return None
+        pulse = round(media_time * self.site.fps)
+        place = bisect_right(self._firsts, pulse) - 1
+        if place < 0:
+            return None
+        first = self._firsts[place]
+        shown = self._shown[first]
+        return shown.camera if pulse < first + shown.frames else None
+
+    def frames(self, first: int, last: int) -> Iterator[Frame]:
+        """Give what is known of the frames from one pulse to another, both included, in order."""
+        for begin in self._firsts:
+            shown = self._shown[begin]
+            if shown.camera is None or begin > last or begin + shown.frames <= first:
+                continue
+            boxes = msgspec.msgpack.decode(shown.boxes, type=tuple[tuple[Box, ...], ...])
+            for pulse, some in enumerate(boxes, start=begin):
+                if first <= pulse <= last:
+                    yield Frame(pulse, shown.camera, some)
+
+    def _take_gop(self, gop: Gop) -> None:
+        camera = gop.choices.get(self.number)
+        boxes = gop.boxes.get(camera, ()) if camera is not None and self._keep else ()
+        if gop.first not in self._shown:
+            insort(self._firsts, gop.first)
+        self._shown[gop.first] = _Shown(gop.frames, camera, msgspec.msgpack.encode(boxes))
+        if not self._keep and len(self._firsts) > _GOPS:
+            del self._shown[self._firsts.pop(0)]
 
 
 @asynccontextmanager
-async def following(url: str, number: int, settings: HttpSettings) -> AsyncIterator[Commentary]:
-    """Follow the events inside the block; that they cannot be had does not disturb who watches."""
-    commentary = Commentary(number)
+async def following(
+    url: str,
+    commentary: Commentary,
+    settings: HttpSettings,
+    start: str | None = None,
+    end: str | None = None,
+) -> AsyncIterator[None]:
+    """Follow the events inside the block; that they cannot be had does not disturb who watches.
+
+    Where there is a ``start``, what was said since then is taken first.
+
+    Raises:
+        ClientError: it cannot be had.
+    """
 
     async def follow() -> None:
         try:
@@ -54,9 +110,13 @@ async def following(url: str, number: int, settings: HttpSettings) -> AsyncItera
         except ClientError as error:
             _log.info("no events: %s", error)
 
+    if start is not None:
+        commentary.take(await site(url, settings))
+        async for gop in past(url, start, end, settings):
+            commentary.take(gop)
     task = asyncio.create_task(follow())
     try:
-        yield commentary
+        yield
     finally:
         task.cancel()
         await asyncio.gather(task, return_exceptions=True)

@@ -54,7 +54,7 @@ def timescale(moov: Mp4Box) -> int:
     Raises:
         Mp4Error: the box has no track, or one without a rate.
     """
-    mdhd = _find(moov.content, b"trak", b"mdia", b"mdhd")
+    mdhd = child(moov.content, b"trak", b"mdia", b"mdhd")
     units = _field(mdhd, 12, 20, ">I")  # after the two times, of 32 or 64 bits by version
     if units == 0:
         raise Mp4Error("the track's timescale is 0")
@@ -67,8 +67,24 @@ def decode_time(moof: Mp4Box) -> int:
     Raises:
         Mp4Error: the fragment does not say.
     """
-    tfdt = _find(moof.content, b"traf", b"tfdt")
+    tfdt = child(moof.content, b"traf", b"tfdt")
     return _field(tfdt, 4, 4, ">Q" if tfdt[:1] == b"\x01" else ">I")
+
+
+def child(content: bytes, *path: bytes) -> bytes:
+    """Give the content of the first box along ``path``.
+
+    Raises:
+        Mp4Error: there is none.
+    """
+    for kind in path:
+        for box in BoxReader().feed(content):
+            if box.kind == kind:
+                content = box.content
+                break
+        else:
+            raise Mp4Error(f"there is no {kind.decode()} box")
+    return content
 
 
 def _field(content: bytes, at_version_0: int, at_version_1: int, code: str) -> int:
@@ -78,18 +94,6 @@ def _field(content: bytes, at_version_0: int, at_version_1: int, code: str) -> i
     except struct.error as error:
         raise Mp4Error("a box is too short") from error
     return int(value)
-
-
-def _find(content: bytes, *path: bytes) -> bytes:
-    """Give the content of the first box along ``path``."""
-    for kind in path:
-        for box in BoxReader().feed(content):
-            if box.kind == kind:
-                content = box.content
-                break
-        else:
-            raise Mp4Error(f"there is no {kind.decode()} box")
-    return content
 
 
 def _first_box(data: bytes | bytearray) -> Mp4Box | None:

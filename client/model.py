@@ -139,6 +139,22 @@ class Gop(msgspec.Struct, frozen=True):
     split: tuple[Split, ...] = ()
 
 
+class Span(msgspec.Struct, frozen=True):
+    """Frames that can be seen again."""
+
+    first: int
+    frames: int
+    begins: str | None
+    """When that was (ISO 8601, UTC); None before the first pulse."""
+    ends: str | None
+
+
+class Past(msgspec.Struct, frozen=True):
+    """``/api/objects/{k}/past``: what can be seen again."""
+
+    spans: tuple[Span, ...]
+
+
 class Objects(msgspec.Struct, frozen=True):
     """Event ``objects``, and the answer of ``/api/objects``."""
 

@@ -11,8 +11,17 @@ from yarl import URL
 
 from client.commentary import Commentary, following
 from client.fmp4 import BoxReader, Mp4Error
-from client.http import AwayError, ContractError, HttpSettings, NotFoundError, get, server_url
+from client.http import (
+    AwayError,
+    ContractError,
+    HttpSettings,
+    NotFoundError,
+    RefusedError,
+    get,
+    server_url,
+)
 from client.recording import Recording, StreamChangedError, recording
+from client.sidecar import write_sidecars
 
 _DEFAULT = HttpSettings()
 
@@ -58,26 +67,37 @@ async def watch(
     seconds: float | None = None,
     progress: Report | None = None,
     *,
+    start: str | None = None,
+    end: str | None = None,
     settings: HttpSettings = _DEFAULT,
 ) -> Watched:
     """Follow the best view of object ``number`` for ``seconds`` of media time (None: until cancelled).
 
-    The stream is the server's own fragmented MP4, unchanged; whole fragments only. With ``out`` it is
-    recorded in ``out.part``, renamed at the end. Cancelling keeps what is there. When the server goes away
-    it is sought again; if it does not come back, what was recorded is kept and ``complete`` is False.
+    ``start`` and ``end`` are moments: seconds back (``-60``), pulses (``p1250``) or times (ISO 8601); without
+    them the stream begins now, and does not end.
+
+    The pictures are the server's own, unchanged; whole fragments only. With ``out`` they are recorded in
+    ``out.part``, of which a plain MP4 file is made at the end, and the boxes beside it: WebVTT and ASS.
+    Cancelling keeps what is there. When the server goes away it is sought again; if it does not come back,
+    what was recorded is kept and ``complete`` is False.
 
     Raises:
         ValueError: ``url`` is no address.
         NotFoundError: there is no such object.
+        RefusedError: ``start`` or ``end`` is no moment, or nothing is kept of that time.
         AwayError: the server could not be reached at all, or never sent any media.
         ContractError: what comes is not such a stream.
         OSError: the file cannot be written.
     """
     server = server_url(url)
+    commentary = Commentary(number, keep=out is not None)
     with recording(out, seconds) as record:
-        async with following(url, number, settings) as commentary:
-            session = _Session(record, commentary, progress)
-            complete = await session.run(server / f"objects/{number}/best.mp4", settings)
+        try:
+            async with following(url, commentary, settings, start, end):
+                session = _Session(record, commentary, progress, start, end)
+                complete = await session.run(server / f"objects/{number}/best.mp4", settings)
+        finally:
+            _write_beside(out, record, commentary)
     return Watched(
         out,
         record.seconds,
@@ -96,10 +116,26 @@ async def record(
     return await watch(url, number, out, seconds, settings=settings)
 
 
+def _write_beside(out: Path | None, record: Recording, commentary: Commentary) -> None:
+    site = commentary.site
+    if out is None or site is None or record.begin is None or record.media_time is None:
+        return
+    first, last = round(record.begin * site.fps), round(record.media_time * site.fps)
+    write_sidecars(out, list(commentary.frames(first, last)), first, commentary.number, site)
+
+
 class _Session:
     """One recording over as many connections as it takes."""
 
-    def __init__(self, record: Recording, commentary: Commentary, report: Report | None) -> None:
+    def __init__(
+        self,
+        record: Recording,
+        commentary: Commentary,
+        report: Report | None,
+        start: str | None,
+        end: str | None,
+    ) -> None:
+        self._start, self._end = start, end
         self._record = record
         self._commentary = commentary
         self._report = report
@@ -113,14 +149,16 @@ class _Session:
         while True:
             before = self._record.fragments
             try:
-                if await self._connection(address, settings):
+                if await self._connection(self._asking(address), settings):
+                    return True
+                if self._end is not None and self._record.fragments:
                     return True
                 problem = AwayError(f"{address.origin()}: the stream has ended")
             except StreamChangedError:
                 return False
-            except (AwayError, NotFoundError) as error:
-                # A server that has just been restarted does not know its objects yet.
-                if isinstance(error, NotFoundError) and not self._record.fragments:
+            except (AwayError, NotFoundError, RefusedError) as error:
+                # A server that has just been restarted does not know its objects yet, nor their past.
+                if not isinstance(error, AwayError) and not self._record.fragments:
                     raise
                 problem = AwayError(str(error))
             failures = 1 if self._record.fragments > before else failures + 1
@@ -130,6 +168,16 @@ class _Session:
                 raise problem
             await asyncio.sleep(settings.backoff(failures))
             self.reconnections += 1
+
+    def _asking(self, address: URL) -> URL:
+        """Say where to begin and to end: after an interruption, with the frame after the last one."""
+        query = {} if self._end is None else {"to": self._end}
+        at, site = self._record.media_time, self._commentary.site
+        if at is not None and site is not None and self._start is not None:
+            return address.with_query({"from": f"p{round(at * site.fps) + 1}", **query})
+        if self._start is not None:
+            return address.with_query({"from": self._start, **query})
+        return address.with_query(query)
 
     async def _connection(self, address: URL, settings: HttpSettings) -> bool:
         """Stream over one connection; True when full, False when it has ended."""
@@ -147,17 +195,24 @@ class _Session:
         return False
 
     def _take(self, boxes: BoxReader, data: bytes) -> bool:
-        before = self._record.fragments
-        more = all(self._record.take(box) for box in boxes.feed(data))
+        before, more = self._record.fragments, True
+        for box in boxes.feed(data):
+            more = self._record.take(box)
+            if not more:
+                break
+            if box.kind == b"mdat":
+                self._note_camera()
         if self._record.fragments > before:
             self._tell()
         return more
 
-    def _tell(self) -> None:
+    def _note_camera(self) -> None:
         camera = self._commentary.camera_at(self._record.media_time)
         if camera is not None and camera != self._camera:
             self.cuts += self._camera is not None
             self._camera = camera
+
+    def _tell(self) -> None:
         if self._report is not None:
             self._report(
                 Progress(

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
 from io import BufferedWriter
 from pathlib import Path
 
 from client.fmp4 import MAX_BOX, Mp4Box, Mp4Error, decode_time, timescale
+from client.plain import write_plain
+
+_log = logging.getLogger(__name__)
 
 
 class StreamChangedError(Mp4Error):
@@ -37,6 +41,11 @@ class Recording:
     def seconds(self) -> float:
         """Media time from the first fragment to the beginning of the last."""
         return 0.0 if self._first is None else (self._last - self._first) / self._timescale
+
+    @property
+    def begin(self) -> float | None:
+        """Media time of the first fragment in seconds; None before it."""
+        return None if self._first is None else self._first / self._timescale
 
     @property
     def media_time(self) -> float | None:
@@ -112,9 +121,10 @@ class Recording:
 
 @contextmanager
 def recording(out: Path | None, seconds: float | None) -> Iterator[Recording]:
-    """Record into ``out.part``, which becomes ``out`` at the end, however it ends, if it has any media.
+    """Record into ``out.part``, which is made into ``out`` at the end, however it ends, if it has any media.
 
     An interrupted recording is whole up to its last fragment, hence kept; an empty one leaves nothing.
+    ``out`` is a plain MP4 file; where the disk has no room for both, it is the fragments as they came.
 
     Raises:
         OSError: the file cannot be written.
@@ -130,6 +140,19 @@ def recording(out: Path | None, seconds: float | None) -> Iterator[Recording]:
             yield kept
     finally:
         if kept is not None and kept.fragments:
-            part.replace(out)
+            _finish(part, out)
         else:
             part.unlink(missing_ok=True)
+
+
+def _finish(part: Path, out: Path) -> None:
+    plain = out.with_name(out.name + ".plain")
+    try:
+        write_plain(part, plain)
+    except (OSError, Mp4Error) as error:
+        _log.warning("%s: is left in fragments: %s", out, error)
+        plain.unlink(missing_ok=True)
+        part.replace(out)
+    else:
+        plain.replace(out)
+        part.unlink()

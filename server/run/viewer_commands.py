@@ -21,8 +21,15 @@ def watch(
     ] = None,
     out: Annotated[Path | None, typer.Option("--out", help="The file to record into.")] = None,
     seconds: Annotated[float | None, typer.Option(help="Stop recording after this long.")] = None,
+    start: Annotated[
+        str | None,
+        typer.Option(
+            "--from", help="From when on: -60 (seconds back), p1250 (a pulse) or a time (ISO 8601)."
+        ),
+    ] = None,
+    end: Annotated[str | None, typer.Option("--to", help="Until when, likewise.")] = None,
 ) -> None:
     """List who is there, or watch or record somebody's best view."""
     from server.run.watch import run_watch
 
-    asyncio.run(run_until_told(lambda: run_watch(url, number, out, seconds)))
+    asyncio.run(run_until_told(lambda: run_watch(url, number, out, seconds, start, end)))

@@ -15,7 +15,14 @@ from server.wire.errors import UserError
 _TELL_EVERY_S = 1.0
 
 
-async def run_watch(url: str, number: int | None, out: Path | None, seconds: float | None) -> None:
+async def run_watch(
+    url: str,
+    number: int | None,
+    out: Path | None,
+    seconds: float | None,
+    start: str | None = None,
+    end: str | None = None,
+) -> None:
     """List who is there, or follow somebody.
 
     Raises:
@@ -25,7 +32,7 @@ async def run_watch(url: str, number: int | None, out: Path | None, seconds: flo
         if number is None:
             await _list(url)
             return
-        watched = await watch(url, number, out, seconds, _Teller())
+        watched = await watch(url, number, out, seconds, _Teller(), start=start, end=end)
     except (ClientError, ValueError) as error:
         raise UserError(f"watch: {error}") from error
     except OSError as error:

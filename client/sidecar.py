@@ -1,0 +1,95 @@
+"""The boxes beside a recorded film: as metadata for programs (WebVTT) and drawn, for people (ASS)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import msgspec
+
+from client.commentary import Frame
+from client.model import Box, Site
+
+_ASS_HEAD = """[Script Info]
+ScriptType: v4.00+
+PlayResX: {width}
+PlayResY: {height}
+ScaledBorderAndShadow: yes
+
+[V4+ Styles]
+Format: Name, Fontname, Fontsize, PrimaryColour, SecondaryColour, OutlineColour, BackColour, Bold, Italic, \
+Underline, StrikeOut, ScaleX, ScaleY, Spacing, Angle, BorderStyle, Outline, Shadow, Alignment, MarginL, \
+MarginR, MarginV, Encoding
+Style: Shown,Sans,{size},&HFF000000,&HFF000000,&H0000E5FF,&HFF000000,0,0,0,0,100,100,0,0,1,1.5,0,7,0,0,0,1
+Style: Other,Sans,{size},&HFF000000,&HFF000000,&H00B0B0B0,&HFF000000,0,0,0,0,100,100,0,0,1,1,0,7,0,0,0,1
+Style: Name,Sans,{size},&H00FFFFFF,&H00FFFFFF,&H00000000,&HFF000000,0,0,0,0,100,100,0,0,1,1,0,1,0,0,0,1
+
+[Events]
+Format: Layer, Start, End, Style, Name, MarginL, MarginR, MarginV, Effect, Text
+"""
+
+
+def sidecars(film: Path) -> tuple[Path, Path]:
+    """Name the files beside a film: WebVTT, ASS."""
+    return film.with_suffix(".vtt"), film.with_suffix(".ass")
+
+
+def write_sidecars(film: Path, frames: Sequence[Frame], first: int, number: int, site: Site) -> None:
+    """Write who is where in a film whose time 0 is pulse ``first``; ``number`` is whom it shows.
+
+    Raises:
+        OSError: they cannot be written.
+    """
+    vtt, ass = sidecars(film)
+    vtt.write_text(_vtt(frames, first, number, site), encoding="utf-8", newline="\n")
+    ass.write_text(_ass(frames, first, number, site), encoding="utf-8", newline="\n")
+
+
+def _vtt(frames: Sequence[Frame], first: int, number: int, site: Site) -> str:
+    """Give a metadata track: a cue per frame, its pulse as the name, JSON as the text (W3C WebVTT)."""
+    cues = [
+        f"p{frame.pulse}\n"
+        f"{' --> '.join(_clock((at - first) / site.fps, 3) for at in (frame.pulse, frame.pulse + 1))}\n"
+        + msgspec.json.encode({"camera": frame.camera, "boxes": frame.boxes}).decode()
+        for frame in frames
+    ]
+    note = (
+        f"NOTE the best view of object {number} of {site.name}; boxes: object, left, top, right, bottom "
+        f"in pixels of a picture of {site.width}x{site.height}"
+    )
+    return "\n\n".join(["WEBVTT", note, *cues]) + "\n"
+
+
+def _ass(frames: Sequence[Frame], first: int, number: int, site: Site) -> str:
+    """Give subtitles that are the boxes (Advanced SubStation Alpha, drawn by libass)."""
+    lines = [
+        f"Dialogue: {line}"
+        for frame in frames
+        for box in frame.boxes
+        for line in _drawn(
+            box,
+            _clock((frame.pulse - first) / site.fps, 2),
+            _clock((frame.pulse + 1 - first) / site.fps, 2),
+            "Shown" if box.object == number else "Other",
+        )
+    ]
+    head = _ASS_HEAD.format(width=site.width, height=site.height, size=max(8, site.height // 24))
+    return head + "\n".join(lines) + "\n"
+
+
+def _drawn(box: Box, begin: str, end: str, style: str) -> tuple[str, str]:
+    left, top, right, bottom = (round(side) for side in (box.left, box.top, box.right, box.bottom))
+    shape = f"m {left} {top} l {right} {top} {right} {bottom} {left} {bottom}"
+    return (
+        f"0,{begin},{end},{style},,0,0,0,,{{\\pos(0,0)\\p1}}{shape}",
+        f"1,{begin},{end},Name,,0,0,0,,{{\\pos({left},{top - 2})}}{box.object}",
+    )
+
+
+def _clock(seconds: float, decimals: int) -> str:
+    """Give hours, minutes and seconds, to so many decimals."""
+    units = round(seconds * 10**decimals)
+    whole, part = divmod(units, 10**decimals)
+    minutes, second = divmod(whole, 60)
+    hours, minute = divmod(minutes, 60)
+    return f"{hours:02}:{minute:02}:{second:02}.{part:0{decimals}}"
