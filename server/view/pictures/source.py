@@ -49,7 +49,8 @@ class Source:
         self._stills = Stills()
         self._used = asyncio.Event()
         self._shown = asyncio.Event()
-        self._newest = -1
+        self.newest = -1
+        """The last frame that the present process has drawn."""
         self._answered = False
         self.users = 0
         self.restarts = 0
@@ -138,7 +139,7 @@ class Source:
         self.series = AllSeries(self._canvas, live=self._live)
 
     async def _run_process(self) -> None:
-        self._newest, self._answered = -1, False
+        self.newest, self._answered = -1, False
         process = await DrawProcess.start(self._canvas)
         self.pid = process.pid
         tasks = [asyncio.create_task(work(process)) for work in (self._feed, self._give_stills)]
@@ -182,7 +183,7 @@ class Source:
                 boxed=self.series.rates(boxed=True),
             )
         )
-        self._newest, self._answered = drawn.newest, True
+        self.newest, self._answered = drawn.newest, True
         self.film.put(drawn.film)
         self.series.put(drawn, asyncio.get_running_loop().time())
         self._shown.set()
@@ -192,7 +193,7 @@ class Source:
         while True:
             await self._stills.asked.wait()
             self._stills.asked.clear()
-            for kind in self._stills.possible(self._newest):
+            for kind in self._stills.possible(self.newest):
                 drawn = await process.ask(Draw(still=kind))
                 self._stills.give(kind, drawn.still)
 

@@ -1,0 +1,201 @@
+"""What pictures cost: boxes burnt in once, for one viewer and for ten, and JPEG of every frame.
+
+    OPENBLAS_NUM_THREADS=1 python -m benchmarks.overlay --out out/bench
+
+Runs a real drawing process on a stream of the synthetic room, as the best-view service does, without HTTP:
+sending costs what it costs of any stream. Costs are processor time of the two processes.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import statistics
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from benchmarks.report import Report
+from benchmarks.surroundings import parser
+from server.camera.encode import Encoder
+from server.camera.scene import Scene
+from server.view.channel import Channel, Chunk, Viewer
+from server.view.fmp4 import Sample, fragment
+from server.view.h264 import nal_units, sample
+from server.view.pictures.decided import Told, first_pulse
+from server.view.pictures.series import Series
+from server.view.pictures.source import Source
+from server.wire.config import Encode, Site
+from server.wire.drawing import Canvas
+
+_MS = 1e3
+_DRAWN = 100
+"""Different frames of the scene; the stream goes through them again and again."""
+_START = 200
+"""The scene's first frame: people are in sight."""
+_MANY = 10
+_LOOK_S = 0.003
+"""So seldom is looked whether a GOP is drawn that it costs nothing."""
+
+
+@dataclass(frozen=True, slots=True)
+class Wish:
+    """Who watches what."""
+
+    name: str
+    films: int = 0
+    series: Sequence[Series] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Cost:
+    """What a wish costs; milliseconds of processor time a frame, but for the start."""
+
+    start_s: float
+    """Until the first GOP is drawn."""
+    drawing: float
+    service: float
+    megabytes: float
+    """Resident memory of the drawing process."""
+
+
+class Stage:
+    """A stream of the room with true boxes."""
+
+    def __init__(self, site: Site, encode: Encode) -> None:
+        scene = Scene("room", 3, 4, 1, site.width, site.height, site.fps)
+        self.site, self.gop = site, encode.gop
+        self._images = [scene.image(0, _START + place) for place in range(_DRAWN)]
+        truth = [scene.truth(_START + place)[0] for place in range(_DRAWN)]
+        self._boxes = [
+            [(int(who), *map(float, box)) for who, box in zip(it.ids, it.boxes, strict=True)] for it in truth
+        ]
+        self._encoder = Encoder(site, encode)
+        self._pulse = 0
+        self.canvas = Canvas(
+            width=site.width,
+            height=site.height,
+            fps=site.fps,
+            gop=encode.gop,
+            preset=encode.preset,
+            crf=encode.crf,
+            jpeg_quality=80,
+        )
+
+    def next_gop(self) -> Chunk:
+        """Encode the next GOP."""
+        data = b""
+        for pulse in range(self._pulse, self._pulse + self.gop):
+            unit = self._encoder.encode(pulse, self._images[pulse % _DRAWN])
+            data += fragment([Sample(sample(nal_units(unit.data)), unit.key)], pulse, self.site.fps)
+        self._pulse += self.gop
+        return Chunk(data, start=True)
+
+    def told(self, fragments: bytes) -> Told:
+        """Give the boxes of a GOP."""
+        first = first_pulse(fragments, self.site.fps)
+        return Told(first, [self._boxes[pulse % _DRAWN] for pulse in range(first, first + self.gop)], 1)
+
+
+async def measure(stage: Stage, wish: Wish, gops: int) -> Cost:
+    """Let a process draw; every GOP is given when the one before is done."""
+    stream = Channel()
+    source = Source("the room", stream, stage.told, stage.canvas, live=True, queue_gops=8)
+    source.use()
+    source.film.wanted = wish.films
+    viewers = [source.film.channel.join() for _ in range(wish.films)]
+    viewers += [source.series.join(series) for series in wish.series]
+    readers = [asyncio.create_task(_read(viewer)) for viewer in viewers]
+    chunks = [stage.next_gop() for _ in range(gops + 1)]
+    run, began = asyncio.create_task(source.run()), time.perf_counter()
+    stream.publish(chunks[0])
+    await source.still("plain", _last(stage, chunks[0]))
+    start, pid = time.perf_counter() - began, source.pid
+    assert pid is not None  # noqa: S101 — it has just drawn
+    drawing, service = _processor_seconds(pid), time.process_time()
+    for chunk in chunks[1:]:
+        stream.publish(chunk)
+        while source.newest < _last(stage, chunk):  # noqa: ASYNC110 — a service does not wait for this
+            await asyncio.sleep(_LOOK_S)
+    frames = gops * stage.gop
+    cost = Cost(
+        start,
+        _MS * (_processor_seconds(pid) - drawing) / frames,
+        _MS * (time.process_time() - service) / frames,
+        _resident_megabytes(pid),
+    )
+    stream.close()
+    await run
+    await asyncio.gather(*readers)
+    return cost
+
+
+async def _read(viewer: Viewer) -> None:
+    async for data in viewer:
+        del data
+
+
+def _last(stage: Stage, chunk: Chunk) -> int:
+    return first_pulse(chunk.data, stage.site.fps) + stage.gop - 1
+
+
+def _processor_seconds(pid: int) -> float:
+    """Give a process's processor time, in nanoseconds the kernel counts (Linux)."""
+    return int(Path(f"/proc/{pid}/schedstat").read_text(encoding="ascii").split()[0]) / 1e9
+
+
+def _resident_megabytes(pid: int) -> float:
+    lines = Path(f"/proc/{pid}/status").read_text(encoding="ascii").splitlines()
+    (line,) = [line for line in lines if line.startswith("VmRSS:")]
+    return int(line.split()[1]) / 1024
+
+
+def wishes(fps: float) -> list[Wish]:
+    """List what is measured."""
+    plain, boxed = Series(fps, boxed=False), Series(fps, boxed=True)
+    return [
+        Wish("decoded only, for stills"),
+        Wish("boxes burnt in, one viewer", 1),
+        Wish(f"boxes burnt in, {_MANY} viewers", _MANY),
+        Wish("JPEG, one viewer", 0, [plain]),
+        Wish(f"JPEG, {_MANY} viewers", 0, [plain] * _MANY),
+        Wish("JPEG with boxes, one viewer", 0, [boxed]),
+        Wish("JPEG, 5 a second", 0, [Series(5.0, boxed=False)]),
+        Wish("all of these at once", _MANY, [plain] * _MANY + [boxed] * _MANY),
+    ]
+
+
+def main() -> None:
+    """Measure and print."""
+    options = parser(__doc__ or "", "overlay")
+    options.add_argument("--size", default="640x360", help="of the picture, WIDTHxHEIGHT")
+    options.add_argument("--gops", type=int, default=30, help="measured in a run")
+    options.add_argument("--runs", type=int, default=3, help="the median of so many is printed")
+    chosen = options.parse_args()
+    width, height = map(int, chosen.size.split("x"))
+    report = Report()
+    stage = Stage(Site(width=width, height=height), Encode())
+    rows = []
+    for wish in wishes(stage.site.fps):
+        costs = [asyncio.run(measure(stage, wish, chosen.gops)) for _ in range(chosen.runs)]
+        drawing = statistics.median(cost.drawing for cost in costs)
+        rows.append(
+            [
+                wish.name,
+                f"{drawing:.2f}",
+                f"{statistics.median(cost.service for cost in costs):.3f}",
+                f"{100 * drawing * stage.site.fps / _MS:.1f}",
+                f"{statistics.median(cost.start_s for cost in costs):.2f}",
+                f"{max(cost.megabytes for cost in costs):.0f}",
+            ]
+        )
+    report.table(
+        f"Pictures of one stream of {chosen.size} at {stage.site.fps:g} a second",
+        ["wanted", "drawing, ms a frame", "service, ms a frame", "% of a core", "start, s", "MB"],
+        rows,
+    )
+    report.save(chosen.out / "overlay.txt")
+
+
+if __name__ == "__main__":
+    main()

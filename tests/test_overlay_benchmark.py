@@ -1,0 +1,19 @@
+"""The benchmark of pictures measures a real process, and what is not wanted costs less."""
+
+from __future__ import annotations
+
+import asyncio
+
+from benchmarks.overlay import Stage, Wish, measure
+from server.wire.config import Encode, Site
+
+
+def test_boxes_cost_more_than_no_boxes_and_no_more_for_another_viewer() -> None:
+    stage = Stage(Site(width=320, height=180), Encode())
+    nothing, one, more = (
+        asyncio.run(measure(stage, wish, 4)) for wish in (Wish("nothing"), Wish("one", 1), Wish("more", 10))
+    )
+    assert 0 < nothing.drawing < one.drawing
+    assert more.drawing < 2 * one.drawing
+    assert nothing.megabytes > 10
+    assert nothing.start_s > 0
