@@ -7,7 +7,7 @@ import threading
 from pathlib import Path
 
 import pytest
-from cameras_by_hand import CAMERAS, GOP, SMALL, FedService, TrackNumbers, small_config
+from cameras_by_hand import CAMERAS, GOP, SMALL, FedService, TrackNumbers, encoded, small_config, video
 from recorded_by_hand import A, B, pictures, piece
 
 from server.view.past.store import Piece
@@ -120,6 +120,23 @@ def test_a_service_records_what_it_decides(tmp_path: Path) -> None:
     assert run is not None
     assert [pulse for pulse, _ in pictures(run.objects[1].path)] == list(range(6 * GOP))
     assert [pulse for pulse, _ in pictures(run.cameras[B].path)] == list(range(6 * GOP))
+
+
+def test_pictures_that_come_after_the_decision_are_recorded_too(tmp_path: Path) -> None:
+    service = fed(tmp_path / "kept")
+    service.past.open()
+    for epoch in range(7):
+        service.feed(epoch, {A: {1: SMALL}})
+    for unit in encoded(1)[: 7 * GOP]:
+        service.intake.video(video(B, unit))
+    service.feed(7, {A: {1: SMALL}})
+    service.close()
+    run = service.past.run
+    assert run is not None
+    decided = service.past.recent.end
+    assert decided >= 5 * GOP
+    for camera in CAMERAS:
+        assert [pulse for pulse, _ in pictures(run.cameras[camera].path)] == list(range(decided))
 
 
 def test_a_folder_that_cannot_be_used_is_told_in_one_line(tmp_path: Path) -> None:

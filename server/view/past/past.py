@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
+from collections import deque
 from collections.abc import Mapping
 
 from server.view.agreement import Agreement
@@ -30,6 +31,9 @@ class Past:
         self._config, self._agreement = config, agreement
         self.recent = Recent(shelves, config.encode.gop, frames)
         self.pulse0: float | None = None
+        self._held: deque[GopChoices] = deque()
+        """Decided, but not all cameras' pictures have come."""
+        self._patience = frames // 2
         self.viewers = 0
         """How many are watching the past."""
         record = config.record
@@ -66,16 +70,32 @@ class Past:
         self.recent.put(choices)
         if self.writer is None:
             return
-        delivered = {
-            camera: self.recent.delivered(camera, choices.first, choices.frames)
-            for camera in self._config.camera_ids
-        }
-        self.writer.put(Piece(choices, {camera: gop for camera, gop in delivered.items() if gop is not None}))
+        self._held.append(choices)
+        while self._held and self._has_come(self._held[0]):
+            self._hand_over(self.writer)
 
     def close(self) -> None:
         """End the recording."""
         if self.writer is not None:
+            while self._held:
+                self._hand_over(self.writer)
             self.writer.close()
+
+    def _has_come(self, choices: GopChoices) -> bool:
+        """Tell whether nothing is to be waited for: a busy camera's pictures may come after the decision."""
+        end = choices.first + choices.frames
+        if end <= self.recent.end - self._patience:
+            return True
+        newest = [self.recent.end_of_camera(camera) for camera in self._config.camera_ids]
+        return all(it >= end or it < choices.first - self._patience for it in newest)
+
+    def _hand_over(self, writer: Writer) -> None:
+        choices = self._held.popleft()
+        delivered = {
+            camera: self.recent.delivered(camera, choices.first, choices.frames)
+            for camera in self._config.camera_ids
+        }
+        writer.put(Piece(choices, {camera: gop for camera, gop in delivered.items() if gop is not None}))
 
     @property
     def run(self) -> Run | None:
