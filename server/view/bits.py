@@ -64,6 +64,16 @@ class BitWriter:
         self._bits.append(f"{value:0{count}b}")
         self._count += count
 
+    def copy(self, text: str) -> None:
+        """Write bits that are zeros and ones in a text."""
+        self._bits.append(text)
+        self._count += len(text)
+
+    @property
+    def text(self) -> str:
+        """The bits so far, as zeros and ones."""
+        return "".join(self._bits)
+
     def ue(self, value: int) -> None:
         """Write an unsigned Exp-Golomb number."""
         self.u(2 * (value + 1).bit_length() - 1, value + 1)
@@ -79,5 +89,5 @@ class BitWriter:
 
     def done(self) -> bytes:
         """Give all whole bytes; call :meth:`align` before."""
-        bits = "".join(self._bits)
+        bits = self.text
         return bytes(int(bits[at : at + 8], 2) for at in range(0, len(bits), 8))

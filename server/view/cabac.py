@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 from server.view.bits import BitWriter
 
 SLICE_QP = 51
@@ -20,12 +22,18 @@ _RANGE_LPS = (
 _HALF, _QUARTER = 0x200, 0x100
 
 
-def write_skipped(bits: BitWriter, macroblocks: int) -> None:
-    """Write so many skipped macroblocks, the slice's end and rbsp_stop_one_bit, from a whole byte on."""
+@lru_cache(maxsize=4)
+def skipped_slice(macroblocks: int) -> str:
+    """Give so many skipped macroblocks, the slice's end and rbsp_stop_one_bit, as bits from a whole byte on.
+
+    They are the same in every picture of a size; coding them takes milliseconds.
+    """
+    bits = BitWriter()
     coder = _Coder(bits)
     for left in range(macroblocks - 1, -1, -1):
         coder.skipped()
         coder.end_of_slice(end=left == 0)
+    return bits.text
 
 
 class _Coder:

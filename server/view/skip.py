@@ -90,7 +90,7 @@ class Continuing:
             bits.ue(1)
         if self.cabac:
             bits.align(1)
-            cabac.write_skipped(bits, self.macroblocks)
+            bits.copy(cabac.skipped_slice(self.macroblocks))
         else:
             bits.ue(self.macroblocks)  # mb_skip_run
             bits.u(1, 1)
