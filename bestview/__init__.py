@@ -1,6 +1,7 @@
 """View qualities in, view choices out: the sliding-window DP, identity across cameras, view quality."""
 
 from bestview.choice import NO_CAMERA, NO_VIEW_COST, Choices, choose_by_gops, choose_views
+from bestview.choice_missed import LastSeen, with_missed
 from bestview.choice_program import Gops
 from bestview.choice_seen import SeenViews
 from bestview.corrections import Merge, Split
@@ -24,6 +25,7 @@ __all__ = [
     "IdentityRegistry",
     "IdentitySettings",
     "IdentityUpdate",
+    "LastSeen",
     "LocalTrack",
     "Merge",
     "QualitySettings",
@@ -46,4 +48,5 @@ __all__ = [
     "to_ground",
     "true_views",
     "view_cost",
+    "with_missed",
 ]

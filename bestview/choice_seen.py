@@ -17,7 +17,7 @@ Ints = NDArray[np.int64]
 class SeenViews:
     """R views that show somebody, of K people in N frames of C cameras. All other views are worth nothing.
 
-    Of one camera and person there is at most one view in a frame, and later frames come later.
+    Of one camera and person there is at most one view in a frame.
 
     Attributes:
         frame: (R,) 0 to N - 1.
@@ -26,6 +26,7 @@ class SeenViews:
         worth: (R,) above 0, at most 1: a view costs ``1 - worth``.
         shown: (N, C) where a camera's frame can be shown at all; there are no views elsewhere.
         people: K.
+        found: the first so many show somebody for sure, the others are only taken to; None: all do.
     """
 
     frame: Ints
@@ -34,17 +35,19 @@ class SeenViews:
     worth: Floats
     shown: NDArray[np.bool_]
     people: int
+    found: int | None = None
 
-    def gops(self, first: int, starts: NDArray[np.bool_], weight: Floats) -> Gops:
+    def gops(self, first: int, starts: NDArray[np.bool_], weight: Floats, *, blind: bool) -> Gops:
         """Sum the costs over the GOPs of a window.
 
-        A GOP costs ``sum of w(n) - sum of w(n) worth(n)``, each sum frame after frame; infinitely much where
+        A GOP costs ``sum of w(n) - sum of w(n) worth(n)``, each sum view after view; infinitely much where
         a camera cannot be shown in all of it.
 
         Args:
             first: frame at which the window begins, which is the first of a GOP.
             starts: (M,) where GOPs begin in the window; the first entry is true.
             weight: (M,) for how many frames each frame stands.
+            blind: whether to tell where a camera is found to show nobody.
         """
         frames, cameras = len(weight), self.shown.shape[1]
         gop = np.cumsum(starts) - 1
@@ -57,7 +60,10 @@ class SeenViews:
         saved = np.bincount(cell, self.worth[rows] * weight[at], cells).reshape(count, cameras, self.people)
         lasting: Floats = np.bincount(gop, weight).astype(np.float64)
         cost = NO_VIEW_COST * lasting[:, None, None] - saved
-        blind = saved == 0.0
         missing = ~np.logical_and.reduceat(self.shown[first : first + frames], np.flatnonzero(starts), axis=0)
-        cost[missing], blind[missing] = np.inf, True
-        return Gops(list(cost), lasting, list(blind))
+        cost[missing] = np.inf
+        if not blind:
+            return Gops(list(cost), lasting, [None] * count)
+        sure = cell if self.found is None else cell[rows < self.found]
+        nobody = np.bincount(sure, minlength=cells).reshape(cost.shape) == 0
+        return Gops(list(cost), lasting, list(nobody | missing[:, :, None]))

@@ -16,8 +16,8 @@ class QualitySettings:
     """
 
     size: float = 1.0  # how large the person is in the picture
-    whole: float = 0.5  # how much of the person the picture's edges leave
-    unhidden: float = 0.5  # how much of the person other people leave to be seen
+    whole: float = 0.1  # how much of the person the picture's edges leave
+    unhidden: float = 0.25  # how much of the person other people leave to be seen
     central: float = 0.0  # how near the middle of the picture
     sharp: float = 0.0  # how much detail there is
     facing: float = 0.0  # walking towards the camera, not away from it; needs the ground

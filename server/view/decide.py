@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from bestview import NO_CAMERA, Merge, Split, choose_by_gops
 from server.view.align import Epoch
+from server.view.lately import Lately
 from server.view.outlook import Outlook
 from server.view.people import People
 from server.view.shots import Shots
@@ -83,6 +84,7 @@ class Decider:
         """GOPs that a shot lasts at least."""
         self._goes_on = config.view.goes_on_s * config.site.fps
         self._shots = Shots()
+        self._lately = Lately()
         self._next_gop: int | None = None
 
     def step(self, epoch: Epoch) -> list[GopDecision]:
@@ -97,7 +99,11 @@ class Decider:
             return []
         outlook = self._outlook(self._next_gop, epoch.last)
         weight = self._weight(lookahead)
-        return [self._decide(outlook, first, gop, weight) for first in range(self._next_gop, last + 1, gop)]
+        decided = [
+            self._decide(outlook, first, gop, weight) for first in range(self._next_gop, last + 1, gop)
+        ]
+        self._lately = outlook.lately(self._next_gop)
+        return decided
 
     def finish(self, last: int) -> list[GopDecision]:
         """Decide what is left when every recording is over; ``last`` is the last frame of the longest."""
@@ -114,8 +120,17 @@ class Decider:
 
     def _outlook(self, first: int, last: int) -> Outlook:
         """Look at the frames from `first` to `last` with what is known of people by now."""
-        relative = self._config.view.quality.relative
-        return Outlook(self._cameras, self._sight, self.people, self._has, first, last, relative=relative)
+        return Outlook(
+            self._cameras,
+            self._sight,
+            self.people,
+            self._has,
+            first,
+            last,
+            relative=self._config.view.quality.relative,
+            lately=self._lately,
+            lasts=self._config.view.missed_s * self._config.site.fps,
+        )
 
     def _weight(self, lookahead: int) -> Floats:
         """Give for how many frames each frame of the look-ahead stands: what is seen last goes on a while."""
@@ -129,7 +144,8 @@ class Decider:
         known = np.fromiter((people.first_seen[it] for it in everybody.tolist()), np.int64, len(everybody))
         part = outlook.part(first, lookahead, known < first + frames)
         before = self._shots.of(part.numbers)
-        gops = part.gops(np.arange(lookahead) % self._config.encode.gop == 0, weight)
+        starts = np.arange(lookahead) % self._config.encode.gop == 0
+        gops = part.gops(starts, weight, blind=self.least_shot > 1)
         (views,), _ = choose_by_gops(
             gops, before.cameras, self.switch_cost, self.least_shot, before.held, asked=1
         )

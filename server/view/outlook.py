@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview import NO_VIEW_COST, Gops, SeenViews
+from bestview import NO_VIEW_COST, Gops, SeenViews, with_missed
 from bestview.quality import compared_views
+from server.view.lately import Lately
 from server.view.line import Line
 from server.view.people import People
 from server.view.sight import Sight
@@ -18,12 +19,15 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
+NOTHING = Lately()
+
 
 class Outlook:
     """The views of all people in the frames from `first` to `last`, as known at one epoch.
 
     One outlook serves all GOPs that the epoch decides. ``has(camera, pulse)`` tells whether a camera's frame
-    can be shown.
+    can be shown. ``lately`` is how everybody was seen before, and `lasts` for how many frames who is missed
+    is taken to be still there.
     """
 
     def __init__(
@@ -36,6 +40,8 @@ class Outlook:
         last: int,
         *,
         relative: bool,
+        lately: Lately = NOTHING,
+        lasts: float = 0.0,
     ) -> None:
         self.cameras, self.first = cameras, first
         self.numbers: Ints = np.array(people.known, dtype=np.int64)
@@ -57,6 +63,14 @@ class Outlook:
         if relative:
             worth = compared_views(worth, frame * everybody + person, len(pulses) * everybody)
         self.views = SeenViews(frame, line.camera[row], person, worth, shown, everybody)
+        self.before = lately.of(self.numbers, len(cameras), first)
+        """How everybody was seen before the first frame."""
+        self.taken = with_missed(self.views, self.before, lasts)
+        """The views, and those that are taken to be there though somebody was missed for a moment."""
+
+    def lately(self, pulse: int) -> Lately:
+        """Tell how everybody was seen before a pulse, for the next outlook."""
+        return Lately.after(self.numbers, self.before, self.views, self.first, pulse)
 
     def terms(self, view: int) -> Floats:
         """Give what the quality of a view is made of, (terms,)."""
@@ -88,9 +102,9 @@ class Part:
         """(K,) the people's numbers, rising."""
         return self.outlook.numbers[self.people]
 
-    def gops(self, starts: Mask, weight: Floats) -> Gops:
+    def gops(self, starts: Mask, weight: Floats, *, blind: bool) -> Gops:
         """Give what the GOPs cost that begin where the mask (N,) says, each frame by its weight (N,)."""
-        gops = self.outlook.views.gops(self.first, starts, weight)
+        gops = self.outlook.taken.gops(self.first, starts, weight, blind=blind)
         return gops if len(self.people) == len(self.outlook.numbers) else gops.of(self.people)
 
     def views(self, number: int) -> Ints:
@@ -99,12 +113,7 @@ class Part:
         Raises:
             KeyError: this part is not about that person.
         """
-        person = self.people[self.numbers == number]
-        if not person.size:
-            raise KeyError(number)
-        views = self.outlook.views
-        inside = (views.frame >= self.first) & (views.frame < self.first + self.frames)
-        return np.flatnonzero(inside & (views.person == person[0]))
+        return self._rows(self.outlook.views, number)
 
     def cost(self, number: int) -> Floats:
         """Give one person's c(n, b), (N, C); infinite where a camera cannot be shown.
@@ -112,10 +121,17 @@ class Part:
         Raises:
             KeyError: this part is not about that person.
         """
-        views, rows = self.outlook.views, self.views(number)
+        views, rows = self.outlook.taken, self._rows(self.outlook.taken, number)
         cost = np.where(views.shown[self.first : self.first + self.frames], NO_VIEW_COST, np.inf)
         cost[views.frame[rows] - self.first, views.camera[rows]] -= views.worth[rows]
         return cost
+
+    def _rows(self, views: SeenViews, number: int) -> Ints:
+        person = self.people[self.numbers == number]
+        if not person.size:
+            raise KeyError(number)
+        inside = (views.frame >= self.first) & (views.frame < self.first + self.frames)
+        return np.flatnonzero(inside & (views.person == person[0]))
 
 
 def _first_of_each(values: Ints, count: int) -> Mask:

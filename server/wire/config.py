@@ -186,6 +186,8 @@ class View(Section):
     that is worth half the best one it takes twice as many."""
     goes_on_s: NonNegativeFloat = 0.5
     """For how long the views at the end of the look-ahead are taken to go on as they are."""
+    missed_s: NonNegativeFloat = 1.0
+    """Who is not found any more is taken to be still there, less and less, for so long; 0: not at all."""
     min_shot_s: NonNegativeFloat = 0.0
     """A camera is shown for so long at least, in whole GOPs; one that sees nobody may be left sooner."""
     late_after_s: PositiveFloat = 0.5
