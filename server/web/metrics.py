@@ -23,7 +23,9 @@ class ServiceCollector(Collector):
         service = self._service
         yield GaugeMetricFamily("myview_pulse", "Newest pulse.", value=service.pulse)
         yield GaugeMetricFamily("myview_objects", "People known.", value=len(service.board.standings))
-        yield GaugeMetricFamily("myview_viewers", "Streams being watched.", value=service.splicer.viewers)
+        yield GaugeMetricFamily(
+            "myview_viewers", "Streams being watched.", value=service.splicer.viewers + service.past.viewers
+        )
         yield CounterMetricFamily("myview_cuts", "Changes of view.", value=service.board.cuts)
         yield CounterMetricFamily(
             "myview_late_epochs",

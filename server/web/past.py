@@ -132,15 +132,23 @@ async def _stream(
     if not any(it.end > wish.start and (wish.end is None or it.first < wish.end) for it in there):
         kept = ", ".join(f"p{it.first} to p{it.end - 1}" for it in there) or "nothing"
         return problem(416, f"of {what} nothing is kept from p{wish.start} on; there is {kept}")
+    counted = 1
+
+    def joined() -> Channel | None:
+        nonlocal counted
+        past.viewers -= counted
+        counted = 0  # from now on the channel counts
+        return live()
+
     timeline = Timeline(service.agreement, site.fps, service.config.encode.gop)
-    stream = PastStream(source, past.run, timeline, site.fps, live)
+    stream = PastStream(source, past.run, timeline, site.fps, joined)
     past.viewers += 1
     try:
         head = init_segment(parameters, site.width, site.height)
         async with aclosing(stream.send(wish)) as data:
             return await send_bytes(request, data, head, {"Content-Type": "video/mp4"})
     finally:
-        past.viewers -= 1
+        past.viewers -= counted
 
 
 def _past(service: BestViewService, source: Source) -> Past:

@@ -226,6 +226,9 @@ def test_when_the_disk_is_full_what_is_there_plays_and_later_it_goes_on(tmp_path
     assert refused.value.errno == errno.EFBIG
     store.abandon()
     assert store.run.camera_file(A, 0).stat().st_size == size
+    with files_of_at_most(len(filled()[1]) + 300), pytest.raises(OSError, match="large"):
+        store.write(piece(3, {1: A}), head(), filled()[1])
+    store.abandon()
     store.write(piece(4, {1: A}), head(), filled()[1])
     store.close()
     assert [pulse // GOP for pulse, _ in pictures(store.run.objects[1].path)][::GOP] == [0, 1, 4]

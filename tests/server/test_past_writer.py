@@ -89,7 +89,7 @@ def test_a_full_disk_is_told_once_tried_again_and_counted(caplog: pytest.LogCapt
     assert (disk.taken, disk.abandoned) == ([15, -1], 3)
     assert (writer.written, writer.lost, writer.trouble) == (1, 3, "")
     told, goes_on = (it.getMessage() for it in caplog.records)
-    assert told.startswith("recording: cannot write c0/000.mp4: No space left on device; nothing is recorded")
+    assert told.startswith("recording: cannot write: No space left on device; nothing is recorded")
     assert goes_on == "recording: goes on"
 
 

@@ -41,7 +41,8 @@ class CameraFile:
     """One camera's file: the header, then GOPs.
 
     A process that is killed in the middle of a GOP leaves a file that plays: until a GOP is there as a
-    whole, it is a ``free`` box, which players pass over, and eight bytes at once make it what it is.
+    whole, it is a ``free`` box, which players pass over, and eight bytes at once make it what it is. The
+    file itself is there from its first GOP on: a header alone does not play.
 
     Raises:
         OSError: the disk does not take it.
@@ -49,13 +50,14 @@ class CameraFile:
 
     def __init__(self, path: Path, header: bytes) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
-        self._handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
+        self._path, self._draft = path, path.with_suffix(".new")
+        self._handle = os.open(self._draft, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o666)
+        self._is_empty = True
         self.size = 0
         try:
             write_at(self._handle, header, 0)
         except OSError:
             self.close()
-            path.unlink(missing_ok=True)
             raise
         self.size = len(header)
 
@@ -72,13 +74,18 @@ class CameraFile:
         except OSError:
             os.ftruncate(self._handle, self.size)
             raise
+        if self._is_empty:
+            self._draft.rename(self._path)
+            self._is_empty = False
         place = (self.size, len(data))
         self.size += len(data)
         return place
 
     def close(self) -> None:
-        """Close the file."""
+        """Close the file; without a GOP there is none."""
         os.close(self._handle)
+        if self._is_empty:
+            self._draft.unlink(missing_ok=True)
 
 
 def write_at(handle: int, data: bytes, offset: int) -> None:

@@ -113,9 +113,14 @@ class Store:
         name = datetime.fromtimestamp(head.began, UTC).strftime("%Y%m%dT%H%M%SZ")
         taken = sorted(it.name for it in self.folder.glob(f"{name}*"))
         folder = self.folder / (f"{name}-{len(taken)}" if taken else name)
+        try:
+            begun = Run.begin(folder, head, header, self._bounds.segment_s)
+        except OSError:
+            shutil.rmtree(folder, ignore_errors=True)
+            raise
         if self.run is not None:
             self.earlier.append(self.run)
-        self.run = Run.begin(folder, head, header, self._bounds.segment_s)
+        self.run = begun
 
     def _is_full(self, segment: Segment, first: int) -> bool:
         run = self.run

@@ -90,9 +90,8 @@ class Writer:
             if not self.trouble:
                 reason = error.strerror or str(error)
                 log.error(  # noqa: TRY400 — says all there is
-                    "recording: cannot write %s: %s; nothing is recorded until it can be written again, "
+                    "recording: cannot write: %s; nothing is recorded until it can be written again, "
                     "which is tried every %.0f s; the streams go on",
-                    error.filename or "on",
                     reason,
                     self._retry_s,
                 )
