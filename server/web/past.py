@@ -17,6 +17,7 @@ from server.view.service import BestViewService
 from server.view.timeline import Timeline
 from server.web.api import answer, not_now, problem
 from server.web.keys import SERVICE
+from server.web.limits import no_place
 from server.web.schema import Past, PastSpan
 from server.web.streams import send_bytes
 
@@ -120,8 +121,9 @@ async def _stream(
     parameters, site = service.agreement.parameters, service.config.site
     if parameters is None:
         return not_now("no camera has delivered a picture yet")
-    if service.splicer.viewers + past.viewers >= service.config.http.viewers_max:
-        return not_now("as many viewers as this server takes (http.viewers_max) are watching")
+    full = no_place(request)
+    if full is not None:
+        return full
     if request.query.get("overlay", "0") != "0":
         return problem(400, "overlay: boxes are not burnt into the past; /api/past tells where they are")
     try:

@@ -19,12 +19,12 @@ from server.view.pictures import (
 from server.view.pictures.multipart import BEGIN, CONTENT_TYPE, PULSE, part
 from server.web.api import not_now, problem
 from server.web.keys import PICTURES, SERVICE
+from server.web.limits import no_place
 from server.web.streams import send_stream, send_viewer
 from server.wire.drawing import Still
 
 routes = web.RouteTableDef()
 
-_NOT_NOW = web.HTTPServiceUnavailable.status_code
 _EXPOSED = {"Access-Control-Expose-Headers": PULSE}
 
 Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
@@ -33,9 +33,9 @@ Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 class _RefusedError(Exception):
     """There is another answer."""
 
-    def __init__(self, status: int, error: str) -> None:
-        super().__init__(error)
-        self.answer = not_now(error) if status == _NOT_NOW else problem(status, error)
+    def __init__(self, answer: web.Response) -> None:
+        super().__init__(answer.text)
+        self.answer = answer
 
 
 def _or_refused(handler: Handler) -> Handler:
@@ -46,11 +46,9 @@ def _or_refused(handler: Handler) -> Handler:
         except _RefusedError as refused:
             return refused.answer
         except FullError:
-            return _RefusedError(
-                503, "as many pictures as this server makes (http.pictures_max) are being made"
-            ).answer
+            return not_now("as many pictures as this server makes (http.pictures_max) are being made")
         except NoPictureError:
-            return _RefusedError(503, "no picture came in time").answer
+            return not_now("no picture came in time")
 
     return run
 
@@ -96,7 +94,7 @@ async def best_with_boxes(request: web.Request) -> web.StreamResponse:
     _newest(request, subject)
     if request.method == "HEAD":
         return _headers_only(headers)
-    _check_viewers(request)
+    _check_place(request, subject)
     with request.app[PICTURES].using(subject) as source:
         film = source.film
         film.wanted += 1
@@ -113,7 +111,7 @@ async def _mjpeg(request: web.Request, subject: Subject) -> web.StreamResponse:
     pulse = _newest(request, subject)
     if request.method == "HEAD":
         return _headers_only(headers)
-    _check_viewers(request)
+    _check_place(request, subject)
     with request.app[PICTURES].using(subject) as source:
         first = await source.still(_kind(request), pulse)
         viewer = source.series.join(series)
@@ -143,14 +141,16 @@ def _person(request: web.Request) -> Subject:
     service, number = request.app[SERVICE], int(request.match_info["object"])
     known = service.board.resolve(number)
     if known not in service.splicer.objects:
-        raise _RefusedError(404, f"there is no object {number}")
+        raise _RefusedError(problem(404, f"there is no object {number}"))
     return PersonView(known)
 
 
 def _camera(request: web.Request) -> Subject:
     service, camera = request.app[SERVICE], request.match_info["camera"]
     if camera not in service.shelves:
-        raise _RefusedError(404, f"there is no camera {camera!r}; there are {', '.join(service.shelves)}")
+        raise _RefusedError(
+            problem(404, f"there is no camera {camera!r}; there are {', '.join(service.shelves)}")
+        )
     return CameraView(camera, decided=wants_boxes(request))
 
 
@@ -160,7 +160,7 @@ def _newest(request: web.Request, subject: Subject) -> int:
     except KeyError:
         pulse = None
     if pulse is None:
-        raise _RefusedError(503, f"there is no picture of {subject} now")
+        raise _RefusedError(not_now(f"there is no picture of {subject} now"))
     return pulse
 
 
@@ -178,11 +178,12 @@ def _rate(request: web.Request) -> float:
     except ValueError:
         rate = math.nan
     if not 0 < rate < math.inf:
-        raise _RefusedError(400, f"fps={asked}: must be a number above 0, such as fps=5")
+        raise _RefusedError(problem(400, f"fps={asked}: must be a number above 0, such as fps=5"))
     return min(rate, most)
 
 
-def _check_viewers(request: web.Request) -> None:
-    service = request.app[SERVICE]
-    if service.splicer.viewers + request.app[PICTURES].viewers >= service.config.http.viewers_max:
-        raise _RefusedError(503, "as many viewers as this server takes (http.viewers_max) are watching")
+def _check_place(request: web.Request, subject: Subject) -> None:
+    source = request.app[PICTURES].sources.get(subject)
+    full = no_place(request, 0 if source is None else source.viewers)
+    if full is not None:
+        raise _RefusedError(full)

@@ -11,6 +11,7 @@ from server.view.fmp4 import init_segment
 from server.view.footage import Footage
 from server.web.api import not_now, problem
 from server.web.keys import SERVICE
+from server.web.limits import no_place
 from server.web.past import asks_for_the_past, best_of_the_past, camera_of_the_past
 from server.web.pictures import best_with_boxes, wants_boxes
 from server.web.streams import send_stream
@@ -73,7 +74,7 @@ async def _mp4(request: web.Request, channel: Channel) -> web.StreamResponse:
     parameters, site = service.agreement.parameters, service.config.site
     if parameters is None:
         return not_now("no camera has delivered a picture yet")
-    full = _full(request, channel)
+    full = no_place(request, channel.viewers)
     if full is not None:
         return full
     head = init_segment(parameters, site.width, site.height)
@@ -81,7 +82,7 @@ async def _mp4(request: web.Request, channel: Channel) -> web.StreamResponse:
 
 
 async def _ts(request: web.Request, channel: Channel) -> web.StreamResponse:
-    full = _full(request, channel)
+    full = no_place(request, channel.viewers)
     if full is not None:
         return full
     return await send_stream(request, channel, b"", {"Content-Type": "video/mp2t"}, _as_ts)
@@ -89,13 +90,3 @@ async def _ts(request: web.Request, channel: Channel) -> web.StreamResponse:
 
 def _as_ts(piece: Piece) -> bytes:
     return piece.ts if isinstance(piece, Footage) else piece.data
-
-
-def _full(request: web.Request, channel: Channel) -> web.Response | None:
-    service = request.app[SERVICE]
-    limits = service.config.http
-    if service.splicer.viewers >= limits.viewers_max:
-        return not_now("as many viewers as this server takes (http.viewers_max) are watching")
-    if channel.viewers >= limits.viewers_per_object:
-        return not_now("as many viewers as one stream takes (http.viewers_per_object) are watching")
-    return None

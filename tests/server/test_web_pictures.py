@@ -248,6 +248,22 @@ async def test_no_more_pictures_are_made_than_the_server_may() -> None:
             assert other.status == 200, "one that nobody watches any more makes place"
 
 
+async def test_pictures_count_among_all_that_is_watched() -> None:
+    async for drawn in drawn_room(http={"viewers_max": 2, "viewers_per_object": 1}):
+        async with drawn.session.get("/cameras/c0/live.mjpeg") as answer:  # and the process that draws it
+            await anext(parts(answer))
+            for path in ("/cameras/c1/live.mp4", "/cameras/c1/live.mjpeg"):
+                code, content = await drawn.get(path)
+                assert code == 503
+                assert "viewers_max" in content["error"]
+    async for drawn in drawn_room(http={"viewers_per_object": 1}):
+        async with drawn.session.get("/cameras/c0/live.mjpeg") as answer:
+            await anext(parts(answer))
+            code, content = await drawn.get("/cameras/c0/live.mjpeg")
+            assert code == 503
+            assert "viewers_per_object" in content["error"]
+
+
 async def test_who_cannot_be_shown_now_is_503(hall: Hall) -> None:
     code, content = await hall.get("/cameras/c0/live.jpg")
     assert (code, content) == (503, {"error": "there is no picture of camera c0 now"})
