@@ -56,9 +56,9 @@ def with_missed(views: SeenViews, last: LastSeen, lasts: float) -> SeenViews:
     found = np.zeros((frames, cameras * people), dtype=np.bool_)
     found[views.frame, cell] = True
     at_start = np.flatnonzero((last.ago.reshape(-1) < lasts) & ~found[0])
-    ends, of = np.nonzero(found[:-1] & ~found[1:])
-    row = np.empty(found.shape, dtype=np.int64)
-    row[views.frame, cell] = np.arange(len(cell))
+    ends, of = np.divmod(np.flatnonzero(found[:-1] & ~found[1:]), cameras * people)
+    row = np.empty(found.shape, dtype=np.int32)
+    row[views.frame, cell] = np.arange(len(cell), dtype=np.int32)
     cells = np.concatenate([at_start, of])
     seen = np.concatenate([-last.ago.reshape(-1)[at_start], ends])
     worth = np.concatenate([last.worth.reshape(-1)[at_start], views.worth[row[ends, of]]])

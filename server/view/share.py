@@ -18,6 +18,8 @@ def served(numbers: Iterable[int], merged: Mapping[int, int], share: Share) -> l
     It does for its own numbers, and for whoever turned out to be one of its own: who watches an old number
     stays there.
     """
+    if share.of == 1:
+        return list(numbers)
     known_as = {new for old, new in merged.items() if index_of(old, share) == share.index}
     return [number for number in numbers if index_of(number, share) == share.index or number in known_as]
 
