@@ -95,10 +95,13 @@ class Reel:
             self._lead = footage
         if self._lead is None:
             return
-        if footage.first != self.until:
-            self._segments.clear()  # the pulses began anew
-        self.until = footage.until
         number = footage.first // self.plan.frames
+        long = footage.until > (number + 1) * self.plan.frames
+        if footage.first != self.until or long:
+            self._segments.clear()  # began anew, or nothing came for long: no number is left out
+        self.until = footage.until
+        if long:
+            return
         if number not in self._segments:
             self._segments[number] = Segment(number, self.plan, self._lead)
         self._segments[number].add(footage)

@@ -175,3 +175,15 @@ def test_the_end_of_somebody_forgotten_can_be_fetched_for_a_while() -> None:
     for gop in range(5, 200):
         site.splicer.decision(GopDecision(gop * GOP, GOP, (), {}, {}, (), NO_REASON))
     assert site.splicer.reel(1) is None
+
+
+@pytest.mark.parametrize("absent", [1, 4, 20, 100_000])
+def test_numbers_follow_each_other_whatever_was_not_decided(absent: int) -> None:
+    site = Site()
+    for gop in [*range(7), *range(7 + absent, 9 + absent)]:
+        site.show(gop, CAMERAS[0])
+    for gop in range(9 + absent, 20 + absent):
+        site.show(gop, CAMERAS[0])
+        numbers = [it.number for it in site.reel.listed]
+        assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
+        assert all(it.seconds <= site.splicer.plan.frames / FPS for it in site.reel.listed)
