@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+import subprocess
+import sys
 from functools import cache
 
 import av
@@ -157,3 +159,12 @@ def test_the_process_answers_until_its_input_ends() -> None:
         assert len(found) == (1 if cut else 2)
         assert len(found[0].film) == GOP
     serve(io.BytesIO(b""), io.BytesIO())
+
+
+def test_the_process_itself_ends_when_nobody_is_left_to_ask() -> None:
+    process = subprocess.Popen(
+        [sys.executable, "-m", "server.draw"], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    )
+    out, _ = process.communicate(framed(CANVAS) + framed(Draw(fragments=fragments(0, 1))), timeout=20)
+    assert msgspec.msgpack.decode(out[4:], type=Drawn).newest == 0
+    assert process.returncode == 0

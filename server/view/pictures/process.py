@@ -6,7 +6,7 @@ import asyncio
 import contextlib
 import os
 import sys
-from typing import Self
+from typing import NoReturn, Self
 
 import msgspec
 
@@ -79,6 +79,15 @@ class DrawProcess:
                 raise ProcessDiedError("died") from error
             except msgspec.DecodeError as error:
                 raise ProcessDiedError(f"gave no sense: {error}") from error
+
+    async def watch(self) -> NoReturn:
+        """Wait until it dies by itself, which may be long before it is asked again.
+
+        Raises:
+            ProcessDiedError: it has died.
+        """
+        await self._process.wait()
+        raise ProcessDiedError("died")
 
     async def end(self) -> None:
         """End it: it has nothing to save."""

@@ -142,7 +142,8 @@ class Source:
         self.newest, self._answered = -1, False
         process = await DrawProcess.start(self._canvas)
         self.pid = process.pid
-        tasks = [asyncio.create_task(work(process)) for work in (self._feed, self._give_stills)]
+        works = (self._feed(process), self._give_stills(process), process.watch())
+        tasks = [asyncio.create_task(work) for work in works]
         try:
             finished, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
             for task in finished:
