@@ -43,3 +43,13 @@ def pictures(path: Path) -> dict[int, NDArray[np.uint8]]:
         return {
             round(frame.time * FPS): frame.to_ndarray(format="yuv420p") for frame in container.decode(video=0)
         }
+
+
+def shown_from_to(path: Path) -> list[tuple[float, float]]:
+    """Give when each picture of a stream begins and ends, in pulses."""
+    data = path.read_bytes()
+    with av.open(io.BytesIO(data[: data.rfind(b"moof") - 4])) as container:
+        found = [
+            (packet.pts, packet.duration) for packet in container.demux(video=0) if packet.pts is not None
+        ]
+    return [(pts * FPS / 90_000, (pts + (duration or 0)) * FPS / 90_000) for pts, duration in found]

@@ -19,7 +19,7 @@ import pytest
 import pytest_asyncio
 import zenoh
 from running_site import CAMERAS, RunningSite, bounded, configuration, running
-from spliced import pictures, record
+from spliced import pictures, record, shown_from_to
 
 pytestmark = [pytest.mark.asyncio(loop_scope="module"), pytest.mark.timeout(300)]
 
@@ -160,6 +160,29 @@ async def test_a_killed_camera_is_replaced_within_a_second_and_comes_back(
     pulses = sorted(pictures(tmp_path / "viewer"))
     gaps = [(a, b) for a, b in pairwise(pulses) if b != a + 1]
     assert not gaps, f"the viewer's stream has holes: {gaps}"
+
+
+async def test_when_all_cameras_die_streams_stand_still_and_go_on(site: RunningSite, tmp_path: Path) -> None:
+    await site.until(lambda: any(site.gops[-1].choices.values()), "somebody is shown")
+    number = next(number for number, camera in site.gops[-1].choices.items() if camera)
+    ways, end = (f"objects/{number}/best.mp4", "cameras/c0/live.mp4"), site.pulse + 250
+    async with aiohttp.ClientSession() as session:
+        viewers = [
+            asyncio.create_task(record(session, site.url + way, end, tmp_path / way.partition("/")[0]))
+            for way in ways
+        ]
+        await asyncio.sleep(0.5)
+        for camera in CAMERAS:
+            os.kill(site.children()[camera], signal.SIGKILL)
+        await site.until(lambda: {site.state(camera) for camera in CAMERAS} == {"gone"}, "the loss is seen")
+        await site.until(lambda: site.gops[-1].choices.get(number) is None, "nobody can be shown")
+        files = [await bounded(viewer) for viewer in viewers]
+        await site.until(lambda: {site.state(camera) for camera in CAMERAS} == {"live"}, "all are back")
+    for file in files:
+        moments = shown_from_to(file)
+        assert len(moments) > 50
+        holes = [(a, b) for a, b in pairwise(moments) if round(b[0] - a[1])]
+        assert not holes, f"{file.name}: {holes}"
 
 
 async def test_it_answers_where_machines_ask(site: RunningSite) -> None:
