@@ -143,7 +143,7 @@ async def _stream(
         return live()
 
     timeline = Timeline(service.agreement, site.fps, service.config.encode.gop)
-    stream = PastStream(source, past.run, timeline, site.fps, joined)
+    stream = PastStream(source, timeline, site.fps, joined)
     past.viewers += 1
     try:
         head = init_segment(parameters, site.width, site.height)

@@ -15,16 +15,16 @@ from cameras_by_hand import CAMERAS, GOP, LARGE, SMALL, Box
 from halls import Hall, opened
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from recorded_by_hand import AMPLE, FPS, A, B, Picture, filled, own_pictures, piece, written
+from recorded_by_hand import AMPLE, FPS, PULSE0, A, B, Picture, filled, own_pictures, piece, written
 
 from server.view.agreement import Agreement
 from server.view.past import stream as past_stream
 from server.view.past.media import fragments, pulse_of
 from server.view.past.moment import MomentError, pulse_at
-from server.view.past.play import known
+from server.view.past.play import Recorded, known
 from server.view.past.store import Store
 from server.view.past.stream import PastStream, Wish
-from server.view.past.stretch import Span, Tape
+from server.view.past.stretch import Span
 from server.view.timeline import Timeline
 
 MOMENT = "say seconds back (-60), a pulse (p1250) or a time (2026-11-21T16:13:36Z)"
@@ -216,8 +216,8 @@ async def test_who_watches_the_past_takes_a_viewers_place_and_gives_it_back(reco
 class OnDisk:
     """A source with nothing in memory."""
 
-    def __init__(self, *tapes: Tape, end: int) -> None:
-        self.tapes, self.end = tapes, end
+    def __init__(self, *recorded: Recorded, end: int) -> None:
+        self.recorded, self.end = recorded, end
 
     def recall(self, pulse: int) -> None:
         del pulse
@@ -242,10 +242,10 @@ async def test_any_part_of_any_past_is_played_without_a_hole(
     pieces = [piece(gop, {} if camera is None else {1: camera}) for gop, camera in enumerate(shown)]
     store = written(Store(folder, AMPLE), pieces)
     assert store.run is not None
-    tapes = [store.run.objects[1].tape] if 1 in store.run.objects else []
+    tapes = [Recorded(store.run, store.run.objects[1].tape)] if 1 in store.run.objects else []
     source = OnDisk(*tapes, end=len(shown) * GOP)
     agreement, header = site_of(store)
-    stream = PastStream(source, store.run, Timeline(agreement, FPS, GOP), FPS, lambda: None)
+    stream = PastStream(source, Timeline(agreement, FPS, GOP), FPS, lambda: None)
     data = b"".join([data async for data in stream.send(Wish(start, start + frames))])
     store.close()
     kept = [gop for gop, camera in enumerate(shown) if camera is not None]
@@ -267,9 +267,9 @@ async def test_what_retention_takes_away_meanwhile_is_left_out(tmp_path: Path) -
     store = written(Store(tmp_path, AMPLE), [piece(gop, {1: A}) for gop in range(12)])
     assert store.run is not None
     store.run.camera_file(A, 25).unlink()
-    source = OnDisk(store.run.objects[1].tape, end=60)
+    source = OnDisk(Recorded(store.run, store.run.objects[1].tape), end=60)
     agreement, header = site_of(store)
-    stream = PastStream(source, store.run, Timeline(agreement, FPS, GOP), FPS, lambda: None)
+    stream = PastStream(source, Timeline(agreement, FPS, GOP), FPS, lambda: None)
     data = b"".join([data async for data in stream.send(Wish(0, 60))])
     assert [pulse for pulse, _ in decoded(header + data)] == list(range(60)), "bridged, as live"
     assert known(source) == [Span(0, 60)]
@@ -288,13 +288,36 @@ async def test_a_few_seconds_come_at_once_and_the_rest_in_real_time(
     monkeypatch.setattr(loop, "time", lambda: now[0])
     monkeypatch.setattr(past_stream.asyncio, "sleep", slept)
     agreement, _ = site_of(store)
-    source = OnDisk(store.run.objects[1].tape, end=200)
-    stream = PastStream(source, store.run, Timeline(agreement, FPS, GOP), FPS, lambda: None)
+    source = OnDisk(Recorded(store.run, store.run.objects[1].tape), end=200)
+    stream = PastStream(source, Timeline(agreement, FPS, GOP), FPS, lambda: None)
     arrived = [now[0] - 100.0 async for _ in stream.send(Wish(0))]
     lead = 4.0
     for gop, at in enumerate(arrived):
         assert at == pytest.approx(max(0.0, gop * GOP / FPS - lead))
     store.close()
+
+
+async def test_a_cameras_past_goes_back_beyond_a_restart_of_the_service(tmp_path: Path) -> None:
+    written(Store(tmp_path / "kept", AMPLE), [piece(gop, {1: A}) for gop in range(4)]).close()
+    async for hall in opened(record={"folder": str(tmp_path / "kept"), "segment_s": 0.4}):
+        hall.service.pulse0 = PULSE0 + 0.01
+        hall.service.past.open()
+        hall.service.come(*CAMERAS)
+        for epoch in range(5, 8):
+            hall.service.feed(epoch, IN_A)
+        await until_written(hall, 1)
+        shown = await read(hall, "/cameras/c0/live.mp4?from=p7&to=p35")
+        assert [pulse for pulse, _ in shown] == list(range(GOP, 35))
+        for pulse, picture in shown:
+            if not 4 * GOP <= pulse < 5 * GOP:  # while the service was away the last picture is repeated
+                np.testing.assert_array_equal(picture, own_pictures(A)[pulse])
+        assert (await hall.get_json("/api/cameras/c0/past"))["spans"][0]["frames"] == 4 * GOP
+        assert (await hall.get_json("/api/objects/1/past"))["spans"][0]["first"] == 5 * GOP, (
+            "another person 1"
+        )
+    other = Store(tmp_path / "kept", AMPLE)
+    other.open()
+    assert len(other.earlier) == 2
 
 
 @pytest.mark.parametrize(

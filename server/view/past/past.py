@@ -6,13 +6,13 @@ import logging
 import time
 from collections import deque
 from collections.abc import Mapping
+from weakref import WeakKeyDictionary
 
 from server.view.agreement import Agreement
 from server.view.fmp4 import init_segment
 from server.view.past.recent import Recent
 from server.view.past.run import Run, RunHead
 from server.view.past.store import Bounds, Piece, Store
-from server.view.past.stretch import Tape
 from server.view.past.writer import Writer
 from server.view.shelf import Shelf
 from server.wire.config import Config
@@ -20,6 +20,9 @@ from server.wire.errors import UserError
 from server.wire.messages import GopChoices
 
 log = logging.getLogger(__name__)
+
+_SAME_S = 0.5
+"""Pulses whose numbers mean the same time but for so much are the same: the pulse server may be another."""
 
 
 class Past:
@@ -34,6 +37,8 @@ class Past:
         self._held: deque[GopChoices] = deque()
         """Decided, but not all cameras' pictures have come."""
         self._patience = frames // 2
+        self._fitting: WeakKeyDictionary[Run, bool] = WeakKeyDictionary()
+        """Of earlier runs: whether they can be played as this one's past."""
         self.viewers = 0
         """How many are watching the past."""
         record = config.record
@@ -102,14 +107,22 @@ class Past:
         """What this service has recorded; None: nothing."""
         return None if self.store is None else self.store.run
 
-    def tape(self, number: int) -> Tape | None:
-        """Give what is recorded of somebody; None: nothing."""
-        playlist = self.run.objects.get(number) if self.run is not None else None
-        return None if playlist is None else playlist.tape
+    @property
+    def runs(self) -> list[Run]:
+        """What this service and those before it have recorded by the same pulses and parameters."""
+        if self.store is None:
+            return []
+        current = [] if self.store.run is None else [self.store.run]
+        return [*(run for run in tuple(self.store.earlier) if self._fits(run)), *current]
 
-    def camera_tape(self, camera: str) -> Tape | None:
-        """Give what is recorded of a camera; None: nothing."""
-        return None if self.run is None else self.run.cameras[camera].tape
+    def _fits(self, run: Run) -> bool:
+        if run not in self._fitting:
+            site, parameters, pulse0 = self._config.site, self._agreement.parameters, self.pulse0
+            if parameters is None or pulse0 is None or run.head.pulse0 is None:
+                return False
+            same = run.head.fps == site.fps and abs(run.head.pulse0 - pulse0) < _SAME_S
+            self._fitting[run] = same and run.header == init_segment(parameters, site.width, site.height)
+        return self._fitting[run]
 
     def _write(self, piece: Piece) -> None:
         """Write a piece, in the writer's thread."""

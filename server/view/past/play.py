@@ -18,12 +18,20 @@ _AT_ONCE = 8
 """GOPs read from the disk in one go."""
 
 
+@dataclass(frozen=True, slots=True)
+class Recorded:
+    """What a run has recorded of a stream."""
+
+    run: Run
+    tape: Tape
+
+
 class Source(Protocol):
     """One stream's past."""
 
     @property
-    def tapes(self) -> Sequence[Tape]:
-        """What is recorded of it."""
+    def recorded(self) -> Sequence[Recorded]:
+        """What there is of it on the disk."""
 
     def recall(self, pulse: int) -> Gop | None:
         """Give the GOP in memory that holds a pulse, or the next one; None where nothing follows."""
@@ -41,9 +49,13 @@ class ObjectPast:
     numbers: tuple[int, ...]
 
     @property
-    def tapes(self) -> Sequence[Tape]:
-        """What is recorded of them."""
-        return [tape for number in self.numbers if (tape := self.past.tape(number)) is not None]
+    def recorded(self) -> Sequence[Recorded]:
+        """What there is of them on the disk: of this run, because another's numbers are other people's."""
+        run = self.past.run
+        if run is None:
+            return []
+        playlists = [run.objects.get(number) for number in self.numbers]
+        return [Recorded(run, it.tape) for it in playlists if it is not None]
 
     def recall(self, pulse: int) -> Gop | None:
         """Give their GOP in memory that holds a pulse, or the next one."""
@@ -64,10 +76,10 @@ class CameraPast:
     camera: str
 
     @property
-    def tapes(self) -> Sequence[Tape]:
-        """What is recorded of it."""
-        tape = self.past.camera_tape(self.camera)
-        return [] if tape is None else [tape]
+    def recorded(self) -> Sequence[Recorded]:
+        """What there is of it on the disk, also of earlier runs by the same pulses."""
+        runs = [run for run in self.past.runs if self.camera in run.cameras]
+        return [Recorded(run, run.cameras[self.camera].tape) for run in runs]
 
     def recall(self, pulse: int) -> Gop | None:
         """Give its GOP in memory that holds a pulse, or the next one, as far as it has come."""
@@ -81,7 +93,7 @@ class CameraPast:
 
 def known(source: Source) -> list[Span]:
     """Say what there is, on the disk and in memory."""
-    found: list[Stretch | Span] = [it for tape in source.tapes for it in tape.all]
+    found: list[Stretch | Span] = [it for one in source.recorded for it in one.tape.all]
     gop = source.recall(0)
     while gop is not None:
         found.append(Span(gop.first, gop.end))
@@ -89,7 +101,7 @@ def known(source: Source) -> list[Span]:
     return spans(found)
 
 
-async def play(source: Source, run: Run | None, start: int) -> AsyncGenerator[Gop, None]:
+async def play(source: Source, start: int) -> AsyncGenerator[Gop, None]:
     """Give the GOPs from the one that holds pulse ``start`` to the newest; nothing is given twice.
 
     Between its last GOP and its end nothing is awaited: whoever joins the stream at once misses nothing.
@@ -97,12 +109,13 @@ async def play(source: Source, run: Run | None, start: int) -> AsyncGenerator[Go
     at = start
     fresh = True
     while True:
-        stretch = _next_on_disk(source, at)
+        on_disk = _next_on_disk(source, at)
         gop = source.recall(at)
-        if gop is not None and (stretch is None or gop.first <= max(at, stretch.first)):
+        if gop is not None and (on_disk is None or gop.first <= max(at, on_disk[1].first)):
             yield gop if fresh else _from(gop, at)
             at, fresh = gop.end, False
-        elif stretch is not None and run is not None:
+        elif on_disk is not None:
+            run, stretch = on_disk
             async with contextlib.aclosing(_read(run, stretch, at)) as reading:
                 async for gop in reading:
                     yield gop
@@ -112,9 +125,9 @@ async def play(source: Source, run: Run | None, start: int) -> AsyncGenerator[Go
             return
 
 
-def _next_on_disk(source: Source, pulse: int) -> Stretch | None:
-    found = [it for tape in source.tapes if (it := tape.at_or_after(pulse)) is not None]
-    return min(found, key=lambda it: max(it.first, pulse), default=None)
+def _next_on_disk(source: Source, pulse: int) -> tuple[Run, Stretch] | None:
+    found = [(one.run, it) for one in source.recorded if (it := one.tape.at_or_after(pulse)) is not None]
+    return min(found, key=lambda it: max(it[1].first, pulse), default=None)
 
 
 def _from(gop: Gop, pulse: int) -> Gop:

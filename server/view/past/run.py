@@ -23,6 +23,7 @@ import msgspec
 from server.view.past.playlist import Playlist, file_name
 
 HEAD = "run.json"
+_HEADER = "init.mp4"
 
 
 class RunHead(msgspec.Struct, frozen=True, kw_only=True):
@@ -71,7 +72,7 @@ class Run:
         """
         for part in ("cameras", "objects", "index"):
             (folder / part).mkdir(parents=True, exist_ok=True)
-        (folder / "cameras" / "init.mp4").write_bytes(header)
+        (folder / "cameras" / _HEADER).write_bytes(header)
         (folder / HEAD).write_bytes(msgspec.json.format(msgspec.json.encode(head)) + b"\n")
         return cls(folder, head, longest_s)
 
@@ -97,7 +98,7 @@ class Run:
         return run
 
     @property
-    def bytes(self) -> int:
+    def size(self) -> int:
         """Bytes on the disk."""
         playlists = [*self.cameras.values(), *self.objects.values()]
         return sum(it.bytes for it in self.segments) + sum(it.bytes for it in playlists)
@@ -115,6 +116,14 @@ class Run:
     def index_file(self, first: int) -> Path:
         """Say where the choices from a pulse on are."""
         return (self.folder / "index" / file_name(first)).with_suffix(".jsonl")
+
+    @property
+    def header(self) -> bytes:
+        """What all its files begin with; empty where that cannot be read."""
+        try:
+            return (self.folder / "cameras" / _HEADER).read_bytes()
+        except OSError:
+            return b""
 
     def index_of(self, start: int, end: int) -> list[Path]:
         """List the indexes in which something may stand about pulses ``start … end - 1``, in order."""

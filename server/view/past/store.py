@@ -142,7 +142,7 @@ class Store:
         runs = [*self.earlier, *([self.run] if self.run else [])]
         oldest = self._now() - self._bounds.keep_s
         most = self._bounds.most_mb * _MEGA
-        too_much = sum(run.bytes for run in runs) - (most - most / _SHARE)
+        too_much = sum(run.size for run in runs) - (most - most / _SHARE)
         for run in runs:
             old: list[Segment] = []
             for segment in run.segments:
@@ -155,7 +155,7 @@ class Store:
         for run in [run for run in self.earlier if not run.segments]:
             self.earlier.remove(run)
             shutil.rmtree(run.folder, ignore_errors=True)
-        self._closed_bytes = sum(run.bytes for run in runs)
+        self._closed_bytes = sum(run.size for run in runs)
 
     @property
     def bytes(self) -> int:

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from server.view.channel import Channel
 from server.view.past.media import Gop, fragments, is_key, pulse_of
 from server.view.past.play import Source, play
-from server.view.past.run import Run
 from server.view.picture import Picture
 from server.view.timeline import Timeline
 
@@ -35,17 +34,16 @@ class PastStream:
     def __init__(
         self,
         source: Source,
-        run: Run | None,
         timeline: Timeline,
         fps: float,
         live: Callable[[], Channel | None],
     ) -> None:
-        self._source, self._run, self._timeline, self._fps, self._live = source, run, timeline, fps, live
+        self._source, self._timeline, self._fps, self._live = source, timeline, fps, live
 
     async def send(self, wish: Wish) -> AsyncGenerator[bytes, None]:
         """Give the past in real time after its first seconds; where it has an end, as fast as it is read."""
         at, pace = wish.start, _Pace(_LEAD_S)
-        async with aclosing(play(self._source, self._run, wish.start)) as gops:
+        async with aclosing(play(self._source, wish.start)) as gops:
             async for gop in gops:
                 if wish.end is not None and gop.first >= wish.end:
                     return
