@@ -34,6 +34,7 @@ class Splicer:
         self._gops = 0
         self.objects: dict[int, Channel] = {}
         self.cameras = {camera: stream.channel for camera, stream in self._live.items()}
+        self.decided = {camera: stream.channel for camera, stream in self._decided.items()}
 
     def frame(self, camera: str, frame: Picture) -> None:
         """Pass a camera's frame on to those who watch that camera."""

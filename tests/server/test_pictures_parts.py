@@ -14,13 +14,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from test_draw import CANVAS, fragments, shown
 
-from server.view.agreement import Agreement
 from server.view.channel import Viewer
 from server.view.pictures.decided import NOTHING, Decided
 from server.view.pictures.film import Film
 from server.view.pictures.pace import Pace
 from server.view.pictures.series import AllSeries, Series
-from server.view.shelf import Shelf
 from server.wire.drawing import Drawn, Jpeg, Unit
 from server.wire.messages import GopChoices
 
@@ -122,16 +120,15 @@ def choices(first: int, camera: str = "c0", number: int = 1) -> GopChoices:
 
 
 def decided(resolve: Callable[[int], int] = lambda number: number, gops: int = 3) -> Decided:
-    shelf = Shelf(FPS, 100, Agreement())
-    for unit in encoded(0):
-        shelf.put(unit.pulse, 1, unit.data, key=unit.key)
-    return Decided({"c0": shelf}, resolve, FPS, gops)
+    return Decided(resolve, FPS, gops)
 
 
 def test_boxes_are_found_by_the_pulse_of_the_frames() -> None:
     known = decided()
+    assert known.newest is None
     for first in range(0, 5 * GOP, GOP):
         known.put(choices(first))
+    assert known.newest == 5 * GOP - 1
     told = known.of_person(1, fragments(3 * GOP, GOP))
     assert told.first == 3 * GOP
     assert told.chosen == 1
@@ -147,18 +144,3 @@ def test_a_merged_number_has_the_boxes_of_whom_it_is() -> None:
     known.put(choices(GOP, number=1))
     assert known.of_person(5, fragments(0, GOP)).chosen == 5
     assert known.of_person(5, fragments(GOP, GOP)).chosen == 1
-
-
-def test_a_cameras_decided_stream_begins_with_its_newest_gop() -> None:
-    known = decided()
-    assert known.newest("c0") is None
-    known.put(choices(0))
-    known.put(choices(GOP))
-    assert known.newest("c0") == 2 * GOP - 1
-    viewer = known.camera("c0").join()
-    known.put(choices(2 * GOP))
-    known.put(choices(100 * GOP))
-    assert known.newest("c0") is None, "its frames did not come"
-    assert pulses_sent(viewer) == fragments(GOP, 2 * GOP)
-    known.leave("c0")
-    assert viewer._closed

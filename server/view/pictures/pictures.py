@@ -74,9 +74,7 @@ class Pictures:
             crf=config.encode.crf,
             jpeg_quality=config.http.jpeg_quality,
         )
-        self._decided = Decided(
-            service.shelves, service.board.resolve, config.site.fps, self._queue + _BESIDE
-        )
+        self._decided = Decided(service.board.resolve, config.site.fps, self._queue + _BESIDE)
         service.on_decision.append(self._decided.put)
         self._running: dict[Subject, _Running] = {}
         self._tasks: set[asyncio.Task[None]] = set()
@@ -138,7 +136,7 @@ class Pictures:
         if service.intake.states[subject.camera].word not in {"live", "ended"}:
             return None
         if subject.decided:
-            return self._decided.newest(subject.camera)
+            return self._decided.newest
         return service.shelves[subject.camera].newest
 
     async def close(self) -> None:
@@ -147,7 +145,6 @@ class Pictures:
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
-        self._decided.close()
 
     def _start(self, subject: Subject) -> _Running:
         if len(self._running) >= self._most:
@@ -175,7 +172,7 @@ class Pictures:
             case PersonView(number):
                 stream, told = splicer.objects[number], partial(decided.of_person, number)
             case CameraView(camera, decided=True):
-                stream, told = decided.camera(camera), partial(decided.of_camera, camera)
+                stream, told = splicer.decided[camera], partial(decided.of_camera, camera)
             case CameraView(camera):
                 stream, told = splicer.cameras[camera], _nothing
         live = isinstance(subject, CameraView) and not subject.decided
@@ -197,8 +194,6 @@ class Pictures:
         del self._running[subject]
         self._restarts += running.source.restarts
         self._lost += running.source.lost
-        if isinstance(subject, CameraView) and subject.decided:
-            self._decided.leave(subject.camera)
 
 
 def _nothing(fragments: bytes) -> Told:
