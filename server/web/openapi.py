@@ -51,11 +51,15 @@ _UNAVAILABLE = {"/objects/{object}/best.mp4", "/cameras/{camera}/live.mp4", "/re
 _OVERLAY = {"/objects/{object}/best.mp4"} | {
     path for path in _OTHER if path.endswith((".ts", ".m3u8", ".mjpeg", "best.jpg", "live.jpg"))
 }
+_PAST = {"/objects/{object}/best.mp4", "/cameras/{camera}/live.mp4", "/api/past"}
+_MOMENT = {"type": "string", "examples": ["-60", "p1250", "2026-11-21T16:13:36Z"]}
 _SCHEMAS: dict[str, Any] = {
     "object": {"type": "integer", "minimum": 0},
     "camera": {"type": "string"},
     "segment": {"type": "integer", "minimum": 0},
     "overlay": {"enum": [0, 1], "default": 0, "description": "1: boxes are burnt in."},
+    "from": {**_MOMENT, "description": "Begins there: seconds back, a pulse, or a time."},
+    "to": {**_MOMENT, "description": "Ends there, likewise."},
     "fps": {"type": "number", "exclusiveMinimum": 0, "description": "Pictures a second; the site's at most."},
 }
 
@@ -90,11 +94,19 @@ def _operation(path: str, summary: str) -> dict[str, Any]:
     names = re.findall(r"\{(\w+)\}", path)
     if names:
         responses["404"] = {"description": "There is none of this name.", "content": error}
+    if path in _PAST:
+        responses["400"] = {"description": "from or to is no moment.", "content": error}
+    if path in _PAST - {"/api/past"}:
+        responses["416"] = {"description": "Nothing is kept of that time.", "content": error}
     if path in _UNAVAILABLE:
         responses["503"] = {"description": "Not now; try again later."}
     parameters = [{"name": name, "in": "path", "required": True, "schema": _SCHEMAS[name]} for name in names]
     queries = ["overlay"] * (path in _OVERLAY) + ["fps"] * path.endswith(".mjpeg")
-    parameters += [{"name": it, "in": "query", "required": False, "schema": _SCHEMAS[it]} for it in queries]
+    queries += ["from", "to"] * (path in _PAST)
+    parameters += [
+        {"name": it, "in": "query", "required": (path, it) == ("/api/past", "from"), "schema": _SCHEMAS[it]}
+        for it in queries
+    ]
     return {"summary": summary.splitlines()[0], "parameters": parameters, "responses": responses}
 
 

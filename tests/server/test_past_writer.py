@@ -93,6 +93,24 @@ def test_a_full_disk_is_told_once_tried_again_and_counted(caplog: pytest.LogCapt
     assert goes_on == "recording: goes on"
 
 
+def test_a_mistake_does_not_end_the_recording(caplog: pytest.LogCaptureFixture) -> None:
+    class Mistaken(Disk):
+        def write(self, it: Piece) -> None:
+            if not self.taken:
+                self.taken.append(-2)
+                raise ValueError("a mistake")
+            super().write(it)
+
+    disk = Mistaken()
+    writer = writer_on(disk, most=100)
+    for gop in range(3):
+        writer.put(piece(gop, {1: A}))
+    writer.close()
+    assert disk.taken == [-2, 5, 10, -1]
+    assert (writer.written, writer.lost, writer.trouble) == (2, 1, "")
+    assert "a mistake in MyView" in caplog.text
+
+
 def test_a_full_disk_is_left_alone_for_a_while() -> None:
     disk = Disk()
     disk.refuses = True

@@ -106,6 +106,8 @@ async def test_the_description_has_every_route_that_is_not_the_page(busy: Hall) 
         assert item["get"]["summary"], path
         inside = {it["name"] for it in item["get"]["parameters"] if it["in"] == "path"}
         assert inside == set(re.findall(r"\{(\w+)\}", path))
+    asked = {it["name"]: it["required"] for it in described["paths"]["/api/past"]["get"]["parameters"]}
+    assert asked == {"from": True, "to": False}
 
 
 async def test_every_answer_is_as_the_description_says(busy: Hall) -> None:

@@ -160,4 +160,5 @@ class Store:
     @property
     def bytes(self) -> int:
         """Bytes on the disk."""
-        return self._closed_bytes + (self._open.segment.bytes if self._open else 0)
+        growing = self._open  # another thread may ask
+        return self._closed_bytes + (growing.segment.bytes if growing else 0)

@@ -96,17 +96,25 @@ class Writer:
                     self._retry_s,
                 )
                 self.trouble = reason
-            self._lose()
-            try:
-                self._abandon()
-            except OSError as second:
-                log.debug("recording: cannot tidy up: %s", second)
+            self._give_up()
+            return False
+        except Exception:
+            log.exception("recording: a mistake in MyView; it is tried again")
+            self.trouble = "a mistake in MyView"
+            self._give_up()
             return False
         if self.trouble:
             log.info("recording: goes on")
             self.trouble = ""
         self.written += 1
         return True
+
+    def _give_up(self) -> None:
+        self._lose()
+        try:
+            self._abandon()
+        except OSError as error:
+            log.debug("recording: cannot tidy up: %s", error)
 
     def _lose(self) -> None:
         with self._changed:
