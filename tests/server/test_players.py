@@ -15,6 +15,7 @@ from cameras_by_hand import CAMERAS, FPS, HEIGHT, LARGE, SMALL, STRIDE, WIDTH, e
 from halls import A, B, Hall, opened
 from numpy.typing import NDArray
 
+from benchmarks.browser import CHROMIUM, chromium
 from server.wire.epochs import end_of_epoch
 
 EPOCHS = 48
@@ -44,8 +45,8 @@ def feed(hall: Hall, epoch: int) -> None:
 
 @pytest.fixture
 async def live() -> AsyncIterator[Hall]:
-    """A site that runs at five times its rate, and ends."""
-    async for hall in opened(http={"hls_segment_s": 0.4, "viewer_queue_gops": 100}):
+    """A site that runs at five times its rate, too fast for a window of HLS, and ends."""
+    async for hall in opened(http={"hls_segment_s": 0.4, "hls_window_s": 60.0, "viewer_queue_gops": 100}):
         hall.service.come(*CAMERAS)
         for epoch in range(20):
             feed(hall, epoch)
@@ -121,3 +122,35 @@ async def test_mpv_plays_to_the_end_without_a_warning(live: Hall) -> None:
     seen = await played(live, *([*command.split(), url] for url in urls))
     for path, it in zip(PATHS, seen, strict=True):
         assert (it.code, it.output + it.complaints.encode()) == (0, b""), path
+
+
+HLS_BY_ITSELF = """async (url) => {
+  const video = document.createElement('video');
+  if (!video.canPlayType('application/vnd.apple.mpegurl')) return null;
+  const end = new Promise((done) => {
+    video.onended = () => done('ended');
+    video.onerror = () => done(video.error.message);
+  });
+  video.muted = true;
+  video.src = url;  // at its own rate: what is live can be played at no other
+  await video.play();
+  return { end: await end, seconds: video.currentTime };
+}"""
+
+
+@pytest.mark.skipif(not CHROMIUM.exists(), reason=f"needs a Chromium at {CHROMIUM}")
+async def test_chromium_plays_hls_by_itself_up_to_the_end(live: Hall) -> None:
+    async with chromium() as browser:
+        page = await browser.new_page(bypass_csp=True)
+        await page.goto(f"http://127.0.0.1:{live.port}/healthz")
+        playing = asyncio.create_task(page.evaluate(HLS_BY_ITSELF, "/objects/1/hls/index.m3u8"))
+        async with asyncio.timeout(30):
+            for epoch in range(20, EPOCHS):
+                await asyncio.sleep(STRIDE / FPS / 5)
+                feed(live, epoch)
+            live.service.splicer.close()
+            seen = await playing
+    if seen is None:
+        pytest.skip("this Chromium plays no HLS by itself")
+    assert seen["end"] == "ended"
+    assert seen["seconds"] > 2, "players begin some segments before the end"

@@ -131,7 +131,7 @@ def test_people_shown_by_one_camera_share_the_bytes_with_each_other_and_the_came
     assert len(held) == 1
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(st.frozensets(st.integers(1, 15)), st.lists(st.sampled_from(CAMERAS), min_size=16, max_size=16))
 def test_every_segment_decodes_by_itself_and_together_there_is_no_hole(
     silent: frozenset[int], wishes: list[str]

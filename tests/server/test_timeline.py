@@ -73,7 +73,7 @@ async def received(viewer: Viewer) -> list[bytes]:
 pulses = st.frozensets(st.integers(0, FRAMES - 1), max_size=8)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(
     missed=pulses,
     lost=st.tuples(pulses, pulses),
