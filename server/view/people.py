@@ -47,6 +47,8 @@ class People:
         self._reader = Reader(site_size)
         self._numbers: dict[TrackKey, int] = {}
         self._heard: dict[TrackKey, int] = {}
+        self._unnamed: dict[TrackKey, int] = {}
+        """Tracks that are nobody's yet, and since when they have been seen."""
         self.first_seen: dict[int, int] = {}
         self.last_seen: dict[int, int] = {}
         self.away: set[int] = set()
@@ -70,7 +72,7 @@ class People:
         seen = chain.from_iterable(window.seen() for window in windows)
         for key, (first, last) in zip(keys, seen, strict=True):
             self._heard[key] = epoch.last
-            self._note_seen(self._numbers.get(key), first, last)
+            self._note_seen(key, first, last)
         self.away = (self.away | set(update.gone)) - set(update.returned)
         for merge in update.merged:
             self._merge(merge.kept, merge.lost)
@@ -130,9 +132,15 @@ class People:
         for history in self._histories.values():
             history.forget_before(pulse)
 
-    def _note_seen(self, number: int | None, first: int, last: int) -> None:
-        if number is None or last < first:
+    def _note_seen(self, key: TrackKey, first: int, last: int) -> None:
+        if last < first:
             return
+        number = self._numbers.get(key)
+        if number is None:
+            self._unnamed.setdefault(key, first)
+            return
+        # Who is confirmed now was there before: frames that are not decided yet can still show them.
+        first = self._unnamed.pop(key, first)
         self.first_seen[number] = min(first, self.first_seen.get(number, first))
         self.last_seen[number] = max(last, self.last_seen.get(number, last))
 
@@ -150,6 +158,7 @@ class People:
         for key in [key for key, heard in self._heard.items() if heard < now - self._remembered]:
             del self._heard[key]
             self._numbers.pop(key, None)
+            self._unnamed.pop(key, None)
             self._reader.locals.forget(key)
         for number in [number for number, last in self.last_seen.items() if last < now - self._remembered]:
             del self.first_seen[number], self.last_seen[number]

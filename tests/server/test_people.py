@@ -121,6 +121,14 @@ def test_first_and_last_seen_are_the_frames_with_a_box() -> None:
     assert (it.first_seen[number], it.last_seen[number]) == (0, 2 * STRIDE - 1)
 
 
+def test_who_is_confirmed_late_was_there_from_their_first_box_on() -> None:
+    it = dictated(said({}), said({}), said({("c0", 1): 1}), said({}), said({("c0", 1): 2}))
+    for epoch in range(5):
+        it.update(epoch_of(epoch, word("c0", epoch, {1: None if epoch == 0 else SMALL})))
+    assert it.first_seen[1] == STRIDE
+    assert it.first_seen[2] == 3 * STRIDE, "since they left the other person"
+
+
 def test_a_restarted_cameras_people_do_not_inherit_the_boxes_of_others() -> None:
     it = people()
     it.update(epoch_of(0, word("c0", 0, {1: SMALL})))
