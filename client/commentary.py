@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
 from bisect import bisect_right, insort
 from collections.abc import AsyncIterator, Iterator
-from contextlib import asynccontextmanager
 from dataclasses import dataclass
 
 import msgspec
@@ -18,6 +18,7 @@ from client.model import Box, Event, Gop, Site
 
 _log = logging.getLogger(__name__)
 _GOPS = 64  # remembered where nothing is recorded: far more than the picture is behind the events
+_PATIENCE_S = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +47,7 @@ class Commentary:
         self._keep = keep
         self._firsts: list[int] = []
         self._shown: dict[int, _Shown] = {}
+        self._heard = asyncio.Event()
 
     def take(self, event: Event) -> None:
         """Take what an event says about the object."""
@@ -53,6 +55,7 @@ class Commentary:
             self.site = event
         elif isinstance(event, Gop):
             self._take_gop(event)
+        self._heard.set()
 
     def camera_at(self, media_time: float | None) -> str | None:
         """Give the camera shown at ``media_time`` (seconds: pulse / fps); None if it is not known."""
@@ -65,6 +68,16 @@ class Commentary:
         first = self._firsts[place]
         shown = self._shown[first]
         return shown.camera if pulse < first + shown.frames else None
+
+    async def reach(self, media_time: float) -> None:
+        """Wait a moment for what is said about ``media_time``: it comes by a connection of its own."""
+        if self.site is None:
+            return  # there are no events
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(_PATIENCE_S):
+                while self.camera_at(media_time) is None:
+                    self._heard.clear()
+                    await self._heard.wait()
 
     def frames(self, first: int, last: int) -> Iterator[Frame]:
         """Give what is known of the frames from one pulse to another, both included, in order."""
@@ -87,7 +100,7 @@ class Commentary:
             del self._shown[self._firsts.pop(0)]
 
 
-@asynccontextmanager
+@contextlib.asynccontextmanager
 async def following(
     url: str,
     commentary: Commentary,

@@ -96,6 +96,8 @@ async def watch(
             async with following(url, commentary, settings, start, end):
                 session = _Session(record, commentary, progress, start, end)
                 complete = await session.run(server / f"objects/{number}/best.mp4", settings)
+                if out is not None and record.media_time is not None:
+                    await commentary.reach(record.media_time)
         finally:
             _write_beside(out, record, commentary)
     return Watched(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import re
 import shutil
@@ -66,6 +67,24 @@ async def test_the_film_begins_at_0_and_is_the_cameras_own_pictures(hall: Hall, 
         assert film.duration == pytest.approx((28 - FIRST) / FPS * av.time_base)
         film.seek(round(12 / FPS * av.time_base))
         assert round(float(next(film.decode(video=0)).time or 0) * FPS) == 10, "the key picture before"
+
+
+async def test_what_is_live_is_recorded_likewise(tmp_path: Path) -> None:
+    async for hall in opened():
+        hall.service.come(*CAMERAS)
+        for epoch in range(4):
+            hall.service.feed(epoch, {A: {1: LARGE}, B: {1: SMALL}})
+        url = f"http://127.0.0.1:{hall.port}"
+        out = tmp_path / "one.mp4"
+        watching = asyncio.create_task(client.watch(url, 1, out, 3 * GOP / FPS))
+        while not hall.service.splicer.viewers:  # noqa: ASYNC110
+            await asyncio.sleep(0.001)
+        for epoch in range(4, 8):
+            hall.service.feed(epoch, {A: {1: LARGE}, B: {1: SMALL}})
+        done = await watching
+        assert (done.complete, done.fragments) == (True, 3 * GOP)
+        assert [place for place, _ in pictures(out)] == list(range(3 * GOP))
+        assert (tmp_path / "one.vtt").read_text().count("\np") == 3 * GOP
 
 
 @pytest.mark.skipif(not CHROMIUM.exists(), reason=f"needs a Chromium at {CHROMIUM}")
