@@ -50,7 +50,9 @@ def _vtt(frames: Sequence[Frame], first: int, number: int, site: Site) -> str:
     cues = [
         f"p{frame.pulse}\n"
         f"{' --> '.join(_clock((at - first) / site.fps, 3) for at in (frame.pulse, frame.pulse + 1))}\n"
-        + msgspec.json.encode({"camera": frame.camera, "boxes": frame.boxes}).decode()
+        + msgspec.json.encode(
+            {"camera": frame.camera, "boxes": [_rounded(it) for it in frame.boxes]}
+        ).decode()
         for frame in frames
     ]
     note = (
@@ -58,6 +60,11 @@ def _vtt(frames: Sequence[Frame], first: int, number: int, site: Site) -> str:
         f"in pixels of a picture of {site.width}x{site.height}"
     )
     return "\n\n".join(["WEBVTT", note, *cues]) + "\n"
+
+
+def _rounded(box: Box) -> Box:
+    """Give a box to a tenth of a pixel: nobody finds people more exactly."""
+    return Box(box.object, *(round(side, 1) for side in (box.left, box.top, box.right, box.bottom)))
 
 
 def _ass(frames: Sequence[Frame], first: int, number: int, site: Site) -> str:
