@@ -60,8 +60,7 @@ class DecidedStream:
             pictures = [shown for picture in came for shown in self._time.take(picture)]
             self._send(pictures + self._time.fill(gop.until), gop)
             return
-        for picture in whole.pictures:
-            self._time.take(picture)
+        self._time.pass_by(whole.pictures[-1])
         self._publish(whole)
 
     def _fill(self, until: int, gop: Gop) -> None:

@@ -56,6 +56,10 @@ class Timeline:
             return self.fill(picture.until)
         return self._slip_in(picture) + self._show(picture)
 
+    def pass_by(self, last: Picture) -> None:
+        """Note that a whole GOP is shown, of which this is the last picture: nothing in it has to be bridged."""
+        self._show(last)
+
     def fill(self, until: int) -> list[Picture]:
         """Give what repeats the last picture up to a pulse; nothing before the first picture."""
         how, missing = self._how(), until - self._until
