@@ -6,6 +6,7 @@ import hashlib
 import io
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import av
 import numpy as np
@@ -84,7 +85,7 @@ async def judge(frames: int, cuts: int, *, seed: int = 0) -> Right:
     ]
     return Right(
         frames=len(expected),
-        cuts=sum(a != b for a, b in zip(chosen, chosen[1:], strict=False)),
+        cuts=sum(a != b for a, b in pairwise(chosen)),
         mp4=_equal(mp4, "mp4", expected),
         ts=_equal(ts, "mpegts", expected),
         alike=sum(len(set(pulse)) < _CAMERAS for pulse in zip(*own, strict=True)),
@@ -118,7 +119,7 @@ def _own(film: Sequence[AccessUnit]) -> list[bytes]:
 def _equal(data: bytes, form: str, expected: Sequence[bytes]) -> int:
     """Count the frames of a stream that are the expected ones of their own pulses."""
     right = 0
-    with av.open(io.BytesIO(data), format=form) as container:
+    with av.open(io.BytesIO(data), "r", format=form) as container:
         for frame in container.decode(video=0):
             pulse = round(float(frame.time or 0.0) * _SITE.fps)
             right += pulse < len(expected) and _digest(frame) == expected[pulse]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import pytest
 
 from benchmarks.stream_right import Right, judge, schedule
@@ -27,7 +29,7 @@ async def test_another_cameras_gop_is_noticed(monkeypatch: pytest.MonkeyPatch) -
 @pytest.mark.parametrize("cuts", [0, 7, 98])
 def test_cuts_are_as_many_as_asked_for(cuts: int) -> None:
     chosen = schedule(99, cuts, seed=2)
-    assert sum(a != b for a, b in zip(chosen, chosen[1:], strict=False)) == cuts
+    assert sum(a != b for a, b in pairwise(chosen)) == cuts
 
 
 @pytest.mark.slow
