@@ -2,7 +2,7 @@
 
     python -m benchmarks.stream_crowd PORT
 
-Commands are lines of JSON on standard input, each answered by one line. `{"watch": ["/objects/1/best.mp4", …]}`
+Commands are lines of JSON on standard input, each answered by a line. `{"watch": ["/objects/1/best.mp4", …]}`
 lets a viewer watch each, instead of those before; `{"for": 5.0}` reads for so long and tells what came.
 """
 
@@ -55,11 +55,7 @@ class Crowd:
 
     def watch(self, paths: Sequence[str]) -> None:
         """Let one viewer watch each path, instead of those who watched before."""
-        for viewer in self._viewers:
-            with contextlib.suppress(KeyError):
-                self._selector.unregister(viewer)
-            viewer.close()
-        self._viewers, self._gone = [], 0
+        self.leave()
         for place, path in enumerate(paths):
             viewer = socket.create_connection(("127.0.0.1", self._port))
             viewer.sendall(f"GET {path} HTTP/1.1\r\nHost: here\r\n\r\n".encode())
@@ -68,6 +64,14 @@ class Crowd:
             self._viewers.append(viewer)
             if place % _TOGETHER == _TOGETHER - 1:
                 self.read(0.02)
+
+    def leave(self) -> None:
+        """Let nobody watch."""
+        for viewer in self._viewers:
+            with contextlib.suppress(KeyError):
+                self._selector.unregister(viewer)
+            viewer.close()
+        self._viewers, self._gone = [], 0
 
     def read(self, seconds: float) -> Heard:
         """Read whatever comes."""

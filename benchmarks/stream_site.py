@@ -133,9 +133,10 @@ def viewers(port: int) -> Iterator[Viewers]:
     try:
         yield Viewers(process)
     finally:
-        assert process.stdin is not None  # noqa: S101 — it was started with pipes
-        process.stdin.close()
         end([process])
+        for end_of_pipe in (process.stdin, process.stdout):
+            assert end_of_pipe is not None  # noqa: S101 — it was started with pipes
+            end_of_pipe.close()
 
 
 def end(processes: Sequence[subprocess.Popen[bytes]]) -> None:

@@ -67,6 +67,11 @@ class Splice:
     spliced: float
     """For an object and a frame."""
 
+    @property
+    def shelved_share(self) -> float:
+        """What shelving all cameras adds to an object's frame."""
+        return CAMERAS * self.shelved / self.objects
+
 
 async def splice(films: Sequence[Sequence[AccessUnit]], objects: int, gops: int) -> Splice:
     """Splice with a viewer for every object, who takes the bytes as they come."""

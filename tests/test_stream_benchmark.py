@@ -1,0 +1,149 @@
+"""The parts of the stream's benchmark: what they count is what was sent."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from socket import create_server
+
+import pytest
+
+from benchmarks.report import Report
+from benchmarks.stream_cameras import draw_room, load, save
+from benchmarks.stream_crowd import Crowd, Heard
+from benchmarks.stream_drift import drift, times
+from benchmarks.stream_load import Step, end_of_first_fragment, first_pictures, send_delays, watch_objects
+from benchmarks.stream_peers import ffmpeg_switching
+from benchmarks.stream_right import Right
+from benchmarks.stream_site import running, viewers
+from benchmarks.stream_splice import encode_again, splice
+from benchmarks.stream_tables import Found, describe, per_core, plot
+from server.camera.encode import AccessUnit
+from server.view.fmp4 import Sample, fragment, ticks
+from server.view.footage import Footage
+from server.view.picture import Picture
+from server.view.ts import Counters
+
+GOP = 10
+Films = Sequence[Sequence[AccessUnit]]
+
+
+@pytest.fixture(scope="module")
+def films() -> Films:
+    return draw_room(2 * GOP)
+
+
+def test_films_are_kept_as_they_are(films: Films, tmp_path: Path) -> None:
+    save([list(film) for film in films], tmp_path / "films")
+    assert load(tmp_path / "films") == films
+
+
+def test_a_splice_is_much_cheaper_than_encoding_and_cheaper_still_for_many(films: Films) -> None:
+    one, many = (asyncio.run(splice(films, objects, 30)) for objects in (1, 50))
+    again = encode_again(films[0], 3)
+    assert 0 < many.spliced < one.spliced < again.whole / 20
+    assert many.shelved_share == pytest.approx(4 * many.shelved / 50)
+    assert many.spliced < again.whole / 300
+
+
+def test_the_delay_is_the_same_to_the_end_and_the_times_are_the_pulses(films: Films) -> None:
+    found = asyncio.run(drift(films, 300))
+    assert found.least == found.most == 24, "look-ahead, less the pulse that begins the GOP"
+    assert found.off == 0
+    assert found.gops == (300 - 24 - 1) // GOP + 1
+    assert len(found.costs) == 10
+
+
+@pytest.mark.parametrize("pulse", [0, 12_345, 2**31])
+def test_the_times_of_a_piece_are_read_from_both_forms(pulse: int) -> None:
+    made = fragment([Sample(b"\x00\x00\x17\x70" + b"\x65" * 6000, key=True)], pulse, 25)
+    at = ticks(pulse, 25)
+    piece = Footage([Picture(pulse, key=True, fragment=made, boot=1)], 25, Counters())
+    assert times(piece) == (at, at % 2**33)
+
+
+def test_the_first_fragment_ends_where_its_pictures_do() -> None:
+    whole = fragment([Sample(b"abc", key=True)], 7, 25)
+    head = b"\x00\x00\x00\x10ftypiso5\x00\x00\x00\x00"
+    assert [end_of_first_fragment((head + whole)[:size]) for size in (0, 20, len(head + whole) - 1)] == [
+        0,
+        0,
+        0,
+    ]
+    assert end_of_first_fragment(head + whole + whole) == len(head + whole)
+
+
+def test_a_send_delay_ends_with_the_last_frame_of_a_gop() -> None:
+    heard = Heard(1.0, 1.0, 0.1, 0, [ticks(19, 25), ticks(14, 25), ticks(39, 25)], [5.25, 5.1, 6.0])
+    assert send_delays(heard, {10: 5.0, 20: 5.4}).tolist() == [250.0]
+
+
+@contextmanager
+def shouting(data: bytes) -> Iterator[int]:
+    """Serve whoever comes with the same bytes, and hang up."""
+    with create_server(("127.0.0.1", 0)) as server:
+
+        def serve() -> None:
+            for _ in range(3):
+                connection, _ = server.accept()
+                with connection:
+                    connection.recv(1000)
+                    connection.sendall(data)
+
+        thread = threading.Thread(target=serve)
+        thread.start()
+        yield server.getsockname()[1]
+        thread.join()
+
+
+def test_a_crowd_hears_all_that_is_sent_and_notices_who_hangs_up() -> None:
+    data = fragment([Sample(b"abc" * 100, key=True)], 9, 25)
+    with shouting(data) as port:
+        crowd, began = Crowd(port), time.monotonic()
+        crowd.watch(["/"] * 3)
+        heard = crowd.read(0.2)
+        crowd.leave()
+    assert heard.megabytes == pytest.approx(3 * len(data) / 1e6)
+    assert heard.gone == 3
+    assert heard.ticks == [ticks(9, 25)] * 3
+    assert all(began < at < began + 5 for at in heard.at)
+
+
+def step(count: int, cores: float, late: float) -> Step:
+    return Step(count, cores, 0.1, 500.0, 1.0, (1.0, 2.0, late), 1.0)
+
+
+def test_viewers_of_a_core_are_on_a_line_beside_what_the_service_uses_anyway() -> None:
+    alone, count = per_core([step(1000, 0.3, 1.0), step(2000, 0.5, 1.0), step(3000, 0.7, 1.0)])
+    assert alone == pytest.approx(0.1)
+    assert count == pytest.approx(4500)
+
+
+def test_the_table_says_how_many_frames_were_wrong_and_who_was_served_in_time(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = Found(steps=[step(500, 0.2, 39.0), step(1000, 0.3, 41.0)], right=Right(100, 5, 100, 98, 0))
+    describe(Report(), found)
+    said = capsys.readouterr().out
+    assert "98 of 100" in said
+    assert any("p99 below" in line and " 500 " in line for line in said.splitlines())
+    plot(found, tmp_path / "plot.png")
+    assert (tmp_path / "plot.png").stat().st_size > 1000
+
+
+@pytest.mark.slow
+def test_a_real_site_is_watched(films: Films, tmp_path: Path) -> None:
+    switched = ffmpeg_switching(films, 100, tmp_path)
+    assert switched is None or switched > 50
+    with running(films, tmp_path / "site") as site, viewers(site.http) as crowd:
+        numbers = site.objects(20)[:20]
+        watched = watch_objects(site, crowd, numbers, 2.0, 1)
+        assert 0 < watched.one < 2
+        assert watched.objects == 20
+        late = first_pictures(site, numbers, 5)
+        assert (late > 0).all()
+        assert (late < 5000).all()
