@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -43,6 +43,8 @@ class Viewer:
         self._begun = bool(backlog)
         self._closed = False
         self._wake = asyncio.Event()
+        self.at_once: Callable[[Piece], bool] | None = None
+        """Takes a piece while nothing waits, or says False; waking a task is most of what a piece costs."""
         self.lost = 0
         """GOPs lost because the viewer fell behind."""
 
@@ -62,6 +64,8 @@ class Viewer:
                 self._begun = piece.start
                 if not self._begun:
                     return
+        if self.at_once is not None and not self._queue and self.at_once(piece):
+            return
         self._queue.append(piece)
         self._wake.set()
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import socket
 from collections.abc import AsyncIterable, Callable, Mapping
+from functools import lru_cache, partial
 
 from aiohttp import web
 
@@ -45,13 +46,42 @@ async def send_viewer(
     request: web.Request, viewer: Viewer, head: bytes, headers: Mapping[str, str], form: Form = plain
 ) -> web.StreamResponse:
     """Send ``head`` and what a viewer is given, from a place that the caller took and will give up."""
-    return await send_bytes(request, (form(piece) async for piece in viewer.pieces()), head, headers)
+
+    def ready(response: web.StreamResponse) -> None:
+        chunked = response.headers.get("Transfer-Encoding") == "chunked"
+        viewer.at_once = partial(_write_at_once, request, form, chunked)
+
+    pieces = (form(piece) async for piece in viewer.pieces())
+    try:
+        return await send_bytes(request, pieces, head, headers, ready)
+    finally:
+        viewer.at_once = None
+
+
+def _write_at_once(request: web.Request, form: Form, chunked: bool, piece: Piece) -> bool:
+    """Write a piece if nothing of the one before waits; what the system does not take follows by itself."""
+    transport = request.transport
+    if transport is None or transport.is_closing() or transport.get_write_buffer_size():
+        return False
+    data = form(piece)
+    transport.write(_chunk(data) if chunked else data)
+    return True
+
+
+@lru_cache(maxsize=8)
+def _chunk(data: bytes) -> bytes:
+    """Give data as a chunk (RFC 9112, 7.1), once for all who are sent them."""
+    return b"%x\r\n%b\r\n" % (len(data), data)
 
 
 async def send_bytes(
-    request: web.Request, data: AsyncIterable[bytes], head: bytes, headers: Mapping[str, str]
+    request: web.Request,
+    data: AsyncIterable[bytes],
+    head: bytes,
+    headers: Mapping[str, str],
+    ready: Callable[[web.StreamResponse], None] = lambda _: None,
 ) -> web.StreamResponse:
-    """Send ``head`` and all of ``data``; of HEAD, neither."""
+    """Send ``head`` and all of ``data``; of HEAD, neither. ``ready`` is called when the head is written."""
     response = web.StreamResponse(headers={**_STREAM_HEADERS, **headers})
     await response.prepare(request)
     if request.method == "HEAD":
@@ -60,6 +90,7 @@ async def send_bytes(
     try:
         if head:
             await response.write(head)
+        ready(response)
         async for some in data:
             await response.write(some)
         await response.write_eof()

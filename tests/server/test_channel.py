@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+from itertools import product
 
-from server.view.channel import Channel, Chunk
+import pytest
+
+from server.view.channel import Channel, Chunk, Piece
 
 
 def gop(number: int) -> Chunk:
@@ -76,3 +79,43 @@ async def test_whoever_joins_after_the_end_gets_what_was_last_and_the_end() -> N
     channel.close()
     async with asyncio.timeout(5):
         assert [data async for data in channel.join()] == [b"1"]
+
+
+@pytest.mark.parametrize("taken", list(product([True, False], repeat=5)))
+async def test_pieces_keep_their_order_whether_they_are_taken_at_once_or_wait(
+    taken: tuple[bool, ...],
+) -> None:
+    channel, sent = Channel(queue_starts=10), list[bytes]()
+    viewer, answers = channel.join(), iter(taken)
+
+    def take_at_once(piece: Piece) -> bool:
+        ready = next(answers)
+        sent.extend([piece.data] * ready)
+        return ready
+
+    async def send() -> None:
+        async for data in viewer:
+            sent.append(data)
+            await asyncio.sleep(0)  # what is put now has to wait, although nothing else does
+
+    viewer.at_once = take_at_once
+    sending = asyncio.create_task(send())
+    await asyncio.sleep(0)
+    for number in range(5):
+        channel.publish(gop(number))
+        if number % 2:
+            await asyncio.sleep(0)
+    channel.close()
+    async with asyncio.timeout(5):
+        await sending
+    assert sent == [b"%d" % number for number in range(5)]
+
+
+async def test_who_refuses_at_once_loses_whole_gops_as_ever() -> None:
+    channel = Channel(queue_starts=3)
+    viewer = channel.join()
+    viewer.at_once = lambda _: False
+    for number in range(10):
+        channel.publish(gop(number))
+    assert viewer.lost > 0
+    assert len(viewer._queue) <= 3

@@ -77,6 +77,29 @@ async def test_an_old_client_gets_a_plain_stream_that_is_not_chunked(busy: Hall)
     await writer.wait_closed()
 
 
+async def test_viewers_old_and_new_are_sent_the_same_bytes_as_each_gop_comes(busy: Hall) -> None:
+    connections = [await asyncio.open_connection("127.0.0.1", busy.port) for _ in range(3)]
+    for (_, writer), version in zip(connections, ["1.0", "1.1", "1.1"], strict=True):
+        writer.write(f"GET /objects/1/best.mp4 HTTP/{version}\r\nHost: hall\r\n\r\n".encode())
+    heads = [await reader.readuntil(b"\r\n\r\n") for reader, _ in connections]
+    assert [b"chunked" in head for head in heads] == [False, True, True]
+    while busy.service.splicer.viewers < 3:  # noqa: ASYNC110 — they join one after the other
+        await asyncio.sleep(0.01)
+    for epoch in range(3, 8):
+        busy.service.feed(epoch, {A: {1: SMALL}, B: {1: LARGE}})
+    busy.service.splicer.close()
+    old = await connections[0][0].read()
+    for reader, _ in connections[1:]:
+        new = b""
+        while size := int(await reader.readline(), 16):
+            new += (await reader.readexactly(size + 2))[:-2]
+        assert new == old
+    assert old.count(b"moof") == 6 * GOP
+    for _, writer in connections:
+        writer.close()
+        await writer.wait_closed()
+
+
 async def test_one_viewer_more_than_the_server_takes_gets_503_and_when_to_try_again() -> None:
     async for hall in opened(http={"viewers_max": 1}):
         hall.service.come(*CAMERAS)
