@@ -16,13 +16,14 @@ from tracking.solvers.base import (
 from tracking.template import Template
 from tracking.template_tracker import TemplateTracker
 from tracking.tracker import OnlineTracker
-from tracking.window import WindowResult, WindowSettings, WindowTrack
+from tracking.window import Glimpse, WindowResult, WindowSettings, WindowTrack
 
 __all__ = [
     "DEFAULT_SOLVER",
     "PAPER_COSTS",
     "CostSettings",
     "Detections",
+    "Glimpse",
     "Network",
     "OnlineTracker",
     "Solution",

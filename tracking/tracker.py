@@ -13,6 +13,7 @@ from tracking.boxes import Floats, iou
 from tracking.bridges import bridged
 from tracking.detections import Detections
 from tracking.duplicates import duplicates
+from tracking.glimpses import with_glimpses
 from tracking.network import CostSettings, build_network
 from tracking.reach import reachable, within_reach
 from tracking.solvers.base import OCCLUDED, Solver, SolveReport, solver_named
@@ -110,17 +111,18 @@ class OnlineTracker:
             states, report = self._assign(first, frames)
         boxes = [boxes_of(row, frames) for row in states]
         gone = self._gone(boxes)
-        tracks = tuple(
-            WindowTrack(
-                item.id, rows, self._bridged(item, first, rows), item.histogram, confidence_of(row, frames)
-            )
-            for item, row, rows in zip(self._objects, states, boxes, strict=True)
+        shown = [
+            n
+            for n, (item, rows) in enumerate(zip(self._objects, boxes, strict=True))
             if item.id not in gone and not np.isnan(rows).all()
-        )
+        ]
+        tracks = [self._track(self._objects[n], first, states[n], boxes[n], frames) for n in shown]
+        final = frames[: max(final_to - first + 1, 0)]
+        looking = with_glimpses(tracks, [states[n] for n in shown], first, final)
         alive = [n for n, item in enumerate(self._objects) if item.id not in gone]
         self._objects = [self._objects[n] for n in alive]
         self._finish(first, final_to, frames, states[alive])
-        return WindowResult(first, end, max(final_to, first - 1), tracks, report)
+        return WindowResult(first, end, max(final_to, first - 1), looking, report)
 
     def _frame(self, number: int) -> Detections:
         return self._seen[number] if number in self._seen else Detections.empty(self._bins())
@@ -202,9 +204,17 @@ class OnlineTracker:
                 gone.add(item.id)
         return gone
 
-    def _bridged(self, item: RememberedObject, first: int, boxes: Floats) -> Floats:
+    def _track(
+        self,
+        item: RememberedObject,
+        first: int,
+        states: npt.NDArray[np.int64],
+        boxes: Floats,
+        frames: Sequence[Detections],
+    ) -> WindowTrack:
         last = (item.frame - first, item.box) if item.frame < first else None
-        return bridged(boxes, last, self._window.bridge)
+        filled = bridged(boxes, last, self._window.bridge)
+        return WindowTrack(item.id, boxes, filled, item.histogram, confidence_of(states, frames))
 
     def _finish(
         self, first: int, final_to: int, frames: Sequence[Detections], states: npt.NDArray[np.int64]

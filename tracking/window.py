@@ -57,6 +57,21 @@ class WindowSettings:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Glimpse:
+    """How an object looks in consecutive frames in which nobody else is in its box.
+
+    Attributes:
+        first: the first of these frames.
+        last: the last one.
+        histogram: `(B,)`, the mean of their histograms.
+    """
+
+    first: int
+    last: int
+    histogram: Floats
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class WindowTrack:
     """One object in one window.
 
@@ -66,6 +81,7 @@ class WindowTrack:
         bridged: `(F, 4)` the same, with the gaps of up to `bridge` frames filled: where it probably is.
         histogram: `(B,)`, its template.
         confidence: mean score of its boxes over the window, 0 where hidden; in [0, 1].
+        looks: where nobody else was in its boxes, in the frames up to `final_to`; in their order.
     """
 
     id: int
@@ -73,6 +89,7 @@ class WindowTrack:
     bridged: Floats
     histogram: Floats
     confidence: float
+    looks: tuple[Glimpse, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -113,6 +130,7 @@ def joined(results: list[WindowResult]) -> WindowResult | None:
             boxes, bridges = (known.boxes, known.bridged) if known else (nowhere, nowhere.copy())
             boxes[window] = track.boxes[: kept - result.first + 1]
             bridges[window] = track.bridged[: kept - result.first + 1]
-            tracks[track.id] = replace(track, boxes=boxes, bridged=bridges)
+            looks = (*known.looks, *track.looks) if known else track.looks
+            tracks[track.id] = replace(track, boxes=boxes, bridged=bridges, looks=looks)
     seen = [tracks[id_] for id_ in sorted(tracks) if not np.isnan(tracks[id_].boxes).all()]
     return replace(newest, first=first, tracks=tuple(seen))

@@ -1,0 +1,48 @@
+"""How objects look is told of the final frames in which nobody else is in their box, run by run."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tracking import Detections, Glimpse, WindowTrack
+from tracking.glimpses import with_glimpses
+
+HERE, THERE, BESIDE = (0.0, 0.0, 10.0, 20.0), (200.0, 0.0, 210.0, 20.0), (3.0, 0.0, 13.0, 20.0)
+
+
+def seen(*boxes: tuple[float, ...]) -> Detections:
+    looks = np.eye(4)[: len(boxes)]
+    return Detections(np.array(boxes), np.ones(len(boxes)), looks)
+
+
+def track(number: int, *boxes: tuple[float, ...] | None) -> WindowTrack:
+    rows = np.array([box or (np.nan,) * 4 for box in boxes])
+    return WindowTrack(number, rows, rows, np.full(4, 0.25), 1.0)
+
+
+def told(looks: tuple[Glimpse, ...]) -> list[tuple[int, int, list[float]]]:
+    return [(it.first, it.last, it.histogram.tolist()) for it in looks]
+
+
+def test_frames_in_a_row_are_one_glimpse_and_a_crowd_or_a_hiding_ends_it() -> None:
+    one = track(1, HERE, HERE, HERE, HERE, HERE, HERE)
+    two = track(2, THERE, THERE, BESIDE, THERE, None, THERE)
+    states = [np.zeros(6, dtype=np.int64), np.array([1, 1, 1, 1, -1, 1])]
+    frames = [seen(HERE, THERE), seen(HERE, THERE), seen(HERE, BESIDE)] + [seen(HERE, THERE)] * 3
+    first, second = with_glimpses([one, two], states, 100, frames)
+    assert told(first.looks) == [(100, 101, [1, 0, 0, 0]), (103, 105, [1, 0, 0, 0])]
+    assert told(second.looks) == [
+        (100, 101, [0, 1, 0, 0]),
+        (103, 103, [0, 1, 0, 0]),
+        (105, 105, [0, 1, 0, 0]),
+    ]
+
+
+def test_only_final_frames_tell_and_whoever_is_hidden_may_be_in_the_box() -> None:
+    one, two = track(1, HERE, HERE, HERE), track(2, BESIDE, THERE, THERE)
+    states = [np.zeros(3, dtype=np.int64), np.full(3, -1)]  # two is not seen, but known to be there
+    frames = [seen(HERE)] * 2
+    first, second = with_glimpses([one, two], states, 7, frames)
+    assert told(first.looks) == [(8, 8, [1, 0, 0, 0])]
+    assert second.looks == ()
+    assert with_glimpses([], [], 7, frames) == ()
