@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.bestview_watch import Messages, Rows
-from bestview import NO_CAMERA, IdentityUpdate, LocalTrack, size_quality
+from bestview import NO_CAMERA, EpisodeKey, IdentityUpdate, LocalTrack, size_quality
 from server.run.evaluate_choices import Choice, read_choices
 from server.view.align import Aligner
 from server.view.decide import Decider, homographies
@@ -45,7 +45,7 @@ class GivenNumbers:
     def update(self, tracks: Sequence[LocalTrack], last_frame: int) -> IdentityUpdate:
         """Give everybody their number."""
         del last_frame
-        numbers = {it.key: self._people[it.key.local - 1] for it in tracks}
+        numbers = {EpisodeKey(*it.key, 0): self._people[it.key.local - 1] for it in tracks}
         return IdentityUpdate(numbers, **_NOTHING_NEW)
 
 
@@ -105,7 +105,6 @@ def _said(
                 Track(
                     id=number + 1,
                     boxes=[boxes.get((person, frame)) for frame in range(first, last + 1)],
-                    histogram=[1.0],
                     confidence=1.0,
                 )
                 for number, person in enumerate(people)

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.stopwatch import Stopwatch
-from bestview import IdentityUpdate, LocalTrack, QualitySettings
+from bestview import EpisodeKey, IdentityUpdate, LocalTrack, QualitySettings
 from server.view import decide
 from server.view.align import Epoch
 from server.view.board import Board
@@ -21,7 +21,7 @@ from server.view.sight import Sight
 from server.wire.config import Config
 from server.wire.epochs import end_of_epoch
 from server.wire.loading import build_config
-from server.wire.messages import CameraTracks, Track
+from server.wire.messages import CameraTracks, Glimpse, Track
 
 _SEED, _WIDTH, _HEIGHT = 5, 1280, 720
 _WARM = 6
@@ -56,8 +56,8 @@ class Crowd:
                 track = Track(
                     id=person,
                     boxes=[(a, b, c, d) for a, b, c, d in boxes],
-                    histogram=[float(person + 1)],
                     confidence=0.7,
+                    looks=[Glimpse(first=first, last=first, histogram=[float(person + 1)])],
                 )
                 for camera in cameras[person]:
                     said[config.camera_ids[camera]].append(track)
@@ -95,7 +95,7 @@ class _Given:
     def update(self, tracks: Sequence[LocalTrack], last_frame: int) -> IdentityUpdate:
         """Give everybody their number."""
         del last_frame
-        numbers = {track.key: int(track.histogram[0]) for track in tracks}
+        numbers = {EpisodeKey(*it.key, 0): int(it.looks[0].histogram[0]) for it in tracks}
         return IdentityUpdate(numbers, born=(), returned=(), gone=(), merged=(), split=())
 
 

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from server.wire.messages import CameraTracks, Track
+from server.wire.messages import CameraTracks, Glimpse, Track
 from tracking.boxes import Floats
 
 WIDTH, HEIGHT = 640, 360
@@ -142,13 +142,14 @@ class Tracker:
         """Report the window that ends with an epoch; `places` are everybody's in its frames."""
         last = (epoch + 1) * STRIDE - 1
         first = last + 1 - places.shape[1]
+        final_to = max(first - 1, last - (WINDOW - STRIDE))
         view = self._hall.view(self._camera, places, epoch * self._hall.cameras + self._camera)
         tracks = [
             Track(
                 id=self._number(person, epoch),
                 boxes=[None if np.isnan(box[0]) else tuple(box) for box in rows],
-                histogram=self._hall.histograms[person].tolist(),
                 confidence=0.8,
+                looks=self._looks(person, first, final_to),
             )
             for person, rows in zip(view.people.tolist(), view.boxes.tolist(), strict=True)
         ]
@@ -159,12 +160,18 @@ class Tracker:
             epoch=epoch,
             first=first,
             last=last,
-            final_to=max(first - 1, last - (WINDOW - STRIDE)),
+            final_to=final_to,
             ended=False,
             shed=[],
             tracks=tracks,
             solve=None,
         )
+
+    def _looks(self, person: int, first: int, final_to: int) -> list[Glimpse]:
+        if final_to < first:
+            return []
+        histogram = self._hall.histograms[person].round(5).tolist()
+        return [Glimpse(first=first, last=final_to, histogram=histogram)]
 
     def _number(self, person: int, epoch: int) -> int:
         if epoch - self._seen.get(person, -_LOST_EPOCHS - 1) > _LOST_EPOCHS:

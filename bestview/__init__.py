@@ -5,15 +5,15 @@ from bestview.choice_missed import LastSeen, with_missed
 from bestview.choice_program import Gops
 from bestview.choice_seen import SeenViews
 from bestview.corrections import Merge, Split
-from bestview.evidence import TrackKey
 from bestview.ground import checked_homography, feet, foot_spread, person_heights, to_ground
 from bestview.identity import IdentityRegistry, IdentityUpdate
 from bestview.identity_settings import IdentitySettings
+from bestview.keys import EpisodeKey, TrackKey
 from bestview.quality import HIDDEN_COST, QualitySettings, size_quality, view_cost
 from bestview.score import ViewScore, cuts_of, score_views
 from bestview.score_objects import NOBODY, stands_for
 from bestview.score_truth import ViewTruth, best_views, true_views
-from bestview.sightings import LocalTrack
+from bestview.sightings import Glimpse, LocalTrack
 
 __all__ = [
     "HIDDEN_COST",
@@ -21,6 +21,8 @@ __all__ = [
     "NO_CAMERA",
     "NO_VIEW_COST",
     "Choices",
+    "EpisodeKey",
+    "Glimpse",
     "Gops",
     "IdentityRegistry",
     "IdentitySettings",

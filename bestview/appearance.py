@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,19 +75,3 @@ def distances(one: NDArray[np.float64], two: NDArray[np.float64]) -> NDArray[np.
     there is no histogram.
     """
     return np.asarray(np.abs(one - two).mean(axis=-1))
-
-
-def normalised(histograms: Sequence[NDArray[np.float64]]) -> list[NDArray[np.float64] | None]:
-    """Scale (B,) histograms to sum 1; None for those that hold nothing that can be compared."""
-    answer: list[NDArray[np.float64] | None] = [None] * len(histograms)
-    by_size: dict[int, list[int]] = {}
-    for i, histogram in enumerate(histograms):
-        by_size.setdefault(histogram.size, []).append(i)
-    for size, places in by_size.items():
-        table = np.array([histograms[i] for i in places], dtype=np.float64).reshape(-1, size)
-        total = table.sum(axis=1)
-        holds = np.isfinite(total) & (total > 0) & (table.min(axis=1, initial=np.inf) >= 0)
-        scaled = np.divide(table, total[:, None], where=holds[:, None], out=np.zeros_like(table))
-        for i, look, good in zip(places, scaled, holds.tolist(), strict=True):
-            answer[i] = look if good else None
-    return answer

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
-from bestview.evidence import TrackKey
+from bestview.keys import EpisodeKey
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -32,9 +32,9 @@ class Corrections:
     """Remembers the last number of every track, to tell when it stands for somebody else than before."""
 
     def __init__(self) -> None:
-        self._last: dict[TrackKey, int] = {}
+        self._last: dict[EpisodeKey, int] = {}
 
-    def update(self, numbers: Mapping[TrackKey, int], merged: Sequence[Merge]) -> tuple[Split, ...]:
+    def update(self, numbers: Mapping[EpisodeKey, int], merged: Sequence[Merge]) -> tuple[Split, ...]:
         """Compare the numbers of the tracks seen with their last ones; a merge is no split.
 
         A track that has no number for a while, until its new person is confirmed, is told when it has.
@@ -51,6 +51,6 @@ class Corrections:
         self._last.update(numbers)
         return tuple(sorted(splits))
 
-    def keep_only(self, keys: Collection[TrackKey]) -> None:
+    def keep_only(self, keys: Collection[EpisodeKey]) -> None:
         """Forget all other tracks."""
         self._last = {key: number for key, number in self._last.items() if key in keys}

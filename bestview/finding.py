@@ -1,91 +1,115 @@
-"""Finding again who left."""
+"""Finding again, by looks alone, who left long ago or has come to a camera that has not seen them yet."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from bestview.appearance import Appearances
-from bestview.identity_settings import IdentitySettings
-from bestview.looks import unlike
-from bestview.persons import Person
-from bestview.succession import Place, clearly_least, picture_cost
+from bestview.appearance import POINTS, Appearances, distances
+from bestview.looks import Looks
 
-_APPEARANCE_RATIO = 1.5
+Floats = NDArray[np.float64]
+
+_RATIO = 1.5
 """How many times further the second likeliest must be before appearance alone decides."""
-
-_LOOSE = 2.0
-"""How many appearance gates apart two sightings may be that place already joins."""
-
 _NEVER = 1e6
 
 
+def find_again(
+    appearances: Appearances,
+    found: Sequence[Looks],
+    lost: Sequence[Looks],
+    possible: NDArray[np.bool_],
+    gate: float,
+) -> list[int]:
+    """Say who of those who are `lost` each newly `found` person is: their index, or -1.
+
+    Only where nobody else looks nearly as like: a wrong number is worse than a new one. One assignment.
+
+    Args:
+        appearances: to compare looks with.
+        found: N of them.
+        lost: L of them.
+        possible: (N, L); where False the two are surely not one.
+        gate: distance below which two looks are likely one person's.
+    """
+    if not found or not lost:
+        return [-1] * len(found)
+    apart = np.where(possible, unlike(appearances, found, lost), np.nan)
+    good = clearly_least(apart, _RATIO) & (apart <= gate)
+    row, column = linear_sum_assignment(np.where(good, apart, _NEVER))
+    answer = [-1] * len(found)
+    for i, j in zip(row.tolist(), column.tolist(), strict=True):
+        if good[i, j]:
+            answer[i] = j
+    return answer
+
+
+def clearly_least(cost: Floats, ratio: float) -> NDArray[np.bool_]:
+    """Where a finite entry is the least of its row and column, and the next is `ratio` times as large.
+
+    NaN and infinite entries do not compete.
+    """
+    filled = np.where(np.isnan(cost), np.inf, cost)
+    clear = np.isfinite(filled)
+    for axis in (0, 1):
+        if cost.shape[axis] > 1:
+            two = np.sort(filled, axis=axis)
+            least, second = np.take(two, [0], axis=axis), np.take(two, [1], axis=axis)
+            clear &= (filled == least) & (second >= ratio * least)
+    return clear
+
+
 @dataclass(frozen=True, slots=True)
-class Finding:
-    """What finding people again goes by.
+class _Curves:
+    """How P people look, L looks in all, sorted by person and camera.
 
     Attributes:
-        settings: of identity.
-        appearances: to compare looks with.
-        gate: distance within which feet are the same, ground units (NaN: no ground yet).
-        height: of a person in ground units (NaN likewise).
+        owner: (L,) which of the people.
+        camera: (L,) names.
+        bins: (L,) of the histogram; looks with others cannot be compared.
+        curves: (L, 33) equalised cumulative histograms.
     """
 
-    settings: IdentitySettings
-    appearances: Appearances
-    gate: float
-    height: float
+    owner: NDArray[np.int64]
+    camera: NDArray[np.str_]
+    bins: NDArray[np.int64]
+    curves: Floats
 
-    def match(self, found: list[Person], lost: list[Person]) -> list[int]:
-        """For each newly `found` person the index of the `lost` one they are, or -1.
-
-        Place decides for those lost a moment ago; appearance for the others, and only where nobody
-        else looks nearly as like: a wrong number is worse than a new one. One assignment.
-        """
-        if not found or not lost:
-            return [-1] * len(found)
-        cost, looks = self._place_costs(found, lost), unlike(self.appearances, found, lost)
-        gate = self.appearances.gate(self.settings.appearance_gate, self.settings.appearance_share)
-        by_place = (cost <= 1.0) & ~(looks > _LOOSE * gate)
-        by_look = (
-            ~np.isfinite(cost) & (cost != np.inf) & (looks <= gate) & clearly_least(looks, _APPEARANCE_RATIO)
+    @classmethod
+    def of(cls, appearances: Appearances, people: Sequence[Looks]) -> _Curves:
+        every = [
+            (i, c, look) for i, looks in enumerate(people) for c, look in sorted(looks.by_camera.items())
+        ]
+        alike: dict[tuple[str, int], list[int]] = {}
+        for row, (_, camera, look) in enumerate(every):
+            alike.setdefault((camera, look.total.size), []).append(row)
+        curves = np.zeros((len(every), POINTS))
+        for (camera, _), rows in alike.items():
+            curves[rows] = appearances.equalised(camera, np.array([every[row][2].mean for row in rows]))
+        return cls(
+            owner=np.array([i for i, _, _ in every], dtype=np.int64),
+            camera=np.array([camera for _, camera, _ in every], dtype=np.str_),
+            bins=np.array([look.total.size for _, _, look in every], dtype=np.int64),
+            curves=curves,
         )
-        cost = np.where(by_place, cost, np.where(by_look, 1.0 + looks, _NEVER))
-        row, column = linear_sum_assignment(cost)
-        answer = [-1] * len(found)
-        for i, j in zip(row, column, strict=True):
-            if cost[i, j] < _NEVER:
-                answer[int(i)] = int(j)
-        return answer
 
-    def _place_costs(self, found: list[Person], lost: list[Person]) -> NDArray[np.float64]:
-        """(N, L): see `_place_cost`; asked only about those lost a moment ago."""
-        cost = np.full((len(found), len(lost)), np.nan)
-        first, last = (
-            np.array(frames) for frames in ([p.first_frame for p in found], [p.last_frame for p in lost])
-        )
-        recent = first[:, None] - last[None, :] <= self.settings.continuity
-        for i, j in np.argwhere(recent).tolist():
-            cost[i, j] = self._place_cost(found[i], lost[j])
-        return cost
 
-    def _place_cost(self, new: Person, old: Person) -> float:
-        """Distance between loss and finding in units of what is plausible; NaN: place says nothing."""
-        gap = new.first_frame - old.last_frame
-        if gap <= 0 and any(new.first[c].frame <= old.last[c].frame for c in new.first if c in old.last):
-            return float("inf")  # seen at the same time: two people
-        gap = max(gap, 0)
-        costs = [self._ground_cost(a, b, gap) for a in new.first.values() for b in old.last.values()]
-        costs += [picture_cost(new.first[c], old.last[c]) for c in sorted(new.first) if c in old.last]
-        known = [cost for cost in costs if not np.isnan(cost)]
-        if not known:
-            return float("nan")
-        best = min(known)
-        return best if best <= 1.0 else float("inf")  # nobody is that fast
-
-    def _ground_cost(self, new: Place, old: Place, gap: int) -> float:
-        apart = float(np.hypot(*(new.ground - old.ground)))
-        return apart / (self.gate + self.settings.speed_heights * self.height * gap)
+def unlike(appearances: Appearances, found: Sequence[Looks], lost: Sequence[Looks]) -> Floats:
+    """(N, L) appearance distances, in common cameras where there are such; NaN: unknown."""
+    new, old = _Curves.of(appearances, found), _Curves.of(appearances, lost)
+    # Sums by pair of people, and how many looks went into them: in common cameras, and in any.
+    total, count, common = (np.zeros((2, len(found), len(lost))) for _ in range(3))
+    for owner, camera, bins, curve in zip(new.owner, new.camera, new.bins, new.curves, strict=True):
+        apart = distances(curve, old.curves)
+        for kind, here in enumerate((old.camera == camera, np.ones(old.owner.size, dtype=np.bool_))):
+            fits = here & (old.bins == bins)
+            total[kind, owner] += np.bincount(old.owner[fits], apart[fits], minlength=len(lost))
+            count[kind, owner] += np.bincount(old.owner[fits], minlength=len(lost))
+            common[kind, owner] += np.bincount(old.owner[here], minlength=len(lost))
+    mean = np.divide(total, count, out=np.full(total.shape, np.nan), where=count > 0)
+    return np.asarray(np.where(common[0] > 0, mean[0], mean[1]))

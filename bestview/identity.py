@@ -8,22 +8,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview.alignment import GroundAlignment
-from bestview.appearance import KNOWN_PAIRS, Appearances, normalised
+from bestview.between import LooksBetween
 from bestview.corrections import Corrections, Merge, Split
-from bestview.evidence import PairEvidence, TrackKey
-from bestview.finding import Finding
+from bestview.episodes import Episodes
 from bestview.ground import checked_homography
-from bestview.grouping import GroupingProblem, group
+from bestview.groups import groups_of
 from bestview.heights import HeightScale
 from bestview.identity_settings import IdentitySettings
-from bestview.likeness import WORST, Scores, appearance_scores
-from bestview.meeting import near_or_known
+from bestview.keys import EpisodeKey
+from bestview.meeting import at_once, near
+from bestview.pairs import PairTables
 from bestview.people import People
-from bestview.persons import Person
-from bestview.settled import SettledLooks
 from bestview.sightings import FootError, LocalTrack, Sightings, line_up
-from bestview.succession import Heirs, Place
+from bestview.weighing import Weighing
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,8 +28,8 @@ class IdentityUpdate:
     """Who is who after one update; every tuple is in rising order.
 
     Attributes:
-        numbers: the person's number of each track given, seen or hidden; a track whose person is not
-            confirmed yet is missing.
+        numbers: the person's number of each episode that may still change; 0: nobody's yet. A track is
+            who its newest episode is that has begun.
         born: numbers given for the first time.
         returned: numbers of people who had gone and are back.
         gone: numbers of people whom no camera has seen for a while; they are remembered.
@@ -40,7 +37,7 @@ class IdentityUpdate:
         split: numbers that stood for somebody else than who was behind them before.
     """
 
-    numbers: Mapping[TrackKey, int]
+    numbers: Mapping[EpisodeKey, int]
     born: tuple[int, ...]
     returned: tuple[int, ...]
     gone: tuple[int, ...]
@@ -51,10 +48,12 @@ class IdentityUpdate:
 class IdentityRegistry:
     """Joins the cameras' tracks into persons, update by update.
 
-    Pairs of tracks gather evidence (the distance of their feet where both cameras have a homography,
-    their likeness where not); one assignment groups the tracks into persons, in which two tracks seen
-    at once in one camera are two people; hysteresis keeps what is joined joined until the evidence
-    against it has mounted. Numbers count from 1 and are not used twice. Same updates, same numbers.
+    Tracks are cut into episodes where they may have been confused (`Episodes`). Pairs of episodes gather
+    evidence of being one person: where they stand, how they look, what goes on, what was told. Every few
+    frames all episodes of the last seconds are grouped anew (`cluster`), such that two seen at once in one
+    camera are two people, and the groups get the numbers that most of their frames were told to have. What
+    is older is settled: it stays whose it was told to be, and speaks as one. Numbers count from 1 and are
+    not used twice. Same updates, same numbers.
 
     Args:
         settings: see there.
@@ -77,144 +76,86 @@ class IdentityRegistry:
         }
         self._camera = {camera: i for i, camera in enumerate(self._homographies)}
         self._scale = HeightScale()
-        self._appearances = Appearances()
-        self._pairs = PairEvidence(WORST, settings.memory, settings.cap, settings.track_memory)
+        calibrated = {camera: matrix is not None for camera, matrix in self._homographies.items()}
+        self._between = LooksBetween(settings, calibrated)
+        self._episodes = Episodes(settings)
         self._people = People(settings)
-        self._heirs = Heirs(settings.continuity)
+        self._tables = PairTables()
+        self._weighing = Weighing(settings, calibrated)
         self._corrections = Corrections()
-        self._alignment = GroundAlignment(settings.trust_ground)
         self._last_frame: int | None = None
 
     def update(self, tracks: Sequence[LocalTrack], last_frame: int) -> IdentityUpdate:
-        """Take in all cameras' tracks of the window that ends with `last_frame`.
+        """Take in what is new and final of all cameras' tracks, by now up to `last_frame`.
 
-        Call it once per solved window; windows may overlap. A track that is missing may come back.
+        Single cameras may be ahead of it. A track that is missing may come back.
 
         Raises:
-            ValueError: frames that do not advance, or tracks that make no sense (see `line_up`).
+            ValueError: updates that do not advance, or tracks that make no sense (see `line_up`).
         """
         if self._last_frame is not None and last_frame <= self._last_frame:
             raise ValueError(f"the update for frame {last_frame} comes after that for {self._last_frame}")
-        given = line_up(tracks, self._homographies, last_frame, self._foot_error)
-        seen = self._alignment.corrected(given)
-        since = last_frame - seen.boxes.shape[1] if self._last_frame is None else self._last_frame
-        self._last_frame = last_frame
-        present = seen.present(since, last_frame)
+        before, self._last_frame = self._last_frame, last_frame
+        seen = line_up(tracks, self._homographies, self._foot_error)
         self._scale.learn(seen.heights)
-
-        for key in seen.keys:
-            self._people.meet(key, last_frame)
-        rows = np.flatnonzero(present).tolist()
-        places = seen.places(rows)
-        self._gather(seen, present, last_frame)
-        merged = self._regroup(seen, self._inherit(seen, present, places))
-        serials = self._people.serials(seen.keys)
-        self._alignment.learn(given, seen, serials, present, self._gate(), self._scale.height)
-        self._remember({track.key: track for track in tracks}, [seen.keys[i] for i in rows], places)
-        finding = Finding(self._settings, self._appearances, self._gate(), self._scale.height)
-        born, found = self._people.confirm(finding, since)
-        gone, returned = self._people.comings_and_goings(last_frame)
-        numbers = {key: self._people.person(key).number for key in seen.keys}
-        numbers = {key: number for key, number in numbers.items() if number}
-        self._people.forget(last_frame)
-        split = self._corrections.update(numbers, merged)
-        self._corrections.keep_only(self._people.tracks)
-        return IdentityUpdate(
-            numbers=numbers,
-            born=tuple(sorted(born)),
-            returned=tuple(sorted(found + returned)),
-            gone=tuple(sorted(gone)),
-            merged=tuple(sorted(merged)),
-            split=split,
-        )
+        rows = self._episodes.take(seen, {track.key: track.looks for track in tracks})
+        self._gather(seen, rows, last_frame)
+        episodes = self._episodes.open
+        born: tuple[int, ...] = ()
+        merged: tuple[Merge, ...] = ()
+        told: dict[EpisodeKey, int] = {}
+        every = self._settings.regroup
+        anew = before is None or last_frame // every > before // every
+        if anew:
+            born, merged = self._regroup(last_frame)
+            told = {it.key: it.number for it in episodes if it.tell(last_frame - self._settings.told_after)}
+        returned, gone = self._people.comings_and_goings(episodes, last_frame)
+        split = self._corrections.update(told, merged)
+        numbers = {episode.key: episode.number for episode in episodes}
+        if anew:
+            self._settle(last_frame)
+        return IdentityUpdate(numbers, born, returned, gone, merged, split)
 
     def _gate(self) -> float:
         """Distance between feet at which they are as likely one person's as two's, ground units."""
         settings = self._settings
         return settings.gate if settings.gate is not None else settings.gate_heights * self._scale.height
 
-    def _gather(self, seen: Sightings, present: NDArray[np.bool_], last_frame: int) -> None:
-        """Count what this update says about pairs of tracks."""
-        keys = self._people.tracks_heard_since(last_frame - self._settings.track_memory)
-        self._pairs.follow(keys, np.array([self._camera[key.camera] for key in keys], dtype=np.int64))
-        rows = self._pairs.rows(seen.keys)
-        scores = Scores.joined([self._by_looks(seen, present), self._by_ground(seen, present, rows)])
-        stands = seen.stands & present[:, None]
-        self._pairs.add(last_frame, rows[scores.one], rows[scores.two], scores.score, rows, stands)
-        for camera in seen.cameras():
-            self._pairs.rivals.add(rows[camera], seen.side_by_side(camera))
+    def _gather(self, seen: Sightings, rows: NDArray[np.int64], last_frame: int) -> None:
+        """Sum up what the update says about pairs of episodes."""
+        past = [person.number for person in self._people.recent(last_frame)]
+        tables = self._tables
+        tables.arrange([*(episode.key for episode in self._episodes.open), *past])
+        camera = np.array([self._camera[key.camera] for key in seen.keys], dtype=np.int64)
+        tables.add_apart(*at_once(rows, camera))
+        if self._gate() > 0:
+            met = near(seen, rows, camera, self._gate())
+            evidence = met.score / self._settings.ground_frames
+            tables.add_near(met.one, met.two, evidence, met.frames, self._settings.ground_cap)
+        self._between.update(self._episodes.open, np.unique(rows[rows >= 0]), tables)
 
-    def _by_ground(self, seen: Sightings, present: NDArray[np.bool_], rows: NDArray[np.int64]) -> Scores:
-        """Score the pairs of tracks that stand near each other, and those that something is known about."""
-        on_ground = present & np.array(
-            [self._homographies[key.camera] is not None for key in seen.keys], bool
-        )
-        return near_or_known(seen, on_ground, rows, self._pairs, self._gate())
+    def _regroup(self, last_frame: int) -> tuple[tuple[int, ...], tuple[Merge, ...]]:
+        """Say anew who is who; give the numbers of who is new, and what was merged."""
+        episodes, past = self._episodes.open, self._people.recent(last_frame)
+        group = self._weighing.grouped(episodes, past, self._tables, self._scale.height)
+        groups = groups_of(episodes, past, group)
+        born, merged = self._people.name(groups, self._tables, self._between, last_frame)
+        self._tables.make_room(merge.kept for merge in merged)
+        for merge in merged:
+            self._tables.absorb(merge.kept, merge.lost)
+        return born, merged
 
-    def _by_looks(self, seen: Sightings, present: NDArray[np.bool_]) -> Scores:
-        """Score the pairs of tracks of two cameras that have no ground in common.
-
-        Learns on the way how each camera renders people, and how much people differ.
-        """
-        looks = SettledLooks(self._appearances, self._people, seen, present)
-        cameras = seen.cameras()
-        # Who was seen side by side, back from the last camera to what is remembered of it.
-        apart: list[NDArray[np.float64]] = []
-        for rows in reversed(cameras):
-            if sum(one.size for one in apart) < KNOWN_PAIRS:
-                within = looks.unlike(rows, rows)
-                apart.append(within[np.triu(seen.side_by_side(rows)) & ~np.isnan(within)])
-        self._appearances.learn_different(np.concatenate([np.zeros(0), *reversed(apart)]))
-        settings = self._settings
-        return appearance_scores(
-            cameras,
-            [self._homographies[seen.keys[rows.start].camera] is not None for rows in cameras],
-            looks.unlike,
-            self._appearances.gate(settings.appearance_gate, settings.appearance_share),
-        )
-
-    def _inherit(
-        self, seen: Sightings, present: NDArray[np.bool_], places: Sequence[tuple[Place, Place]]
-    ) -> NDArray[np.bool_]:
-        """Note who is whose heir; (T,) who of those present stays so: whoever has an heir now does not."""
-        row_of = {seen.keys[i]: i for i in np.flatnonzero(present).tolist()}
-        found = self._heirs.update(self._pairs.keys, dict(zip(row_of, places, strict=True)), seen.first)
-        heirs, lost = (self._pairs.rows(keys) for keys in ([f.heir for f in found], [f.lost for f in found]))
-        self._pairs.inherit(heirs, lost, self._settings.heir * np.array([f.score for f in found]))
-        stays = present.copy()
-        stays[[row_of[f.lost] for f in found if f.lost in row_of]] = False
-        return stays
-
-    def _regroup(self, seen: Sightings, present: NDArray[np.bool_]) -> tuple[Merge, ...]:
-        """Group the tracks present into persons anew."""
-        keys = self._pairs.keys
-        here = np.zeros(len(keys), dtype=bool)
-        here[self._pairs.rows(seen.keys)] = present
-        if not here.any():
-            return ()
-        problem = GroupingProblem(
-            pairs=self._pairs,
-            person=self._people.serials(keys),
-            present=here,
-            hold=np.array([self._people.hold(key) for key in keys]),
-            join=self._settings.join,
-        )
-        return self._people.regroup(self._pairs, group(problem), here)
-
-    def _remember(
-        self,
-        given: Mapping[TrackKey, LocalTrack],
-        keys: Sequence[TrackKey],
-        places: Sequence[tuple[Place, Place]],
-    ) -> None:
-        """Write down where each person was seen, and how they looked."""
-        looks = normalised([given[key].histogram for key in keys])
-        counted: dict[int, Person] = {}
-        for key, look, (first, last) in zip(keys, looks, places, strict=True):
-            person = self._people.person(key)
-            person.see(key, first, last)
-            if look is not None:
-                person.look(key.camera, look)
-            counted[id(person)] = person
-        for person in counted.values():
-            person.updates += 1
+    def _settle(self, last_frame: int) -> None:
+        """Let go of what is old: it goes on as its person's past."""
+        oldest = last_frame - self._settings.settled_after
+        rows = [row for row, it in enumerate(self._episodes.open) if it.end.frame <= oldest]
+        self._weighing.remember(rows, self._episodes.open, self._tables)
+        old = [self._episodes.open[row] for row in rows]
+        self._tables.make_room(episode.mostly for episode in old if episode.mostly)
+        for episode in old:
+            if episode.mostly:
+                self._tables.absorb(episode.mostly, episode.key)
+        self._people.settle(old)
+        self._episodes.settle(old)
+        self._people.forget(last_frame)
+        self._corrections.keep_only({episode.key for episode in self._episodes.open})

@@ -7,15 +7,21 @@ from dataclasses import dataclass, fields
 
 @dataclass(frozen=True, slots=True)
 class IdentitySettings:
-    """What makes two tracks one person, and for how long a person is remembered.
+    """What makes two parts of tracks one person, and for how long a person is remembered.
 
-    Evidence is counted in "agreeing updates": an update in which two tracks stand on the very same
-    ground gives 1, one in which they stand a gate apart gives 0, and one further apart takes away.
+    Evidence is the logarithm of how many times likelier what was seen is of one person than of two, by
+    round numbers rather than by fitted distributions.
 
     Raises:
         ValueError: a setting outside its range.
     """
 
+    # Overlap (IoU) with somebody else in the same picture above which a track is in a crowd.
+    crowd: float = 0.2
+    # Frames of crowd after which it is asked anew who has come out of it.
+    crowd_frames: int = 3
+    # Frames unseen after which a track that goes on is asked likewise.
+    gap: int = 10
     # How far apart two cameras may see the same feet, in units of the ground plane. None: by person height.
     gate: float | None = None
     # The same in person heights, which the boxes tell in a ground plane of any unit (0.7: about 1.2 m).
@@ -23,34 +29,57 @@ class IdentitySettings:
     # How well boxes find the feet, standard deviations in box heights: the gate is longer where they do
     # not, which is along the line of sight.
     foot_sideways: float = 0.05
-    foot_upwards: float = 0.2
-    # Sightings of people in two cameras that weigh as much as the homographies, which they correct.
-    trust_ground: float = 50.0
-    # Fastest plausible walk in person heights per frame, for who was lost and found (0.06: 2.5 m/s at 25/s).
+    foot_upwards: float = 0.15
+    # Frames of standing on the same ground that are worth one: neighbouring frames err alike.
+    ground_frames: float = 5.0
+    # The most evidence that the ground gives, for or against.
+    ground_cap: float = 20.0
+    # Evidence of looking as much alike as the same person usually does in a camera.
+    look: float = 3.0
+    # The most evidence that looks give in one camera, for or against.
+    look_cap: float = 4.0
+    # Frames alone after which a look is known well enough to weigh in full.
+    look_frames: int = 8
+    # Evidence that a camera's track is the same person before and after a crowd...
+    goes_on: float = 3.0
+    # ... which fades with the frames of the crowd.
+    goes_on_frames: float = 40.0
+    # Evidence that who begins where somebody of the same camera was just lost is the same person.
+    found: float = 2.0
+    # How far that may be at once, and the fastest plausible walk per frame (0.06: 2.5 m/s at 25/s), in person
+    # heights. Twice as far, and it is somebody else.
+    reach_heights: float = 0.6
     speed_heights: float = 0.06
-    # Histograms further apart than this (mean difference of their CDFs, 0..1) are two people's.
+    # Frames within which place tells who was lost and found.
+    found_frames: int = 75
+    # Evidence that who was told to be one person is one.
+    told: float = 1.0
+    # Evidence that joins.
+    join: float = 0.5
+    # Histograms further apart than this (mean difference of their CDFs, 0..1) are two people's: between
+    # cameras without a common ground, and for who comes back after long.
     appearance_gate: float = 0.05
     # ... and so are those further apart than this times the lower quartile between people seen side by side.
     appearance_share: float = 1.0
-    # Evidence that a track is the heir of one of the same camera that was lost where it begins.
-    heir: float = 2.0
-    # Evidence that lets a track join a person, in agreeing updates.
-    join: float = 1.0
-    # Evidence against that it takes to part a track from its person, in disagreeing updates.
-    hold: float = 4.0
-    # The most evidence a pair of tracks can have, for or against: how fast an old error is forgotten.
-    cap: float = 8.0
-    # Share of the evidence that lives on from one update to the next (0.95: half is forgotten in 14).
+    # Share of the evidence of looks between cameras that lives on from one update to the next.
     memory: float = 0.95
-    # Updates in which someone must be seen before they are given a number.
-    confirm_updates: int = 4
+    # The most such evidence, for or against.
+    cap: float = 8.0
+    # Frames, of all cameras together, in which someone must be seen before they are given a number.
+    confirm: int = 25
+    # Frames between two times at which everybody is grouped anew.
+    regroup: int = 10
+    # Frames after which a number was told, and weighs for staying.
+    told_after: int = 5
+    # Frames after which an old part of a track is settled: it stays whose it was told to be.
+    settled_after: int = 120
+    # Frames for which a number must be nobody's, its tracks somebody else's, to be told as merged.
+    merge_after: int = 50
     # Frames after which someone whom no camera sees is said to be gone (250: ten seconds at 25/s).
     gone_after: int = 250
-    # Frames within which someone lost may be found again by place alone.
-    continuity: int = 50
-    # Frames for which a track that is not heard of keeps its evidence.
-    track_memory: int = 500
-    # Frames after which someone gone, and a track not heard of, are forgotten (15000: ten minutes at 25/s).
+    # Frames for which who is gone is compared like everybody; later only a clear likeness brings them back.
+    recent: int = 750
+    # Frames after which someone gone is forgotten (15000: ten minutes at 25/s).
     forget_after: int = 15000
     # The most people remembered who are gone; the longest gone are forgotten first.
     remember: int = 1000
@@ -61,6 +90,9 @@ class IdentitySettings:
             raise ValueError(f"identity gate: {self.gate} is not above 0")
         if not 0 < self.memory <= 1:
             raise ValueError(f"identity memory: {self.memory} is not in (0, 1]")
+        for name in ("regroup", "look_frames", "ground_frames", "goes_on_frames", "reach_heights"):
+            if not getattr(self, name) > 0:
+                raise ValueError(f"identity {name}: {getattr(self, name)} is not above 0")
         for field in fields(self):
             value = getattr(self, field.name)
             if value is not None and not value >= 0:

@@ -1,4 +1,4 @@
-"""Scores for one update: how much pairs of tracks look like one person, by ground and by greys."""
+"""Scores for one update: how much pairs of two cameras' tracks look like one person."""
 
 from __future__ import annotations
 
@@ -10,14 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-WORST = -2.0
-"""Least score of an update: feet 1.7 gates apart or 17 say the same."""
-
-GATES_TO_WORST = 3.0**0.5
-"""That many gates: where ``1 - distance^2`` is -2."""
-
 _APPEARANCE_WEIGHT = 0.5
-"""Most that likeness may say in one update: half of what standing on the same ground says."""
+"""Most that likeness may say in one update."""
 
 _UNCLEAR = 0.4
 """Share of the gate by which any exchange of partners must be worse for a pair to count."""
@@ -47,11 +41,6 @@ class Scores:
             np.concatenate([part.two for part in every]),
             np.concatenate([part.score for part in every]),
         )
-
-
-def ground_scores(distances: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Score ``1 - distance^2``, at least -2: distances in gates; NaN where the distance is."""
-    return np.asarray(np.maximum(1.0 - distances**2, WORST))
 
 
 def appearance_scores(

@@ -1,51 +1,82 @@
-"""Scores by ground of one update: only of pairs of tracks that it can say something new about."""
+"""Which tracks of an update were seen at once, and how near to each other they stood."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview.evidence import PairEvidence
-from bestview.likeness import GATES_TO_WORST, Scores, ground_scores
-from bestview.reach import within_reach
 from bestview.sightings import Sightings
 
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
-def near_or_known(
-    seen: Sightings,
-    on_ground: NDArray[np.bool_],
-    rows: NDArray[np.int64],
-    pairs: PairEvidence,
-    gate: float,
-) -> Scores:
-    """Score the pairs of tracks of two cameras that stand near each other, and those that have an entry.
+_WORST = -2.0
+"""Least score of a frame: feet 1.7 gates apart or 17 say the same."""
 
-    All others are strangers, and far apart.
+
+def at_once(rows: Ints, camera: Ints) -> tuple[Ints, Ints]:
+    """Give the pairs of rows that were seen in one frame of one camera, each at least once: (P,) and (P,).
 
     Args:
-        seen: S tracks.
-        on_ground: (S,) those to compare.
-        rows: (S,) theirs in `pairs`.
-        pairs: what is known so far.
-        gate: see `Sightings.distances`.
+        rows: (T, W) of each track's sightings by frame, -1: hidden.
+        camera: (T,) number of each track's camera.
     """
-    count, here = len(seen.keys), np.flatnonzero(on_ground)
-    seen_row = np.full(len(pairs.keys), -1)
-    seen_row[rows[here]] = here
-    known = seen_row[np.stack([pairs.one, pairs.two])]
-    known = _of_two_cameras(known[:, (known >= 0).all(axis=0)], pairs.camera[rows])
-    near = here[np.stack(within_reach(seen.ground[here], seen.spread[here], gate, GATES_TO_WORST))]
-    near = _of_two_cameras(near, pairs.camera[rows])
-    # Rows keep their order from one to the other, so that the known pairs are sorted as they were.
-    code, others = known[0] * count + known[1], near[0] * count + near[1]
-    at = np.minimum(np.searchsorted(code, others), max(code.size - 1, 0))
-    new = code[at] != others if code.size else np.ones(others.shape, dtype=np.bool_)
-    one, two = np.concatenate([known, near[:, new]], axis=1)
-    score = ground_scores(seen.distances(one, two, gate))
-    learned = ~np.isnan(score)
-    return Scores(one[learned], two[learned], score[learned])
+    one, two = np.nonzero(np.triu(camera[:, None] == camera, 1))
+    both = (rows[one] >= 0) & (rows[two] >= 0)
+    return rows[one][both], rows[two][both]
 
 
-def _of_two_cameras(pairs: NDArray[np.int64], camera: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Keep those of (2, P) pairs of tracks that two cameras see; `camera` is (S,)."""
-    return np.asarray(pairs[:, camera[pairs[0]] != camera[pairs[1]]])
+@dataclass(frozen=True, slots=True, eq=False)
+class Nearness:
+    """What an update says about P pairs of rows of different cameras that stood somewhere at once.
+
+    Attributes:
+        one: (P,) rows.
+        two: (P,) rows; each pair is there once.
+        score: (P,) sums over frames.
+        frames: (P,) how many.
+    """
+
+    one: Ints
+    two: Ints
+    score: Floats
+    frames: Ints
+
+
+def near(seen: Sightings, rows: Ints, camera: Ints, gate: float) -> Nearness:
+    """Score how near to each other different cameras' tracks stand.
+
+    The score of a frame is ``1 - D^2``, at least -2, with D the distance of the feet in gates: 1 for the
+    very same place, 0 a gate apart. Where feet are uncertain, which is along the lines of sight, the gate
+    is stretched by their covariance.
+
+    Args:
+        seen: the tracks.
+        rows: (T, W) of their sightings, -1: hidden.
+        camera: (T,) number of each track's camera.
+        gate: distance at which feet are as likely one person's as two's, ground units.
+    """
+    known = np.isfinite(seen.ground[..., 0]) & np.isfinite(seen.spread[..., 0, 0])
+    track, frame = np.nonzero(known & (rows >= 0))
+    # One line for each row: a track that is cut within the update has two.
+    row, first, line = np.unique(rows[track, frame], return_index=True, return_inverse=True)
+    camera = camera[track[first]]
+    one, two = np.nonzero(np.triu(camera[:, None] != camera, 1))
+    spread = seen.spread[track, frame]
+    stands = np.full((rows.shape[1], 5, row.size), np.nan)
+    stands[frame, :2, line] = seen.ground[track, frame]
+    stands[frame, 2:, line] = spread[:, [0, 0, 1], [0, 1, 1]]
+    score, frames = np.zeros(one.shape), np.zeros(one.shape, dtype=np.int64)
+    for x, y, *about in stands:
+        dx, dy = x[one] - x[two], y[one] - y[two]
+        xx, xy, yy = (part[one] + part[two] for part in about)
+        xx, yy = xx + gate**2, yy + gate**2
+        # Squared length of (dx, dy) in the metric of the inverse covariance, the 2x2 inverse written out.
+        squared = (yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy) / (xx * yy - xy * xy)
+        there = ~np.isnan(squared)
+        score += np.where(there, np.maximum(1.0 - squared, _WORST), 0.0)
+        frames += there
+    met = frames > 0
+    return Nearness(row[one[met]], row[two[met]], score[met], frames[met])

@@ -1,194 +1,169 @@
-"""Everybody known, numbered or not yet, and which track is whose."""
+"""Everybody who has a number, and how numbers are given, told, merged and taken back."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
-from itertools import takewhile
+from collections.abc import Iterable, Sequence
+from itertools import chain
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bestview.between import LooksBetween
 from bestview.corrections import Merge
-from bestview.evidence import PairEvidence, TrackKey
-from bestview.finding import Finding
+from bestview.episodes import Episode
+from bestview.finding import find_again
+from bestview.groups import Group
 from bestview.identity_settings import IdentitySettings
+from bestview.looks import Looks
+from bestview.naming import named
+from bestview.pairs import PairTables
 from bestview.persons import Person
-
-_TENURE_UPDATES = 10.0
-"""Updates after which a track has half of the extra hold that rooted tracks have."""
-
-_TENURE_SHARE = 0.25
-"""That extra hold: enough to say which of two goes, too little to keep what should go."""
 
 
 class People:
-    """The persons by an internal serial number, and the serial number of each track's person."""
+    """The persons by number."""
 
     def __init__(self, settings: IdentitySettings) -> None:
         self._settings = settings
         self._persons: dict[int, Person] = {}
-        self._serial_of: dict[TrackKey, int] = {}
-        self._tracks_of: dict[int, set[TrackKey]] = {}
-        # In the order in which they were heard of last: who was not for long comes first.
-        self._heard: dict[TrackKey, int] = {}
-        self._next_serial = 0
         self._next_number = 1
 
     def __len__(self) -> int:
-        """Count everybody remembered, the unconfirmed too."""
+        """Count everybody remembered."""
         return len(self._persons)
 
-    def meet(self, key: TrackKey, frame: int) -> None:
-        """Hear of a track; a new one is a person of its own at first."""
-        if key not in self._serial_of:
-            self._assign(key, self._new_serial())
-        self._heard.pop(key, None)
-        self._heard[key] = frame
+    def recent(self, frame: int) -> list[Person]:
+        """List those who are compared like everybody, by number: some episode of theirs is settled."""
+        oldest = frame - self._settings.recent
+        return [it for _, it in sorted(self._persons.items()) if it.settled and it.last >= oldest]
 
-    def _assign(self, key: TrackKey, serial: int) -> None:
-        before = self._serial_of.get(key)
-        if before is not None:
-            self._tracks_of[before].discard(key)
-        self._serial_of[key] = serial
-        self._tracks_of[serial].add(key)
+    def name(
+        self, groups: Sequence[Group], tables: PairTables, between: LooksBetween, frame: int
+    ) -> tuple[tuple[int, ...], tuple[Merge, ...]]:
+        """Give the groups their numbers, and those of their episodes; say who is new, and who was merged."""
+        told = [{it: n for it, n in group.told.items() if it in self._persons} for group in groups]
+        for group, number in zip(groups, named(told), strict=True):
+            group.number = number
+        born = self._number_new(groups, tables, between, frame)
+        for group in groups:
+            for episode in group.episodes:
+                episode.number = group.number
+            if group.number:
+                person = self._persons[group.number]
+                person.last = max(person.last, group.last)
+        return born, self._merge(groups, frame)
 
-    def person(self, key: TrackKey) -> Person:
-        """Whose track it is."""
-        return self._persons[self._serial_of[key]]
+    def _number_new(
+        self, groups: Sequence[Group], tables: PairTables, between: LooksBetween, frame: int
+    ) -> tuple[int, ...]:
+        """Number those who were seen often enough: a new number, or that of the lost person they are."""
+        new = [it for it in groups if not it.number and it.frames >= self._settings.confirm]
+        new.sort(key=lambda it: (it.first, it.rows[0]))
+        here = {it.number: it for it in groups if it.number}
+        lost = [
+            person
+            for number, person in sorted(self._persons.items())
+            if number not in here or here[number].last < frame - self._settings.gap
+        ]
+        before = [here.get(person.number) for person in lost]
+        looks = [_looks(person, group) for person, group in zip(lost, before, strict=True)]
+        asked = [(it, *who) for it in new for who in zip(lost, before, strict=True)]
+        possible = np.array([self._may_be(*one, tables, between, frame) for one in asked], dtype=np.bool_)
+        possible = possible.reshape(len(new), len(lost))
+        found = find_again(between.appearances, [it.looks for it in new], looks, possible, between.gate)
+        born = []
+        for group, match in zip(new, found, strict=True):
+            if match >= 0:
+                group.number = lost[match].number
+                continue
+            group.number = self._next_number
+            self._persons[group.number] = Person(group.number)
+            born.append(group.number)
+            self._next_number += 1
+        return tuple(born)
 
-    def serials(self, keys: Sequence[TrackKey]) -> NDArray[np.int64]:
-        """Give the internal number of each track's person: (T,)."""
-        return np.array([self._serial_of[key] for key in keys], dtype=np.int64)
+    def _may_be(
+        self,
+        new: Group,
+        person: Person,
+        before: Group | None,
+        tables: PairTables,
+        between: LooksBetween,
+        frame: int,
+    ) -> bool:
+        """Say whether looks alone may tell that somebody is one of the lost."""
+        if before is None:
+            # Who has no group though they are compared with everybody is in somebody else's.
+            return person.last < frame - self._settings.recent
+        # Where there was something to compare by, grouping has had its say.
+        compared = bool(new.cameras & before.cameras) or between.share_ground(new.cameras, before.cameras)
+        return not compared and not tables.apart[np.ix_(new.rows, before.rows)].any()
 
-    @property
-    def tracks(self) -> Collection[TrackKey]:
-        """All tracks remembered."""
-        return self._heard.keys()
-
-    def tracks_heard_since(self, frame: int) -> list[TrackKey]:
-        """List the tracks heard of since `frame`, sorted."""
-        return sorted(takewhile(lambda key: self._heard[key] >= frame, reversed(self._heard)))
-
-    def hold(self, key: TrackKey) -> float:
-        """How firmly a track sits in its person: who came last is the first to go."""
-        person = self.person(key)
-        if not person.number:
-            return 0.0
-        tenure = person.tracks.get(key, 0)
-        return self._settings.hold * (1.0 + _TENURE_SHARE * tenure / (tenure + _TENURE_UPDATES))
-
-    def regroup(
-        self, pairs: PairEvidence, grouped: NDArray[np.int64], present: NDArray[np.bool_]
-    ) -> tuple[Merge, ...]:
-        """Carry out a grouping of the tracks of `pairs`: (T,) serials; those nobody had are new persons.
-
-        A person all of whose present tracks went to another is that other person, unless tracks of the
-        two were once seen side by side: then they have only left the picture.
-        """
-        before = self.serials(pairs.keys)
-        after = grouped.copy()
-        # New ones count on in the order of their first tracks. They may have a serial that somebody has who
-        # is remembered without a track here.
-        new, first = np.unique(np.where(np.isin(grouped, before), -1, grouped), return_index=True)
-        for given in new[np.argsort(first)].tolist():
-            if given >= 0:
-                after[grouped == given] = self._new_serial()
-        for row in np.flatnonzero(after != before).tolist():
-            self._assign(pairs.keys[row], int(after[row]))
-        emptied = np.setdiff1d(before[present], after[present]).tolist()
+    def _merge(self, groups: Sequence[Group], frame: int) -> tuple[Merge, ...]:
+        """Merge numbers that have been nobody's for long: whoever had them is in somebody else's group."""
+        into = _whose_now(groups)
         merged = []
-        for old in emptied:
-            targets, count = np.unique(after[present & (before == old)], return_counts=True)
-            target = int(targets[np.argmax(count)])
-            if old != target and old in self._persons and target in self._persons:
-                merged += self._unite(pairs, old, target)
+        for number, person in sorted(self._persons.items()):
+            if number not in into:
+                person.nobody_since = -1
+            elif person.nobody_since < 0:
+                person.nobody_since = frame
+            elif frame - person.nobody_since >= self._settings.merge_after:
+                merged.append(Merge(into[number], number))
+        for merge in merged:
+            self._persons[merge.kept].absorb(self._persons.pop(merge.lost))
+            for episode in chain.from_iterable(group.episodes for group in groups):
+                episode.told_anew(merge.lost, merge.kept)
         return tuple(merged)
 
-    def _unite(self, pairs: PairEvidence, old: int, new: int) -> list[Merge]:
-        tracks = [pairs.in_play(self._tracks_of[serial]) for serial in (old, new)]
-        if pairs.rivals.any_between(*tracks):
-            return []
-        # The lower number is the one people have known for longer.
-        one, two = self._persons[old], self._persons[new]
-        first = (one.number or np.inf, old) < (two.number or np.inf, new)
-        keep, lose = (old, new) if first else (new, old)
-        kept, lost = self._persons[keep], self._persons[lose]
-        self._absorb(keep, lose)
-        return [Merge(kept.number, lost.number)] if lost.number else []
+    def settle(self, episodes: Iterable[Episode]) -> None:
+        """Take over episodes that stay whose they were told to be."""
+        for episode in episodes:
+            person = self._persons.get(episode.mostly)
+            if person is not None:
+                person.looks.add_all(episode.looks)
+                person.settled += episode.told[person.number]
 
-    def _absorb(self, keep: int, lose: int) -> None:
-        self._persons[keep].absorb(self._persons.pop(lose))
-        for key in sorted(self._tracks_of[lose]):
-            self._assign(key, keep)
-        del self._tracks_of[lose]
-
-    def confirm(self, finding: Finding, since: int) -> tuple[list[int], list[int]]:
-        """Number those seen often enough: a new number, or that of the lost person they are.
-
-        Args:
-            finding: how people are found again.
-            since: people not seen after this frame are lost.
-
-        Returns:
-            Numbers given for the first time, and numbers of people said to be gone who are back.
-        """
-        new = [
-            serial
-            for serial, person in self._persons.items()
-            if not person.number and person.updates >= self._settings.confirm_updates
-        ]
-        new.sort(key=lambda serial: (self._persons[serial].first_frame, serial))
-        lost = [serial for serial, p in sorted(self._persons.items()) if p.number and p.last_frame <= since]
-        matches = finding.match([self._persons[s] for s in new], [self._persons[s] for s in lost])
-        born, back = [], []
-        for serial, match in zip(new, matches, strict=True):
-            if match < 0:
-                self._persons[serial].number = self._next_number
-                born.append(self._next_number)
-                self._next_number += 1
-                continue
-            person = self._persons[lost[match]]
-            self._absorb(lost[match], serial)
-            if person.gone:
-                person.gone = False
-                back.append(person.number)
-        return born, back
-
-    def comings_and_goings(self, frame: int) -> tuple[list[int], list[int]]:
-        """Say whom no camera has seen for a while, and who of those is back: (gone, returned) numbers."""
-        gone: list[int] = []
+    def comings_and_goings(
+        self, episodes: Iterable[Episode], frame: int
+    ) -> tuple[tuple[int, ...], tuple[int, ...]]:
+        """Say who of those who had gone is back, and whom no camera has seen for a while: their numbers."""
+        for episode in episodes:
+            person = self._persons.get(episode.number)
+            if person is not None:
+                person.last = max(person.last, episode.end.frame)
         returned: list[int] = []
-        for person in self._persons.values():
-            away = frame - person.last_frame > self._settings.gone_after
-            if person.number and away != person.gone:
-                (gone if away else returned).append(person.number)
+        gone: list[int] = []
+        for number, person in sorted(self._persons.items()):
+            away = frame - person.last > self._settings.gone_after
+            if away != person.gone:
+                (gone if away else returned).append(number)
                 person.gone = away
-        return gone, returned
+        return tuple(returned), tuple(gone)
 
     def forget(self, frame: int) -> None:
-        """Forget whoever was gone for too long, and tracks that were never somebody."""
+        """Forget whoever was gone for too long."""
         settings = self._settings
-        gone = sorted((p.last_frame, s) for s, p in self._persons.items() if p.gone)
+        settled = frame - settings.settled_after
+        gone = sorted(
+            (it.last, number) for number, it in self._persons.items() if it.gone and it.last < settled
+        )
         surplus = len(gone) - settings.remember
-        drop = {s for i, (last, s) in enumerate(gone) if i < surplus or frame - last > settings.forget_after}
-        drop |= {
-            serial
-            for serial, person in self._persons.items()
-            if not person.number and frame - person.last_frame > settings.gone_after
-        }
-        stale = frame - settings.forget_after
-        tracks = [key for serial in sorted(drop) for key in sorted(self._tracks_of[serial])]
-        tracks += list(takewhile(lambda key: self._heard[key] < stale, self._heard))
-        for key in dict.fromkeys(tracks):
-            self.person(key).tracks.pop(key, None)
-            self._tracks_of[self._serial_of.pop(key)].discard(key)
-            del self._heard[key]
-        for serial in drop:
-            del self._persons[serial], self._tracks_of[serial]
+        for i, (last, number) in enumerate(gone):
+            if i < surplus or frame - last > settings.forget_after:
+                del self._persons[number]
 
-    def _new_serial(self) -> int:
-        serial = self._next_serial
-        self._next_serial += 1
-        self._persons[serial] = Person()
-        self._tracks_of[serial] = set()
-        return serial
+
+def _whose_now(groups: Sequence[Group]) -> dict[int, int]:
+    """Give the numbers that are no group's, though told: by number, that of most who were told so."""
+    most: dict[int, tuple[int, int]] = {}
+    for group in groups:
+        for number, frames in group.told.items():
+            if group.number and frames > most.get(number, (0, 0))[0]:
+                most[number] = (frames, group.number)
+    here = {group.number for group in groups}
+    return {number: other for number, (_, other) in most.items() if number not in here}
+
+
+def _looks(person: Person, group: Group | None) -> Looks:
+    """How somebody looks who is lost: with what is not settled yet."""
+    return person.looks if group is None else group.looks

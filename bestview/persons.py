@@ -1,81 +1,34 @@
-"""The people remembered."""
+"""The people who have a number."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-import numpy as np
-from numpy.typing import NDArray
-
-from bestview.evidence import TrackKey
-from bestview.succession import Place
-
-
-@dataclass(slots=True)
-class Look:
-    """Mean histogram of a person in one camera."""
-
-    total: NDArray[np.float64]
-    count: int
+from bestview.looks import Looks
 
 
 @dataclass(slots=True, eq=False)
 class Person:
-    """Somebody, numbered (``number > 0``) or not yet.
+    """Somebody with a number.
 
     Attributes:
-        number: 0 until confirmed.
+        number: from 1, never used for anybody else.
+        last: frame of the last sighting.
         gone: said to be gone, and not back yet.
-        updates: in which they were seen.
-        first: by camera, where they were first seen.
-        last: by camera, where they were last seen.
-        looks: by camera.
-        tracks: by track, the updates in which it was seen as this person.
+        looks: of the settled episodes.
+        settled: their frames that were told to be this person's.
+        nobody_since: frame since which the number has been no group's, though it was told; -1: it is.
     """
 
-    number: int = 0
+    number: int
+    last: int = -1
     gone: bool = False
-    updates: int = 0
-    first: dict[str, Place] = field(default_factory=dict)
-    last: dict[str, Place] = field(default_factory=dict)
-    looks: dict[str, Look] = field(default_factory=dict)
-    tracks: dict[TrackKey, int] = field(default_factory=dict)
-
-    @property
-    def first_frame(self) -> int:
-        """Frame of the first sighting in any camera."""
-        return min((place.frame for place in self.first.values()), default=0)
-
-    @property
-    def last_frame(self) -> int:
-        """Frame of the last sighting in any camera."""
-        return max((place.frame for place in self.last.values()), default=-1)
-
-    def see(self, key: TrackKey, first: Place, last: Place) -> None:
-        """Take in one more sighting, by its first and last frame."""
-        self.first.setdefault(key.camera, first)
-        self.last[key.camera] = last
-        self.tracks[key] = self.tracks.get(key, 0) + 1
-
-    def look(self, camera: str, histogram: NDArray[np.float64]) -> None:
-        """Take in one more normalised (B,) histogram."""
-        look = self.looks.get(camera)
-        if look is None:
-            self.looks[camera] = Look(histogram.copy(), 1)
-        else:
-            look.total, look.count = look.total + histogram, look.count + 1
+    looks: Looks = field(default_factory=Looks)
+    settled: int = 0
+    nobody_since: int = -1
 
     def absorb(self, other: Person) -> None:
-        """Take over what `other` was seen as: the two are one."""
-        for camera, place in sorted(other.first.items()):
-            if camera not in self.first or place.frame < self.first[camera].frame:
-                self.first[camera] = place
-        for camera, place in sorted(other.last.items()):
-            if camera not in self.last or place.frame >= self.last[camera].frame:
-                self.last[camera] = place
-        for camera, look in sorted(other.looks.items()):
-            mine = self.looks.setdefault(camera, Look(np.zeros_like(look.total), 0))
-            mine.total, mine.count = mine.total + look.total, mine.count + look.count
-        for key, updates in sorted(other.tracks.items()):
-            self.tracks[key] = self.tracks.get(key, 0) + updates
-        self.updates = max(self.updates, other.updates)
+        """Take over what is known of `other`: the two are one."""
+        self.looks.add_all(other.looks)
+        self.last = max(self.last, other.last)
+        self.settled += other.settled

@@ -145,7 +145,7 @@ def test_a_cameras_own_tracks_are_what_was_final() -> None:
             final_to=final_to,
             ended=ended,
             shed=[],
-            tracks=[Track(id=3, boxes=boxes, histogram=[1.0], confidence=1.0)],
+            tracks=[Track(id=3, boxes=boxes, confidence=1.0)],
             solve=None,
         )
 

@@ -7,9 +7,13 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
+import tracking
 from server.wire.epochs import closing_epoch, epoch_of_window
-from server.wire.messages import Box, CameraTracks, Solve, Track
+from server.wire.messages import Box, CameraTracks, Glimpse, Solve, Track
 from tracking import SolveReport, WindowResult, WindowTrack
+
+_LOOK_DIGITS = 5
+"""Of a share of the pixels: more would only make messages longer."""
 
 
 class Reporter:
@@ -71,9 +75,14 @@ def _track(track: WindowTrack) -> Track:
     return Track(
         id=track.id,
         boxes=[_box(row) for row in track.bridged],
-        histogram=[float(share) for share in track.histogram],
         confidence=float(track.confidence),
+        looks=[_glimpse(look) for look in track.looks],
     )
+
+
+def _glimpse(look: tracking.Glimpse) -> Glimpse:
+    shares = [round(float(share), _LOOK_DIGITS) for share in look.histogram]
+    return Glimpse(first=look.first, last=look.last, histogram=shares)
 
 
 def _box(row: NDArray[np.float64]) -> Box | None:

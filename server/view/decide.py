@@ -77,7 +77,8 @@ class Decider:
         self._cameras: Sequence[str] = config.camera_ids
         self._has = has
         size = (config.site.width, config.site.height)
-        self.people = People(config.view.identity, self._cameras, homographies, size, config.view.share)
+        lag, share = config.track.window.lag, config.view.share
+        self.people = People(config.view.identity, self._cameras, homographies, size, lag, share)
         self._sight = Sight(config, homographies, self.people.fits)
         self.switch_cost = config.view.switch_cost_s * config.site.fps
         self.least_shot = -(-round(config.view.min_shot_s * config.site.fps) // config.encode.gop)

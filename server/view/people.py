@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import chain
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview import IdentityRegistry, IdentitySettings, Merge, Split, TrackKey
+from bestview import EpisodeKey, IdentityRegistry, IdentitySettings, Merge, Split, TrackKey
 from server.view.align import Epoch
 from server.view.history import History
 from server.view.numbered import numbered_boxes
@@ -25,11 +26,25 @@ NOBODY_YET = -1
 """Stands for a person's number where a track is not confirmed to be anybody."""
 
 
+class Part(NamedTuple):
+    """From which frame on a track is somebody's.
+
+    A named tuple, since one is made of every track in every update.
+    """
+
+    first: int
+    number: int
+
+
+_UNKNOWN = (Part(0, NOBODY_YET),)
+
+
 class People:
     """Joins the cameras' tracks epoch by epoch, and remembers who was where.
 
     ``homographies`` map each camera's own picture to the ground; None where there is none. ``share`` says
-    whom this service decides for; who is who is worked out for everybody, the same in every service.
+    whom this service decides for; who is who is worked out for everybody, the same in every service. ``lag``
+    frames before an epoch's end tracks are final: who is who is worked out up to there.
     """
 
     def __init__(
@@ -38,6 +53,7 @@ class People:
         cameras: Sequence[str],
         homographies: Mapping[str, NDArray[np.float64] | None],
         site_size: tuple[int, int],
+        lag: int,
         share: Share = ALL,
     ) -> None:
         self._registry = IdentityRegistry(settings, homographies)
@@ -45,10 +61,9 @@ class People:
         self._share = share
         self._histories = {camera: History[CameraWindow]() for camera in cameras}
         self._reader = Reader(site_size)
-        self._numbers: dict[TrackKey, int] = {}
+        self._lag = lag
+        self._parts: dict[TrackKey, Sequence[Part]] = {}
         self._heard: dict[TrackKey, int] = {}
-        self._unnamed: dict[TrackKey, int] = {}
-        """Tracks that are nobody's yet, and since when they have been seen."""
         self.first_seen: dict[int, int] = {}
         self.last_seen: dict[int, int] = {}
         self.away: set[int] = set()
@@ -63,16 +78,13 @@ class People:
         for window in windows:
             self._histories[window.message.camera].put(window, window.first, window.message.last)
         tracks = [track for window in windows for track in window.local_tracks()]
-        update = self._registry.update(tracks, epoch.last)
-        keys = [key for window in windows for key in window.keys]
-        for key in keys:
-            # Who has left a person for one not confirmed yet has no number for now.
-            self._numbers.pop(key, None)
-        self._numbers.update(update.numbers)
+        update = self._registry.update(tracks, epoch.last - self._lag)
+        self._parts.update(_parts(update.numbers))
+        keys = chain.from_iterable(window.keys for window in windows)
         seen = chain.from_iterable(window.seen() for window in windows)
         for key, (first, last) in zip(keys, seen, strict=True):
             self._heard[key] = epoch.last
-            self._note_seen(key, first, last)
+            self._note_seen(self._parts.get(key, ()), first, last)
         self.away = (self.away | set(update.gone)) - set(update.returned)
         for merge in update.merged:
             self._merge(merge.kept, merge.lost)
@@ -113,10 +125,17 @@ class People:
 
     def numbers(self, keys: Sequence[TrackKey], first: int, frames: int) -> NDArray[np.int64]:
         """Give the persons' numbers behind T tracks, frame by frame, (T, frames); -1: nobody yet."""
-        del first  # a track is one person's for as long as it is known
-        known = self._numbers
-        numbers = np.fromiter((known.get(key, NOBODY_YET) for key in keys), dtype=np.int64, count=len(keys))
-        return np.broadcast_to(numbers[:, None], (len(keys), frames))
+        known = [self._parts.get(key, _UNKNOWN) for key in keys]
+        newest = np.fromiter((parts[-1].number for parts in known), dtype=np.int64, count=len(keys))
+        since = np.fromiter((parts[-1].first for parts in known), dtype=np.int64, count=len(keys))
+        if (since <= first).all():
+            return np.broadcast_to(newest[:, None], (len(keys), frames))
+        numbers = np.repeat(newest[:, None], frames, axis=1)
+        for row in np.flatnonzero(since > first).tolist():
+            numbers[row] = NOBODY_YET
+            for part in known[row]:
+                numbers[row, max(0, part.first - first) :] = part.number
+        return numbers
 
     def also(self, number: int) -> list[int]:
         """Give the other numbers that somebody once had, in order."""
@@ -132,21 +151,20 @@ class People:
         for history in self._histories.values():
             history.forget_before(pulse)
 
-    def _note_seen(self, key: TrackKey, first: int, last: int) -> None:
-        if last < first:
-            return
-        number = self._numbers.get(key)
-        if number is None:
-            self._unnamed.setdefault(key, first)
-            return
-        # Who is confirmed now was there before: frames that are not decided yet can still show them.
-        first = self._unnamed.pop(key, first)
-        self.first_seen[number] = min(first, self.first_seen.get(number, first))
-        self.last_seen[number] = max(last, self.last_seen.get(number, last))
+    def _note_seen(self, parts: Sequence[Part], first: int, last: int) -> None:
+        for place, part in enumerate(parts):
+            ends = last if place + 1 == len(parts) else min(last, parts[place + 1].first - 1)
+            if part.number != NOBODY_YET and max(first, part.first) <= ends:
+                # Who is confirmed now was there before: frames that are not decided yet can still show them.
+                self.first_seen[part.number] = min(part.first, self.first_seen.get(part.number, part.first))
+                self.last_seen[part.number] = max(ends, self.last_seen.get(part.number, ends))
 
     def _merge(self, kept: int, lost: int) -> None:
         self.merged = {old: kept if new == lost else new for old, new in self.merged.items()} | {lost: kept}
-        self._numbers = {key: kept if number == lost else number for key, number in self._numbers.items()}
+        self._parts = {
+            key: [Part(part.first, kept) if part.number == lost else part for part in parts]
+            for key, parts in self._parts.items()
+        }
         first, last = self.first_seen.pop(lost, None), self.last_seen.pop(lost, None)
         self.away.discard(lost)
         if first is not None and last is not None:
@@ -157,10 +175,17 @@ class People:
         """Let go of tracks and people that were not heard of for as long as the registry remembers."""
         for key in [key for key, heard in self._heard.items() if heard < now - self._remembered]:
             del self._heard[key]
-            self._numbers.pop(key, None)
-            self._unnamed.pop(key, None)
+            self._parts.pop(key, None)
             self._reader.locals.forget(key)
         for number in [number for number, last in self.last_seen.items() if last < now - self._remembered]:
             del self.first_seen[number], self.last_seen[number]
             self.away.discard(number)
             self.merged = {old: new for old, new in self.merged.items() if new != number}
+
+
+def _parts(numbers: Mapping[EpisodeKey, int]) -> dict[TrackKey, list[Part]]:
+    """Sort the numbers of episodes by track, the episodes of each in order."""
+    parts: dict[TrackKey, list[Part]] = {}
+    for key, number in numbers.items():
+        parts.setdefault(key.track, []).append(Part(key.first, number or NOBODY_YET))
+    return parts

@@ -8,10 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview import LocalTrack, TrackKey
+from bestview import Glimpse, LocalTrack, TrackKey
 from server.view.align import Epoch
 from server.view.boxes import boxes_array
 from server.view.locals import LocalNumbers
+from server.wire import messages
 from server.wire.fit import Fit
 from server.wire.messages import CameraTracks
 
@@ -42,20 +43,22 @@ class CameraWindow:
         return self.message.first
 
     def local_tracks(self) -> list[LocalTrack]:
-        """Give the tracks as identity takes them, boxes in the camera's own picture."""
+        """Give what is final of the tracks, where it is anything, boxes in the camera's own picture."""
         _, height = self.message.size
+        frames = max(0, self.message.final_to - self.first + 1)
+        hidden = np.isnan(self.boxes[:, :frames, 0])
+        own = self.fit.boxes_to_own(self.boxes[:, :frames])
         return [
             LocalTrack(
                 camera=key.camera,
                 local=key.local,
                 first=self.first,
                 boxes=boxes,
-                histogram=np.array(track.histogram, dtype=np.float64),
+                looks=_glimpses(track.looks),
                 picture_height=float(height),
             )
-            for key, track, boxes in zip(
-                self.keys, self.message.tracks, self.fit.boxes_to_own(self.boxes), strict=True
-            )
+            for key, track, boxes, gone in zip(self.keys, self.message.tracks, own, hidden, strict=True)
+            if not gone.all()
         ]
 
     def seen(self) -> list[tuple[int, int]]:
@@ -67,6 +70,10 @@ class CameraWindow:
         ends = self.first + there.shape[1] - 1 - there[:, ::-1].argmax(axis=1)
         ends[~there.any(axis=1)] = self.first - 1
         return list(zip(begins.tolist(), ends.tolist(), strict=True))
+
+
+def _glimpses(looks: Sequence[messages.Glimpse]) -> tuple[Glimpse, ...]:
+    return tuple(Glimpse(it.first, it.last, np.array(it.histogram, dtype=np.float64)) for it in looks)
 
 
 class Reader:

@@ -13,7 +13,8 @@ def makes_sense(message: CameraTracks, stride: int) -> bool:
     """Tell whether the frames, the tracks and the sizes in a message fit together."""
     frames = message.last - message.first + 1
     ids = [track.id for track in message.tracks]
-    bins = [len(track.histogram) for track in message.tracks]
+    looks = [look for track in message.tracks for look in track.looks]
+    bins = [len(look.histogram) for look in looks]
     return (
         0 <= frames <= _WINDOW_MAX
         and message.last <= end_of_epoch(message.epoch, stride)
@@ -21,4 +22,5 @@ def makes_sense(message: CameraTracks, stride: int) -> bool:
         and len(ids) == len(dict.fromkeys(ids))
         and all(count == bins[0] > 0 for count in bins)
         and all(len(track.boxes) == frames for track in message.tracks)
+        and all(message.first <= look.first <= look.last <= message.final_to for look in looks)
     )

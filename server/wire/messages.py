@@ -55,6 +55,15 @@ class FrameHead(msgspec.Struct, frozen=True, kw_only=True):
     encoded: float
 
 
+class Glimpse(msgspec.Struct, frozen=True, kw_only=True):
+    """How a person looks in consecutive frames in which nobody else is in the box."""
+
+    first: Pulse
+    last: Pulse
+    histogram: list[float]
+    """The mean of these frames' histograms."""
+
+
 class Track(msgspec.Struct, frozen=True, kw_only=True):
     """One person in one camera over a window."""
 
@@ -62,8 +71,9 @@ class Track(msgspec.Struct, frozen=True, kw_only=True):
     """The tracker's own number: one per person, camera and boot."""
     boxes: list[Box | None]
     """One per frame of the window; null where the person is hidden."""
-    histogram: list[float]
     confidence: float
+    looks: list[Glimpse] = []
+    """Where nobody else was in the boxes, in the frames up to ``final_to``; in their order."""
     sharpness: Annotated[float, msgspec.Meta(ge=0, le=1)] | None = None
     """How sharp the picture of the person is; null where nobody has measured it."""
 

@@ -10,7 +10,7 @@ from typing import Any, cast
 import msgspec
 import numpy as np
 
-from bestview import IdentityUpdate, LocalTrack
+from bestview import EpisodeKey, IdentityUpdate, LocalTrack
 from server.camera.encode import AccessUnit, Encoder
 from server.view.align import Epoch
 from server.view.service import BestViewService
@@ -19,7 +19,7 @@ from server.wire.config import Config, Encode, Site
 from server.wire.epochs import end_of_epoch
 from server.wire.inbox import Message
 from server.wire.loading import build_config
-from server.wire.messages import Box, CameraStatus, CameraTracks, FrameHead, Keys, ThumbHead, Track
+from server.wire.messages import Box, CameraStatus, CameraTracks, FrameHead, Glimpse, Keys, ThumbHead, Track
 
 WIDTH, HEIGHT, FPS = 64, 48, 25
 GOP = STRIDE = 5
@@ -37,7 +37,7 @@ def small_config(cameras: Sequence[str] = CAMERAS, **changes: Any) -> Config:
         "encode": {"gop": GOP},
         "cameras": [{"id": camera, "source": "scene:room"} for camera in cameras],
         "track": {"window": {"window": 5, "stride": STRIDE, "birth_window": 5}},
-        "view": {"lookahead": 2 * GOP, "switch_cost_s": 0.04, "identity": {"confirm_updates": 1}},
+        "view": {"lookahead": 2 * GOP, "switch_cost_s": 0.04, "identity": {"confirm": 1, "regroup": 1}},
     }
     for section, value in changes.items():
         content[section] = {**content.get(section, {}), **value} if isinstance(value, dict) else value
@@ -75,7 +75,14 @@ def word(camera: str, epoch: int, boxes: Mapping[int, Box | None], **changes: An
         ended=False,
         shed=[],
         tracks=[
-            Track(id=track, boxes=[box] * STRIDE, histogram=look(track), confidence=1.0)
+            Track(
+                id=track,
+                boxes=[box] * STRIDE,
+                confidence=1.0,
+                looks=[]
+                if box is None
+                else [Glimpse(first=last - STRIDE + 1, last=last, histogram=look(track))],
+            )
             for track, box in boxes.items()
         ],
         solve=None,
@@ -129,7 +136,7 @@ class TrackNumbers:
     def update(self, tracks: Sequence[LocalTrack], last_frame: int) -> IdentityUpdate:
         """Give everybody their number."""
         del last_frame
-        return IdentityUpdate({track.key: track.local for track in tracks}, (), (), (), (), ())
+        return IdentityUpdate({EpisodeKey(*it.key, 0): it.local for it in tracks}, (), (), (), (), ())
 
 
 class FedService(BestViewService):

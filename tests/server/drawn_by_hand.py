@@ -11,7 +11,7 @@ import aiohttp
 import av
 import numpy as np
 from aiohttp import web
-from cameras_by_hand import GOP, STRIDE, FedService, TrackNumbers, look, small_config, tracks, video, word
+from cameras_by_hand import GOP, STRIDE, FedService, TrackNumbers, small_config, tracks, video, word
 from halls import PATIENCE, Hall
 from numpy.typing import NDArray
 
@@ -78,7 +78,7 @@ class Drawn(Hall):
                 for unit in units(number, MOST)[first : first + STRIDE]:
                     self.service.intake.video(video(camera, unit))
                 seen = [
-                    Track(id=person, boxes=places, histogram=look(person), confidence=1.0)
+                    Track(id=person, boxes=places, confidence=1.0)
                     for person, places in boxes(number, first, STRIDE).items()
                 ]
                 self.service.intake.tracks(tracks(word(camera, epoch, {}, tracks=seen, size=SIZE)))

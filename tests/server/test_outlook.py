@@ -51,7 +51,7 @@ def long_word(camera: str, epoch: int, boxes: Mapping[int, Sequence[Box | None]]
         type(it)(
             id=it.id,
             boxes=list(boxes[it.id][: told.last - first + 1]),
-            histogram=it.histogram,
+            looks=it.looks,
             confidence=1.0,
         )
         for it in told.tracks
@@ -83,7 +83,7 @@ def test_it_holds_every_view_once_and_compares_it_with_the_best(
     story: list[dict[str, dict[int, list[Box | None]]]], missing: set[tuple[str, int]], relative: bool
 ) -> None:
     config = small_config()
-    people = Drifting(config.view.identity, CAMERAS, dict.fromkeys(CAMERAS), (64, 48))
+    people = Drifting(config.view.identity, CAMERAS, dict.fromkeys(CAMERAS), (64, 48), lag=0)
     people._registry = TrackNumbers()  # type: ignore[assignment]
     sight = Sight(config, dict.fromkeys(CAMERAS), people.fits)
     epochs = [

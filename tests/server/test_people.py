@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from cameras_by_hand import CAMERAS, HEIGHT, LARGE, SMALL, STRIDE, WIDTH, epoch_of, word
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bestview import IdentitySettings, IdentityUpdate, LocalTrack, Merge, Split, TrackKey
+from bestview import EpisodeKey, IdentitySettings, IdentityUpdate, LocalTrack, Merge, Split, TrackKey
 from server.view.history import History
 from server.view.locals import LocalNumbers
 from server.view.people import People
@@ -16,8 +18,8 @@ from server.wire.messages import Box
 
 
 def people(**settings: int) -> People:
-    identity = IdentitySettings(**{"confirm_updates": 1, **settings})
-    return People(identity, CAMERAS, dict.fromkeys(CAMERAS), (WIDTH, HEIGHT))
+    identity = IdentitySettings(**{"confirm": 1, "regroup": 1, **settings})
+    return People(identity, CAMERAS, dict.fromkeys(CAMERAS), (WIDTH, HEIGHT), lag=0)
 
 
 class Dictated:
@@ -52,7 +54,7 @@ class Heard:
 
 
 def said(numbers: dict[tuple[str, int], int], *corrections: Merge | Split) -> IdentityUpdate:
-    keys = {TrackKey(*key): number for key, number in numbers.items()}
+    keys = {EpisodeKey(*key, 0): number for key, number in numbers.items()}
     merged = tuple(it for it in corrections if isinstance(it, Merge))
     split = tuple(it for it in corrections if isinstance(it, Split))
     return IdentityUpdate(numbers=keys, born=(), returned=(), gone=(), merged=merged, split=split)
@@ -122,11 +124,23 @@ def test_first_and_last_seen_are_the_frames_with_a_box() -> None:
 
 
 def test_who_is_confirmed_late_was_there_from_their_first_box_on() -> None:
-    it = dictated(said({}), said({}), said({("c0", 1): 1}), said({}), said({("c0", 1): 2}))
+    def since(*numbers: tuple[int, int]) -> IdentityUpdate:
+        return replace(said({}), numbers={EpisodeKey("c0", 1, first): number for first, number in numbers})
+
+    later = 3 * STRIDE
+    it = dictated(
+        said({}),
+        since((STRIDE, 0)),
+        since((STRIDE, 1)),
+        since((STRIDE, 1), (later, 0)),
+        since((STRIDE, 1), (later, 2)),
+    )
     for epoch in range(5):
         it.update(epoch_of(epoch, word("c0", epoch, {1: None if epoch == 0 else SMALL})))
-    assert it.first_seen[1] == STRIDE
-    assert it.first_seen[2] == 3 * STRIDE, "since they left the other person"
+    assert it.first_seen == {1: STRIDE, 2: later}
+    assert it.last_seen == {1: later - 1, 2: 5 * STRIDE - 1}
+    numbers = it.numbers([TrackKey("c0", 1)], 0, 5 * STRIDE)[0].tolist()
+    assert numbers == [-1] * STRIDE + [1] * (later - STRIDE) + [2] * (2 * STRIDE)
 
 
 def test_a_restarted_cameras_people_do_not_inherit_the_boxes_of_others() -> None:
@@ -163,7 +177,7 @@ def test_what_turned_out_is_taken_once_and_in_order() -> None:
 
 
 def test_who_has_left_a_person_for_one_not_confirmed_yet_has_no_number() -> None:
-    it = dictated(said({("c0", 1): 1}), said({}))
+    it = dictated(said({("c0", 1): 1}), said({("c0", 1): 0}))
     it.update(epoch_of(0, word("c0", 0, {1: SMALL})))
     it.update(epoch_of(1, word("c0", 1, {1: SMALL})))
     assert boxes(it, "c0", STRIDE) == {}
@@ -188,7 +202,7 @@ def test_people_who_were_gone_for_long_are_forgotten_with_all_that_is_known_of_t
     assert it.known == []
     assert it.away == set()
     assert it.whose("c0", 1, 1, 0) is None
-    assert not it._numbers
+    assert not it._parts
     assert not it._heard
 
 

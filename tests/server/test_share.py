@@ -25,7 +25,7 @@ from cameras_by_hand import (
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bestview import IdentityUpdate, LocalTrack, Merge, TrackKey
+from bestview import EpisodeKey, IdentityUpdate, LocalTrack, Merge
 from server.run.setup import free_port
 from server.view.decide import Decider
 from server.view.service import BestViewService
@@ -85,9 +85,9 @@ def test_an_old_numbers_stream_goes_on_at_its_own_service() -> None:
 
         def update(self, given: Sequence[LocalTrack], last_frame: int) -> IdentityUpdate:
             if last_frame < 15:
-                return IdentityUpdate({it.key: it.local for it in given}, (), (), (), (), ())
+                return IdentityUpdate({EpisodeKey(*it.key, 0): it.local for it in given}, (), (), (), (), ())
             merged = (Merge(1, 2),) if last_frame < 20 else ()
-            numbers = dict.fromkeys((TrackKey("c0", 1), TrackKey("c0", 2)), 1)
+            numbers = dict.fromkeys((EpisodeKey("c0", 1, 0), EpisodeKey("c0", 2, 0)), 1)
             return IdentityUpdate(numbers, (), (), (), merged, ())
 
     service = FedService(small_config(**shared(0)))

@@ -1,0 +1,158 @@
+"""Tracks in parts that are surely one person: cut where a tracker may have taken one for another.
+
+A tracker confuses people where they hide each other, hardly ever elsewhere. Whoever comes out of a crowd,
+or comes back after a while unseen, begins a new episode: who it is, is asked anew.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bestview.identity_settings import IdentitySettings
+from bestview.keys import EpisodeKey, TrackKey
+from bestview.looks import Look, Looks
+from bestview.sightings import Glimpse, Sightings
+
+Floats = NDArray[np.float64]
+
+_ROOTED = 4
+"""Frames outside crowds that an episode needs before the next crowd can end it."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class End:
+    """Where an episode begins or ends: frame, (4,) box in pixels, (2,) ground point (NaN: unknown)."""
+
+    frame: int
+    box: Floats
+    ground: Floats
+
+
+@dataclass(slots=True, eq=False)
+class Episode:
+    """Part of one camera's track.
+
+    Attributes:
+        key: camera, the camera's number for the track, and the first frame.
+        begin: first sighting.
+        end: last sighting.
+        before: the episode of the same track before this one.
+        crowded: frames of crowd between the two.
+        frames: sightings.
+        free: those outside crowds.
+        crowd: of the newest sightings, how many in a row are in a crowd.
+        looks: where nobody else was in the box.
+        untold: frames whose number has not been told yet.
+        told: frames by number told.
+        number: the person's; 0: nobody's yet.
+    """
+
+    key: EpisodeKey
+    begin: End
+    end: End
+    before: Episode | None = None
+    crowded: int = 0
+    frames: int = 0
+    free: int = 0
+    crowd: int = 0
+    looks: Looks = field(default_factory=Looks)
+    untold: list[int] = field(default_factory=list)
+    told: dict[int, int] = field(default_factory=dict)
+    number: int = 0
+
+    @property
+    def gap(self) -> int:
+        """Frames from the end of the episode before; 0: there was none."""
+        return self.begin.frame - self.before.end.frame if self.before is not None else 0
+
+    @property
+    def mostly(self) -> int:
+        """The number it was told most often, 0 before the first; of equals the lowest."""
+        return max(sorted(self.told), key=self.told.__getitem__, default=0)
+
+    def tell(self, upto: int) -> bool:
+        """Count the frames up to `upto` as told by today's number; say whether any was."""
+        told = [frame for frame in self.untold if frame <= upto]
+        if told and self.number:
+            self.told[self.number] = self.told.get(self.number, 0) + len(told)
+        self.untold = self.untold[len(told) :]
+        return bool(told and self.number)
+
+    def told_anew(self, lost: int, kept: int) -> None:
+        """Count what was told to be one person as told to be another: the two turned out to be one."""
+        frames = self.told.pop(lost, 0)
+        if frames:
+            self.told[kept] = self.told.get(kept, 0) + frames
+
+
+class Episodes:
+    """Cuts every camera's tracks into episodes as they come in.
+
+    Attributes:
+        open: those that are not settled yet, in the order in which they were heard of: the rows of what
+            others keep about them.
+    """
+
+    def __init__(self, settings: IdentitySettings) -> None:
+        self._settings = settings
+        self.open: list[Episode] = []
+        self._current: dict[TrackKey, Episode] = {}
+        self._row: dict[EpisodeKey, int] = {}
+
+    def take(self, seen: Sightings, looks: Mapping[TrackKey, Sequence[Glimpse]]) -> NDArray[np.int64]:
+        """Take in an update: (T, W) the row in `open` that each sighting belongs to, -1: none.
+
+        `looks` are how tracks look; in a crowd they do not count.
+        """
+        rows = np.full(seen.visible.shape, -1)
+        crowded = seen.crowded(self._settings.crowd)
+        for track, (key, columns) in enumerate(zip(seen.keys, seen.visible, strict=True)):
+            ends = {look.last - seen.first: look for look in looks.get(key, ())}
+            for column in np.flatnonzero(columns).tolist():
+                at = End(seen.first + column, seen.boxes[track, column], seen.ground[track, column])
+                episode = self._sight(key, at, bool(crowded[track, column]))
+                rows[track, column] = self._row[episode.key]
+                look = ends.get(column)
+                if look is not None and not crowded[track, look.first - seen.first : column + 1].any():
+                    episode.looks.add(key.camera, Look.of(look.histogram, look.last - look.first + 1))
+        return rows
+
+    def _sight(self, key: TrackKey, at: End, crowded: bool) -> Episode:
+        episode = self._current.get(key)
+        if episode is None or self._ends(episode, at.frame, crowded):
+            # Copies: an end is remembered for long, and must not keep a whole update.
+            at = End(at.frame, at.box.copy(), at.ground.copy())
+            before, crowd = episode, episode.crowd if episode is not None else 0
+            episode = Episode(EpisodeKey(*key, at.frame), at, at, before, crowd)
+            self._current[key] = episode
+            self._row[episode.key] = len(self.open)
+            self.open.append(episode)
+        episode.end = at
+        episode.frames += 1
+        episode.free += not crowded
+        episode.crowd = episode.crowd + 1 if crowded else 0
+        episode.untold.append(at.frame)
+        return episode
+
+    def _ends(self, episode: Episode, frame: int, crowded: bool) -> bool:
+        """Say whether a sighting in `frame` begins a new episode."""
+        settings = self._settings
+        out_of_crowd = not crowded and episode.crowd >= settings.crowd_frames and episode.free >= _ROOTED
+        return out_of_crowd or frame - episode.end.frame > settings.gap
+
+    def settle(self, old: Iterable[Episode]) -> None:
+        """Let go of episodes; the rows of the others move up."""
+        closed = {episode.key for episode in old}
+        if not closed:
+            return
+        for episode in self.open:
+            if episode.key in closed:
+                episode.before = None  # or all there ever was would be kept
+                if self._current.get(episode.key.track) is episode:
+                    del self._current[episode.key.track]
+        self.open = [episode for episode in self.open if episode.key not in closed]
+        self._row = {episode.key: row for row, episode in enumerate(self.open)}

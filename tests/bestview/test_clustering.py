@@ -1,0 +1,150 @@
+"""Rows become people as a plain reading of the rule says, and as the best partition where that is clear."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from bestview.clustering import cluster
+from bestview.likelihood import CameraLooks, LookScale, LookWeights, look_distances, look_evidence
+from bestview.naming import named
+
+WEIGHTS = LookWeights(look=3.0, cap=4.0, frames=8)
+JOIN = 0.5
+
+
+@dataclass(frozen=True)
+class Case:
+    """What `cluster` is given."""
+
+    evidence: NDArray[np.float64]
+    apart: NDArray[np.bool_]
+    past: NDArray[np.bool_]
+    looks: list[CameraLooks]
+
+    def grouped(self) -> list[int]:
+        found = cluster(self.evidence, self.apart, self.past, self.looks, WEIGHTS, JOIN)
+        return [int(label) for label in found]
+
+    def value(self, one: list[int], two: list[int]) -> float:
+        """Evidence between two groups, from the beginning."""
+        if self.apart[np.ix_(one, two)].any() or self.past[[*one, *two]].all():
+            return -np.inf
+        return float(self.evidence[np.ix_(one, two)].sum()) + sum(
+            self._look(it, one, two) for it in self.looks
+        )
+
+    @staticmethod
+    def _look(camera: CameraLooks, one: list[int], two: list[int]) -> float:
+        a, b = (np.isin(camera.rows, group) for group in (one, two))
+        if not (a.any() and b.any()):
+            return 0.0
+        total = [camera.total[mine].sum(axis=0)[None] for mine in (a, b)]
+        count = np.array([camera.count[mine].sum() for mine in (a, b)])
+        distance = look_distances(total[0] / count[0], total[1] / count[1])[0]
+        return float(look_evidence(distance, count[:1], count[1:], camera.scale, WEIGHTS)[0])
+
+
+@st.composite
+def cases(draw: st.DrawFn, most: int = 9) -> Case:
+    count = draw(st.integers(0, most))
+    rng = np.random.default_rng(draw(st.integers(0, 2**32)))
+    evidence = np.round(rng.normal(0, 2, (count, count)), 2)
+    evidence = np.triu(evidence, 1) + np.triu(evidence, 1).T
+    apart = np.triu(rng.random((count, count)) < draw(st.sampled_from([0.0, 0.1, 0.4])), 1)
+    looks = []
+    for _ in range(draw(st.integers(0, 3))):
+        rows = np.flatnonzero(rng.random(count) < 0.6)
+        if rows.size:
+            frames = rng.integers(1, 12, rows.size).astype(float)
+            total = rng.dirichlet(np.ones(4), rows.size) * frames[:, None]
+            looks.append(CameraLooks(rows, total, frames, LookScale(0.1, 0.3)))
+    return Case(evidence, apart | apart.T, rng.random(count) < 0.3, looks)
+
+
+def plainly(case: Case) -> list[int]:
+    """Join the two groups with the most evidence, all looked at anew every time."""
+    groups = [[row] for row in range(len(case.evidence))]
+    while True:
+        pairs = [
+            (-case.value(one, two), one[0], two[0], i, j)
+            for i, one in enumerate(groups)
+            for j, two in enumerate(groups)
+            if i < j
+        ]
+        worth, _, _, i, j = min(pairs, default=(np.inf, 0, 0, 0, 0))
+        if not -worth >= JOIN:
+            return [next(group[0] for group in groups if row in group) for row in range(len(case.evidence))]
+        groups[i] = sorted(groups[i] + groups[j])
+        del groups[j]
+
+
+@settings(deadline=None, max_examples=150)
+@given(cases())
+def test_groups_are_those_of_joining_the_best_pair_until_none_is_left(case: Case) -> None:
+    assert case.grouped() == plainly(case)
+
+
+@settings(deadline=None, max_examples=100)
+@given(cases())
+def test_nobody_is_joined_who_was_seen_apart_and_nobody_is_left_who_belongs_together(case: Case) -> None:
+    labels = np.array(case.grouped())
+    same = labels[:, None] == labels
+    assert not (same & case.apart).any()
+    groups = [np.flatnonzero(labels == label).tolist() for label in sorted(set(labels.tolist()))]
+    assert all(case.past[group].all() <= (len(group) == 1) for group in groups)
+    for i, one in enumerate(groups):
+        for two in groups[i + 1 :]:
+            assert case.value(one, two) < JOIN + 1e-9
+
+
+def partitions(rows: list[int]) -> Iterator[list[list[int]]]:
+    """All ways to part rows into groups."""
+    if not rows:
+        yield []
+        return
+    for rest in partitions(rows[1:]):
+        for i in range(len(rest)):
+            yield [*rest[:i], [rows[0], *rest[i]], *rest[i + 1 :]]
+        yield [[rows[0]], *rest]
+
+
+@settings(deadline=None, max_examples=40)
+@given(st.integers(1, 7), st.integers(0, 2**32))
+def test_where_evidence_is_right_on_the_whole_groups_are_the_best_of_all_partitions(
+    count: int, seed: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    who = rng.integers(0, 3, count)
+    same = who[:, None] == who
+    evidence = np.where(same, rng.uniform(1, 4, same.shape), rng.uniform(-4, -0.1, same.shape))
+    evidence = np.triu(evidence, 1) + np.triu(evidence, 1).T
+    nobody = np.zeros(count, dtype=np.bool_)
+    case = Case(evidence, np.zeros(same.shape, dtype=np.bool_), nobody, [])
+    best = max(
+        partitions(list(range(count))),
+        key=lambda groups: sum(float(np.triu(evidence[np.ix_(g, g)], 1).sum()) for g in groups),
+    )
+    assert case.grouped() == [min(group) for row in range(count) for group in best if row in group]
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.lists(st.dictionaries(st.integers(1, 4), st.integers(1, 9), max_size=3), max_size=4))
+def test_names_keep_as_many_frames_as_can_be_what_they_were_told(told: list[dict[int, int]]) -> None:
+    numbers = named(told)
+    given_ = [number for number in numbers if number]
+    assert len(given_) == len(set(given_))
+    kept = sum(frames.get(number, 0) for frames, number in zip(told, numbers, strict=True))
+
+    def best(at: int, taken: frozenset[int]) -> int:
+        if at == len(told):
+            return 0
+        free = [it for it in told[at] if it not in taken]
+        return max([best(at + 1, taken), *(told[at][it] + best(at + 1, taken | {it}) for it in free)])
+
+    assert kept == best(0, frozenset())

@@ -1,0 +1,80 @@
+"""Tracks are cut where they may have been confused, and nowhere else; looks count outside crowds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bestview import Glimpse, IdentitySettings, LocalTrack, TrackKey
+from bestview.episodes import Episodes
+from bestview.sightings import FootError, line_up
+
+FEET = FootError(0.05, 0.15)
+LEFT, RIGHT, ONTO_LEFT = (0.0, 0.0, 10.0, 20.0), (100.0, 0.0, 110.0, 20.0), (2.0, 0.0, 12.0, 20.0)
+
+
+def track(local: int, first: int, boxes: Sequence[tuple[float, ...] | None], *looks: Glimpse) -> LocalTrack:
+    rows = np.array([box or (np.nan,) * 4 for box in boxes])
+    return LocalTrack("c0", local, first, rows, looks)
+
+
+def taken(*updates: Sequence[LocalTrack]) -> Episodes:
+    episodes = Episodes(IdentitySettings())
+    for tracks in updates:
+        rows = episodes.take(line_up(tracks, {"c0": None}, FEET), {it.key: it.looks for it in tracks})
+        assert rows.max(initial=-1) < len(episodes.open)
+    return episodes
+
+
+def spans(episodes: Episodes, local: int) -> list[tuple[int, int]]:
+    mine = [it for it in episodes.open if it.key.track == TrackKey("c0", local)]
+    return [(it.key.first, it.end.frame) for it in mine]
+
+
+def test_who_comes_out_of_a_crowd_begins_anew() -> None:
+    met = [RIGHT] * 5 + [ONTO_LEFT] * 3 + [RIGHT] * 4
+    episodes = taken([track(1, 0, [LEFT] * 12), track(2, 0, met)])
+    assert spans(episodes, 1) == spans(episodes, 2) == [(0, 7), (8, 11)]
+    assert [it.crowded for it in episodes.open] == [0, 3, 0, 3]
+    assert [it.before for it in episodes.open] == [None, episodes.open[0], None, episodes.open[2]]
+
+
+def test_a_short_touch_and_a_short_moment_unseen_cut_nothing() -> None:
+    met = [RIGHT] * 5 + [ONTO_LEFT] * 2 + [RIGHT] * 3 + [None] * 9 + [RIGHT] * 3
+    assert spans(taken([track(1, 0, [LEFT] * 22), track(2, 0, met)]), 2) == [(0, 21)]
+    assert spans(taken([track(2, 0, [RIGHT] * 5 + [None] * 11 + [RIGHT] * 3)]), 2) == [(0, 4), (16, 18)]
+
+
+def test_looks_in_a_crowd_do_not_count() -> None:
+    coat = np.array([1.0, 3.0])
+    met = [RIGHT] * 4 + [ONTO_LEFT] * 2
+    crowded = Glimpse(3, 4, coat)
+    alone = Glimpse(0, 2, coat)
+    episodes = taken([track(1, 0, [LEFT] * 6), track(2, 0, met, alone, crowded)])
+    [look] = [it.looks.by_camera["c0"] for it in episodes.open if it.key.local == 2]
+    assert look.count == 3
+    np.testing.assert_allclose(look.mean, [0.25, 0.75])
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.data())
+def test_episodes_do_not_depend_on_how_frames_come_in_updates(data: st.DataObject) -> None:
+    frames = 40
+    places = st.sampled_from([LEFT, RIGHT, ONTO_LEFT, None])
+    runs = st.lists(st.tuples(places, st.integers(1, 14)), min_size=1, max_size=8)
+    boxes = {
+        local: [box for box, count in data.draw(runs) for _ in range(count)][:frames] for local in (1, 2)
+    }
+    cuts = sorted(data.draw(st.sets(st.integers(1, frames - 1), max_size=5)))
+    updates = [
+        [track(local, a, rows[a:b]) for local, rows in boxes.items() if any(rows[a:b])]
+        for a, b in zip([0, *cuts], [*cuts, frames], strict=True)
+    ]
+    whole = taken([track(local, 0, rows) for local, rows in boxes.items() if any(rows)])
+    parts = taken(*updates)
+    for local in (1, 2):
+        assert spans(parts, local) == spans(whole, local)
+        assert sum(it.frames for it in whole.open if it.key.local == local) == sum(map(bool, boxes[local]))
