@@ -144,6 +144,20 @@ class Episodes:
         out_of_crowd = not crowded and episode.crowd >= settings.crowd_frames and episode.free >= _ROOTED
         return out_of_crowd or frame - episode.end.frame > settings.gap
 
+    def old(self, last_frame: int) -> list[int]:
+        """Give the rows of episodes that are old enough to be settled by now, in order.
+
+        Where more than `most` are open, those that are unseen for longest are settled sooner, but not before
+        they can have been told.
+        """
+        settings = self._settings
+        ends = np.array([episode.end.frame for episode in self.open], dtype=np.int64)
+        longest = np.argsort(ends, kind="stable")[: max(0, len(ends) - settings.most)]
+        soonest = last_frame - settings.told_after - 2 * settings.regroup
+        old = ends <= last_frame - settings.settled_after
+        old[longest[ends[longest] <= soonest]] = True
+        return [int(row) for row in np.flatnonzero(old)]
+
     def settle(self, old: Iterable[Episode]) -> None:
         """Let go of episodes; the rows of the others move up."""
         closed = {episode.key for episode in old}

@@ -147,8 +147,7 @@ class IdentityRegistry:
 
     def _settle(self, last_frame: int) -> None:
         """Let go of what is old: it goes on as its person's past."""
-        oldest = last_frame - self._settings.settled_after
-        rows = [row for row, it in enumerate(self._episodes.open) if it.end.frame <= oldest]
+        rows = self._episodes.old(last_frame)
         self._weighing.remember(rows, self._episodes.open, self._tables)
         old = [self._episodes.open[row] for row in rows]
         self._tables.make_room(episode.mostly for episode in old if episode.mostly)

@@ -59,6 +59,19 @@ def test_looks_in_a_crowd_do_not_count() -> None:
     np.testing.assert_allclose(look.mean, [0.25, 0.75])
 
 
+def test_of_too_many_those_unseen_for_longest_are_old_sooner_but_not_before_they_were_told() -> None:
+    few = IdentitySettings(most=2, settled_after=100, told_after=5, regroup=10)
+    tracks = [track(n, 0, [(50.0 * n, 0.0, 50.0 * n + 10, 20.0)] * (10 * n)) for n in range(1, 6)]
+    episodes = Episodes(few)
+    episodes.take(line_up(tracks, {"c0": None}, FEET), {})
+    assert [it.end.frame for it in episodes.open] == [9, 19, 29, 39, 49]
+    assert episodes.old(49) == [0, 1], "the third was told just now"
+    assert episodes.old(60) == [0, 1, 2], "two are left"
+    assert episodes.old(119) == [0, 1, 2]
+    assert episodes.old(130) == [0, 1, 2]
+    assert episodes.old(139) == [0, 1, 2, 3]
+
+
 @settings(deadline=None, max_examples=60)
 @given(st.data())
 def test_episodes_do_not_depend_on_how_frames_come_in_updates(data: st.DataObject) -> None:
