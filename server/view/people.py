@@ -64,6 +64,8 @@ class People:
         self._lag = lag
         self._parts: dict[TrackKey, Sequence[Part]] = {}
         self._heard: dict[TrackKey, int] = {}
+        self._asked_from = 0
+        """Nobody asks for frames before this one any more."""
         self.first_seen: dict[int, int] = {}
         self.last_seen: dict[int, int] = {}
         self.away: set[int] = set()
@@ -79,7 +81,8 @@ class People:
             self._histories[window.message.camera].put(window, window.first, window.message.last)
         tracks = [track for window in windows for track in window.local_tracks()]
         update = self._registry.update(tracks, epoch.last - self._lag)
-        self._parts.update(_parts(update.numbers))
+        for key, parts in _parts(update.numbers).items():
+            self._parts[key] = self._with_settled(key, parts)
         keys = chain.from_iterable(window.keys for window in windows)
         seen = chain.from_iterable(window.seen() for window in windows)
         for key, (first, last) in zip(keys, seen, strict=True):
@@ -147,9 +150,22 @@ class People:
         return taken
 
     def forget_boxes_before(self, pulse: int) -> None:
-        """Let go of the boxes before a pulse."""
+        """Let go of the boxes before a pulse, and of who they were."""
+        self._asked_from = max(self._asked_from, pulse)
         for history in self._histories.values():
             history.forget_before(pulse)
+
+    def _with_settled(self, key: TrackKey, parts: list[Part]) -> list[Part]:
+        """Put parts that the registry has settled before those that may still change.
+
+        A long look-ahead asks for frames that are older than what the registry still speaks of.
+        """
+        settled = [part for part in self._parts.get(key, ()) if part.first < parts[0].first]
+        if not settled:
+            return parts
+        ends = [*(part.first for part in settled[1:]), parts[0].first]
+        asked = [part for part, end in zip(settled, ends, strict=True) if end > self._asked_from]
+        return asked + parts
 
     def _note_seen(self, parts: Sequence[Part], first: int, last: int) -> None:
         for place, part in enumerate(parts):

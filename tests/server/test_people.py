@@ -143,6 +143,35 @@ def test_who_is_confirmed_late_was_there_from_their_first_box_on() -> None:
     assert numbers == [-1] * STRIDE + [1] * (later - STRIDE) + [2] * (2 * STRIDE)
 
 
+def test_frames_that_are_not_decided_yet_keep_their_people_when_the_registry_has_settled_them() -> None:
+    def since(*parts: tuple[int, int]) -> IdentityUpdate:
+        return replace(said({}), numbers={EpisodeKey("c0", 1, first): number for first, number in parts})
+
+    second, third = 2 * STRIDE, 4 * STRIDE
+    it = dictated(
+        since((0, 1)),
+        since((0, 1)),
+        since((0, 1), (second, 2)),
+        since((second, 2)),
+        since((third, 3)),
+        since((third, 3)),
+        replace(since((third, 4)), merged=(Merge(kept=4, lost=2),)),
+    )
+
+    def told() -> list[int]:
+        return [next(iter(boxes(it, "c0", first)), -1) for first in (0, second, third)]
+
+    for epoch in range(5):
+        it.update(epoch_of(epoch, word("c0", epoch, {1: SMALL})))
+    assert told() == [1, 2, 3]
+    it.forget_boxes_before(second)
+    it.update(epoch_of(5, word("c0", 5, {1: SMALL})))
+    assert told() == [-1, 2, 3]
+    assert len(it._parts[TrackKey("c0", 1)]) == 2, "what is not asked for any more is let go"
+    it.update(epoch_of(6, word("c0", 6, {1: SMALL})))
+    assert told() == [-1, 4, 4], "merges hold for what is settled, too"
+
+
 def test_a_restarted_cameras_people_do_not_inherit_the_boxes_of_others() -> None:
     it = people()
     it.update(epoch_of(0, word("c0", 0, {1: SMALL})))
