@@ -47,9 +47,8 @@ def carry_out(options: argparse.Namespace, films: Films, folder: Path) -> Found:
     """Measure the parts that are asked for."""
     parts, quick = options.part or PARTS, options.quick
     found = Found()
-    if "splice" in parts or "objects" in parts:
-        found.encoded = encode_again(films[0], 5 if quick else 40)
     if "splice" in parts:
+        found.encoded = encode_again(films[0], 5 if quick else 40)
         found.spliced = [asyncio.run(splice(films, it, 20 if quick else 200)) for it in (1, 10, _OBJECTS)]
         found.ffmpeg = ffmpeg_switching(films, 100 if quick else 1000, folder)
     if "right" in parts:
@@ -71,7 +70,7 @@ def _watch(
     with running(films, folder / "site") as site, viewers(site.http) as crowd:
         numbers = site.objects(_OBJECTS)[:_OBJECTS]
         if "objects" in parts:
-            found.watched = watch_objects(site, crowd, numbers, seconds, 1 if quick else 5)
+            found.watched = watch_objects(site, crowd, numbers, films[0], seconds, 1 if quick else 5)
         if "first" in parts:
             crowd.watch([f"/objects/{number}/best.mp4" for number in numbers])
             found.first = first_pictures(site, numbers, 30 if quick else 300)

@@ -17,11 +17,14 @@ from numpy.typing import NDArray
 from benchmarks.stream_cameras import ENCODE, SITE
 from benchmarks.stream_crowd import Heard
 from benchmarks.stream_site import StreamSite, Viewers
+from benchmarks.stream_splice import encode_again
+from server.camera.encode import AccessUnit
 from server.view.fmp4 import TIMESCALE
 
 _SETTLE_S = 2.0
 _PAUSE_S = 0.037
 """Between requests: they come at every place within a GOP."""
+_ENCODED_GOPS = 20
 _RECEIVED = 65_536
 
 
@@ -33,6 +36,8 @@ class Watched:
     nobody: float
     one: float
     all: float
+    encoded: float
+    """That an encoder of its own for each object would use instead, worked out."""
     rounds: int
 
     @property
@@ -40,18 +45,34 @@ class Watched:
         """What all cost against one."""
         return self.all / self.one
 
+    @property
+    def against_encoding(self) -> float:
+        """What encoding for each costs against all."""
+        return (self.nobody + self.encoded) / self.all
+
 
 def watch_objects(
-    site: StreamSite, viewers: Viewers, numbers: Sequence[int], seconds: float, rounds: int
+    site: StreamSite,
+    viewers: Viewers,
+    numbers: Sequence[int],
+    film: Sequence[AccessUnit],
+    seconds: float,
+    rounds: int,
 ) -> Watched:
-    """Let nobody, one and all of the objects be watched by turns, one viewer each."""
+    """Let nobody, one and all of the objects be watched by turns, one viewer each; encode between them.
+
+    A busy machine makes all of them dearer: hence by turns.
+    """
     cores: dict[int, list[float]] = {0: [], 1: [], len(numbers): []}
+    again = []
     for _ in range(rounds):
+        again.append(SITE.fps * encode_again(film, _ENCODED_GOPS).whole / 1e6)
         for count, found in cores.items():
             viewers.watch([_path(number) for number in numbers[:count]], _SETTLE_S)
             found.append(_used(site, viewers, seconds)[0])
     nobody, one, everybody = (statistics.median(found) for found in cores.values())
-    return Watched(len(numbers), nobody, one, everybody, rounds)
+    encoded = len(numbers) * statistics.median(again)
+    return Watched(len(numbers), nobody, one, everybody, encoded, rounds)
 
 
 @dataclass(frozen=True, slots=True)

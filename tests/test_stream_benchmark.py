@@ -141,9 +141,10 @@ def test_a_real_site_is_watched(films: Films, tmp_path: Path) -> None:
     assert switched is None or switched > 50
     with running(films, tmp_path / "site") as site, viewers(site.http) as crowd:
         numbers = site.objects(20)[:20]
-        watched = watch_objects(site, crowd, numbers, 2.0, 1)
+        watched = watch_objects(site, crowd, numbers, films[0], 2.0, 1)
         assert 0 < watched.one < 2
         assert watched.objects == 20
+        assert watched.against_encoding > 1
         late = first_pictures(site, numbers, 5)
         assert (late > 0).all()
         assert (late < 5000).all()
