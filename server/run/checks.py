@@ -5,6 +5,7 @@ from __future__ import annotations
 import socket
 
 from server.camera.pipeline import CameraPipeline
+from server.camera.sound import open_sound
 from server.wire.config import Config
 from server.wire.errors import UserError
 from server.wire.sources import SourceKind, kind_of
@@ -42,8 +43,10 @@ def check_recordings(config: Config) -> None:
     """Refuse at once what no camera process could open; live cameras may come and go.
 
     Raises:
-        UserError: a recording, a scene or a file of detections cannot be opened.
+        UserError: a recording, a scene, a file of detections or the sound cannot be opened.
     """
+    if config.sounding is not None:
+        open_sound(config, config.sounding)
     for it in config.cameras:
         if kind_of(it.source) is not SourceKind.STREAM:
             CameraPipeline(config, it.id).close()

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from functools import cached_property
 
 from server.view.picture import Picture
+from server.view.sound import Heard
 from server.view.ts import Counters, pack
 
 
@@ -16,12 +17,20 @@ class Footage:
     """
 
     def __init__(
-        self, pictures: Sequence[Picture], fps: float, counters: Counters, *, fills: bool = False
+        self,
+        pictures: Sequence[Picture],
+        fps: float,
+        counters: Counters,
+        *,
+        fills: bool = False,
+        heard: Heard | None = None,
     ) -> None:
         self.pictures = tuple(pictures)
         self._fps, self._counters = fps, counters
         self.start = self.pictures[0].key
         self.fills = fills
+        self.heard = heard
+        """What is to be heard meanwhile; None at a site without sound."""
 
     @property
     def first(self) -> int:
@@ -38,7 +47,17 @@ class Footage:
         """The pictures as fragments of MP4."""
         return b"".join(picture.fragment for picture in self.pictures)
 
+    @property
+    def sound(self) -> bytes:
+        """What is to be heard meanwhile as a fragment of MP4; nothing at a site without sound."""
+        return b"" if self.heard is None else self.heard.fragment
+
+    @cached_property
+    def with_sound(self) -> bytes:
+        """The pictures as fragments of MP4, behind what is to be heard with them."""
+        return self.sound + self.data
+
     @cached_property
     def ts(self) -> bytes:
         """The pictures as an MPEG transport stream."""
-        return pack(self.pictures, self._fps, self._counters)
+        return pack(self.pictures, self._fps, self._counters, self.heard)

@@ -12,8 +12,9 @@ from server.view.agreement import ParameterMismatchError
 from server.view.align import Aligner
 from server.view.sense import makes_sense
 from server.view.shelf import Shelf, Shelved
+from server.view.sound import SoundShelf
 from server.wire.inbox import Message
-from server.wire.messages import CameraStatus, CameraTracks, FrameHead, ThumbHead, camera_of
+from server.wire.messages import CameraStatus, CameraTracks, FrameHead, SoundHead, ThumbHead, camera_of
 
 log = logging.getLogger(__name__)
 
@@ -68,15 +69,22 @@ class Intake:
     """Takes the cameras' messages in. What cannot be understood is counted and dropped."""
 
     def __init__(
-        self, shelves: Mapping[str, Shelf], aligner: Aligner, on_frame: Callable[[str, Shelved], None]
+        self,
+        shelves: Mapping[str, Shelf],
+        aligner: Aligner,
+        on_frame: Callable[[str, Shelved], None],
+        sound: SoundShelf | None = None,
     ) -> None:
         self._shelves, self._aligner, self._on_frame = shelves, aligner, on_frame
+        self._sound = sound
+        self.bad_sounds = 0
         self.states = {camera: CameraState() for camera in shelves}
         self.thumbnails: dict[tuple[str, int, int], Thumbnail] = {}
         """By camera, boot and track."""
         self._frame_head = msgspec.json.Decoder(FrameHead)
         self._tracks = msgspec.json.Decoder(CameraTracks)
         self._status = msgspec.json.Decoder(CameraStatus)
+        self._sound_head = msgspec.json.Decoder(SoundHead)
         self._thumb_head = msgspec.json.Decoder(ThumbHead)
 
     def alive(self, key: str, there: bool) -> None:
@@ -115,6 +123,15 @@ class Intake:
             state.frames += 1
             self._aligner.frame(camera, head.boot, head.pulse)
             self._on_frame(camera, frame)
+
+    def sound(self, message: Message) -> None:
+        """Shelve some of the site's sound."""
+        if self._sound is None:
+            return
+        try:
+            self._sound.put(self._sound_head.decode(message.attachment), message.payload)
+        except ValueError:  # also what cannot be decoded
+            self.bad_sounds += 1
 
     def tracks(self, message: Message) -> None:
         """Hand a window's tracks to the aligner."""

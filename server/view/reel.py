@@ -69,8 +69,9 @@ class Segment:
     def data(self) -> bytes:
         """The segment as fragments of MP4."""
         standing = list(takewhile(lambda it: not it.start, self._footage))
-        rest = b"".join(it.data for it in self._footage[len(standing) :])
-        return self._stand(standing[-1].until) + rest if standing else rest
+        rest = b"".join(it.with_sound for it in self._footage[len(standing) :])
+        heard = b"".join(it.sound for it in standing)
+        return heard + self._stand(standing[-1].until) + rest if standing else rest
 
     def _stand(self, until: int) -> bytes:
         """Show the lead's last picture until a pulse: what it is decoded by passes within a few ticks."""

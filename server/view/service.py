@@ -18,6 +18,7 @@ from server.view.intake import Intake
 from server.view.past.past import Past
 from server.view.record import Recorder
 from server.view.shelf import Shelf
+from server.view.sound import SoundShelf
 from server.view.splice import Splicer
 from server.wire.bus import Bus
 from server.wire.config import Config
@@ -42,8 +43,10 @@ class BestViewService:
         self.agreement = Agreement()
         self.shelves = {camera: Shelf(config.site.fps, frames, self.agreement) for camera in cameras}
         self.aligner = Aligner(cameras, stride, grace)
-        self.splicer = Splicer(self.shelves, self.agreement, config)
-        self.intake = Intake(self.shelves, self.aligner, self.splicer.frame)
+        form = config.sound.format
+        self.sound = None if form is None else SoundShelf(form, config.site.fps, frames / config.site.fps)
+        self.splicer = Splicer(self.shelves, self.agreement, config, self.sound)
+        self.intake = Intake(self.shelves, self.aligner, self.splicer.frame, self.sound)
         self.decider = Decider(
             config, homographies(config), lambda camera, pulse: self.shelves[camera].has(pulse)
         )
@@ -76,6 +79,8 @@ class BestViewService:
         }
         for what, handler in handlers.items():
             bus.subscribe(self._keys.camera("*", what), handler)
+        if self.sound is not None:
+            bus.subscribe(self._keys.sound, self.intake.sound)
         bus.watch_alive(self._keys.camera("*", "alive"), self._alive)
         bus.declare_alive(self._keys.bestview("alive", index))
 

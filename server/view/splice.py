@@ -10,6 +10,7 @@ from server.view.decide import GopDecision
 from server.view.picture import Picture
 from server.view.reel import Reel, plan
 from server.view.shelf import Shelf
+from server.view.sound import SoundShelf
 from server.view.streams import DecidedStream, Gop, LiveStream
 from server.view.timeline import Timeline
 from server.wire.config import Config
@@ -21,11 +22,20 @@ _SILENT_S = 2
 class Splicer:
     """Cuts from camera to camera by passing on other bytes: nothing is decoded or encoded here."""
 
-    def __init__(self, shelves: Mapping[str, Shelf], agreement: Agreement, config: Config) -> None:
+    def __init__(
+        self,
+        shelves: Mapping[str, Shelf],
+        agreement: Agreement,
+        config: Config,
+        sound: SoundShelf | None = None,
+    ) -> None:
         self._shelves, self._agreement, self._config = shelves, agreement, config
+        self._sound = sound
         site, http = config.site, config.http
         self.plan = plan(site.fps, config.encode.gop, http.hls_segment_s, http.hls_window_s)
-        self._live = {camera: LiveStream(self._channel(), self._time(), site.fps) for camera in shelves}
+        self._live = {
+            camera: LiveStream(self._channel(), self._time(), site.fps, sound) for camera in shelves
+        }
         self._decided = {camera: self._stream() for camera in shelves}
         """Each camera as if it were always chosen."""
         self._people: dict[int, DecidedStream] = {}
@@ -43,7 +53,7 @@ class Splicer:
     def decision(self, decision: GopDecision) -> None:
         """Pass every object's chosen GOP on to those who watch it; a camera's GOP is put together once."""
         fps = self._config.site.fps
-        gop = Gop(self._shelves, decision.first, decision.frames, fps, self._gops)
+        gop = Gop(self._shelves, decision.first, decision.frames, fps, self._gops, self._sound)
         self._gops += 1
         cameras = {choice.number: choice.camera for choice in decision.choices}
         for number, camera in cameras.items():

@@ -9,17 +9,19 @@ from server.view.footage import Footage
 from server.view.picture import Picture
 from server.view.reel import Reel
 from server.view.shelf import Shelf
+from server.view.sound import Following, SoundShelf
 from server.view.timeline import Timeline
-from server.view.ts import Counters, packets
+from server.view.ts import Counters, packets, sound_packets
 
 
 class LiveStream:
     """A camera's own stream: every picture at once."""
 
-    def __init__(self, channel: Channel, time: Timeline, fps: float) -> None:
+    def __init__(self, channel: Channel, time: Timeline, fps: float, sound: SoundShelf | None = None) -> None:
         self.channel = channel
         self._time, self._fps = time, fps
-        self._tables = self._packets = 0
+        self._sound = None if sound is None else Following(sound)
+        self._tables = self._packets = self._sound_packets = 0
 
     def take(self, frame: Picture) -> None:
         """Send a picture, after what bridges a hole before it."""
@@ -33,10 +35,12 @@ class LiveStream:
     def _send(self, pictures: list[Picture], *, fills: bool) -> None:
         if not pictures:
             return
-        counters = Counters(self._tables, self._packets, whole=False)
+        counters = Counters(self._tables, self._packets, self._sound_packets, whole=False)
+        heard = None if self._sound is None else self._sound.beside(pictures[0].pulse, pictures[-1].until)
+        self._sound_packets += 0 if heard is None else sound_packets(heard)
         self._tables += pictures[0].key
         self._packets += sum(packets(picture) for picture in pictures)
-        self.channel.publish(Footage(pictures, self._fps, counters, fills=fills))
+        self.channel.publish(Footage(pictures, self._fps, counters, fills=fills, heard=heard))
 
 
 class DecidedStream:
@@ -84,8 +88,16 @@ class Gop:
     """What the cameras have of the frames ``first … first + frames - 1``; ``tables`` counts GOPs."""
 
     def __init__(
-        self, shelves: Mapping[str, Shelf], first: int, frames: int, fps: float, tables: int
+        self,
+        shelves: Mapping[str, Shelf],
+        first: int,
+        frames: int,
+        fps: float,
+        tables: int,
+        sound: SoundShelf | None = None,
     ) -> None:
+        self._sound = sound
+        self._heard = None if sound is None else sound.between(first, first + frames)
         self.first, self.until = first, first + frames
         self._shelves, self._fps, self._tables = shelves, fps, tables
         self._whole: dict[str, Footage | None] = {}
@@ -104,4 +116,8 @@ class Gop:
 
     def footage(self, pictures: list[Picture]) -> Footage:
         """Put pictures of these frames together."""
-        return Footage(pictures, self._fps, Counters(self._tables), fills=not pictures[0].key)
+        first, until = pictures[0].pulse, pictures[-1].until
+        heard = self._heard  # of all its frames, shared by all who show them
+        if self._sound is not None and (first, until) != (self.first, self.until):
+            heard = self._sound.between(first, until)
+        return Footage(pictures, self._fps, Counters(self._tables), fills=not pictures[0].key, heard=heard)

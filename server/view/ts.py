@@ -1,4 +1,4 @@
-"""MPEG transport stream by hand (ISO/IEC 13818-1): one program, one video, on one clock.
+"""MPEG transport stream by hand (ISO/IEC 13818-1): one program, a video, perhaps a sound, on one clock.
 
 Each packet counts on from the one before of its stream (continuity_counter, modulo 16). So that a GOP is
 packed once however many watch, and any GOP can follow any other, each GOP is stretched by stuffing to a
@@ -14,13 +14,15 @@ from dataclasses import dataclass
 
 from server.view.fmp4 import TIMESCALE, ticks
 from server.view.picture import Picture
+from server.view.sound import Heard
+from server.wire.sound import FRAME
 
 PACKET_BYTES = 188
 COUNTERS = 16
 """Packets after which the continuity counter begins anew."""
 
-_PAT_PID, _PMT_PID, _VIDEO_PID = 0x0000, 0x1000, 0x0100
-_H264 = 0x1B
+_PAT_PID, _PMT_PID, _VIDEO_PID, _SOUND_PID = 0x0000, 0x1000, 0x0100, 0x0101
+_H264, _AAC = 0x1B, 0x0F
 """stream_type."""
 _CLOCK = 1 << 33
 """Time stamps are modulo this (2.4.3.7)."""
@@ -35,6 +37,8 @@ _AUD = b"\x00\x00\x00\x01\x09\xf0"
 """Access unit delimiter: begins every picture in a transport stream (2.14.1)."""
 _START_CODE = b"\x00\x00\x00\x01"
 _PES_HEAD = 14
+_FRAMES_AT_ONCE = 6
+"""Frames of sound in a PES packet, which has to say how long it is: in 16 bits."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +47,7 @@ class Counters:
 
     tables: int = 0
     video: int = 0
+    sound: int = 0
     whole: bool = True
     """Stretch it to a multiple of 16 packets, so that any other can follow."""
 
@@ -52,11 +57,24 @@ def packets(picture: Picture) -> int:
     return _packets(_PES_HEAD + len(_AUD) + len(picture.sample))
 
 
-def pack(pictures: Sequence[Picture], fps: float, counters: Counters) -> bytes:
-    """Give consecutive pictures as packets; the tables come before each whole GOP and each key picture."""
+def sound_packets(heard: Heard) -> int:
+    """Give how many packets with content some sound becomes."""
+    return sum(_plain_packets(len(content)) for content in _sound_pes(heard))
+
+
+def pack(pictures: Sequence[Picture], fps: float, counters: Counters, heard: Heard | None = None) -> bytes:
+    """Give consecutive pictures as packets, behind what is to be heard with them.
+
+    The tables come before each whole GOP and each key picture.
+    """
     out: list[bytes] = []
     if counters.whole or pictures[0].key:
-        out += [_table(_PAT_PID, _PAT, counters.tables), _table(_PMT_PID, _PMT, counters.tables)]
+        out += [
+            _table(_PAT_PID, _PAT, counters.tables),
+            _table(_PMT_PID, _PMT if heard is None else _PMT_WITH_SOUND, counters.tables),
+        ]
+    if heard is not None:
+        out += _pack_sound(heard, counters)
     counter = counters.video
     for place, picture in enumerate(pictures):
         content = _pes(picture, fps)
@@ -64,11 +82,38 @@ def pack(pictures: Sequence[Picture], fps: float, counters: Counters) -> bytes:
         if counters.whole and place == len(pictures) - 1:
             count += -(counter + count) % COUNTERS
         time = ticks(picture.pulse, fps)
-        out += _split(content, count, counter, _reference(time, key=picture.key))
+        out += _split(_VIDEO_PID, content, count, counter, _reference(time, key=picture.key))
         counter = (counter + count) % COUNTERS
         for later in range(time + _PCR_EVERY, ticks(picture.until, fps), _PCR_EVERY):
             out.append(_packet(_VIDEO_PID, counter - 1, b"", _reference(later)))
     return b"".join(out)
+
+
+def _pack_sound(heard: Heard, counters: Counters) -> Iterator[bytes]:
+    counter, contents = counters.sound, _sound_pes(heard)
+    for place, content in enumerate(contents):
+        count = _plain_packets(len(content))
+        if counters.whole and place == len(contents) - 1:
+            count += -(counter + count) % COUNTERS
+        yield from _split(_SOUND_PID, content, count, counter, b"")
+        counter = (counter + count) % COUNTERS
+
+
+def _sound_pes(heard: Heard) -> list[bytes]:
+    """Give sound as PES packets, each frame behind its ADTS head."""
+    form, made = heard.format, []
+    for place in range(0, len(heard.frames), _FRAMES_AT_ONCE):
+        stamp = _stamp(round((heard.first + place) * FRAME * TIMESCALE / form.rate) % _CLOCK)
+        frames = heard.frames[place : place + _FRAMES_AT_ONCE]
+        content = b"".join(form.adts(len(frame)) + frame for frame in frames)
+        made.append(
+            struct.pack(">IHBBB", 0x1C0, 3 + len(stamp) + len(content), 0x84, 0x80, 5) + stamp + content
+        )
+    return made
+
+
+def _plain_packets(content: int) -> int:
+    return -(-content // _PAYLOAD)
 
 
 def _packets(content: int) -> int:
@@ -78,12 +123,16 @@ def _packets(content: int) -> int:
 def _pes(picture: Picture, fps: float) -> bytes:
     """Give a picture as a PES packet (2.4.3.6): it carries its time, and says its length where that fits."""
     time = ticks(picture.pulse, fps) % _CLOCK
-    stamp = struct.pack(">BHH", 0x21 | time >> 29 & 0x0E, time >> 14 & 0xFFFE | 1, time << 1 & 0xFFFE | 1)
+    stamp = _stamp(time)
     content = _AUD + b"".join(_annex_b(picture.sample))
     length = 3 + len(stamp) + len(content)
     # 0x84: the access unit begins right here; 0x80: it is decoded when it is shown.
     head = struct.pack(">IHBBB", 0x1E0, length if length < 1 << 16 else 0, 0x84, 0x80, len(stamp))
     return head + stamp + content
+
+
+def _stamp(time: int) -> bytes:
+    return struct.pack(">BHH", 0x21 | time >> 29 & 0x0E, time >> 14 & 0xFFFE | 1, time << 1 & 0xFFFE | 1)
 
 
 def _annex_b(sample: bytes) -> Iterator[bytes]:
@@ -101,14 +150,14 @@ def _reference(time: int, *, key: bool = False) -> bytes:
     return struct.pack(">BIH", 0x10 | 0x40 * key, base >> 1, (base & 1) << 15 | 0x7E00)
 
 
-def _split(content: bytes, count: int, counter: int, reference: bytes) -> Iterator[bytes]:
+def _split(pid: int, content: bytes, count: int, counter: int, reference: bytes) -> Iterator[bytes]:
     """Spread the content over so many packets: full ones first, and at least a byte in each."""
     at = 0
     for place in range(count):
         field = reference if place == 0 else b""
         room = _PAYLOAD - (1 + len(field) if field else 0)
         size = min(room, len(content) - at - (count - 1 - place))
-        yield _packet(_VIDEO_PID, counter + place, content[at : at + size], field, begins=place == 0)
+        yield _packet(pid, counter + place, content[at : at + size], field, begins=place == 0)
         at += size
 
 
@@ -146,4 +195,6 @@ def _crc(data: bytes) -> int:
 
 
 _PAT = _section(0, 1, struct.pack(">HH", 1, 0xE000 | _PMT_PID))
-_PMT = _section(2, 1, struct.pack(">HHBHH", 0xE000 | _VIDEO_PID, 0xF000, _H264, 0xE000 | _VIDEO_PID, 0xF000))
+_STREAMS = struct.pack(">HHBHH", 0xE000 | _VIDEO_PID, 0xF000, _H264, 0xE000 | _VIDEO_PID, 0xF000)
+_PMT = _section(2, 1, _STREAMS)
+_PMT_WITH_SOUND = _section(2, 1, _STREAMS + struct.pack(">BHH", _AAC, 0xE000 | _SOUND_PID, 0xF000))

@@ -107,7 +107,7 @@ def _init(request: web.Request) -> web.Response:
         return _nobody(request)
     if parameters is None:
         return not_now("no camera has delivered a picture yet")
-    return _media(request, init_segment(parameters, site.width, site.height))
+    return _media(request, init_segment(parameters, site.width, site.height, service.config.sound.format))
 
 
 def _segment(request: web.Request) -> web.Response:

@@ -16,6 +16,8 @@ class SiteInfo(msgspec.Struct, frozen=True):
     lookahead_frames: int
     codec: str | None
     """RFC 6381 codec string of every stream; null before the first key frame."""
+    sound: str | None
+    """The same of the sound beside the pictures; null: this site has none."""
     pulse0: float | None
     """When pulse 0 was due: unix seconds by the server's clock."""
     now: float

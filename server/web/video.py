@@ -77,8 +77,8 @@ async def _mp4(request: web.Request, channel: Channel) -> web.StreamResponse:
     full = no_place(request, channel.viewers)
     if full is not None:
         return full
-    head = init_segment(parameters, site.width, site.height)
-    return await send_stream(request, channel, head, {"Content-Type": "video/mp4"})
+    head = init_segment(parameters, site.width, site.height, service.config.sound.format)
+    return await send_stream(request, channel, head, {"Content-Type": "video/mp4"}, _with_sound)
 
 
 async def _ts(request: web.Request, channel: Channel) -> web.StreamResponse:
@@ -86,6 +86,10 @@ async def _ts(request: web.Request, channel: Channel) -> web.StreamResponse:
     if full is not None:
         return full
     return await send_stream(request, channel, b"", {"Content-Type": "video/mp2t"}, _as_ts)
+
+
+def _with_sound(piece: Piece) -> bytes:
+    return piece.with_sound if isinstance(piece, Footage) else piece.data
 
 
 def _as_ts(piece: Piece) -> bytes:

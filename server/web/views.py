@@ -22,6 +22,7 @@ def site_info(service: BestViewService) -> SiteInfo:
         gop=config.encode.gop,
         lookahead_frames=config.view.lookahead,
         codec=None if parameters is None else parameters.codec,
+        sound=None if service.sound is None else service.sound.format.codec,
         pulse0=service.pulse0,
         now=time.time(),
         cameras=list(config.camera_ids),

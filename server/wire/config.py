@@ -29,6 +29,7 @@ from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, Settings
 from bestview import IdentitySettings, QualitySettings, checked_homography
 from server.wire.detect import DetectSettings
 from server.wire.library import validated
+from server.wire.sound import SoundFormat
 from tracking import DEFAULT_SOLVER, CostSettings, WindowSettings, solver_named
 
 Polygon = Annotated[list[tuple[float, float]], Field(min_length=3)]
@@ -136,6 +137,27 @@ class Camera(Section):
         if ground is not None:
             checked_homography(ground, f"camera {info.data.get('id', '?')}")
         return ground
+
+
+class Sound(Section):
+    """One sound for the whole site, under every picture."""
+
+    source: str | None = None
+    """A camera's id: that camera's sound. Or a file; None: the site has no sound."""
+    offset: int = 0
+    """A file's sound at pulse n is that of its moment (n - offset) / fps; a camera has its own offset."""
+    at_end: Literal["stop", "loop"] = "stop"
+    """What a file does after its end; a camera has its own."""
+    rate: Literal[48_000, 44_100, 32_000, 24_000] = 48_000
+    """Samples a second."""
+    channels: Literal[1, 2] = 2
+    kbps: Annotated[int, Field(ge=16, le=320)] = 96
+    """Of what has to be encoded: AAC of this rate and so many channels is passed on as it is."""
+
+    @property
+    def format(self) -> SoundFormat | None:
+        """What all streams of the site sound like; None: they have no sound."""
+        return None if self.source is None else SoundFormat(self.rate, self.channels)
 
 
 class Track(Section):
@@ -251,6 +273,7 @@ class Config(BaseSettings):
     cameras: Annotated[list[Camera], Field(min_length=1)]
     ground: Path | None = None
     """A JSON file with one homography per camera; a camera's own `ground` goes before it."""
+    sound: Sound = Sound()
     detect: Annotated[DetectSettings, validated(DetectSettings)] = DetectSettings()
     """Finding people in a picture; by default by background subtraction and box filters (paper, IV.A.2)."""
     track: Track = Track()
@@ -290,6 +313,12 @@ class Config(BaseSettings):
                 "so that a view is chosen on tracks that no longer change"
             )
         return self
+
+    @property
+    def sounding(self) -> str | None:
+        """The camera whose process sends the sound: the one whose sound it is, or the first; None: nobody."""
+        source = self.sound.source
+        return source if source is None or source in self.camera_ids else self.camera_ids[0]
 
     def camera(self, camera_id: str) -> Camera:
         """Give one camera.

@@ -69,10 +69,13 @@ def build_config(content: Mapping[str, Any], *, where: str, folder: Path) -> Con
         raise UserError(f"{where}: {error}") from error
     onnx = replace(config.detect.onnx, model=config.detect.model_in(folder))
     detect = replace(config.detect, onnx=onnx)
+    sound = config.sound
+    if sound.source is not None and sound.source not in config.camera_ids:
+        sound = sound.model_copy(update={"source": resolved(sound.source, folder)})
     record = config.record
     if record.folder is not None:
         record = record.model_copy(update={"folder": folder / record.folder})
-    return config.model_copy(update={"cameras": cameras, "detect": detect, "record": record})
+    return config.model_copy(update={"cameras": cameras, "detect": detect, "sound": sound, "record": record})
 
 
 def _resolved(camera: Camera, homographies: Mapping[str, Any], folder: Path) -> Camera:

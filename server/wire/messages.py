@@ -12,6 +12,7 @@ key                                       payload                               
 ``myview/SITE/camera/ID/status``          :class:`CameraStatus`
 ``myview/SITE/camera/ID/thumbs/LOCAL``    JPEG of one person                       :class:`ThumbHead`
 ``myview/SITE/camera/ID/alive``           liveliness token
+``myview/SITE/sound``                     frames of AAC, one after the other       :class:`SoundHead`
 ``myview/SITE/bestview/choices``          :class:`GopChoices`
 ``myview/SITE/bestview/INDEX/choices``    of a further service that shares the site
 ``myview/SITE/bestview/alive``            liveliness token
@@ -62,6 +63,15 @@ class Glimpse(msgspec.Struct, frozen=True, kw_only=True):
     last: Pulse
     histogram: list[float]
     """The mean of these frames' histograms."""
+
+
+class SoundHead(msgspec.Struct, frozen=True, kw_only=True):
+    """Which frames of the site's sound these are (:mod:`server.wire.sound`)."""
+
+    first: Number
+    """The number of the first: it begins with sample 1024 · first, counted from pulse 0."""
+    sizes: list[Annotated[int, msgspec.Meta(ge=1, le=8184)]]
+    """Bytes of each; a transport stream can say no more than 8191 with its head."""
 
 
 class Track(msgspec.Struct, frozen=True, kw_only=True):
@@ -197,6 +207,11 @@ class Keys:
     def camera(self, camera_id: str, what: str) -> str:
         """Name a camera's key; ``*`` as the id stands for all cameras."""
         return f"myview/{self.site}/camera/{camera_id}/{what}"
+
+    @property
+    def sound(self) -> str:
+        """Name the key of the site's sound."""
+        return f"myview/{self.site}/sound"
 
     def bestview(self, what: str, index: int = 0) -> str:
         """Name a key of the best-view service, of several the one with this index."""

@@ -1,0 +1,32 @@
+"""A site's sound from what a camera or a file has: AAC frames on the clock of the pulses."""
+
+from __future__ import annotations
+
+from server.camera.sound.frames import Frame, runs
+from server.camera.sound.recorded import RecordedSound
+from server.wire.config import Config
+from server.wire.errors import UserError
+from server.wire.sources import SourceKind, kind_of
+
+__all__ = ["Frame", "RecordedSound", "open_sound", "runs"]
+
+
+def open_sound(config: Config, camera_id: str) -> RecordedSound | None:
+    """Open the site's sound, where this camera's process is to send it; None where it is not.
+
+    Raises:
+        UserError: it cannot be opened.
+    """
+    settings, fps = config.sound, config.site.fps
+    if settings.source is None or config.sounding != camera_id:
+        return None
+    path, offset, at_end = settings.source, settings.offset, settings.at_end
+    if settings.source in config.camera_ids:
+        camera = config.camera(camera_id)
+        path, offset, at_end = camera.source, camera.offset, camera.at_end
+        if kind_of(path) is not SourceKind.FILE:
+            raise UserError(f"sound: camera {camera_id} is no recorded video ({path}); name a file instead")
+    try:
+        return RecordedSound(path, settings, fps, offset, at_end)
+    except UserError as error:
+        raise UserError(f"sound: {error}") from error

@@ -1,0 +1,94 @@
+"""Sound of any kind, encoded once to AAC."""
+
+from __future__ import annotations
+
+import logging
+from fractions import Fraction
+
+import av
+import numpy as np
+from av.audio.codeccontext import AudioCodecContext
+from av.audio.frame import AudioFrame
+from av.audio.resampler import AudioResampler
+from numpy.typing import NDArray
+
+from server.camera.sound.frames import Frame, Packet
+from server.wire.sound import FRAME, SoundFormat
+
+log = logging.getLogger(__name__)
+
+_OFF_S = 0.02
+"""Sound that is this far away from its place is moved there."""
+
+
+class Encoding:
+    """Decodes, resamples and encodes. Where nothing comes there is silence; what comes twice is left out."""
+
+    def __init__(self, form: SoundFormat, kbps: int) -> None:
+        self._rate = form.rate
+        self._layout = "mono" if form.channels == 1 else "stereo"
+        self._resampler = self._new_resampler()
+        self._encoder = self._new_encoder(form, kbps)
+        self._samples: NDArray[np.float32] = np.zeros((form.channels, 0), dtype=np.float32)
+        """``(channels, samples)`` that are no whole frame yet."""
+        self._first: int | None = None
+        """The sample number of the first of them."""
+        self._too_many = 0
+        """Samples that are to be left out of what comes."""
+
+    def take(self, packet: Packet, at: Fraction) -> list[Frame]:
+        """Give the frames that have become whole."""
+        if packet.pts is None or packet.time_base is None:
+            return []
+        shift = at - packet.pts * packet.time_base
+        try:
+            heard = [it for it in packet.decode() if isinstance(it, AudioFrame)]
+        except av.error.FFmpegError as error:
+            log.debug("sound that cannot be decoded: %s", error)
+            return []
+        for frame in heard:
+            if frame.pts is not None and frame.time_base is not None:
+                self._place(round((frame.pts * frame.time_base + shift) * self._rate))
+            self._append(frame)
+        return self._encoded()
+
+    def _place(self, at: int) -> None:
+        """Make sample number ``at`` the next one, if it is not nearly so."""
+        if self._first is None:
+            self._first = max(0, at) // FRAME * FRAME
+        ahead = at - (self._first + self._samples.shape[1])
+        if abs(ahead) <= _OFF_S * self._rate and self._samples.shape[1]:
+            return
+        self._resampler = self._new_resampler()
+        self._too_many = max(0, -ahead)
+        self._samples = np.pad(self._samples, ((0, 0), (0, max(0, ahead))))
+
+    def _append(self, frame: AudioFrame) -> None:
+        for out in self._resampler.resample(frame):
+            samples = out.to_ndarray()[:, self._too_many :]
+            self._too_many -= out.samples - samples.shape[1]
+            self._samples = np.concatenate((self._samples, samples), axis=1)
+
+    def _encoded(self) -> list[Frame]:
+        found: list[Frame] = []
+        while self._first is not None and self._samples.shape[1] >= FRAME:
+            samples = np.ascontiguousarray(self._samples[:, :FRAME])
+            frame = AudioFrame.from_ndarray(samples, format="fltp", layout=self._layout)
+            frame.sample_rate, frame.pts, frame.time_base = self._rate, self._first, Fraction(1, self._rate)
+            # The encoder's first packet is what comes before its first sample: its time says so.
+            packets = [it for it in self._encoder.encode(frame) if it.pts is not None and it.pts >= 0]
+            found += [Frame(it.pts // FRAME, bytes(it)) for it in packets if it.pts is not None]
+            self._samples, self._first = self._samples[:, FRAME:], self._first + FRAME
+        return found
+
+    def _new_resampler(self) -> AudioResampler:
+        return AudioResampler(format="fltp", layout=self._layout, rate=self._rate)
+
+    def _new_encoder(self, form: SoundFormat, kbps: int) -> AudioCodecContext:
+        encoder = av.CodecContext.create("aac", "w")
+        assert isinstance(encoder, AudioCodecContext)  # noqa: S101 — tells mypy what aac is
+        encoder.sample_rate, encoder.layout, encoder.format = form.rate, self._layout, "fltp"
+        encoder.time_base = Fraction(1, form.rate)
+        encoder.bit_rate = kbps * 1000
+        encoder.open()
+        return encoder

@@ -1,0 +1,140 @@
+"""The sound of a recording, replayed on the pulses."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+from fractions import Fraction
+from itertools import chain
+from pathlib import Path
+from typing import Literal
+
+import av
+from av.audio.stream import AudioStream
+from av.container import InputContainer
+
+from server.camera.sound.encoding import Encoding
+from server.camera.sound.frames import Frame, Packet, Way
+from server.camera.sound.passing import Passing, fits
+from server.wire.config import Sound
+from server.wire.errors import UserError
+
+log = logging.getLogger(__name__)
+
+_WARM_S = 1
+"""What is decoded of a recording before the moment at which it is first asked for."""
+_SPEED_OFF = 0.002
+"""Pictures may be shown this much faster or slower than they were taken: the sound follows in small jumps."""
+
+
+class RecordedSound:
+    """Sounds at pulse *n* as the recording does with its picture ``n - offset``.
+
+    AAC of the site's format is passed on; all else is encoded.
+
+    Raises:
+        UserError: it cannot be opened, there is no sound in it, or its pictures have another rate.
+    """
+
+    def __init__(
+        self, path: str, settings: Sound, fps: float, offset: int, at_end: Literal["stop", "loop"]
+    ) -> None:
+        form = settings.format
+        if form is None:
+            raise ValueError("a site without sound")
+        self._path = path
+        self._fps = Fraction(fps).limit_denominator(100_000)
+        self._begin = offset / self._fps
+        container, stream = _open(path)
+        try:
+            self._start, self._speed = self._of_pictures(container)
+            self.passes = fits(stream, form)
+            """Whether it is passed on as it is."""
+            self._lasts = self._length(container, stream) if at_end == "loop" else None
+        finally:
+            container.close()
+        self._way: Way = Passing(form) if self.passes else Encoding(form, settings.kbps)
+        self._packets: Iterator[tuple[Fraction, Packet]] | None = None
+
+    def until(self, pulse: int) -> list[Frame]:
+        """Give the frames that follow, up to what sounds when ``pulse`` is due; pulses must grow.
+
+        The first call begins a second before that.
+        """
+        end = pulse / self._fps
+        if self._packets is None:
+            self._packets = self._from(max(Fraction(0), end - _WARM_S))
+        frames: list[Frame] = []
+        for at, packet in self._packets:
+            if at >= end:
+                self._packets = chain([(at, packet)], self._packets)
+                break
+            frames += self._way.take(packet, at)
+        return frames
+
+    def _from(self, moment: Fraction) -> Iterator[tuple[Fraction, Packet]]:
+        """Give the packets from a moment on with when they sound, seconds after pulse 0."""
+        begin, lasts = self._begin, self._lasts
+        if lasts is not None:
+            begin += max(0, (moment - begin) // lasts) * lasts
+        while True:
+            for time, packet in self._once():
+                if lasts is not None and time >= lasts:
+                    break
+                if begin + time >= moment:
+                    yield begin + time, packet
+            if lasts is None:
+                return
+            begin += lasts
+
+    def _once(self) -> Iterator[tuple[Fraction, Packet]]:
+        """Give the packets of one pass with when they sound after the first picture."""
+        container, stream = _open(self._path)
+        try:
+            for packet in container.demux(stream):
+                if packet.pts is not None and packet.time_base is not None and packet.size:
+                    yield (packet.pts * packet.time_base - self._start) * self._speed, packet
+        except av.error.FFmpegError as error:
+            log.warning("%s: its sound cannot be read any further: %s", self._path, error.strerror)
+        finally:
+            container.close()
+
+    def _of_pictures(self, container: InputContainer) -> tuple[Fraction, Fraction]:
+        """Give when the first picture is shown, and how much longer one is shown here than it was there."""
+        if not container.streams.video:
+            return Fraction(0), Fraction(1)
+        video = container.streams.video[0]
+        rate = video.average_rate
+        start = Fraction(0) if video.start_time is None else video.start_time * (video.time_base or 0)
+        speed = Fraction(1) if rate is None else Fraction(rate) / self._fps
+        if abs(speed - 1) > _SPEED_OFF:
+            raise UserError(
+                f"{self._path}: has {float(speed * self._fps):g} pictures a second, but site.fps is "
+                f"{float(self._fps):g}: its sound cannot be in step"
+            )
+        return Fraction(start), speed
+
+    def _length(self, container: InputContainer, sound: AudioStream) -> Fraction:
+        """Give the seconds after which it begins again: that of its pictures, or without any of its sound."""
+        if container.streams.video:
+            return sum(bool(it.size) for it in container.demux(container.streams.video[0])) / self._fps
+        ends = [
+            (it.pts + (it.duration or 0)) * it.time_base
+            for it in container.demux(sound)
+            if it.pts is not None and it.time_base is not None
+        ]
+        return Fraction(max(ends, default=Fraction(1)))
+
+
+def _open(path: str) -> tuple[InputContainer, AudioStream]:
+    if not Path(path).exists():
+        raise UserError(f"{path}: is neither a camera of this site nor a file")
+    try:
+        container = av.open(path)
+    except (av.error.FFmpegError, OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or " ".join(str(error).split())
+        raise UserError(f"{path}: cannot open this file: {reason}") from error
+    if not container.streams.audio:
+        container.close()
+        raise UserError(f"{path}: there is no sound in this file")
+    return container, container.streams.audio[0]
