@@ -1,0 +1,146 @@
+"""A recording's sound comes out as numbered AAC, in step with its pictures: as it is where it fits."""
+
+from __future__ import annotations
+
+import io
+from itertools import pairwise
+from pathlib import Path
+
+import av
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from sounds_by_hand import EVERY, FPS, beeps, write_flashes
+
+from server.camera.sound import Frame, RecordedSound, open_sound, runs
+from server.wire.config import Sound
+from server.wire.errors import UserError
+from server.wire.loading import build_config
+from server.wire.sound import SoundFormat
+
+FRAMES = 70
+STEREO = Sound(source="here")
+
+
+def all_until(sound: RecordedSound, pulse: int, first: int = 0) -> list[Frame]:
+    return [frame for it in range(first, pulse + 1) for frame in sound.until(it)]
+
+
+def as_adts(frames: list[Frame], form: SoundFormat) -> bytes:
+    """Give frames 0 to the last one as a stream, silent where there is none."""
+    found = {frame.number: frame.data for frame in frames}
+    data = [found.get(number, form.silence) for number in range(max(found) + 1)]
+    return b"".join(form.adts(len(frame)) + frame for frame in data)
+
+
+def numbers_grow(frames: list[Frame]) -> bool:
+    return all(a.number < b.number for a, b in pairwise(frames))
+
+
+def test_what_fits_is_passed_on_byte_for_byte(tmp_path: Path) -> None:
+    path = write_flashes(tmp_path / "own.mp4", FRAMES)
+    sound = RecordedSound(str(path), STEREO, FPS, 0, "stop")
+    with av.open(str(path)) as container:
+        own = [bytes(it) for it in container.demux(audio=0) if it.size and it.pts is not None and it.pts >= 0]
+    frames = all_until(sound, FRAMES + 10)
+    assert sound.passes
+    assert [frame.data for frame in frames] == own
+    assert [frame.number for frame in frames] == list(range(len(own)))
+
+
+@pytest.mark.parametrize(
+    ("name", "codec", "rate", "channels"),
+    [
+        ("same.mp4", "aac", 48_000, 2),
+        ("other.mp4", "aac", 44_100, 1),
+        ("plain.wav", "pcm_s16le", 48_000, 2),
+        ("opus.mkv", "libopus", 48_000, 2),
+        ("mp3.mkv", "mp3", 32_000, 1),
+    ],
+)
+@pytest.mark.parametrize("offset", [0, 7, -3])
+def test_beeps_are_where_the_pictures_are(
+    tmp_path: Path, name: str, codec: str, rate: int, channels: int, offset: int
+) -> None:
+    path = write_flashes(
+        tmp_path / name, FRAMES, codec=codec, rate=rate, channels=channels, pictures=name != "plain.wav"
+    )
+    sound = RecordedSound(str(path), STEREO, FPS, offset, "stop")
+    frames = all_until(sound, FRAMES + 10)
+    assert sound.passes == (name == "same.mp4")
+    assert numbers_grow(frames)
+    form = STEREO.format
+    assert form is not None
+    expected = [(number + offset) / FPS for number in range(EVERY, FRAMES, EVERY)]
+    assert beeps(as_adts(frames, form), "aac") == pytest.approx(expected, abs=0.03)
+
+
+@pytest.mark.parametrize("codec", ["aac", "mp3"])
+def test_a_recording_that_repeats_stays_in_step(tmp_path: Path, codec: str) -> None:
+    path = write_flashes(tmp_path / "loop.mkv", FRAMES, codec=codec)
+    frames = all_until(RecordedSound(str(path), STEREO, FPS, 0, "loop"), 4 * FRAMES)
+    assert numbers_grow(frames)
+    assert sum(1 for _ in runs(frames)) <= 5, "whole but for the places where it begins again"
+    form = STEREO.format
+    assert form is not None
+    expected = [(n + m) / FPS for m in range(0, 4 * FRAMES, FRAMES) for n in range(EVERY, FRAMES, EVERY)]
+    assert beeps(as_adts(frames, form), "aac") == pytest.approx(expected, abs=0.03)
+
+
+@pytest.mark.parametrize("codec", ["aac", "mp3"])
+def test_whoever_begins_late_hears_the_same_moments(tmp_path: Path, codec: str) -> None:
+    path = write_flashes(tmp_path / "late.mkv", FRAMES, codec=codec)
+    late = 10 * FRAMES
+    frames = all_until(RecordedSound(str(path), STEREO, FPS, 0, "loop"), late + FRAMES, first=late)
+    form = STEREO.format
+    assert form is not None
+    assert frames[0].number >= form.frame_at(late, FPS) - 48, "about a second before, not all that was"
+    moments = beeps(as_adts(frames, form), "aac")
+    expected = [(late + n) / FPS for n in range(EVERY, FRAMES, EVERY)]
+    assert [it for it in moments if it > late / FPS] == pytest.approx(expected, abs=0.03)
+
+
+def test_what_cannot_be_in_step_or_has_no_sound_is_refused(tmp_path: Path) -> None:
+    path = write_flashes(tmp_path / "own.mp4", FRAMES)
+    with pytest.raises(UserError, match=r"25 pictures a second, but site.fps is 30"):
+        RecordedSound(str(path), STEREO, 30, 0, "stop")
+    cameras = [{"id": "c0", "source": str(path)}, {"id": "c1", "source": "scene:room"}]
+
+    def opened(camera: str, source: str) -> RecordedSound | None:
+        content = {"cameras": cameras, "sound": {"source": source}}
+        return open_sound(build_config(content, where="hall", folder=tmp_path), camera)
+
+    assert opened("c0", "c0") is not None
+    assert opened("c1", "c0") is None, "one process sends it"
+    assert opened("c0", "own.mp4") is not None
+    with pytest.raises(UserError, match="sound: camera c1 is no recorded video"):
+        opened("c1", "c1")
+    with pytest.raises(UserError, match=r"sound: .*none\.mp4: is neither a camera of this site nor a file"):
+        opened("c0", "none.mp4")
+    silent = tmp_path / "text.srt"
+    silent.write_text("1\n00:00:00,000 --> 00:00:01,000\nno sound\n", encoding="utf-8")
+    with pytest.raises(UserError, match=r"sound: .*there is no sound in this file"):
+        opened("c0", "text.srt")
+
+
+@given(st.sampled_from([24_000, 32_000, 44_100, 48_000]), st.sampled_from([1, 2]), st.integers(1, 60))
+def test_silence_decodes_to_nothing_at_all(rate: int, channels: int, count: int) -> None:
+    form = SoundFormat(rate, channels)
+    data = count * (form.adts(len(form.silence)) + form.silence)
+    with av.open(io.BytesIO(data), format="aac") as container:
+        frames = list(container.decode(audio=0))
+    assert [(it.samples, it.sample_rate, len(it.layout.channels)) for it in frames] == count * [
+        (1024, rate, channels)
+    ]
+    assert not any(it.to_ndarray().any() for it in frames)
+
+
+@given(
+    st.integers(0, 2**40),
+    st.sampled_from([7.5, 24, 25, 29.97, 30, 50, 59.94]),
+    st.sampled_from([24_000, 48_000]),
+)
+def test_the_frame_of_a_pulse_sounds_when_it_is_due(pulse: int, fps: float, rate: int) -> None:
+    number = SoundFormat(rate, 2).frame_at(pulse, fps)
+    error = 1 + 2e-15 * pulse * rate / fps  # samples: rounded, and as precise as a float
+    assert number * 1024 - error <= pulse * rate / fps <= (number + 1) * 1024 + error

@@ -1,0 +1,267 @@
+"""One sound under every picture: unbroken under cuts and holes, in step to 40 ms, in every kind of stream."""
+
+from __future__ import annotations
+
+import asyncio
+import shutil
+import subprocess
+from collections.abc import AsyncIterator
+from functools import cache
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+from cameras_by_hand import CAMERAS, FPS, GOP, NO_REASON, SMALL, FedService, encoded, small_config, video
+from halls import A, B, Hall, opened
+from sounds_by_hand import EVERY, beeps, flashes, heard, messages, packets, write_flashes
+from test_ts import check_counters, taken_apart
+
+from benchmarks.browser import CHROMIUM, chromium
+from server.camera.encode import AccessUnit, Encoder
+from server.camera.sound import RecordedSound
+from server.view.decide import GopDecision, ObjectChoice
+from server.view.fmp4 import init_segment
+from server.wire.config import Encode, Site, Sound
+from server.wire.sound import FRAME
+
+GOPS = 24
+FRAMES = GOPS * GOP
+STEP = 0.04
+BEEPS = [number / FPS for number in range(EVERY, FRAMES, EVERY)]
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A recording that flashes and beeps."""
+    return write_flashes(tmp_path_factory.mktemp("sound") / "flashes.mp4", FRAMES)
+
+
+@pytest.fixture
+async def loud(recording: Path) -> AsyncIterator[Hall]:
+    """A site that has that recording's sound."""
+    async for hall in opened(sound={"source": str(recording)}):
+        yield hall
+
+
+@cache
+def flashing(recording: Path) -> tuple[AccessUnit, ...]:
+    """Give the recording's pictures as a camera of the hall sends them."""
+    encoder = Encoder(Site(width=64, height=48, fps=FPS), Encode(gop=GOP))
+    with av.open(str(recording)) as container:
+        pictures = [it.to_ndarray(format="bgr24") for it in container.decode(video=0)]
+    return tuple(encoder.encode(pulse, picture) for pulse, picture in enumerate(pictures))
+
+
+def sends(service: FedService, recording: Path, silent: range = range(0)) -> list[bytes]:
+    """Send all of the recording's sound, but for some frames; give its frames of AAC."""
+    sound = RecordedSound(str(recording), Sound(source="here"), FPS, 0, "stop")
+    frames = [*sound.until(0), *sound.until(FRAMES)]
+    for message in messages([it for it in frames if it.number not in silent]):
+        service.intake.sound(message)
+    return [frame.data for frame in frames]
+
+
+def decide(service: FedService, gop: int, camera: str | None) -> None:
+    choice = ObjectChoice(1, camera, None, away=False)
+    service.splicer.decision(GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
+
+
+async def watched(
+    hall: Hall, recording: Path, ways: list[str], lost: frozenset[int] = frozenset()
+) -> list[bytes]:
+    """Show the recording's pictures as either camera in turn; give what is received on these ways."""
+    service = hall.service
+    service.come(*CAMERAS)
+    for camera in CAMERAS:
+        for unit in flashing(recording):
+            if unit.pulse not in lost:
+                service.intake.video(video(camera, unit))
+    decide(service, 0, A)
+    answers = [await hall.session.get(way) for way in ways]
+    for gop in range(1, GOPS):
+        decide(service, gop, CAMERAS[gop % 2])
+        await asyncio.sleep(0.005)  # the viewer is not to fall behind
+    service.splicer.close()
+    return [await answer.read() for answer in answers]
+
+
+@pytest.mark.parametrize(("way", "kind"), [("best.mp4", "mp4"), ("best.ts", "mpegts")])
+async def test_after_every_cut_a_beep_is_with_its_flash(
+    loud: Hall, recording: Path, way: str, kind: str
+) -> None:
+    own = sends(loud.service, recording)
+    (data,) = await watched(loud, recording, [f"/objects/1/{way}"])
+    assert flashes(data, kind) == pytest.approx(BEEPS, abs=0.001)
+    assert beeps(data, kind) == pytest.approx(BEEPS, abs=STEP)
+    if kind == "mp4":
+        assert packets(data) == own[: len(packets(data))], "byte for byte the recording's"
+        assert len(packets(data)) == FRAMES * 48_000 // FPS // FRAME
+
+
+async def test_sound_has_no_hole_where_pictures_or_sound_are_missing(loud: Hall, recording: Path) -> None:
+    sends(loud.service, recording, silent=range(60, 80))
+    lost = frozenset({13, *range(30, 45), 71})
+    data, ts = await watched(loud, recording, ["/objects/1/best.mp4", "/objects/1/best.ts"], lost)
+    for stream, kind in ((data, "mp4"), (ts, "mpegts")):
+        times, samples = heard(stream, kind)
+        assert np.diff(times) == pytest.approx(1 / 48_000, abs=1e-4), "without a hole"
+        quiet = (times > 61 * FRAME / 48_000) & (times < 80 * FRAME / 48_000)
+        assert quiet.sum() > 18 * FRAME
+        assert not samples[quiet].any()
+    check_counters(taken_apart(ts))
+
+
+async def test_a_camera_has_the_sound_at_once_or_silence_a_little_later(loud: Hall, recording: Path) -> None:
+    service = loud.service
+    own = sends(service, recording, silent=range(60, 1000))
+    service.come(*CAMERAS)
+    units = flashing(recording)
+    service.intake.video(video(B, units[0]))
+    answers = [await loud.session.get(f"/cameras/c1/live.{kind}") for kind in ("mp4", "ts")]
+    for unit in units[1:]:
+        service.intake.video(video(B, unit))
+        await asyncio.sleep(0.002)
+    service.splicer.close()
+    data, ts = [await answer.read() for answer in answers]
+    got = packets(data)
+    assert got[:60] == own[:60]
+    assert {*got[60:]} == {service.config.sound.format.silence}  # type: ignore[union-attr]
+    assert 0 <= FRAMES * 1.92 / FRAME * 1000 - len(got) <= 0.5 * 48_000 / FRAME + 1, "half a second later"
+    assert beeps(data) == beeps(ts, "mpegts") == pytest.approx(BEEPS[:1], abs=STEP)
+    check_counters(taken_apart(ts))
+
+
+async def test_segments_have_the_sound_of_their_pictures(loud: Hall, recording: Path) -> None:
+    sends(loud.service, recording)
+    await watched(loud, recording, [])
+    init = await (await loud.session.get("/objects/1/hls/init.mp4")).read()
+    listed = await (await loud.session.get("/objects/1/hls/index.m3u8")).text()
+    names = [line for line in listed.splitlines() if line.endswith(".m4s")]
+    parts = [await (await loud.session.get(f"/objects/1/hls/{name}")).read() for name in names]
+    data = init + b"".join(parts)
+    times, _ = heard(data)
+    assert np.diff(times) == pytest.approx(1 / 48_000, abs=1e-4)
+    began = int(names[0].split(".")[0]) * 25 / FPS
+    assert times[0] == pytest.approx(began, abs=0.022)
+    assert beeps(data) == pytest.approx([it for it in BEEPS if it > began], abs=STEP)
+
+
+async def test_everybody_shares_the_bytes_of_sound(loud: Hall, recording: Path) -> None:
+    service = loud.service
+    sends(service, recording)
+    for camera in CAMERAS:
+        for unit in encoded(0):
+            service.intake.video(video(camera, unit))
+    both = (ObjectChoice(1, A, None, away=False), ObjectChoice(2, B, None, away=False))
+    service.splicer.decision(GopDecision(0, GOP, both, {}, {}, (), NO_REASON))
+    reels = [service.splicer.reel(number) for number in (1, 2)]
+    one, two = [reel._segments[0]._footage[0] for reel in reels if reel is not None]
+    assert one.heard is not None
+    assert one.heard is two.heard
+
+
+async def test_a_site_without_sound_is_as_it_always_was(hall: Hall) -> None:
+    service = hall.service
+    service.come(*CAMERAS)
+    for epoch in range(3):
+        service.feed(epoch, {A: {1: SMALL}, B: {}})
+    site = small_config().site
+    parameters = service.agreement.parameters
+    assert parameters is not None
+    answer = await hall.session.get("/objects/1/best.mp4")
+    head = await answer.content.readexactly(len(init_segment(parameters, site.width, site.height)))
+    assert head == init_segment(parameters, site.width, site.height)
+    assert b"soun" not in head
+    assert (await answer.content.readexactly(8))[4:] == b"moof"
+    assert (await hall.get_json("/api/site"))["sound"] is None
+    service.splicer.close()
+    assert b"soun" not in await answer.read()
+
+
+async def test_the_site_says_what_sound_it_has_and_passes_over_what_is_none(loud: Hall) -> None:
+    assert (await loud.get_json("/api/site"))["sound"] == "mp4a.40.2"
+    (good,) = messages(
+        RecordedSound(str(loud.service.config.sound.source), Sound(source="x"), FPS, 0, "stop").until(5)
+    )
+    for bad in (
+        b"",
+        b"{}",
+        b'{"first":-1,"sizes":[1]}',
+        b'{"first":1,"sizes":[0]}',
+        b'{"first":1,"sizes":[7]}',
+    ):
+        loud.service.intake.sound(type(good)(good.key, good.payload, bad))
+    assert loud.service.intake.bad_sounds == 5
+
+
+@pytest.mark.skipif(not shutil.which("ffprobe"), reason="needs ffprobe")
+async def test_ffprobe_has_nothing_to_say(loud: Hall, recording: Path, tmp_path: Path) -> None:
+    sends(loud.service, recording)
+    ways, entries = ["best.mp4", "best.ts"], "stream=codec_name,nb_read_frames"
+    for way, data in zip(
+        ways, await watched(loud, recording, [f"/objects/1/{it}" for it in ways]), strict=True
+    ):
+        (tmp_path / way).write_bytes(data)
+        done = subprocess.run(
+            f"ffprobe -v warning -count_frames -show_entries {entries} -of csv=p=0 {way}".split(),
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            timeout=30,
+            check=True,
+        )
+        assert done.stderr == ""
+        found = dict(line.split(",")[:2] for line in done.stdout.split())
+        assert int(found["h264"]) == FRAMES
+        assert int(found["aac"]) >= FRAMES * 48_000 // FPS // FRAME
+
+
+PLAY = """async ([url, codecs]) => {
+  const video = document.createElement('video');
+  const source = new MediaSource();
+  video.src = URL.createObjectURL(source);
+  await new Promise((done) => source.addEventListener('sourceopen', done, { once: true }));
+  const buffer = source.addSourceBuffer(`video/mp4; codecs="${codecs}"`);
+  buffer.appendBuffer(await (await fetch(url)).arrayBuffer());
+  await new Promise((done) => buffer.addEventListener('updateend', done, { once: true }));
+  source.endOfStream();
+  const ended = new Promise((done) => video.addEventListener('ended', done, { once: true }));
+  const range = [buffer.buffered.start(0), buffer.buffered.end(0)];
+  video.muted = true;
+  video.playbackRate = 4;
+  await video.play();
+  await ended;
+  return { ranges: buffer.buffered.length, range, error: video.error?.message ?? '',
+    tracks: [video.webkitAudioDecodedByteCount > 0, video.webkitVideoDecodedByteCount > 0] };
+}"""
+
+
+@pytest.mark.skipif(not CHROMIUM.exists(), reason=f"needs a Chromium at {CHROMIUM}")
+async def test_chromium_plays_both_to_the_end_where_either_is_missing(loud: Hall, recording: Path) -> None:
+    sends(loud.service, recording, silent=range(100, 1000))
+    async with chromium() as browser:
+        page = await browser.new_page(bypass_csp=True)
+        await page.goto(f"http://127.0.0.1:{loud.port}/healthz")
+        service = loud.service
+        service.come(*CAMERAS)
+        for camera in CAMERAS:
+            for unit in flashing(recording):
+                if unit.pulse not in range(30, 45):
+                    service.intake.video(video(camera, unit))
+        decide(service, 0, A)
+        parameters = service.agreement.parameters
+        assert parameters is not None
+        playing = asyncio.create_task(
+            page.evaluate(PLAY, ["/objects/1/best.mp4", f"{parameters.codec},mp4a.40.2"])
+        )
+        while not service.splicer.viewers:  # noqa: ASYNC110 — the browser comes when it comes
+            await asyncio.sleep(0.01)
+        for gop in range(1, GOPS):
+            decide(service, gop, CAMERAS[gop % 2])
+            await asyncio.sleep(0.01)
+        service.splicer.close()
+        async with asyncio.timeout(20):
+            seen = await playing
+    assert (seen["error"], seen["ranges"], seen["tracks"]) == ("", 1, [True, True])
+    assert seen["range"] == [0, pytest.approx(FRAMES / FPS, abs=0.03)]
