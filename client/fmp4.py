@@ -61,6 +61,31 @@ def timescale(moov: Mp4Box) -> int:
     return units
 
 
+def sound_track(moov: Mp4Box) -> int | None:
+    """Give the number of the track of sound; None where there is none."""
+    for trak in BoxReader().feed(moov.content):
+        if trak.kind == b"trak" and _handler(trak.content) == b"soun":
+            return _field(child(trak.content, b"tkhd"), 12, 20, ">I")
+    return None
+
+
+def _handler(trak: bytes) -> bytes:
+    """Say what kind of track it is; nothing where it does not say."""
+    try:
+        return child(trak, b"mdia", b"hdlr")[8:12]
+    except Mp4Error:
+        return b""
+
+
+def track_of(moof: Mp4Box) -> int:
+    """Give the number of the track that a fragment belongs to.
+
+    Raises:
+        Mp4Error: the fragment does not say.
+    """
+    return _field(child(moof.content, b"traf", b"tfhd"), 4, 4, ">I")
+
+
 def decode_time(moof: Mp4Box) -> int:
     """Give the media time of the fragment's first frame, in units of the timescale.
 

@@ -23,6 +23,8 @@ class Site(msgspec.Struct, frozen=True):
     now: float
     """The server's clock (unix seconds)."""
     cameras: tuple[str, ...]
+    sound: str | None = None
+    """The codec of the sound beside the pictures; None: the site has none."""
 
 
 class SeenObject(msgspec.Struct, frozen=True):

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from io import BufferedWriter
 from pathlib import Path
 
-from client.fmp4 import MAX_BOX, Mp4Box, Mp4Error, decode_time, timescale
+from client.fmp4 import MAX_BOX, Mp4Box, Mp4Error, decode_time, sound_track, timescale, track_of
 from client.plain import write_plain
 
 _log = logging.getLogger(__name__)
@@ -30,10 +30,13 @@ class Recording:
         self._header = b""  # ftyp and moov, as in the file
         self._arriving = b""  # the header of the present connection
         self._timescale = 0
+        self._sound: int | None = None  # the track of sound
         self._fragment: list[bytes] = []
         self._time: int | None = None
         self._first: int | None = None
         self._last = 0
+        self._is_sound = False
+        self._last_sound = -1
         self.bytes = 0
         self.fragments = 0
 
@@ -72,7 +75,8 @@ class Recording:
                 self._take_header(box)
             case b"moof":
                 self._time = decode_time(box)
-                if self._is_full(self._time):
+                self._is_sound = self._sound is not None and track_of(box) == self._sound
+                if not self._is_sound and self._is_full(self._time):
                     return False
                 self._fragment.append(box.data)
             case b"mdat":
@@ -88,7 +92,7 @@ class Recording:
         if self._header and header != self._header:
             raise StreamChangedError("the stream has changed its format; the recording ends before it")
         if not self._header:
-            self._timescale = timescale(moov)
+            self._timescale, self._sound = timescale(moov), sound_track(moov)
             self._header = header
             self._write(header)
         self._fragment = []
@@ -105,12 +109,22 @@ class Recording:
         if time is None:
             raise Mp4Error("media without a fragment header")
         fragment, self._fragment = b"".join(self._fragment) + mdat, []
+        if self._is_sound:
+            self._take_sound(time, fragment)
+            return
         if self._first is None:
             self._first = time
         elif time <= self._last:
             return  # sent again after a reconnection
         self._last = time
         self.fragments += 1
+        self._write(fragment)
+
+    def _take_sound(self, time: int, fragment: bytes) -> None:
+        """Write sound, which comes before its pictures, unless it is sent again after a reconnection."""
+        if time <= self._last_sound:
+            return
+        self._last_sound = time
         self._write(fragment)
 
     def _write(self, data: bytes) -> None:

@@ -1,9 +1,10 @@
-/** The keyboard: left and right walk through the people, B shows or hides boxes, F fills the screen. */
+/** The keyboard: left and right walk through the people, B shows or hides boxes, M is sound, F fills the screen. */
 
 /**
  * @param {object} act
  * @param {(by: number) => void} act.step to the next or previous person
  * @param {() => void} act.boxes
+ * @param {() => void} act.sound
  * @param {() => void} act.fullScreen
  */
 export function listenToKeys(act) {
@@ -12,6 +13,7 @@ export function listenToKeys(act) {
     ArrowRight: () => act.step(1),
     ArrowLeft: () => act.step(-1),
     b: act.boxes,
+    m: act.sound,
     f: act.fullScreen,
   };
   document.addEventListener('keydown', (event) => {

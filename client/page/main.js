@@ -32,6 +32,8 @@ const stage = element('stage');
 const video = element('video');
 /** @type {HTMLButtonElement} */
 const toggle = element('toggle-boxes');
+/** @type {HTMLButtonElement} */
+const soundToggle = element('toggle-sound');
 const [title, text] = /** @type {HTMLElement[]} */ ([...element('status').children]);
 
 const viewer = new Viewer(video, show);
@@ -48,6 +50,7 @@ function show() {
   const { site } = viewer;
   if (site) {
     element('site').textContent = site.name;
+    soundToggle.hidden = !site.sound;
     document.documentElement.style.setProperty('--picture', String(site.width / site.height));
     document.body.classList.add('ready');
     cameras.configure(site.cameras, viewer.palette);
@@ -120,6 +123,13 @@ function toggleBoxes() {
   repaint();
 }
 
+/** Muted at first, or no browser would play by itself. */
+function toggleSound() {
+  if (!viewer.site?.sound) return;
+  video.muted = !video.muted;
+  soundToggle.setAttribute('aria-pressed', String(!video.muted));
+}
+
 function fullScreen() {
   if (document.fullscreenElement) void document.exitFullscreen();
   else void stage.requestFullscreen?.();
@@ -131,8 +141,9 @@ function personAt(event) {
 }
 
 toggle.addEventListener('click', toggleBoxes);
+soundToggle.addEventListener('click', toggleSound);
 element('full-screen').addEventListener('click', fullScreen);
-listenToKeys({ step: (by) => viewer.step(by), boxes: toggleBoxes, fullScreen });
+listenToKeys({ step: (by) => viewer.step(by), boxes: toggleBoxes, sound: toggleSound, fullScreen });
 stage.addEventListener('mousemove', (event) => stage.classList.toggle('over-person', personAt(event) !== null));
 stage.addEventListener('click', (event) => {
   if (video.paused) video.play().catch(() => undefined);

@@ -6,18 +6,21 @@
  */
 
 const LARGEST_BOX = 64 * 1024 * 1024; // bytes; beyond any frame: such a size is damage, not video
+const SOUND = 0x736f756e; // "soun"
 
 /**
  * @typedef {object} Segment
- * @property {'init' | 'media'} kind
+ * @property {'init' | 'media' | 'sound'} kind media: pictures
  * @property {Uint8Array} bytes
- * @property {number} start seconds of media time of the first frame; 0 for an init segment
+ * @property {number} start seconds of media time of the first picture; 0 for all else
  */
 
 export class SegmentSplitter {
   /** @type {Uint8Array} bytes of a segment that is not whole yet */
   #rest = new Uint8Array(0);
   #timescale = 0;
+  /** @type {number | null} number of the track of sound */
+  #sound = null;
 
   /**
    * @param {Uint8Array} chunk
@@ -45,8 +48,11 @@ export class SegmentSplitter {
   #segment(last, bytes) {
     if (last === 'moov') {
       this.#timescale = timescale(find(bytes, ['moov', 'trak', 'mdia', 'mdhd']));
+      this.#sound = soundTrack(bytes);
       return { kind: 'init', bytes, start: 0 };
     }
+    const track = find(bytes, ['moof', 'traf', 'tfhd']).getUint32(4);
+    if (track === this.#sound) return { kind: 'sound', bytes, start: 0 };
     const ticks = decodeTime(find(bytes, ['moof', 'traf', 'tfdt']));
     return { kind: 'media', bytes, start: ticks / this.#timescale };
   }
@@ -100,6 +106,20 @@ function find(bytes, path) {
     body = box.body;
   }
   return new DataView(body.buffer, body.byteOffset, body.byteLength);
+}
+
+/**
+ * @param {Uint8Array} init
+ * @returns {number | null}
+ */
+function soundTrack(init) {
+  const moov = [...boxes(init)].find((box) => box.type === 'moov');
+  for (const { type, body } of boxes(moov?.body ?? new Uint8Array(0))) {
+    if (type !== 'trak' || find(body, ['mdia', 'hdlr']).getUint32(8) !== SOUND) continue;
+    const tkhd = find(body, ['tkhd']);
+    return tkhd.getUint32(tkhd.getUint8(0) === 1 ? 20 : 12);
+  }
+  return null;
 }
 
 /** @param {DataView} mdhd */

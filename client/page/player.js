@@ -29,6 +29,7 @@ const INSIDE_S = 0.001; // a seek to the very start of a range may round to just
  * @property {number} start media time of its first frame; NaN before that came
  * @property {number} since performance.now() of when its first frame was in the buffer; NaN before
  * @property {boolean} landed whether the picture now comes from it
+ * @property {Segment[]} early sound that has come before the first picture
  */
 
 /** @type {typeof MediaSource | undefined} iPhones have only the managed kind */
@@ -68,7 +69,7 @@ export class Player {
   }
 
   /**
-   * @param {string} codec
+   * @param {string} codec of the pictures, and after a comma of the sound if there is any
    * @returns {boolean} whether this browser can play such streams at all
    */
   configure(codec) {
@@ -126,6 +127,7 @@ export class Player {
       }
       if (signal.aborted) return;
       run.start = run.since = NaN;
+      run.early = [];
       await pause(backoff.next(), signal);
     }
   }
@@ -138,6 +140,10 @@ export class Player {
     const buffer = await /** @type {Promise<MediaBuffer>} */ (this.#buffer);
     if (run.leave.signal.aborted) return;
     const first = segments.find((segment) => segment.kind === 'media');
+    if (!first && Number.isNaN(run.start) && segments.some((segment) => segment.kind === 'sound')) {
+      run.early.push(...segments); // when the first picture tells where it begins, the old stream is cut off there
+      return;
+    }
     if (first && Number.isNaN(run.start)) {
       run.start = first.start;
       // Nothing of the old stream may be met again behind the edge of the new one.
@@ -146,7 +152,8 @@ export class Player {
       await buffer.remove(anew ? 0 : run.start, Infinity);
       if (run.leave.signal.aborted) return;
     }
-    await buffer.append(join(segments.map((segment) => segment.bytes)), this.video.currentTime);
+    const all = [...run.early.splice(0), ...segments];
+    await buffer.append(join(all.map((segment) => segment.bytes)), this.video.currentTime);
     if (!first) return;
     if (Number.isNaN(run.since)) run.since = performance.now();
     this.#land(run, buffer);
@@ -220,7 +227,7 @@ export class Player {
  * @returns {Run}
  */
 function begin(object) {
-  return { object, leave: new AbortController(), start: NaN, since: NaN, landed: false };
+  return { object, leave: new AbortController(), start: NaN, since: NaN, landed: false, early: [] };
 }
 
 /** @param {string} codec */

@@ -58,7 +58,7 @@ export class Viewer {
     if (anew) this.decisions = new Decisions(site.fps);
     this.site = this.probe.site = site;
     this.palette = new Palette(site.cameras);
-    this.supported = this.player.configure(site.codec);
+    this.supported = this.player.configure(site.sound ? `${site.codec},${site.sound}` : site.codec);
     this.#play();
     this.changed();
   }

@@ -17,6 +17,7 @@ from halls import A, B, Hall, opened
 from sounds_by_hand import EVERY, beeps, flashes, heard, messages, packets, write_flashes
 from test_ts import check_counters, taken_apart
 
+import client
 from benchmarks.browser import CHROMIUM, chromium
 from server.camera.encode import AccessUnit, Encoder
 from server.camera.sound import RecordedSound
@@ -265,3 +266,31 @@ async def test_chromium_plays_both_to_the_end_where_either_is_missing(loud: Hall
             seen = await playing
     assert (seen["error"], seen["ranges"], seen["tracks"]) == ("", 1, [True, True])
     assert seen["range"] == [0, pytest.approx(FRAMES / FPS, abs=0.03)]
+
+
+async def test_a_recording_has_the_sound_from_its_first_picture_to_its_last(
+    loud: Hall, recording: Path, tmp_path: Path
+) -> None:
+    service, out = loud.service, tmp_path / "one.mp4"
+    sends(service, recording)
+    service.come(*CAMERAS)
+    for camera in CAMERAS:
+        for unit in flashing(recording):
+            service.intake.video(video(camera, unit))
+    decide(service, 0, A)
+    decide(service, 1, A)
+    recorded = asyncio.create_task(client.record(f"http://127.0.0.1:{loud.port}/", 1, out, seconds=3.3))
+    while not service.splicer.viewers:  # noqa: ASYNC110 — the client comes when it comes
+        await asyncio.sleep(0.01)
+    for gop in range(2, GOPS):
+        decide(service, gop, CAMERAS[gop % 2])
+        await asyncio.sleep(0.005)
+    done = await recorded
+    assert done.complete
+    data, begin = out.read_bytes(), GOP / FPS
+    expected = [moment - begin for moment in BEEPS if begin < moment < begin + 3.3]
+    assert flashes(data) == pytest.approx(expected, abs=0.001)
+    assert beeps(data) == pytest.approx(expected, abs=STEP)
+    times, _ = heard(data)
+    assert np.diff(times) == pytest.approx(1 / 48_000, abs=1e-4)
+    assert (times[0], times[-1]) == (pytest.approx(0, abs=0.025), pytest.approx(3.3, abs=0.025))
