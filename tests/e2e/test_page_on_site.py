@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 import signal
 from collections.abc import AsyncIterator
 from pathlib import Path
 
+import aiohttp
+import numpy as np
 import pytest
 import pytest_asyncio
+from beeps import heard, write_beeps
 from playwright.async_api import Page
-from running_site import PATIENCE_S, RunningSite, configuration, running
+from running_site import PATIENCE_S, RunningSite, bounded, configuration, running
+from spliced import FPS, record
 
 from benchmarks.browser import CHROMIUM, chromium
 
@@ -24,7 +29,9 @@ pytestmark = [
 @pytest_asyncio.fixture(scope="module", loop_scope="module")
 async def site(recording: Path, tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[RunningSite]:
     """A site whose recordings begin again at their end, with people in sight."""
-    config = configuration(tmp_path_factory.mktemp("site"), recording, camera={"at_end": "loop"})
+    folder = tmp_path_factory.mktemp("site")
+    sound = {"source": str(write_beeps(folder / "beeps.wav")), "at_end": "loop"}
+    config = configuration(folder, recording, camera={"at_end": "loop"}, sound=sound)
     async with running(config) as site:
         await site.until(lambda: bool(site.gops and site.gops[-1].choices), "somebody is shown")
         yield site
@@ -55,6 +62,28 @@ async def test_the_best_view_plays_across_a_cut_and_the_frames_go_on(page: Page)
     around = [pulse for pulse in shown if cut - 25 <= pulse <= cut + 25]
     assert len(around) > 20, "a slow core may leave frames out, but not the seconds around a cut"
     assert around == sorted(around)
+
+
+async def test_the_sound_goes_on_across_cuts_and_choices_in_step(
+    page: Page, site: RunningSite, tmp_path: Path
+) -> None:
+    await page.wait_for_function("myview.state === 'playing'")
+    video = "document.querySelector('video')"
+    assert await page.evaluate(f"{video}.muted"), "or it would not play by itself"
+    await page.get_by_role("button", name="Sound").click()
+    assert not await page.evaluate(f"{video}.muted")
+    before = await page.evaluate(f"{video}.webkitAudioDecodedByteCount")
+    await page.locator("#people button.person:not(.away)[aria-current=false]").first.click()
+    more = f"{video}.webkitAudioDecodedByteCount > {before} + 5000"
+    await page.wait_for_function(f"myview.state === 'playing' && {more}")
+    number = await page.evaluate("myview.object")
+    async with aiohttp.ClientSession() as session:
+        url = f"{site.url}objects/{number}/best.mp4"
+        film = await bounded(record(session, url, site.pulse + 4 * FPS, tmp_path / "film"))
+    times, begins = await asyncio.to_thread(heard, film)
+    assert np.diff(times) == pytest.approx(1 / 48_000, abs=1e-4), "without a hole"
+    assert len(begins) >= 3
+    assert [begin - round(begin) for begin in begins] == pytest.approx([0] * len(begins), abs=0.04)
 
 
 async def test_choosing_somebody_else_shows_them_without_another_player(page: Page) -> None:

@@ -1,0 +1,40 @@
+"""A file that beeps at known moments, and what is heard of it in a stream."""
+
+from __future__ import annotations
+
+import io
+import wave
+from itertools import pairwise
+from pathlib import Path
+
+import av
+import numpy as np
+from numpy.typing import NDArray
+
+RATE = 44_100
+"""Another than the site's: it has to be encoded."""
+EVERY_S = 1.0
+_LASTS_S = 0.08
+
+
+def write_beeps(path: Path) -> Path:
+    """Write a file of two seconds that beeps at each of them."""
+    time = np.arange(2 * RATE) / RATE
+    samples = 0.5 * np.sin(2 * np.pi * 1000 * time) * (time % EVERY_S < _LASTS_S)
+    with wave.open(str(path), "wb") as file:
+        file.setnchannels(1)
+        file.setsampwidth(2)
+        file.setframerate(RATE)
+        file.writeframes((samples * 32767).astype("<i2").tobytes())
+    return path
+
+
+def heard(path: Path) -> tuple[NDArray[np.float64], list[float]]:
+    """Give the times of all samples of a stream, and of them when beeps begin (media time, seconds)."""
+    data = path.read_bytes()
+    with av.open(io.BytesIO(data[: data.rfind(b"moof") - 4])) as container:
+        frames = list(container.decode(audio=0))
+    times = np.concatenate([float(it.time or 0) + np.arange(it.samples) / it.sample_rate for it in frames])
+    loud = times[np.abs(np.concatenate([it.to_ndarray()[0] for it in frames])) > 0.1]
+    begins = [float(time) for before, time in pairwise([times[0], *loud]) if time - before > EVERY_S / 2]
+    return times, begins
