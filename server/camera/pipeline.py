@@ -6,6 +6,7 @@ from server.camera.encode import AccessUnit, Encoder
 from server.camera.observe import make_detector
 from server.camera.report import Reporter
 from server.camera.sharpness import Sharpness
+from server.camera.sound import LiveSound
 from server.camera.sources import Image, open_source
 from server.wire.config import Config
 from server.wire.fit import Fit
@@ -22,9 +23,11 @@ class CameraPipeline:
         UserError: the source or the detections cannot be opened.
     """
 
-    def __init__(self, config: Config, camera_id: str, boot: int = 0) -> None:
+    def __init__(
+        self, config: Config, camera_id: str, boot: int = 0, listener: LiveSound | None = None
+    ) -> None:
         camera, site = config.camera(camera_id), config.site
-        self.source = open_source(camera, site)
+        self.source = open_source(camera, site, listener)
         self._fit = Fit(self.source.size, (site.width, site.height))
         self._encoder = Encoder(site, config.encode)
         self._detector = make_detector(config, camera, self._fit)

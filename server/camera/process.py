@@ -15,7 +15,7 @@ import msgspec
 from camsync import ClientSettings, Pulse, PulseClient
 from server.camera.meter import Meter
 from server.camera.pipeline import CameraPipeline
-from server.camera.sound import open_sound, runs
+from server.camera.sound import LiveSound, open_sound, runs
 from server.camera.sources import Image, SourceEnded
 from server.camera.thumbs import thumbnails
 from server.wire.bus import Bus
@@ -27,8 +27,6 @@ log = logging.getLogger(__name__)
 T = TypeVar("T")
 
 _STATUS_EVERY_S = 1.0
-_SOUND_AHEAD_S = 0.2
-"""Sound is recorded, so it can be sent early: other cameras' pictures, shown at once, find it there."""
 _MARKS_PER_PICTURE = 10
 """Frame numbers that may wait for each picture that may; more are left out, as if missed."""
 
@@ -44,8 +42,9 @@ class CameraProcess:
         self._config, self._id = config, camera_id
         self._boot = time.time_ns() // 1_000_000
         self._keys = Keys(config.site.name)
-        self._pipeline = CameraPipeline(config, camera_id, self._boot)
         self._sound = open_sound(config, camera_id)
+        listener = self._sound if isinstance(self._sound, LiveSound) else None
+        self._pipeline = CameraPipeline(config, camera_id, self._boot, listener)
         self._video = ThreadPoolExecutor(1, "video")
         self._tracking = ThreadPoolExecutor(1, "tracking")
         fps = config.site.fps
@@ -142,12 +141,11 @@ class CameraProcess:
         self._queue_for_tracking(pulse.number, image)
 
     async def _send_sound(self, pulse: int) -> None:
-        """Send what sounds up to a moment after this pulse, if this is the process to do so."""
+        """Send what sounds about this pulse, if this is the process to do so."""
         sound = self._sound
         if sound is None:
             return
-        until = pulse + max(1, round(_SOUND_AHEAD_S * self._config.site.fps))
-        for run in runs(await self._in(self._video, lambda: sound.until(until))):
+        for run in runs(await self._in(self._video, lambda: sound.at(pulse))):
             head = SoundHead(first=run[0].number, sizes=[len(frame.data) for frame in run])
             if self._bus is not None:
                 data = b"".join(frame.data for frame in run)

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from sounds_by_hand import EVERY, FPS, beeps, write_flashes
 
-from server.camera.sound import Frame, RecordedSound, open_sound, runs
+from server.camera.sound import Frame, LiveSound, RecordedSound, open_sound, runs
 from server.wire.config import Sound
 from server.wire.errors import UserError
 from server.wire.loading import build_config
@@ -106,14 +106,14 @@ def test_what_cannot_be_in_step_or_has_no_sound_is_refused(tmp_path: Path) -> No
         RecordedSound(str(path), STEREO, 30, 0, "stop")
     cameras = [{"id": "c0", "source": str(path)}, {"id": "c1", "source": "scene:room"}]
 
-    def opened(camera: str, source: str) -> RecordedSound | None:
+    def opened(camera: str, source: str) -> RecordedSound | LiveSound | None:
         content = {"cameras": cameras, "sound": {"source": source}}
         return open_sound(build_config(content, where="hall", folder=tmp_path), camera)
 
     assert opened("c0", "c0") is not None
     assert opened("c1", "c0") is None, "one process sends it"
     assert opened("c0", "own.mp4") is not None
-    with pytest.raises(UserError, match="sound: camera c1 is no recorded video"):
+    with pytest.raises(UserError, match="sound: camera c1 has none: scene:room"):
         opened("c1", "c1")
     with pytest.raises(UserError, match=r"sound: .*none\.mp4: is neither a camera of this site nor a file"):
         opened("c0", "none.mp4")

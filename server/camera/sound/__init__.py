@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from server.camera.sound.frames import Frame, runs
+from server.camera.sound.live import LiveSound
 from server.camera.sound.recorded import RecordedSound
 from server.wire.config import Config
 from server.wire.errors import UserError
 from server.wire.sources import SourceKind, kind_of
 
-__all__ = ["Frame", "RecordedSound", "open_sound", "runs"]
+__all__ = ["Frame", "LiveSound", "RecordedSound", "open_sound", "runs"]
 
 
-def open_sound(config: Config, camera_id: str) -> RecordedSound | None:
+def open_sound(config: Config, camera_id: str) -> RecordedSound | LiveSound | None:
     """Open the site's sound, where this camera's process is to send it; None where it is not.
 
     Raises:
@@ -24,8 +25,10 @@ def open_sound(config: Config, camera_id: str) -> RecordedSound | None:
     if settings.source in config.camera_ids:
         camera = config.camera(camera_id)
         path, offset, at_end = camera.source, camera.offset, camera.at_end
+        if kind_of(path) is SourceKind.STREAM:
+            return LiveSound(settings, fps)
         if kind_of(path) is not SourceKind.FILE:
-            raise UserError(f"sound: camera {camera_id} is no recorded video ({path}); name a file instead")
+            raise UserError(f"sound: camera {camera_id} has none: {path}; name another, or a file")
     try:
         return RecordedSound(path, settings, fps, offset, at_end)
     except UserError as error:

@@ -17,6 +17,8 @@ from server.wire.sound import FRAME, SoundFormat
 
 log = logging.getLogger(__name__)
 
+_LONG_S = 10
+"""A longer silence is not encoded: its frames are left out."""
 _OFF_S = 0.02
 """Sound that is this far away from its place is moved there."""
 
@@ -54,8 +56,8 @@ class Encoding:
 
     def _place(self, at: int) -> None:
         """Make sample number ``at`` the next one, if it is not nearly so."""
-        if self._first is None:
-            self._first = max(0, at) // FRAME * FRAME
+        if self._first is None or at > self._first + _LONG_S * self._rate:
+            self._first, self._samples = max(0, at) // FRAME * FRAME, self._samples[:, :0]
         ahead = at - (self._first + self._samples.shape[1])
         if abs(ahead) <= _OFF_S * self._rate and self._samples.shape[1]:
             return

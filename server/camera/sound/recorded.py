@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterator
 from fractions import Fraction
-from itertools import chain
 from pathlib import Path
 from typing import Literal
 
@@ -23,6 +22,7 @@ log = logging.getLogger(__name__)
 
 _WARM_S = 1
 """What is decoded of a recording before the moment at which it is first asked for."""
+_AHEAD_S = Fraction(1, 5)
 _SPEED_OFF = 0.002
 """Pictures may be shown this much faster or slower than they were taken: the sound follows in small jumps."""
 
@@ -55,6 +55,14 @@ class RecordedSound:
             container.close()
         self._way: Way = Passing(form) if self.passes else Encoding(form, settings.kbps)
         self._packets: Iterator[tuple[Fraction, Packet]] | None = None
+        self._waiting: tuple[Fraction, Packet] | None = None
+
+    def at(self, pulse: int) -> list[Frame]:
+        """Give what is to be sent at a pulse: it is recorded, so it can be sent a moment early.
+
+        The pictures of other cameras, shown at once, then find it there.
+        """
+        return self.until(pulse + max(1, round(_AHEAD_S * self._fps)))
 
     def until(self, pulse: int) -> list[Frame]:
         """Give the frames that follow, up to what sounds when ``pulse`` is due; pulses must grow.
@@ -65,11 +73,11 @@ class RecordedSound:
         if self._packets is None:
             self._packets = self._from(max(Fraction(0), end - _WARM_S))
         frames: list[Frame] = []
-        for at, packet in self._packets:
-            if at >= end:
-                self._packets = chain([(at, packet)], self._packets)
+        while (found := self._waiting or next(self._packets, None)) is not None:
+            self._waiting = found if found[0] >= end else None
+            if self._waiting is not None:
                 break
-            frames += self._way.take(packet, at)
+            frames += self._way.take(found[1], found[0])
         return frames
 
     def _from(self, moment: Fraction) -> Iterator[tuple[Fraction, Packet]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from server.camera.sound import LiveSound
 from server.camera.sources.base import Image, Source, SourceEnded
 from server.camera.sources.folder import Folder
 from server.camera.sources.recording import Recording
@@ -14,8 +15,8 @@ from server.wire.sources import SourceKind, kind_of
 __all__ = ["Image", "Recording", "Source", "SourceEnded", "open_source"]
 
 
-def open_source(camera: Camera, site: Site) -> Source:
-    """Open a camera's source.
+def open_source(camera: Camera, site: Site, listener: LiveSound | None = None) -> Source:
+    """Open a camera's source; a network camera's sound is handed to ``listener``, if there is one.
 
     Raises:
         UserError: it cannot be opened; the text says which camera and why.
@@ -26,7 +27,7 @@ def open_source(camera: Camera, site: Site) -> Source:
             case SourceKind.SCENE:
                 return Stage(camera.source, site).warm_up()
             case SourceKind.STREAM:
-                return Stream(camera.source, camera.options)
+                return Stream(camera.source, camera.options, listener)
             case SourceKind.FOLDER:
                 return Folder(camera.source, camera.offset, camera.at_end)
             case SourceKind.FILE:

@@ -6,11 +6,14 @@ import logging
 import threading
 import time
 from collections.abc import Mapping
+from typing import cast
 
 import av
+from av.audio.stream import AudioStream
 from av.video.frame import VideoFrame
 from av.video.stream import VideoStream
 
+from server.camera.sound import LiveSound
 from server.camera.sources.base import Image
 from server.camera.sources.opening import Opened, bgr, open_video
 from server.wire.errors import UserError
@@ -28,8 +31,8 @@ class Stream:
 
     recorded = False
 
-    def __init__(self, url: str, options: Mapping[str, str]) -> None:
-        self._url, self._options = url, options
+    def __init__(self, url: str, options: Mapping[str, str], listener: LiveSound | None = None) -> None:
+        self._url, self._options, self._listener = url, options, listener
         opened = open_video(url, options, (_OPEN_S, _READ_S))
         self.size = opened.size
         self._lock = threading.Lock()
@@ -69,15 +72,26 @@ class Stream:
         """Read until the connection ends; tell whether any picture came."""
         any_picture = False
         try:
-            for packet in opened.container.demux(opened.stream):
+            for packet in opened.container.demux(opened.stream, *self._listened_to(opened)):
                 if self._closing.is_set():
                     break
-                any_picture |= self._decode(packet)
+                if packet.stream is opened.stream:
+                    any_picture |= self._decode(cast("av.Packet[VideoStream]", packet))
+                elif self._listener is not None:
+                    self._listener.packet(cast("av.Packet[AudioStream]", packet))
         except (av.error.FFmpegError, OSError) as error:
             log.warning("%s: reading stopped: %s", self._url, error)
         finally:
             opened.container.close()
         return any_picture
+
+    def _listened_to(self, opened: Opened) -> tuple[AudioStream, ...]:
+        """Give what else is to be read than the pictures."""
+        if self._listener is None:
+            return ()
+        streams = opened.container.streams.audio[:1]
+        self._listener.opened(streams[0] if streams else None)
+        return streams
 
     def _decode(self, packet: av.Packet[VideoStream]) -> bool:
         try:
@@ -87,4 +101,7 @@ class Stream:
         if pictures:
             with self._lock:
                 self._newest, self._newest_at = pictures[-1], time.monotonic()
+            newest = pictures[-1]
+            if self._listener is not None and newest.pts is not None and newest.time_base is not None:
+                self._listener.picture(newest.pts * newest.time_base)
         return bool(pictures)

@@ -1,0 +1,90 @@
+"""The sound of a network camera, as it comes beside the camera's pictures."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections import deque
+from fractions import Fraction
+
+from av.audio.stream import AudioStream
+
+from server.camera.sound.encoding import Encoding
+from server.camera.sound.frames import Frame, Packet, Way
+from server.camera.sound.passing import Passing, fits
+from server.wire.config import Sound
+from server.wire.sound import FRAME
+
+log = logging.getLogger(__name__)
+
+_MEAN_S = 4.0
+"""How late pictures are shown is averaged over so long: each waits for its pulse, more or less."""
+_ANEW_S = 0.5
+"""A picture that comes this much sooner or later than those before tells of another time."""
+_WAITING_S = 2.0
+"""Sound that may wait to be fetched."""
+
+
+class LiveSound:
+    """Sounds when the pictures are shown that were taken at the same moment, by the camera's own clock.
+
+    A source tells it what comes, in a thread of its own; ``at`` is called in another.
+    """
+
+    def __init__(self, settings: Sound, fps: float) -> None:
+        form = settings.format
+        if form is None:
+            raise ValueError("a site without sound")
+        self._form, self._kbps, self._fps = form, settings.kbps, fps
+        self._lock = threading.Lock()
+        self._newest: Fraction | None = None
+        """When the newest picture was taken, by the camera's clock."""
+        self._shifts: deque[float] = deque(maxlen=max(1, round(_MEAN_S * fps)))
+        """Of the last pictures: how much later they are shown, counted from pulse 0."""
+        self._shift: Fraction | None = None
+        self._frames: deque[Frame] = deque(maxlen=round(_WAITING_S * form.rate / FRAME))
+        self._way: Way | None = None
+        self._last = -1
+
+    def opened(self, stream: AudioStream | None) -> None:
+        """Begin with a connection."""
+        self._way = None
+        if stream is None:
+            log.warning("there is no sound in what the camera sends; the site is silent")
+        else:
+            passes = fits(stream, self._form)
+            self._way = Passing(self._form) if passes else Encoding(self._form, self._kbps)
+
+    def picture(self, time: Fraction) -> None:
+        """Note when the newest picture was taken, by the camera's clock."""
+        with self._lock:
+            self._newest = time
+
+    def packet(self, packet: Packet) -> None:
+        """Take some sound."""
+        with self._lock:
+            shift = self._shift
+        if shift is None or self._way is None or packet.pts is None or packet.time_base is None:
+            return
+        for frame in self._way.take(packet, packet.pts * packet.time_base + shift):
+            if frame.number <= self._last:
+                continue  # of a time that is past: a connection was opened anew, or the mean has moved
+            self._last = frame.number
+            with self._lock:
+                self._frames.append(frame)
+
+    def at(self, pulse: int) -> list[Frame]:
+        """Give what has come since the pulse before, now that the newest picture is shown at this one."""
+        with self._lock:
+            if self._newest is not None:
+                self._note(pulse / self._fps - float(self._newest))
+                self._newest = None
+            frames = list(self._frames)
+            self._frames.clear()
+        return frames
+
+    def _note(self, shift: float) -> None:
+        if self._shift is not None and abs(shift - self._shift) > _ANEW_S:
+            self._shifts.clear()
+        self._shifts.append(shift)
+        self._shift = Fraction(sum(self._shifts) / len(self._shifts))

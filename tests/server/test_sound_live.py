@@ -1,0 +1,131 @@
+"""A network camera's sound comes out in step with its pictures, by the camera's own clock."""
+
+from __future__ import annotations
+
+import contextlib
+import http.server
+import threading
+import time
+from collections.abc import Iterator
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import av
+import pytest
+from sounds_by_hand import EVERY, FPS, beeps, write_flashes
+
+from server.camera.sound import Frame, LiveSound
+from server.camera.sources.stream import Stream
+from server.wire.config import Sound
+from server.wire.sound import SoundFormat
+
+FRAMES = 3 * EVERY
+FORM = SoundFormat(48_000, 2)
+
+
+def send(path: Path, to: Any) -> None:
+    """Send a recording as a camera does that takes it now: each packet when it has been taken."""
+    begin = time.monotonic()
+    with (
+        av.open(str(path)) as recorded,
+        av.open(to, "w", format="mpegts", buffer_size=1316, options={"flush_packets": "1"}) as sent,
+    ):
+        streams = {it.index: sent.add_stream_from_template(it) for it in recorded.streams}
+        for packet in recorded.demux():
+            if packet.dts is None:
+                continue
+            time.sleep(max(0.0, begin + float(packet.dts * packet.time_base) + 0.1 - time.monotonic()))
+            packet.stream = streams[packet.stream.index]
+            sent.mux(packet)
+
+
+@pytest.fixture
+def camera(tmp_path: Path) -> Iterator[str]:
+    """A camera that flashes and beeps, sending what it takes when it takes it; its address."""
+    path = write_flashes(tmp_path / "own.ts", FRAMES)
+
+    class Handler(http.server.BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            self.send_response(200)
+            self.end_headers()
+            with contextlib.suppress(OSError, av.error.FFmpegError):
+                send(path, self.wfile)
+
+        def log_message(self, *_: object) -> None:
+            pass
+
+    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+    thread = threading.Thread(target=server.serve_forever, args=(0.02,))
+    thread.start()
+    yield f"http://127.0.0.1:{server.server_address[1]}/"
+    server.shutdown()
+    thread.join()
+    server.server_close()
+
+
+def test_a_beep_is_where_the_flash_is_shown(camera: str) -> None:
+    sound = LiveSound(Sound(source="c0"), FPS)
+    source = Stream(camera, {"probesize": "20000", "analyzeduration": "200000"}, sound)
+    shown: list[int] = []
+    frames: list[Frame] = []
+    begin = time.monotonic()
+    for pulse in range(100, 100 + FRAMES):
+        time.sleep(max(0.0, begin + (pulse - 100) / FPS - time.monotonic()))
+        picture = source.take(pulse)
+        frames += sound.at(pulse)
+        if picture is not None and picture.mean() > 128:
+            shown.append(pulse)
+    source.close()
+    flashes = [it / FPS for it in shown if it - 1 not in shown]
+    heard = moments(frames)
+    assert len(flashes) == len(heard) == FRAMES // EVERY - 1
+    # Whichever pulse a picture is shown at, it waits for it: up to a pulse later than its sound knows.
+    assert heard == pytest.approx(flashes, abs=0.04 + 1 / FPS)
+
+
+def moments(frames: list[Frame]) -> list[float]:
+    """Give when beeps begin, seconds after pulse 0."""
+    found = {frame.number: frame.data for frame in frames}
+    data = [found.get(number, FORM.silence) for number in range(max(found) + 1)]
+    return beeps(b"".join(FORM.adts(len(it)) + it for it in data), "aac")
+
+
+def handed_over(path: Path, sound: LiveSound, first: int) -> list[Frame]:
+    """Hand over a recording as a camera would whose pulse numbers are ``first`` ahead of its clock's."""
+    frames: list[Frame] = []
+    with av.open(str(path)) as container:
+        sound.opened(container.streams.audio[0])
+        for packet in container.demux():
+            if packet.pts is None:
+                continue
+            if packet.stream.type == "audio":
+                sound.packet(packet)
+                continue
+            picture = Fraction(packet.pts * packet.time_base)
+            sound.picture(picture)
+            frames += sound.at(first + round(picture * FPS))
+    return frames
+
+
+def test_sound_goes_on_after_the_camera_has_begun_anew(tmp_path: Path) -> None:
+    path = write_flashes(tmp_path / "own.mp4", FRAMES)
+    sound = LiveSound(Sound(source="c0"), FPS)
+    one, two = handed_over(path, sound, 50), handed_over(path, sound, 50 + 2 * FRAMES)
+    numbers = [frame.number for frame in one + two]
+    assert numbers == sorted(set(numbers)), "each once, in order"
+    assert len(two) > 0.9 * len(one)
+    starts = (50, 50 + 2 * FRAMES)
+    expected = [(start + number) / FPS for start in starts for number in range(EVERY, FRAMES, EVERY)]
+    assert moments(one + two) == pytest.approx(expected, abs=0.04)
+
+
+def test_a_camera_without_sound_is_no_mistake(tmp_path: Path) -> None:
+    path = write_flashes(tmp_path / "own.mp4", 10)
+    sound = LiveSound(Sound(source="c0"), FPS)
+    sound.opened(None)
+    with av.open(str(path)) as container:
+        for packet in container.demux(audio=0):
+            sound.picture(Fraction(0))
+            sound.packet(packet)
+    assert sound.at(5) == []
