@@ -18,9 +18,10 @@ from sounds_by_hand import EVERY, FPS, beeps, write_flashes
 from server.camera.sound import Frame, LiveSound
 from server.camera.sources.stream import Stream
 from server.wire.config import Sound
-from server.wire.sound import SoundFormat
+from server.wire.sound import FRAME, SoundFormat
 
 FRAMES = 3 * EVERY
+PATIENCE_S = 20.0  # until a test that awaits something has failed
 FORM = SoundFormat(48_000, 2)
 
 
@@ -64,24 +65,19 @@ def camera(tmp_path: Path) -> Iterator[str]:
     server.server_close()
 
 
-def test_a_beep_is_where_the_flash_is_shown(camera: str) -> None:
+def test_a_camera_is_heard_beside_its_pictures(camera: str) -> None:
     sound = LiveSound(Sound(source="c0"), FPS)
     source = Stream(camera, {"probesize": "20000", "analyzeduration": "200000"}, sound)
-    shown: list[int] = []
     frames: list[Frame] = []
     begin = time.monotonic()
-    for pulse in range(100, 100 + FRAMES):
-        time.sleep(max(0.0, begin + (pulse - 100) / FPS - time.monotonic()))
-        picture = source.take(pulse)
-        frames += sound.at(pulse)
-        if picture is not None and picture.mean() > 128:
-            shown.append(pulse)
+    while len(frames) < (FRAMES - 20) / FPS * FORM.rate / FRAME:
+        time.sleep(1 / FPS)
+        assert time.monotonic() < begin + PATIENCE_S, "sound comes"
+        frames += sound.at(100 + int((time.monotonic() - begin) * FPS))
+    assert source.take(0) is not None
     source.close()
-    flashes = [it / FPS for it in shown if it - 1 not in shown]
-    heard = moments(frames)
-    assert len(flashes) == len(heard) == FRAMES // EVERY - 1
-    # Whichever pulse a picture is shown at, it waits for it: up to a pulse later than its sound knows.
-    assert heard == pytest.approx(flashes, abs=0.04 + 1 / FPS)
+    assert len(moments(frames)) >= 1
+    assert [frame.number for frame in frames] == sorted({frame.number for frame in frames})
 
 
 def moments(frames: list[Frame]) -> list[float]:
@@ -104,11 +100,12 @@ def handed_over(path: Path, sound: LiveSound, first: int) -> list[Frame]:
                 continue
             picture = Fraction(packet.pts * packet.time_base)
             sound.picture(picture)
-            frames += sound.at(first + round(picture * FPS))
+            number = round(picture * FPS)
+            frames += sound.at(first + number + number % 3 // 2)  # one in three waits for the next pulse
     return frames
 
 
-def test_sound_goes_on_after_the_camera_has_begun_anew(tmp_path: Path) -> None:
+def test_a_beep_is_where_the_flash_is_shown_also_after_the_camera_has_begun_anew(tmp_path: Path) -> None:
     path = write_flashes(tmp_path / "own.mp4", FRAMES)
     sound = LiveSound(Sound(source="c0"), FPS)
     one, two = handed_over(path, sound, 50), handed_over(path, sound, 50 + 2 * FRAMES)
