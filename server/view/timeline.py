@@ -57,7 +57,7 @@ class Timeline:
         return self._slip_in(picture) + self._show(picture)
 
     def pass_by(self, last: Picture) -> None:
-        """Note that a whole GOP is shown, of which this is the last picture: nothing in it has to be bridged."""
+        """Note that a whole GOP is shown, of which this is the last picture: nothing has to be bridged."""
         self._show(last)
 
     def fill(self, until: int) -> list[Picture]:
