@@ -17,6 +17,7 @@ from server.web.cors import preflight
 from server.web.events import Events
 from server.web.keys import EVENTS, METRICS, PICTURES, SERVICE
 from server.web.metrics import registry
+from server.web.queries import refuse_what_is_not_there
 from server.web.share import to_the_right_service
 from server.wire.config import Http
 from server.wire.errors import UserError
@@ -53,7 +54,9 @@ async def one_line_errors(
 
 def make_app(service: BestViewService) -> web.Application:
     """Give the application on top of a service."""
-    app = web.Application(middlewares=[one_line_errors, preflight, to_the_right_service])
+    app = web.Application(
+        middlewares=[one_line_errors, preflight, refuse_what_is_not_there, to_the_right_service]
+    )
     app[SERVICE], app[EVENTS], app[PICTURES] = service, Events(service), Pictures(service)
     app[METRICS] = registry(service, app[PICTURES])
     for module in (api, video, past, hls, pictures, openapi, page):

@@ -11,6 +11,7 @@ from typing import Any
 import msgspec
 from aiohttp import web
 
+from server.web.queries import OVERLAY, PAST
 from server.web.schema import Cameras, Choice, Objects, Past, Problem, SiteInfo
 
 routes = web.RouteTableDef()
@@ -48,10 +49,6 @@ _OTHER = {
 _UNAVAILABLE = {"/objects/{object}/best.mp4", "/cameras/{camera}/live.mp4", "/readyz"} | {
     path for path in _OTHER if path.endswith((".ts", ".m3u8", ".mjpeg", "best.jpg", "live.jpg"))
 }
-_OVERLAY = {"/objects/{object}/best.mp4"} | {
-    path for path in _OTHER if path.endswith((".ts", ".m3u8", ".mjpeg", "best.jpg", "live.jpg"))
-}
-_PAST = {"/objects/{object}/best.mp4", "/cameras/{camera}/live.mp4", "/api/past"}
 _MOMENT = {"type": "string", "examples": ["-60", "p1250", "2026-11-21T16:13:36Z"]}
 _SCHEMAS: dict[str, Any] = {
     "object": {"type": "integer", "minimum": 0},
@@ -73,7 +70,7 @@ def describe(app: web.Application) -> dict[str, Any]:
     for route in app.router.routes():
         if route.method != "GET" or route.resource is None:
             continue
-        path = re.sub(r"\{(\w+):[^/]*\}(?=[/.]|$)", r"{\1}", route.resource.canonical)
+        path = route.resource.canonical
         if path in _JSON or path in _OTHER:
             paths[path] = {"get": _operation(path, inspect.getdoc(route.handler) or "")}
     return {
@@ -94,15 +91,15 @@ def _operation(path: str, summary: str) -> dict[str, Any]:
     names = re.findall(r"\{(\w+)\}", path)
     if names:
         responses["404"] = {"description": "There is none of this name.", "content": error}
-    if path in _PAST:
-        responses["400"] = {"description": "from or to is no moment.", "content": error}
-    if path in _PAST - {"/api/past"}:
+    if path in OVERLAY | PAST:
+        responses["400"] = {"description": "The query asks for what there is not.", "content": error}
+    if path in PAST - {"/api/past"}:
         responses["416"] = {"description": "Nothing is kept of that time.", "content": error}
     if path in _UNAVAILABLE:
         responses["503"] = {"description": "Not now; try again later."}
     parameters = [{"name": name, "in": "path", "required": True, "schema": _SCHEMAS[name]} for name in names]
-    queries = ["overlay"] * (path in _OVERLAY) + ["fps"] * path.endswith(".mjpeg")
-    queries += ["from", "to"] * (path in _PAST)
+    queries = ["overlay"] * (path in OVERLAY) + ["fps"] * path.endswith(".mjpeg")
+    queries += ["from", "to"] * (path in PAST)
     parameters += [
         {"name": it, "in": "query", "required": (path, it) == ("/api/past", "from"), "schema": _SCHEMAS[it]}
         for it in queries

@@ -82,7 +82,7 @@ async def get_live_still(request: web.Request) -> web.StreamResponse:
 
 
 def wants_boxes(request: web.Request) -> bool:
-    """Tell whether ``overlay=1`` is asked for; anything but 0 and 1 is as good as nothing."""
+    """Tell whether boxes are asked for."""
     return request.query.get("overlay") == "1"
 
 

@@ -35,6 +35,38 @@ async def test_what_is_not_there_is_404_and_one_line_of_json(busy: Hall, path: s
 
 
 @pytest.mark.parametrize(
+    ("path", "error"),
+    [
+        ("/objects/1/best.mp4?overlay=yes", "overlay=yes: must be 0 or 1"),
+        ("/objects/1/best.jpg?overlay=", "overlay=: must be 0 or 1"),
+        ("/objects/1/best.ts?overlay=1", "overlay: boxes are burnt into a person's best.mp4"),
+        ("/cameras/c0/live.mp4?overlay=1", "overlay: boxes are burnt into a person's best.mp4"),
+        ("/objects/1/best.ts?from=-5", "from: only best.mp4 and live.mp4 can begin in the past"),
+        ("/objects/1/hls/index.m3u8?from=-5", "from: only best.mp4 and live.mp4 can begin in the past"),
+        ("/cameras/c0/live.mjpeg?to=-5", "to: only best.mp4 and live.mp4 can begin in the past"),
+    ],
+)
+async def test_what_a_stream_does_not_have_is_refused_and_not_left_out(
+    busy: Hall, path: str, error: str
+) -> None:
+    code, content = await busy.get(path)
+    assert code == 400
+    assert content["error"].startswith(error)
+    assert "\n" not in content["error"]
+
+
+async def test_boxes_and_the_past_are_described_where_they_are(busy: Hall) -> None:
+    described = await busy.get_json("/api/openapi.json")
+    for path, item in described["paths"].items():
+        queries = {it["name"] for it in item["get"]["parameters"] if it["in"] == "query"}
+        if path.startswith(("/objects/", "/cameras/")):
+            asked = path.replace("{object}", "1").replace("{camera}", A).replace("{segment}", "0")
+            for query in ("overlay=1", "from=p0"):
+                async with busy.session.head(f"{asked}?{query}") as answer:
+                    assert (answer.status == 400) == (query.split("=")[0] not in queries), asked
+
+
+@pytest.mark.parametrize(
     "path",
     [
         "/page/../app.py",

@@ -1,0 +1,46 @@
+"""What may be asked of a stream after the question mark: nothing that is meant is passed over in silence."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable
+
+from aiohttp import web
+
+from server.web.api import problem
+
+OVERLAY = {
+    "/objects/{object}/best.mp4",
+    "/objects/{object}/best.mjpeg",
+    "/objects/{object}/best.jpg",
+    "/cameras/{camera}/live.mjpeg",
+    "/cameras/{camera}/live.jpg",
+}
+"""What boxes can be burnt into."""
+PAST = {"/objects/{object}/best.mp4", "/cameras/{camera}/live.mp4", "/api/past"}
+"""What can begin in the past."""
+_STREAMS = ("/objects/", "/cameras/")
+
+
+@web.middleware
+async def refuse_what_is_not_there(
+    request: web.Request, handler: Callable[[web.Request], Awaitable[web.StreamResponse]]
+) -> web.StreamResponse:
+    """Answer 400 where a stream is asked for boxes or a past that it does not have."""
+    resource = request.match_info.route.resource
+    if resource is not None and request.query and request.path.startswith(_STREAMS):
+        complaint = _complaint(request, resource.canonical)
+        if complaint is not None:
+            return problem(400, complaint)
+    return await handler(request)
+
+
+def _complaint(request: web.Request, path: str) -> str | None:
+    overlay = request.query.get("overlay", "0")
+    if overlay not in {"0", "1"}:
+        return f"overlay={overlay}: must be 0 or 1"
+    if overlay == "1" and path not in OVERLAY:
+        return "overlay: boxes are burnt into a person's best.mp4, and into .mjpeg and .jpg; not into this"
+    for name in ("from", "to"):
+        if name in request.query and path not in PAST:
+            return f"{name}: only best.mp4 and live.mp4 can begin in the past"
+    return None
