@@ -142,7 +142,7 @@ def summary(found: Found) -> list[list[str]]:
 
 def _watched_rows(watched: Watched) -> list[list[str]]:
     how = f"cores: {watched.all:.3f}, {watched.one:.3f}, nobody {watched.nobody:.3f}; {watched.rounds} rounds"
-    rows = [[f"{watched.objects} objects watched against 1", f"{watched.ratio:.2f}x", "1.10x", how]]
+    rows = [[f"watching {watched.objects} objects against 1", f"{watched.ratio:.2f}x", "1.10x", how]]
     how = f"worked out: {watched.nobody + watched.encoded:.2f} cores with an encoder for each"
     rows.append(["re-encoding each against that", f"{watched.against_encoding:.1f}x", "14x", how])
     return rows
