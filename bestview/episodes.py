@@ -139,7 +139,12 @@ class Episodes:
         return episode
 
     def _ends(self, episode: Episode, frame: int, crowded: bool) -> bool:
-        """Say whether a sighting in `frame` begins a new episode."""
+        """Say whether a sighting in `frame` begins a new episode.
+
+        Where nothing is known of how somebody looks there is nothing to ask by: the tracker is believed.
+        """
+        if not episode.looks.by_camera:
+            return False
         settings = self._settings
         out_of_crowd = not crowded and episode.crowd >= settings.crowd_frames and episode.free >= _ROOTED
         return out_of_crowd or frame - episode.end.frame > settings.gap

@@ -21,12 +21,21 @@ def track(local: int, first: int, boxes: Sequence[tuple[float, ...] | None], *lo
     return LocalTrack("c0", local, first, rows, looks)
 
 
+def seen_at(frame: int) -> Glimpse:
+    return Glimpse(frame, frame, np.array([1.0, 3.0]))
+
+
 def taken(*updates: Sequence[LocalTrack]) -> Episodes:
     episodes = Episodes(IdentitySettings())
     for tracks in updates:
         rows = episodes.take(line_up(tracks, {"c0": None}, FEET), {it.key: it.looks for it in tracks})
         assert rows.max(initial=-1) < len(episodes.open)
     return episodes
+
+
+def looking(local: int, first: int, boxes: Sequence[tuple[float, ...] | None]) -> LocalTrack:
+    """Give a track of which every sighting shows a look."""
+    return track(local, first, boxes, *(seen_at(first + i) for i, box in enumerate(boxes) if box))
 
 
 def spans(episodes: Episodes, local: int) -> list[tuple[int, int]]:
@@ -36,7 +45,7 @@ def spans(episodes: Episodes, local: int) -> list[tuple[int, int]]:
 
 def test_who_comes_out_of_a_crowd_begins_anew() -> None:
     met = [RIGHT] * 5 + [ONTO_LEFT] * 3 + [RIGHT] * 4
-    episodes = taken([track(1, 0, [LEFT] * 12), track(2, 0, met)])
+    episodes = taken([track(1, 0, [LEFT] * 12, seen_at(0)), track(2, 0, met, seen_at(0))])
     assert spans(episodes, 1) == spans(episodes, 2) == [(0, 7), (8, 11)]
     assert [it.crowded for it in episodes.open] == [0, 3, 0, 3]
     assert [it.before for it in episodes.open] == [None, episodes.open[0], None, episodes.open[2]]
@@ -44,8 +53,14 @@ def test_who_comes_out_of_a_crowd_begins_anew() -> None:
 
 def test_a_short_touch_and_a_short_moment_unseen_cut_nothing() -> None:
     met = [RIGHT] * 5 + [ONTO_LEFT] * 2 + [RIGHT] * 3 + [None] * 9 + [RIGHT] * 3
-    assert spans(taken([track(1, 0, [LEFT] * 22), track(2, 0, met)]), 2) == [(0, 21)]
-    assert spans(taken([track(2, 0, [RIGHT] * 5 + [None] * 11 + [RIGHT] * 3)]), 2) == [(0, 4), (16, 18)]
+    assert spans(taken([track(1, 0, [LEFT] * 22), track(2, 0, met, seen_at(0))]), 2) == [(0, 21)]
+    away = [RIGHT] * 5 + [None] * 11 + [RIGHT] * 3
+    assert spans(taken([track(2, 0, away, seen_at(0))]), 2) == [(0, 4), (16, 18)]
+
+
+def test_where_no_look_is_known_the_tracker_is_believed() -> None:
+    met = [RIGHT] * 5 + [ONTO_LEFT] * 3 + [RIGHT] * 4 + [None] * 20 + [RIGHT] * 3
+    assert spans(taken([track(1, 0, [LEFT] * 12), track(2, 0, met)]), 2) == [(0, 34)]
 
 
 def test_looks_in_a_crowd_do_not_count() -> None:
@@ -83,10 +98,10 @@ def test_episodes_do_not_depend_on_how_frames_come_in_updates(data: st.DataObjec
     }
     cuts = sorted(data.draw(st.sets(st.integers(1, frames - 1), max_size=5)))
     updates = [
-        [track(local, a, rows[a:b]) for local, rows in boxes.items() if any(rows[a:b])]
+        [looking(local, a, rows[a:b]) for local, rows in boxes.items() if any(rows[a:b])]
         for a, b in zip([0, *cuts], [*cuts, frames], strict=True)
     ]
-    whole = taken([track(local, 0, rows) for local, rows in boxes.items() if any(rows)])
+    whole = taken([looking(local, 0, rows) for local, rows in boxes.items() if any(rows)])
     parts = taken(*updates)
     for local in (1, 2):
         assert spans(parts, local) == spans(whole, local)
