@@ -1,0 +1,119 @@
+"""Who is found again by looks is nobody else's likeness; and what a distance between looks says."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bestview.appearance import Appearances
+from bestview.finding import clearly_least, find_again, unlike
+from bestview.likelihood import LookScale, LookWeights, look_evidence
+from bestview.looks import Look, Looks
+
+BINS, RATIO = 16, 1.5
+
+COSTS = st.one_of(st.just(np.nan), st.integers(0, 12).map(float))
+
+
+@st.composite
+def people(draw: st.DrawFn) -> list[Looks]:
+    """Draw how some people look, each in some of two cameras, with histograms of one of two sizes."""
+    rng = np.random.default_rng(draw(st.integers(0, 2**32)))
+    found = []
+    for _ in range(draw(st.integers(0, 5))):
+        looks = Looks()
+        for camera in draw(st.sets(st.sampled_from(["c0", "c1"]))):
+            bins = draw(st.sampled_from([BINS, BINS, 2 * BINS]))
+            looks.add(camera, Look.of(rng.dirichlet(np.full(bins, 0.3)), 30))
+        found.append(looks)
+    return found
+
+
+@settings(deadline=None, max_examples=200)
+@given(st.data())
+def test_clearly_least_is_least_of_its_row_and_column_by_far(data: st.DataObject) -> None:
+    high, wide = data.draw(st.integers(1, 4)), data.draw(st.integers(1, 4))
+    cost = np.array([[data.draw(COSTS) for _ in range(wide)] for _ in range(high)])
+    clear = clearly_least(cost, RATIO)
+    for i in range(high):
+        for j in range(wide):
+            rivals = [*np.delete(cost[i], j), *np.delete(cost[:, j], i)]
+            worse = all(np.isnan(it) or (it >= cost[i, j] and it >= RATIO * cost[i, j]) for it in rivals)
+            assert clear[i, j] == (not np.isnan(cost[i, j]) and worse)
+
+
+@settings(deadline=None, max_examples=100)
+@given(people(), people(), st.floats(0.0, 0.3), st.data())
+def test_nobody_is_found_twice_nor_against_what_is_possible(
+    found: list[Looks], lost: list[Looks], gate: float, data: st.DataObject
+) -> None:
+    shape = (len(found), len(lost))
+    flat = data.draw(st.lists(st.booleans(), min_size=shape[0] * shape[1], max_size=shape[0] * shape[1]))
+    possible = np.array(flat, dtype=np.bool_).reshape(shape)
+    answer = find_again(Appearances(), found, lost, possible, gate)
+    assert len(answer) == len(found)
+    again = [who for who in answer if who >= 0]
+    assert len(again) == len(dict.fromkeys(again))
+    distance = unlike(Appearances(), found, lost)
+    for new, old in enumerate(answer):
+        if old >= 0:
+            assert possible[new, old]
+            assert distance[new, old] <= gate
+
+
+@settings(deadline=None, max_examples=100)
+@given(people(), people())
+def test_looks_are_compared_in_common_cameras_alone_where_there_are_such(
+    found: list[Looks], lost: list[Looks]
+) -> None:
+    distance = unlike(Appearances(), found, lost)
+    for i, new in enumerate(found):
+        for j, old in enumerate(lost):
+            pairs = [
+                (a, b)
+                for a in new.by_camera
+                for b in old.by_camera
+                if a == b or not new.by_camera.keys() & old.by_camera.keys()
+            ]
+            fits = [
+                (new.by_camera[a], old.by_camera[b])
+                for a, b in pairs
+                if new.by_camera[a].total.size == old.by_camera[b].total.size
+            ]
+            assert np.isnan(distance[i, j]) == (not fits)
+            if any(a is not None and np.array_equal(a.mean, b.mean) for a, b in fits) and len(fits) == 1:
+                assert distance[i, j] == pytest.approx(0.0)
+
+
+def test_a_look_that_nothing_can_be_compared_with_is_none() -> None:
+    looks = Looks()
+    for histogram in (np.zeros(0), np.zeros(BINS), np.full(BINS, np.nan), np.full(BINS, -1.0)):
+        looks.add("c0", Look.of(histogram, 5))
+    assert looks.by_camera == {}
+    assert find_again(Appearances(), [looks], [looks], np.ones((1, 1), dtype=np.bool_), 1.0) == [-1]
+
+
+DISTANCES = st.lists(st.floats(0, 1), max_size=8).map(lambda it: np.array(it, dtype=np.float64))
+
+
+@settings(deadline=None, max_examples=200)
+@given(DISTANCES, DISTANCES, st.floats(0, 1), st.floats(0, 1), st.integers(0, 20), st.integers(0, 20))
+def test_nearer_looks_never_say_less_and_never_more_than_the_cap(
+    own: np.ndarray, others: np.ndarray, one: float, two: float, frames: int, more: int
+) -> None:
+    weights, scale = LookWeights(look=3.0, cap=4.0, frames=8), LookScale.learned(own, others)
+    assert 0.0 <= scale.own <= scale.others
+
+    def evidence(distance: float, count: int) -> float:
+        counts = np.array([float(count)])
+        return float(look_evidence(np.array([distance]), counts, np.array([8.0]), scale, weights)[0])
+
+    near, far = sorted((one, two))
+    assert evidence(near, frames) >= evidence(far, frames)
+    assert abs(evidence(one, frames + more)) >= abs(evidence(one, frames)), "more frames say more"
+    assert abs(evidence(one, frames)) <= weights.cap * min(frames / weights.frames, 1.0)
+    if scale.others > 1e-6:
+        assert evidence(scale.own, 8) == pytest.approx(weights.look)
+        assert evidence(scale.others, 8) == pytest.approx(-weights.look)
