@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 from recorded_by_hand import AMPLE, FPS, PULSE0, A, B, Picture, filled, own_pictures, piece, written
 
 from server.view.agreement import Agreement
+from server.view.channel import Channel, Chunk
 from server.view.past import stream as past_stream
 from server.view.past.media import fragments, pulse_of
 from server.view.past.moment import MomentError, pulse_at
@@ -273,6 +274,33 @@ async def test_what_retention_takes_away_meanwhile_is_left_out(tmp_path: Path) -
     data = b"".join([data async for data in stream.send(Wish(0, 60))])
     assert [pulse for pulse, _ in decoded(header + data)] == list(range(60)), "bridged, as live"
     assert known(source) == [Span(0, 60)]
+
+
+@pytest.mark.parametrize("end", [2 * GOP + 1, 10 * GOP])
+async def test_who_is_out_of_view_at_the_end_is_not_waited_for(tmp_path: Path, end: int) -> None:
+    now = 10 * GOP + FPS
+    store = written(
+        Store(tmp_path, AMPLE), [piece(gop, {1: A} if gop < 2 else {}) for gop in range(now // GOP)]
+    )
+    assert store.run is not None
+    source = OnDisk(Recorded(store.run, store.run.objects[1].tape), end=now)
+    agreement, header = site_of(store)
+    stream = PastStream(source, Timeline(agreement, FPS, GOP), FPS, Channel)  # in which nothing comes
+    data = b"".join([data async for data in stream.send(Wish(0, end))])
+    assert [pulse for pulse, _ in decoded(header + data)] == list(range(2 * GOP))
+
+
+async def test_who_comes_back_after_the_end_does_not_make_the_past_longer(tmp_path: Path) -> None:
+    store = written(Store(tmp_path, AMPLE), [piece(gop, {1: A} if gop < 2 else {}) for gop in range(4)])
+    assert store.run is not None
+    source = OnDisk(Recorded(store.run, store.run.objects[1].tape), end=4 * GOP)
+    agreement, header = site_of(store)
+    channel, back = Channel(), piece(8, {1: A}).cameras[A]
+    channel.publish(Chunk(b"".join(back.fragments), start=True))
+    stream = PastStream(source, Timeline(agreement, FPS, GOP), FPS, lambda: channel)
+    data = b"".join([data async for data in stream.send(Wish(0, 5 * GOP))])
+    assert [pulse for pulse, _ in decoded(header + data)] == list(range(2 * GOP))
+    assert len(fragments(data)) == 2 * GOP, "and nothing that lasts up to then"
 
 
 async def test_a_few_seconds_come_at_once_and_the_rest_in_real_time(

@@ -15,6 +15,8 @@ from server.view.timeline import Timeline
 
 _LEAD_S = 4.0
 """Seconds of the past that are sent at once: what a player likes to have before it begins."""
+_LATE_S = 1.0
+"""Seconds for which pictures of a time that is decided may still come."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,8 +54,8 @@ class PastStream:
                     await pace.wait(len(gop.fragments) / self._fps)
                 yield data
                 at = gop.end
-        if wish.end is not None and at >= wish.end:
-            return
+        if wish.end is not None and max(at, self._source.end - _LATE_S * self._fps) >= wish.end:
+            return  # of that time nothing more will come
         channel = self._live()
         if channel is not None:  # nothing was awaited since the newest GOP: none can have come between
             async with aclosing(self._joined(channel, at, wish.end)) as joined:
@@ -71,6 +73,8 @@ class PastStream:
                     if not shown:
                         continue
                     begun = True
+                    if end is not None and pulse_of(shown[0], self._fps) >= end:
+                        return
                     filled = self._timeline.fill(pulse_of(shown[0], self._fps))
                     shown = [*(picture.fragment for picture in filled), *shown]
                 if end is not None and pulse_of(shown[-1], self._fps) >= end:
