@@ -56,7 +56,7 @@ class People:
         self, groups: Sequence[Group], tables: PairTables, between: LooksBetween, frame: int
     ) -> tuple[int, ...]:
         """Number those who were seen often enough: a new number, or that of the lost person they are."""
-        new = [it for it in groups if not it.number and it.frames >= self._settings.confirm]
+        new = [it for it in groups if it.episodes and not it.number and it.frames >= self._settings.confirm]
         new.sort(key=lambda it: (it.first, it.rows[0]))
         here = {it.number: it for it in groups if it.number}
         lost = [

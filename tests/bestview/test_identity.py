@@ -300,6 +300,44 @@ def test_memory_does_not_grow_with_the_length_of_the_recording() -> None:
     assert sizes[-1][0] <= 10
 
 
+@pytest.mark.parametrize(
+    "nothing",
+    [
+        {name: 0}
+        for name in (
+            "confirm",
+            "recent",
+            "most",
+            "told_after",
+            "merge_after",
+            "gap",
+            "crowd",
+        )
+    ]
+    + [{"confirm": 0, "recent": 5000, "merge_after": 500, "settled_after": 20}],
+    ids=", ".join,
+)
+def test_any_setting_may_be_at_its_least_and_cameras_may_come_and_go(nothing: Mapping[str, int]) -> None:
+    # Looks of other sizes, of no size and of nothing; boxes that shake; tracks that pause and begin anew.
+    random = np.random.default_rng(1)
+    who = registry({"south": CALIBRATED["south"], "west": None}, **nothing)
+    for last in range(STRIDE - 1, 1000, STRIDE):
+        tracks = []
+        for camera in ("south", "west"):
+            for local in range(4):
+                if last // (150 + 37 * local) % 3 == 2:
+                    continue
+                left = 100.0 * local + 0.1 * last * (local - 1.5)
+                boxes = np.array([left, 100.0, left + 40.0, 220.0]) + random.normal(0, 4, (STRIDE, 4))
+                look = random.random(random.choice([0, 8, 8, 16])) if local else np.zeros(8)
+                glimpse = Glimpse(last - STRIDE + 1, last, look)
+                run = 1 + local + 4 * (last // 400)
+                tracks.append(LocalTrack(camera, run, last - STRIDE + 1, boxes, (glimpse,)))
+        shown = [number for number in numbers(who.update(tracks, last)).values() if number]
+        assert all(number >= 1 for number in shown)
+    assert shown
+
+
 def test_what_makes_no_sense_is_refused_in_one_line() -> None:
     track = Stay("south", 1, 0, 99, (0, 0)).track(0, 14)
 
