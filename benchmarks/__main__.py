@@ -47,7 +47,7 @@ BENCHMARKS = (
     Benchmark("live", "four live cameras: whether tracking keeps up, and what each stage costs; 2 minutes"),
     Benchmark("endurance", "memory and time over 50 000 frames; 10 minutes"),
     Benchmark("calibration", "cameras placed from nothing but people who walk; 5 minutes"),
-    Benchmark("scaling", "a hundred simulated cameras: what one best-view process carries; 4 minutes"),
+    Benchmark("scaling", "many simulated cameras: what one best-view process carries; 4 minutes"),
     Benchmark("stream", "splices, viewers and their delay beside ffmpeg and nginx; 6 minutes"),
     Benchmark("overlay", "boxes burnt in and JPEG: what pictures cost; 1 minute"),
     Benchmark("choice", "what choosing views costs, and how it grows; 1 minute"),
