@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,8 @@ Floats = NDArray[np.float64]
 
 _ROOTED = 4
 """Frames outside crowds that an episode needs before the next crowd can end it."""
+_SURE = 2
+"""Groupings for which an episode must have been told one number to be settled while it goes on."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,6 +52,7 @@ class Episode:
         untold: frames whose number has not been told yet.
         told: frames by number told.
         number: the person's; 0: nobody's yet.
+        firm: the person's number, if that was settled though the episode goes on; 0: it was not.
     """
 
     key: EpisodeKey
@@ -63,6 +67,7 @@ class Episode:
     untold: list[int] = field(default_factory=list)
     told: dict[int, int] = field(default_factory=dict)
     number: int = 0
+    firm: int = 0
 
     @property
     def gap(self) -> int:
@@ -103,23 +108,32 @@ class Episodes:
         self._current: dict[TrackKey, Episode] = {}
         self._row: dict[EpisodeKey, int] = {}
 
-    def take(self, seen: Sightings, looks: Mapping[TrackKey, Sequence[Glimpse]]) -> NDArray[np.int64]:
-        """Take in an update: (T, W) the row in `open` that each sighting belongs to, -1: none.
+    def take(
+        self, seen: Sightings, looks: Mapping[TrackKey, Sequence[Glimpse]]
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Take in an update.
 
-        `looks` are how tracks look; in a crowd they do not count.
+        Args:
+            seen: the tracks.
+            looks: how they look; in a crowd that does not count.
+
+        Returns:
+            (T, W) the row in `open` that each sighting belongs to, -1: none; (T, W) the number of the person
+            that it is settled to be, 0: it is not.
         """
-        rows = np.full(seen.visible.shape, -1)
+        rows, firm = np.full(seen.visible.shape, -1), np.zeros(seen.visible.shape, dtype=np.int64)
         crowded = seen.crowded(self._settings.crowd)
         for track, (key, columns) in enumerate(zip(seen.keys, seen.visible, strict=True)):
             ends = {look.last - seen.first: look for look in looks.get(key, ())}
             for column in np.flatnonzero(columns).tolist():
                 at = End(seen.first + column, seen.boxes[track, column], seen.ground[track, column])
                 episode = self._sight(key, at, bool(crowded[track, column]))
-                rows[track, column] = self._row[episode.key]
+                rows[track, column] = self._row.get(episode.key, -1)
+                firm[track, column] = episode.firm
                 look = ends.get(column)
                 if look is not None and not crowded[track, look.first - seen.first : column + 1].any():
                     episode.looks.add(key.camera, Look.of(look.histogram, look.last - look.first + 1))
-        return rows
+        return rows, firm
 
     def _sight(self, key: TrackKey, at: End, crowded: bool) -> Episode:
         episode = self._current.get(key)
@@ -135,7 +149,8 @@ class Episodes:
         episode.frames += 1
         episode.free += not crowded
         episode.crowd = episode.crowd + 1 if crowded else 0
-        episode.untold.append(at.frame)
+        if not episode.firm:
+            episode.untold.append(at.frame)
         return episode
 
     def _ends(self, episode: Episode, frame: int, crowded: bool) -> bool:
@@ -149,6 +164,12 @@ class Episodes:
         out_of_crowd = not crowded and episode.crowd >= settings.crowd_frames and episode.free >= _ROOTED
         return out_of_crowd or frame - episode.end.frame > settings.gap
 
+    def told_anew(self, lost: int, kept: int) -> None:
+        """Take over that two numbers turned out to be one person's."""
+        for episode in chain(self.open, self._current.values()):
+            episode.told_anew(lost, kept)
+            episode.firm = kept if episode.firm == lost else episode.firm
+
     def old(self, last_frame: int) -> list[int]:
         """Give the rows of episodes that are old enough to be settled by now, in order.
 
@@ -161,17 +182,23 @@ class Episodes:
         soonest = last_frame - settings.told_after - 2 * settings.regroup
         old = ends <= last_frame - settings.settled_after
         old[longest[ends[longest] <= soonest]] = True
+        over = len(ends) - int(old.sum()) - settings.most
+        if over > 0:
+            # Still too many: whoever has been one person for longest stays it until the next crowd.
+            sure = [it.told.get(it.number, 0) if it.number == it.mostly else 0 for it in self.open]
+            surest = np.argsort(-np.where(old, 0, sure), kind="stable")[:over]
+            old[surest[np.array(sure)[surest] >= _SURE * settings.regroup]] = True
         return [int(row) for row in np.flatnonzero(old)]
 
-    def settle(self, old: Iterable[Episode]) -> None:
-        """Let go of episodes; the rows of the others move up."""
+    def settle(self, old: Iterable[Episode], last_frame: int) -> None:
+        """Let go of episodes, of those that go on only as rows; the rows of the others move up."""
+        oldest = last_frame - self._settings.settled_after
         closed = {episode.key for episode in old}
-        if not closed:
-            return
         for episode in self.open:
             if episode.key in closed:
                 episode.before = None  # or all there ever was would be kept
-                if self._current.get(episode.key.track) is episode:
-                    del self._current[episode.key.track]
+                episode.firm, episode.untold = episode.mostly, []
+        # Whoever may go on stays here: tracks are not cut because they were settled.
+        self._current = {key: it for key, it in self._current.items() if not it.firm or it.end.frame > oldest}
         self.open = [episode for episode in self.open if episode.key not in closed]
         self._row = {episode.key: row for row, episode in enumerate(self.open)}

@@ -41,8 +41,8 @@ class Group:
 
     @property
     def last(self) -> int:
-        """Frame of the last one; -1: there is none."""
-        return max((episode.end.frame for episode in self.episodes), default=-1)
+        """Frame of the last one."""
+        return max([*(it.end.frame for it in self.episodes), *(it.last for it in self.past)])
 
     @property
     def cameras(self) -> set[str]:

@@ -83,6 +83,7 @@ class IdentityRegistry:
         self._tables = PairTables()
         self._weighing = Weighing(settings, calibrated)
         self._corrections = Corrections()
+        self._here: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
         self._last_frame: int | None = None
 
     def update(self, tracks: Sequence[LocalTrack], last_frame: int) -> IdentityUpdate:
@@ -98,8 +99,10 @@ class IdentityRegistry:
         before, self._last_frame = self._last_frame, last_frame
         seen = line_up(tracks, self._homographies, self._foot_error)
         self._scale.learn(seen.heights)
-        rows = self._episodes.take(seen, {track.key: track.looks for track in tracks})
-        self._gather(seen, rows, last_frame)
+        rows, firm = self._episodes.take(seen, {track.key: track.looks for track in tracks})
+        self._here = np.unique(firm[firm > 0])
+        self._people.see(self._here.tolist(), last_frame)
+        self._gather(seen, rows, firm, last_frame)
         episodes = self._episodes.open
         born: tuple[int, ...] = ()
         merged: tuple[Merge, ...] = ()
@@ -121,28 +124,37 @@ class IdentityRegistry:
         settings = self._settings
         return settings.gate if settings.gate is not None else settings.gate_heights * self._scale.height
 
-    def _gather(self, seen: Sightings, rows: NDArray[np.int64], last_frame: int) -> None:
+    def _gather(
+        self, seen: Sightings, rows: NDArray[np.int64], firm: NDArray[np.int64], last_frame: int
+    ) -> None:
         """Sum up what the update says about pairs of episodes."""
         past = [person.number for person in self._people.recent(last_frame)]
         tables = self._tables
+        count = len(self._episodes.open)
         tables.arrange([*(episode.key for episode in self._episodes.open), *past])
+        if past:
+            # Who is settled though they go on has the row of their past.
+            place = np.minimum(np.searchsorted(past, firm), len(past) - 1)
+            rows = np.where(np.array(past)[place] == firm, count + place, rows)
         camera = np.array([self._camera[key.camera] for key in seen.keys], dtype=np.int64)
         tables.add_apart(*at_once(rows, camera))
         if self._gate() > 0:
-            met = near(seen, rows, camera, self._gate())
+            met = near(seen, rows, camera, self._gate(), count)
             evidence = met.score / self._settings.ground_frames
             tables.add_near(met.one, met.two, evidence, met.frames, self._settings.ground_cap)
-        self._between.update(self._episodes.open, np.unique(rows[rows >= 0]), tables)
+        self._between.update(self._episodes.open, np.unique(rows[(rows >= 0) & (rows < count)]), tables)
 
     def _regroup(self, last_frame: int) -> tuple[tuple[int, ...], tuple[Merge, ...]]:
         """Say anew who is who; give the numbers of who is new, and what was merged."""
         episodes, past = self._episodes.open, self._people.recent(last_frame)
-        group = self._weighing.grouped(episodes, past, self._tables, self._scale.height)
+        here = np.isin([person.number for person in past], self._here)
+        group = self._weighing.grouped(episodes, past, here, self._tables, self._scale.height)
         groups = groups_of(episodes, past, group)
         born, merged = self._people.name(groups, self._tables, self._between, last_frame)
         self._tables.make_room(merge.kept for merge in merged)
         for merge in merged:
             self._tables.absorb(merge.kept, merge.lost)
+            self._episodes.told_anew(merge.lost, merge.kept)
         return born, merged
 
     def _settle(self, last_frame: int) -> None:
@@ -155,6 +167,6 @@ class IdentityRegistry:
             if episode.mostly:
                 self._tables.absorb(episode.mostly, episode.key)
         self._people.settle(old)
-        self._episodes.settle(old)
+        self._episodes.settle(old, last_frame)
         self._people.forget(last_frame)
         self._corrections.keep_only({episode.key for episode in self._episodes.open})

@@ -73,8 +73,8 @@ class IdentitySettings:
     told_after: int = 5
     # Frames after which an old part of a track is settled: it stays whose it was told to be.
     settled_after: int = 120
-    # Parts of tracks up to which that is so; of more, those unseen for longest are settled sooner: a bound
-    # on what grouping costs in a large site.
+    # Parts of tracks up to which that is so; of more, those unseen for longest are settled sooner, then those
+    # that have been told one number for longest: a bound on what grouping costs in a large site.
     most: int = 400
     # Frames for which a number must be nobody's, its tracks somebody else's, to be told as merged.
     merge_after: int = 50

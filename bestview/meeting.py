@@ -24,7 +24,7 @@ def at_once(rows: Ints, camera: Ints) -> tuple[Ints, Ints]:
         camera: (T,) number of each track's camera.
     """
     one, two = np.nonzero(np.triu(camera[:, None] == camera, 1))
-    both = (rows[one] >= 0) & (rows[two] >= 0)
+    both = (rows[one] >= 0) & (rows[two] >= 0) & (rows[one] != rows[two])
     return rows[one][both], rows[two][both]
 
 
@@ -34,7 +34,7 @@ class Nearness:
 
     Attributes:
         one: (P,) rows.
-        two: (P,) rows; each pair is there once.
+        two: (P,) rows; a pair is there once, or once for each track of somebody settled.
         score: (P,) sums over frames.
         frames: (P,) how many.
     """
@@ -45,7 +45,7 @@ class Nearness:
     frames: Ints
 
 
-def near(seen: Sightings, rows: Ints, camera: Ints, gate: float) -> Nearness:
+def near(seen: Sightings, rows: Ints, camera: Ints, gate: float, open_rows: int) -> Nearness:
     """Score how near to each other different cameras' tracks stand.
 
     The score of a frame is ``1 - D^2``, at least -2, with D the distance of the feet in gates: 1 for the
@@ -57,15 +57,20 @@ def near(seen: Sightings, rows: Ints, camera: Ints, gate: float) -> Nearness:
         rows: (T, W) of their sightings, -1: hidden.
         camera: (T,) number of each track's camera.
         gate: distance at which feet are as likely one person's as two's, ground units.
+        open_rows: rows from this one on are settled: two of them are not compared.
     """
     known = np.isfinite(seen.ground[..., 0]) & np.isfinite(seen.spread[..., 0, 0])
     track, frame = np.nonzero(known & (rows >= 0))
-    # One line for each row: a track that is cut within the update has two.
-    row, first, line = np.unique(rows[track, frame], return_index=True, return_inverse=True)
-    camera = camera[track[first]]
-    one, two = np.nonzero(np.triu(camera[:, None] != camera, 1))
+    # One line for each track and row: a track that is cut within the update has two, and a row whose tracks
+    # are settled one for each of them.
+    code = rows[track, frame] * max(len(rows), 1) + track
+    code, first, line = np.unique(code, return_index=True, return_inverse=True)
+    row, camera = rows[track[first], frame[first]], camera[track[first]]
+    # Lines are in the order of the rows: those of open episodes come first.
+    count = int(np.searchsorted(row, open_rows))
+    one, two = np.nonzero(np.triu(camera[:count, None] != camera, 1))
     spread = seen.spread[track, frame]
-    stands = np.full((rows.shape[1], 5, row.size), np.nan)
+    stands = np.full((rows.shape[1], 5, code.size), np.nan)
     stands[frame, :2, line] = seen.ground[track, frame]
     stands[frame, 2:, line] = spread[:, [0, 0, 1], [0, 1, 1]]
     score, frames = np.zeros(one.shape), np.zeros(one.shape, dtype=np.int64)

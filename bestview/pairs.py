@@ -89,14 +89,16 @@ class PairTables:
         frames: NDArray[np.int64],
         cap: float,
     ) -> None:
-        """Add what some frames say about how near (P,) pairs of rows stand, each pair once.
+        """Add what some frames say about how near (P,) pairs of rows stand.
 
         The sum stays within `cap`: what was said long ago can be taken back.
         """
-        near = np.clip(self._near[one, two] + evidence, -cap, cap)
-        common = np.minimum(self._common[one, two] + frames, _LEAST_COMMON)
-        self._near[one, two] = self._near[two, one] = near
-        self._common[one, two] = self._common[two, one] = common
+        low, high = np.minimum(one, two), np.maximum(one, two)
+        np.add.at(self._near, (low, high), evidence)
+        near = np.clip(self._near[low, high], -cap, cap)
+        common = np.minimum(self._common[low, high] + frames, _LEAST_COMMON)
+        self._near[low, high] = self._near[high, low] = near
+        self._common[low, high] = self._common[high, low] = common
 
     def add_alike(
         self, one: NDArray[np.int64], two: NDArray[np.int64], score: Floats, memory: float, cap: float

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from itertools import chain
 
 import numpy as np
 
@@ -111,8 +110,6 @@ class People:
                 merged.append(Merge(into[number], number))
         for merge in merged:
             self._persons[merge.kept].absorb(self._persons.pop(merge.lost))
-            for episode in chain.from_iterable(group.episodes for group in groups):
-                episode.told_anew(merge.lost, merge.kept)
         return tuple(merged)
 
     def settle(self, episodes: Iterable[Episode]) -> None:
@@ -122,6 +119,12 @@ class People:
             if person is not None:
                 person.looks.add_all(episode.looks)
                 person.settled += episode.told[person.number]
+
+    def see(self, numbers: Iterable[int], frame: int) -> None:
+        """Note that people are seen whose tracks are settled though they go on."""
+        for number in numbers:
+            if number in self._persons:
+                self._persons[number].last = max(self._persons[number].last, frame)
 
     def comings_and_goings(
         self, episodes: Iterable[Episode], frame: int

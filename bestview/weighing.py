@@ -36,18 +36,28 @@ class Weighing:
         self._weights = LookWeights(settings.look, settings.look_cap, settings.look_frames)
 
     def grouped(
-        self, episodes: Sequence[Episode], past: Sequence[Person], tables: PairTables, height: float
+        self,
+        episodes: Sequence[Episode],
+        past: Sequence[Person],
+        here: NDArray[np.bool_],
+        tables: PairTables,
+        height: float,
     ) -> Ints:
         """Give the group of each row, episodes first, then people: (N,) the lowest row of the group.
 
-        `height` of a person is in ground units.
+        Args:
+            episodes: open ones.
+            past: people as they were before.
+            here: (P,) of these, who is seen by tracks that are settled though they go on.
+            tables: of pairs of both.
+            height: of a person in ground units.
         """
         evidence, too_far = self._order(episodes, past, height)
         evidence += tables.near + tables.alike + self._told(episodes, past)
         return cluster(
             evidence,
             tables.apart | too_far,
-            np.arange(len(evidence)) >= len(episodes),
+            np.concatenate([np.zeros(len(episodes), dtype=np.bool_), ~here]),
             self._looks(episodes, past, tables.apart),
             self._weights,
             self._settings.join,

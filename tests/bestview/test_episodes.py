@@ -28,7 +28,7 @@ def seen_at(frame: int) -> Glimpse:
 def taken(*updates: Sequence[LocalTrack]) -> Episodes:
     episodes = Episodes(IdentitySettings())
     for tracks in updates:
-        rows = episodes.take(line_up(tracks, {"c0": None}, FEET), {it.key: it.looks for it in tracks})
+        rows, _ = episodes.take(line_up(tracks, {"c0": None}, FEET), {it.key: it.looks for it in tracks})
         assert rows.max(initial=-1) < len(episodes.open)
     return episodes
 

@@ -44,6 +44,10 @@ CALIBRATED: Mapping[str, NDArray[np.float64] | None] = {
 BLIND: Mapping[str, NDArray[np.float64] | None] = dict.fromkeys(VIEWS)
 
 
+HOWEVER_MANY = pytest.mark.parametrize("most", [400, 0], ids=["few", "too many at once"])
+"""Who is surely somebody is settled at once where there are too many parts of tracks."""
+
+
 @dataclass(frozen=True)
 class Stay:
     """A person under one local number in one camera, for some frames, along a line on the ground."""
@@ -110,20 +114,28 @@ def both(local: int, start: tuple[float, float], begin: int = 0, end: int = 999)
     return [Stay("south", local, begin, end, start), Stay("west", local, begin, end, start)]
 
 
+def known(seen: Sequence[IdentityUpdate]) -> dict[tuple[str, int], int]:
+    """Whose each track is after these updates, also where that was settled before."""
+    every = {key: number for update in seen for key, number in update.numbers.items()}
+    newest = {key.track: number for key, number in sorted(every.items())}
+    return {(key.camera, key.local): number for key, number in newest.items() if number}
+
+
 def numbers(update: IdentityUpdate) -> dict[tuple[str, int], int]:
     """Whose each track is now: its newest episode's; without those that are nobody's yet."""
     newest = {key.track: number for key, number in update.numbers.items()}
     return {(key.camera, key.local): number for key, number in newest.items() if number}
 
 
-def test_a_person_has_one_number_in_every_camera() -> None:
+@HOWEVER_MANY
+def test_a_person_has_one_number_in_every_camera(most: int) -> None:
     stays = [
         Stay("south", 4, 0, 999, (0, 0)),
         Stay("west", 9, 0, 999, (0, 0)),
         Stay("south", 5, 0, 999, (3, 1)),
         Stay("west", 8, 0, 999, (3, 1)),
     ]
-    last = numbers(play(registry(), stays, 60)[-1])
+    last = known(play(registry(most=most), stays, 60))
     assert last["south", 4] == last["west", 9]
     assert last["south", 5] == last["west", 8]
     assert sorted(last.values()) == [1, 1, 2, 2]
@@ -136,21 +148,23 @@ def test_numbers_are_shown_only_when_confirmed_and_born_once() -> None:
     assert [len(numbers(update)) for update in seen[:4]] == [0, 0, 2, 2]
 
 
-def test_two_people_seen_side_by_side_in_one_camera_are_two_however_close() -> None:
+@HOWEVER_MANY
+def test_two_people_seen_side_by_side_in_one_camera_are_two_however_close(most: int) -> None:
     stays = [*both(1, (0, 0)), *both(2, (0.3, 0.3))]
-    last = numbers(play(registry(), stays, 100)[-1])
+    last = known(play(registry(most=most), stays, 100))
     assert last["south", 1] != last["south", 2]
     assert last["west", 1] != last["west", 2]
     assert last["south", 1] == last["west", 1]
 
 
-def test_a_restarted_camera_finds_everybody_again() -> None:
+@HOWEVER_MANY
+def test_a_restarted_camera_finds_everybody_again(most: int) -> None:
     people = [(-2.0, -2.0), (2.0, -1.0), (0.0, 3.0)]
     stays = [Stay("south", 1 + i, 0, 999, at) for i, at in enumerate(people)]
     stays += [Stay("west", 1 + i, 0, 99, at) for i, at in enumerate(people)]
     stays += [Stay("west", 101 + i, 150, 999, at) for i, at in enumerate(people)]
-    seen = play(registry(), stays, 200)
-    again = numbers(seen[(150 // STRIDE) + 4])  # five updates after it came back
+    seen = play(registry(most=most), stays, 200)
+    again = known(seen[: (150 // STRIDE) + 5])  # five updates after it came back
     assert [again["west", 101 + i] for i in range(3)] == [again["south", 1 + i] for i in range(3)]
     assert max(max(update.numbers.values(), default=0) for update in seen) == 3
 
@@ -210,7 +224,8 @@ def test_evidence_corrects_a_number_and_says_so() -> None:
     assert numbers(seen[-1]) == {("south", 1): 1, ("west", 1): 1}
 
 
-def test_a_track_that_takes_one_for_the_other_in_a_crowd_is_two_episodes() -> None:
+@HOWEVER_MANY
+def test_a_track_that_takes_one_for_the_other_in_a_crowd_is_two_episodes(most: int) -> None:
     # Two meet before one camera and part again, and its tracker has exchanged them; another camera sees all.
     def meeting(camera: str, local: int, start: float, speed: float, begin: int = 0, end: int = 999) -> Stay:
         return Stay(camera, local, begin, end, (start, 0), (speed, 0), coat=1 + 2 * (start > 0))
@@ -218,8 +233,8 @@ def test_a_track_that_takes_one_for_the_other_in_a_crowd_is_two_episodes() -> No
     stays = [Stay("west", 1, 0, 999, (-3, 0), (0.03, 0), 1), Stay("west", 2, 0, 999, (3, 0.8), (-0.03, 0), 3)]
     stays += [meeting("south", 1, -3, 0.03, end=100), meeting("south", 2, 3, -0.03, end=100)]
     stays += [meeting("south", 2, -3, 0.03, begin=101), meeting("south", 1, 3, -0.03, begin=101)]
-    seen = play(registry(), stays, 200)
-    before, after = numbers(seen[80 // STRIDE]), numbers(seen[-1])
+    seen = play(registry(most=most), stays, 200)
+    before, after = known(seen[: 80 // STRIDE]), known(seen)
     assert len({before["south", 1], before["south", 2]}) == 2
     assert after["south", 1] == before["south", 2]
     assert after["south", 2] == before["south", 1]
@@ -289,6 +304,15 @@ def test_two_tracks_seen_at_once_in_one_camera_never_share_a_number(data: st.Dat
             assert len(here) == len(dict.fromkeys(here))
 
 
+@HOWEVER_MANY
+def test_who_is_settled_while_they_go_on_is_seen_and_not_gone(most: int) -> None:
+    seen = play(registry(most=most, gone_after=60, settled_after=100), both(1, (0, 0), end=400), 600)
+    assert [update.gone for update in seen if update.gone] == [(1,)]
+    gone = next(i for i, update in enumerate(seen) if update.gone)
+    assert 400 + 60 < STRIDE * gone + STRIDE - 1 <= 400 + 60 + 2 * STRIDE
+    assert [update.born for update in seen if update.born] == [(1,)]
+
+
 def test_memory_does_not_grow_with_the_length_of_the_recording() -> None:
     who = registry(forget_after=200, remember=5, recent=100, settled_after=100, gone_after=50)
     stays = [Stay("south", i, 30 * i, 30 * i + 25, (4.0 * (-1) ** i, i % 5 - 2)) for i in range(100)]
@@ -321,6 +345,7 @@ def test_any_setting_may_be_at_its_least_and_cameras_may_come_and_go(nothing: Ma
     # Looks of other sizes, of no size and of nothing; boxes that shake; tracks that pause and begin anew.
     random = np.random.default_rng(1)
     who = registry({"south": CALIBRATED["south"], "west": None}, **nothing)
+    updates = []
     for last in range(STRIDE - 1, 1000, STRIDE):
         tracks = []
         for camera in ("south", "west"):
@@ -333,9 +358,9 @@ def test_any_setting_may_be_at_its_least_and_cameras_may_come_and_go(nothing: Ma
                 glimpse = Glimpse(last - STRIDE + 1, last, look)
                 run = 1 + local + 4 * (last // 400)
                 tracks.append(LocalTrack(camera, run, last - STRIDE + 1, boxes, (glimpse,)))
-        shown = [number for number in numbers(who.update(tracks, last)).values() if number]
-        assert all(number >= 1 for number in shown)
-    assert shown
+        updates.append(who.update(tracks, last))
+        assert all(number >= 1 for number in numbers(updates[-1]).values())
+    assert known(updates)
 
 
 def test_what_makes_no_sense_is_refused_in_one_line() -> None:

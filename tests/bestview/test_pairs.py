@@ -122,7 +122,7 @@ def test_nearness_is_the_sum_over_frames_in_which_both_stand_somewhere(
                 score = max(1.0 - float(apart @ np.linalg.solve(metric, apart)), -2.0)
                 pair = frozenset((int(rows[one, frame]), int(rows[two, frame])))
                 expected.setdefault(pair, []).append(score)
-    met = near(seen, rows, camera, gate)
+    met = near(seen, rows, camera, gate, int(rows.max(initial=-1)) + 1)
     pairs = [frozenset(pair) for pair in zip(met.one.tolist(), met.two.tolist(), strict=True)]
     assert len(set(pairs)) == len(pairs)
     assert dict(zip(pairs, met.frames.tolist(), strict=True)) == {it: len(of) for it, of in expected.items()}
