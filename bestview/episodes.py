@@ -198,7 +198,11 @@ class Episodes:
             if episode.key in closed:
                 episode.before = None  # or all there ever was would be kept
                 episode.firm, episode.untold = episode.mostly, []
-        # Whoever may go on stays here: tracks are not cut because they were settled.
-        self._current = {key: it for key, it in self._current.items() if not it.firm or it.end.frame > oldest}
         self.open = [episode for episode in self.open if episode.key not in closed]
         self._row = {episode.key: row for row, episode in enumerate(self.open)}
+        # Tracks are not cut because they were settled; but who was nobody, or is long gone, begins anew.
+        self._current = {
+            key: it
+            for key, it in self._current.items()
+            if it.key in self._row or (it.firm and it.end.frame > oldest)
+        }

@@ -1,7 +1,7 @@
 """What is known about pairs of episodes and people: tables that follow who is in play.
 
-The rows are the open episodes, then the people as they were before (`Past`), in the order in which others
-list them. Evidence is summed up as it comes in: a pair is never looked at again.
+The rows are the open episodes, then the people who have settled ones, in the order in which others list
+them. Evidence is summed up as it comes in: a pair is never looked at again.
 """
 
 from __future__ import annotations

@@ -87,6 +87,25 @@ def test_of_too_many_those_unseen_for_longest_are_old_sooner_but_not_before_they
     assert episodes.old(139) == [0, 1, 2, 3]
 
 
+def test_who_was_nobody_when_they_were_settled_begins_anew() -> None:
+    episodes = taken([track(1, 0, [LEFT] * 5)])
+    episodes.settle(list(episodes.open), 200)
+    again = [track(1, 201, [LEFT] * 5)]
+    rows, firm = episodes.take(line_up(again, {"c0": None}, FEET), {})
+    assert rows.tolist() == [[0] * 5]
+    assert not firm.any()
+    assert spans(episodes, 1) == [(201, 205)]
+
+
+def test_a_track_that_is_settled_while_it_goes_on_is_not_cut() -> None:
+    episodes = taken([track(1, 0, [LEFT] * 5)])
+    episodes.open[0].told[7] = 5
+    episodes.settle(list(episodes.open), 5)
+    rows, firm = episodes.take(line_up([track(1, 5, [LEFT] * 5)], {"c0": None}, FEET), {})
+    assert (rows.tolist(), firm.tolist()) == ([[-1] * 5], [[7] * 5])
+    assert not episodes.open
+
+
 @settings(deadline=None, max_examples=60)
 @given(st.data())
 def test_episodes_do_not_depend_on_how_frames_come_in_updates(data: st.DataObject) -> None:
