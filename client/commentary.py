@@ -69,6 +69,11 @@ class Commentary:
         shown = self._shown[first]
         return shown.camera if pulse < first + shown.frames else None
 
+    async def begin(self) -> None:
+        """Wait for the next word."""
+        self._heard.clear()
+        await self._heard.wait()
+
     async def reach(self, media_time: float) -> None:
         """Wait a moment for what is said about ``media_time``: it comes by a connection of its own."""
         if self.site is None:
@@ -110,7 +115,8 @@ async def following(
 ) -> AsyncIterator[None]:
     """Follow the events inside the block; that they cannot be had does not disturb who watches.
 
-    Where there is a ``start``, what was said since then is taken first.
+    Where there is a ``start``, what was said since then is taken first. The block is entered when the
+    server has begun to tell: of pictures that are fetched inside it nothing remains untold.
 
     Raises:
         ClientError: it cannot be had.
@@ -127,9 +133,12 @@ async def following(
         commentary.take(await site(url, settings))
         async for gop in past(url, start, end, settings):
             commentary.take(gop)
-    task = asyncio.create_task(follow())
+    told = asyncio.create_task(follow())
+    begun = asyncio.create_task(commentary.begin())
     try:
+        await asyncio.wait({told, begun}, timeout=_PATIENCE_S, return_when=asyncio.FIRST_COMPLETED)
         yield
     finally:
-        task.cancel()
-        await asyncio.gather(task, return_exceptions=True)
+        told.cancel()
+        begun.cancel()
+        await asyncio.gather(told, begun, return_exceptions=True)
