@@ -14,7 +14,7 @@ from benchmarks.report import Report
 from bestview import NO_CAMERA, ViewScore, choose_views, score_views
 from server.run.evaluate_choices import views_of
 from server.run.evaluate_truth import Truth
-from server.wire.config import Encode, View
+from server.wire.sections import Encode, View
 
 STRIDE = 5
 """Frames between two windows of the tracker, as by default; its delay is that of the true site."""

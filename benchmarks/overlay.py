@@ -25,8 +25,8 @@ from server.view.h264 import nal_units, sample
 from server.view.pictures.decided import Told, first_pulse
 from server.view.pictures.series import Series
 from server.view.pictures.source import Source
-from server.wire.config import Encode, Site
 from server.wire.drawing import Canvas
+from server.wire.sections import Encode, Site
 
 _MS = 1e3
 _DRAWN = 100

@@ -21,9 +21,10 @@ from server.camera.encode import AccessUnit, Encoder
 from server.camera.scene import Scene
 from server.run.ending import end_with_parent
 from server.wire.bus import Bus
-from server.wire.config import Config, Encode, Site
+from server.wire.config import Config
 from server.wire.loading import load_config
 from server.wire.messages import FrameHead, Keys
+from server.wire.sections import Encode, Site
 
 CAMERAS = 4
 SITE = Site(name="stream", width=352, height=288, fps=25)

@@ -15,9 +15,10 @@ from server.view.channel import Piece
 from server.view.fmp4 import ticks
 from server.view.footage import Footage
 from server.view.service import BestViewService
-from server.wire.config import Camera, Config
+from server.wire.config import Config
 from server.wire.inbox import Message
 from server.wire.messages import FrameHead, GopChoices, Keys
+from server.wire.sections import Camera
 
 _PER_CAMERA = 2
 """People in a camera's view, on average: few, so that an hour passes in minutes."""

@@ -16,7 +16,8 @@ from server.camera.encode import AccessUnit, Encoder
 from server.view.channel import Piece
 from server.view.fmp4 import init_segment
 from server.view.footage import Footage
-from server.wire.config import Camera, Config, Encode, Site
+from server.wire.config import Config
+from server.wire.sections import Camera, Encode, Site
 
 _SITE = Site(name="right", width=64, height=48, fps=25)
 _ENCODE = Encode()

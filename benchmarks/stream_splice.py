@@ -20,7 +20,8 @@ from server.view.decide import GopDecision, ObjectChoice
 from server.view.shelf import Shelf
 from server.view.splice import Splicer
 from server.view.why import Why
-from server.wire.config import Camera, Config
+from server.wire.config import Config
+from server.wire.sections import Camera
 
 _NAMES = tuple(f"c{number}" for number in range(CAMERAS))
 _NO_REASON = cast("Why", None)

@@ -23,7 +23,7 @@ from server.web.app import make_app, serving
 from server.web.keys import METRICS
 from server.web.schema import CameraInfo, Choice, ObjectInfo, SiteInfo
 from server.wire import messages
-from server.wire.config import Http
+from server.wire.sections import Http
 
 ROOT = Path(__file__).parents[1]
 DOCS = sorted((ROOT / "docs").glob("*.md"))

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from server.wire.drawing import Canvas
 
 if TYPE_CHECKING:  # a drawing process encodes too, and has no second to load the configuration's libraries
-    from server.wire.config import Encode, Site
+    from server.wire.sections import Encode, Site
 
 _CLOCK = Fraction(1, 90_000)
 _FAR = 1_000_000

@@ -9,10 +9,11 @@ from typing import Protocol
 
 import numpy as np
 
-from server.wire.config import Camera, Config
+from server.wire.config import Config
 from server.wire.detect import DetectSettings
 from server.wire.errors import UserError
 from server.wire.fit import Fit, Image
+from server.wire.sections import Camera
 from tracking import Detections
 from tracking.detectors import (
     BackgroundDetector,

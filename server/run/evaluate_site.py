@@ -9,8 +9,8 @@ from pathlib import Path
 from server.run.recorded import Size, look_at, parse_size
 from server.run.setup import camera_name
 from server.run.site_file import SITE_FILE, SiteFacts, read_site
-from server.wire.config import View
 from server.wire.errors import UserError
+from server.wire.sections import View
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,7 +18,7 @@ from server.run.plots import new_figure, save_figure
 from server.run.recorded import Size
 from server.run.site_file import SiteFacts
 from server.run.track import pictures
-from server.wire.config import Camera, Site
+from server.wire.sections import Camera, Site
 
 MOST_CUTS = 12
 """Cuts shown of one person: the first."""

@@ -11,7 +11,7 @@ from server.view.agreement import Agreement
 from server.view.decide import GopDecision
 from server.view.fmp4 import init_segment, rebased, ticks
 from server.view.shelf import Shelf
-from server.wire.config import Site
+from server.wire.sections import Site
 
 
 @dataclass(slots=True)

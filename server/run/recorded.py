@@ -8,8 +8,8 @@ from pathlib import Path
 from server.camera.sources import open_source
 from server.camera.sources.opening import open_video
 from server.run.setup import camera_name
-from server.wire.config import Camera, Site
 from server.wire.errors import UserError
+from server.wire.sections import Camera, Site
 
 Size = tuple[int, int]
 """Width and height of a picture, pixels."""

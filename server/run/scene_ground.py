@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from server.wire.config import Camera, Config, Site
+from server.wire.config import Config
+from server.wire.sections import Camera, Site
 from server.wire.sources import SourceKind, kind_of
 
 

@@ -15,9 +15,9 @@ from server.view.history import History
 from server.view.numbered import numbered_boxes
 from server.view.reading import CameraWindow, Reader
 from server.view.share import served
-from server.wire.config import Share
 from server.wire.fit import Fit
 from server.wire.messages import NumberedBox
+from server.wire.sections import Share
 
 ALL = Share()
 """One service for everybody."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from server.wire.config import Share
+from server.wire.sections import Share
 
 
 def index_of(number: int, share: Share) -> int:

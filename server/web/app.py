@@ -19,8 +19,8 @@ from server.web.keys import EVENTS, METRICS, PICTURES, SERVICE
 from server.web.metrics import registry
 from server.web.queries import refuse_what_is_not_there
 from server.web.share import to_the_right_service
-from server.wire.config import Http
 from server.wire.errors import UserError
+from server.wire.sections import Http
 
 log = logging.getLogger(__name__)
 

@@ -8,9 +8,9 @@ from typing import Self
 
 import zenoh
 
-from server.wire.config import Zenoh
 from server.wire.errors import UserError
 from server.wire.inbox import Inbox, Message
+from server.wire.sections import Zenoh
 
 _DROP_AFTER_US = 20_000
 """zenoh drops a message after 1 ms in a full queue by default: too soon for an I picture's burst."""

@@ -16,8 +16,9 @@ from pydantic_core import ErrorDetails
 from pydantic_settings import SettingsError
 
 from bestview import checked_homography
-from server.wire.config import Camera, Config
+from server.wire.config import Config
 from server.wire.errors import UserError
+from server.wire.sections import Camera
 from server.wire.sources import resolved
 
 

@@ -15,11 +15,12 @@ from server.camera.encode import AccessUnit, Encoder
 from server.view.align import Epoch
 from server.view.service import BestViewService
 from server.view.why import Why
-from server.wire.config import Config, Encode, Site
+from server.wire.config import Config
 from server.wire.epochs import end_of_epoch
 from server.wire.inbox import Message
 from server.wire.loading import build_config
 from server.wire.messages import Box, CameraStatus, CameraTracks, FrameHead, Glimpse, Keys, ThumbHead, Track
+from server.wire.sections import Encode, Site
 
 WIDTH, HEIGHT, FPS = 64, 48, 25
 GOP = STRIDE = 5

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from server.camera.encode import AccessUnit, Encoder
 from server.camera.scene import Scene
 from server.web.app import make_app, serving
-from server.wire.config import Http
 from server.wire.epochs import end_of_epoch
 from server.wire.messages import Box, GopChoices, Track
+from server.wire.sections import Http
 
 SIZE = (320, 180)
 CAMERAS = ("c0", "c1")

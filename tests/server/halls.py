@@ -11,7 +11,7 @@ import pytest
 from cameras_by_hand import CAMERAS, LARGE, SMALL, FedService, TrackNumbers, small_config
 
 from server.web.app import make_app, serving
-from server.wire.config import Http
+from server.wire.sections import Http
 
 PATIENCE = 10.0  # seconds until a test that awaits something has failed
 A, B = CAMERAS

@@ -13,9 +13,9 @@ from pydantic import ValidationError
 
 from server.run.setup import free_port
 from server.wire.bus import Bus
-from server.wire.config import Zenoh
 from server.wire.errors import UserError
 from server.wire.inbox import Inbox, Message
+from server.wire.sections import Zenoh
 
 PATIENCE = 20.0  # seconds until a test that awaits something has failed
 
@@ -142,7 +142,7 @@ async def test_an_address_that_is_none_is_refused() -> None:
 SCRIPT = """
 import asyncio
 from server.wire.bus import Bus
-from server.wire.config import Zenoh
+from server.wire.sections import Zenoh
 async def main():
     address = "tcp/127.0.0.1:{port}"
     settings = Zenoh(connect=address, listen=address)

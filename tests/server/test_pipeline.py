@@ -15,10 +15,11 @@ from server.camera.pipeline import CameraPipeline
 from server.camera.scene import Scene, write_recording
 from server.camera.sources import SourceEnded
 from server.run.offline import Batch, run_camera
-from server.wire.config import Config, Site
+from server.wire.config import Config
 from server.wire.errors import UserError
 from server.wire.loading import build_config
 from server.wire.messages import Box, CameraTracks
+from server.wire.sections import Site
 
 FRAMES = 48
 STRIDE = 5

@@ -15,9 +15,9 @@ from server.view.agreement import Agreement
 from server.view.decide import GopDecision, ObjectChoice
 from server.view.record import Recorder
 from server.view.shelf import Shelf
-from server.wire.config import Site
 from server.wire.fit import Fit
 from server.wire.messages import NumberedBox
+from server.wire.sections import Site
 
 A, B = CAMERAS
 SITE = Site(width=WIDTH, height=HEIGHT, fps=FPS)

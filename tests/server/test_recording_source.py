@@ -17,8 +17,8 @@ from server.camera.sources import SourceEnded, open_source
 from server.camera.sources.base import Source
 from server.camera.sources.folder import Folder
 from server.camera.sources.recording import Recording
-from server.wire.config import Camera, Site
 from server.wire.errors import UserError
+from server.wire.sections import Camera, Site
 
 FRAMES = 25
 

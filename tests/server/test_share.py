@@ -32,9 +32,9 @@ from server.view.service import BestViewService
 from server.view.share import index_of, served, server_of
 from server.web.app import make_app, serving
 from server.wire.bus import Bus
-from server.wire.config import Http, Share
 from server.wire.errors import UserError
 from server.wire.messages import Box, Keys
+from server.wire.sections import Http, Share
 
 PATIENCE_S = 20.0
 

@@ -16,7 +16,7 @@ from server.camera.encode import AccessUnit, Encoder
 from server.view.bits import BitReader, BitWriter, payload_of, unit_of
 from server.view.h264 import ParameterSets, nal_units, parameter_sets, sample
 from server.view.skip import Continuing, UnfitError, continuing
-from server.wire.config import Encode, Site
+from server.wire.sections import Encode, Site
 
 PRESETS = ("ultrafast", "superfast", "medium")
 

@@ -17,7 +17,7 @@ from sounds_by_hand import EVERY, FPS, beeps, write_flashes
 
 from server.camera.sound import Frame, LiveSound
 from server.camera.sources.stream import Stream
-from server.wire.config import Sound
+from server.wire.sections import Sound
 from server.wire.sound import FRAME, SoundFormat
 
 FRAMES = 3 * EVERY

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from sounds_by_hand import EVERY, FPS, beeps, write_flashes
 
 from server.camera.sound import Frame, LiveSound, RecordedSound, open_sound, runs
-from server.wire.config import Sound
 from server.wire.errors import UserError
 from server.wire.loading import build_config
+from server.wire.sections import Sound
 from server.wire.sound import SoundFormat
 
 FRAMES = 70

@@ -23,7 +23,7 @@ from server.camera.encode import AccessUnit, Encoder
 from server.camera.sound import RecordedSound
 from server.view.decide import GopDecision, ObjectChoice
 from server.view.fmp4 import init_segment
-from server.wire.config import Encode, Site, Sound
+from server.wire.sections import Encode, Site, Sound
 from server.wire.sound import FRAME
 
 GOPS = 24

@@ -7,8 +7,8 @@ import pytest
 
 from server.camera.scene import Scene
 from server.camera.sources.stage import Stage
-from server.wire.config import Site
 from server.wire.errors import UserError
+from server.wire.sections import Site
 from server.wire.sources import SourceKind, kind_of
 
 SITE = Site(width=128, height=72)

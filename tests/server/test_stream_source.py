@@ -14,8 +14,8 @@ from videos_by_hand import HEIGHT, STEP, WIDTH, frame_in
 
 from server.camera.sources import open_source, stream
 from server.camera.sources.stream import Stream
-from server.wire.config import Camera, Site
 from server.wire.errors import UserError
+from server.wire.sections import Camera, Site
 
 PATIENCE = 20.0  # seconds until a test that awaits something has failed
 

@@ -21,7 +21,7 @@ from server.view.decide import GopDecision, ObjectChoice
 from server.view.fmp4 import init_segment
 from server.view.shelf import Shelf
 from server.view.splice import Splicer
-from server.wire.config import Encode, Site
+from server.wire.sections import Encode, Site
 
 FRAMES = 6 * GOP
 

@@ -12,7 +12,7 @@ from av.audio.stream import AudioStream
 from server.camera.sound.encoding import Encoding
 from server.camera.sound.frames import Frame, Packet, Way
 from server.camera.sound.passing import Passing, fits
-from server.wire.config import Sound
+from server.wire.sections import Sound
 from server.wire.sound import FRAME
 
 log = logging.getLogger(__name__)

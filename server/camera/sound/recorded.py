@@ -15,8 +15,8 @@ from av.container import InputContainer
 from server.camera.sound.encoding import Encoding
 from server.camera.sound.frames import Frame, Packet, Way
 from server.camera.sound.passing import Passing, fits
-from server.wire.config import Sound
 from server.wire.errors import UserError
+from server.wire.sections import Sound
 
 log = logging.getLogger(__name__)
 

@@ -8,8 +8,8 @@ from server.camera.sources.folder import Folder
 from server.camera.sources.recording import Recording
 from server.camera.sources.stage import Stage
 from server.camera.sources.stream import Stream
-from server.wire.config import Camera, Site
 from server.wire.errors import AwayError, UserError
+from server.wire.sections import Camera, Site
 from server.wire.sources import SourceKind, kind_of
 
 __all__ = ["Image", "Recording", "Source", "SourceEnded", "open_source"]

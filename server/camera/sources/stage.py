@@ -8,8 +8,8 @@ from urllib.parse import parse_qsl
 
 from server.camera.scene import Scene
 from server.camera.sources.base import Image
-from server.wire.config import Site
 from server.wire.errors import UserError
+from server.wire.sections import Site
 
 _WHOLE = re.compile(r"[0-9]{1,18}")
 _DEFAULTS = {"camera": 0, "cameras": 3, "objects": 4, "seed": 1}

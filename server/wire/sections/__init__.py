@@ -1,0 +1,28 @@
+"""The sections of the configuration, one idea per file."""
+
+from server.wire.sections.base import Endpoint, Name, Polygon, Port, Section, Side
+from server.wire.sections.camera import Camera, Encode, Track
+from server.wire.sections.serve import Http, Record
+from server.wire.sections.site import Site, Sync, Zenoh
+from server.wire.sections.sound import Sound
+from server.wire.sections.view import Share, View
+
+__all__ = [
+    "Camera",
+    "Encode",
+    "Endpoint",
+    "Http",
+    "Name",
+    "Polygon",
+    "Port",
+    "Record",
+    "Section",
+    "Share",
+    "Side",
+    "Site",
+    "Sound",
+    "Sync",
+    "Track",
+    "View",
+    "Zenoh",
+]

@@ -1,0 +1,43 @@
+"""What every part of the configuration is made of."""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+
+Polygon = Annotated[list[tuple[float, float]], Field(min_length=3)]
+"""Corners in pixels of the camera's own picture."""
+
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,31}$")]
+"""A name that fits into a zenoh key, a URL and a file name."""
+
+
+def _even(value: int) -> int:
+    if value % 2:
+        raise ValueError("must be even: H.264 stores colour at half the size")
+    return value
+
+
+def _endpoint(value: str) -> str:
+    if not _ENDPOINT.fullmatch(value):
+        raise ValueError(f"{value!r} is not an address such as tcp/127.0.0.1:7447")
+    return value
+
+
+_ENDPOINT = re.compile(r"[a-z]+/[^\s/]+:[0-9]{1,5}([?#]\S*)?")
+
+Endpoint = Annotated[str, AfterValidator(_endpoint)]
+"""Where zenoh connects to or listens: protocol/host:port."""
+
+Side = Annotated[int, Field(ge=16, le=8192), AfterValidator(_even)]
+"""Width or height of a picture in pixels; x264 cannot encode much smaller or larger ones."""
+
+Port = Annotated[int, Field(ge=1, le=65535)]
+
+
+class Section(BaseModel):
+    """A part of the configuration: a key that it does not know is an error, never ignored."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)

@@ -1,0 +1,68 @@
+"""One camera, and what is done with its pictures and its people."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field, PositiveFloat, PositiveInt, ValidationInfo, field_validator
+
+from bestview import checked_homography
+from server.wire.library import validated
+from server.wire.sections.base import Name, Polygon, Section
+from tracking import DEFAULT_SOLVER, CostSettings, WindowSettings, solver_named
+
+
+class Camera(Section):
+    """One camera."""
+
+    id: Name
+    source: str
+    """A file, a folder of images, a URL that FFmpeg opens, /dev/video0, or scene:NAME?camera=0&…"""
+    offset: int = 0
+    """A recording shows its frame n - offset at pulse n."""
+    at_end: Literal["stop", "loop"] = "stop"
+    """What a recording does after its last frame."""
+    options: dict[str, str] = {}
+    """Options for FFmpeg's opener, e.g. rtsp_transport: tcp."""
+    ignore: list[Polygon] = []
+    """Parts of the picture where nobody is looked for, in pixels of the camera's own picture."""
+    ground: list[list[float]] | None = None
+    """3x3 homography from the camera's own picture (pixels) to the ground plane."""
+    detections: Path | None = None
+    """A MOTChallenge detection file to use instead of looking for people in the picture."""
+
+    @field_validator("ground")
+    @classmethod
+    def _ground_is_invertible(
+        cls, ground: list[list[float]] | None, info: ValidationInfo
+    ) -> list[list[float]] | None:
+        if ground is not None:
+            checked_homography(ground, f"camera {info.data.get('id', '?')}")
+        return ground
+
+
+class Encode(Section):
+    """H.264. Identical in all cameras: that is what makes cutting without re-encoding possible."""
+
+    gop: PositiveInt = 10
+    """Frames in a closed group of pictures; views can change only where one begins."""
+    crf: Annotated[int, Field(ge=0, le=51)] = 23
+    """x264's constant quality: smaller is better and larger; 18 to 28 is sensible."""
+    preset: Literal["ultrafast", "superfast", "veryfast", "faster", "fast", "medium"] = "ultrafast"
+
+
+class Track(Section):
+    """Following people in one camera: the network LP over a moving window (paper, II)."""
+
+    solver: str = DEFAULT_SOLVER
+    backlog_s: PositiveFloat = 2.0
+    """Seconds of frames that may wait on a busy machine; a camera's older ones are left out, and said so."""
+    window: Annotated[WindowSettings, validated(WindowSettings)] = WindowSettings()
+    costs: Annotated[CostSettings, validated(CostSettings)] = CostSettings()
+
+    @field_validator("solver")
+    @classmethod
+    def _solver_is_known(cls, solver: str) -> str:
+        solver_named(solver)
+        return solver

@@ -1,0 +1,43 @@
+"""What is given out, and what is kept."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import Field, PositiveFloat, PositiveInt
+
+from server.wire.sections.base import Section
+
+
+class Http(Section):
+    """The page, the streams and the API."""
+
+    host: str = "127.0.0.1"
+    port: Annotated[int, Field(ge=0, le=65535)] = 8080
+    viewers_max: PositiveInt = 1000
+    """Streams served at once; one more gets 503."""
+    viewers_per_object: PositiveInt = 1000
+    """The same of one object, or of one camera."""
+    viewer_queue_gops: PositiveInt = 8
+    """A viewer that falls behind by more loses whole GOPs."""
+    hls_segment_s: PositiveFloat = 1.0
+    """As many whole GOPs as fit are a segment of HLS, at least one."""
+    hls_window_s: PositiveFloat = 6.0
+    """Segments that a playlist of HLS lists; twice as many are kept."""
+    pictures_max: PositiveInt = 8
+    """People and cameras whose pictures are decoded at once: JPEG, and boxes burnt in. One more gets 503."""
+    jpeg_quality: Annotated[int, Field(ge=1, le=100)] = 80
+
+
+class Record(Section):
+    """What was streamed, kept on the disk."""
+
+    folder: Path | None = None
+    """Where; none: nothing is recorded."""
+    keep_s: PositiveFloat = 86_400.0
+    """Seconds after which it is taken away."""
+    most_mb: PositiveFloat = 10_000.0
+    """Megabytes that it takes on the disk at most; the oldest goes first."""
+    segment_s: PositiveFloat = 60.0
+    """Seconds in a file: only whole files are taken away."""

@@ -1,0 +1,41 @@
+"""What all processes of a site share."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field, NonNegativeFloat, PositiveFloat
+
+from server.wire.sections.base import Endpoint, Name, Port, Section, Side
+
+
+class Site(Section):
+    """What all cameras share. Every camera's picture is scaled to one size, so that any can follow any."""
+
+    name: Name = "site"
+    fps: Annotated[float, Field(gt=0, le=1000, allow_inf_nan=False)] = 25.0
+    width: Side = 640
+    height: Side = 360
+
+
+class Sync(Section):
+    """The pulse server."""
+
+    host: str = "127.0.0.1"
+    """Where cameras find the server."""
+    bind: str = "127.0.0.1"
+    """The address the server listens on."""
+    port: Port = 7400
+    start_timeout_s: NonNegativeFloat = 20.0
+    """How long pulse 0 waits for all cameras to be there, so that recordings start at their first frame."""
+
+
+class Zenoh(Section):
+    """The message bus. The best-view service is its router: no separate daemon is needed."""
+
+    connect: Endpoint = "tcp/127.0.0.1:7447"
+    """Where cameras find the router."""
+    listen: Endpoint = "tcp/127.0.0.1:7447"
+    """Where the best-view service's router listens."""
+    lease_s: PositiveFloat = 1.0
+    """A process that is silent this long counts as gone."""

@@ -1,0 +1,31 @@
+"""The site's sound."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from server.wire.sections.base import Section
+from server.wire.sound import SoundFormat
+
+
+class Sound(Section):
+    """One sound for the whole site, under every picture."""
+
+    source: str | None = None
+    """A camera's id: that camera's sound. Or a file; None: the site has no sound."""
+    offset: int = 0
+    """A file's sound at pulse n is that of its moment (n - offset) / fps; a camera has its own offset."""
+    at_end: Literal["stop", "loop"] = "stop"
+    """What a file does after its end; a camera has its own."""
+    rate: Literal[48_000, 44_100, 32_000, 24_000] = 48_000
+    """Samples a second."""
+    channels: Literal[1, 2] = 2
+    kbps: Annotated[int, Field(ge=16, le=320)] = 96
+    """Of what has to be encoded: AAC of this rate and so many channels is passed on as it is."""
+
+    @property
+    def format(self) -> SoundFormat | None:
+        """What all streams of the site sound like; None: they have no sound."""
+        return None if self.source is None else SoundFormat(self.rate, self.channels)

@@ -1,0 +1,59 @@
+"""The choice of views."""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated, Self
+
+from pydantic import NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt, model_validator
+
+from bestview import IdentitySettings, QualitySettings
+from server.wire.library import validated
+from server.wire.sections.base import Section
+
+
+class Share(Section):
+    """Several best-view services of one site: each decides for the objects whose number leaves its index."""
+
+    of: PositiveInt = 1
+    """How many there are: an object's number modulo this is the index of its service."""
+    index: NonNegativeInt = 0
+    """Which of them this is; 0 is the router, which the others and the cameras connect to."""
+    servers: list[str] = []
+    """Base URLs of all, by index: where whoever asks for another's object is sent."""
+
+    @model_validator(mode="after")
+    def _fits(self) -> Self:
+        if self.index >= self.of:
+            raise ValueError(f"index is {self.index}, but of {self.of} services the last is {self.of - 1}")
+        if self.servers and len(self.servers) != self.of:
+            raise ValueError(f"servers names {len(self.servers)}, but there are {self.of}; name all or none")
+        for server in self.servers:
+            if not re.fullmatch(r"https?://[^\s/?#]+(/[^\s?#]*)?", server):
+                raise ValueError(f"servers: {server!r} is not an address such as http://127.0.0.1:8081/")
+        return self
+
+
+class View(Section):
+    """The best-view service."""
+
+    lookahead: PositiveInt = 25
+    """Frames the choice of a view looks ahead: N of the paper's section III; all of it is delay."""
+    switch_cost_s: NonNegativeFloat = 0.3
+    """λ: how many seconds of not seeing the person, while another camera does, are worth a cut; of a view
+    that is worth half the best one it takes twice as many."""
+    goes_on_s: NonNegativeFloat = 0.5
+    """For how long the views at the end of the look-ahead are taken to go on as they are."""
+    missed_s: NonNegativeFloat = 1.0
+    """Who is not found any more is taken to be still there, less and less, for so long; 0: not at all."""
+    min_shot_s: NonNegativeFloat = 0.0
+    """A camera is shown for so long at least, in whole GOPs; one that sees nobody may be left sooner."""
+    late_after_s: PositiveFloat = 0.5
+    """How long to wait for a camera's tracks before going on without that camera."""
+    buffer_s: PositiveFloat = 10.0
+    """Video kept per camera."""
+    quality: Annotated[QualitySettings, validated(QualitySettings)] = QualitySettings()
+    """What makes a view good."""
+    identity: Annotated[IdentitySettings, validated(IdentitySettings)] = IdentitySettings()
+    share: Share = Share()
+    """With other best-view services of the site."""
