@@ -79,6 +79,7 @@ class Stage:
             gop=encode.gop,
             preset=encode.preset,
             crf=encode.crf,
+            max_kbps=encode.max_kbps,
             jpeg_quality=80,
         )
 

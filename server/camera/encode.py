@@ -20,6 +20,7 @@ if TYPE_CHECKING:  # a drawing process encodes too, and has no second to load th
 _CLOCK = Fraction(1, 90_000)
 _FAR = 1_000_000
 """Frames between x264's own key frames: never, they come from the pulse numbers."""
+_LONGEST_BUFFER_S = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +57,8 @@ class Encoder:
             "tune": "zerolatency",
             "crf": str(settings.crf),
             "forced-idr": "1",
-            "x264-params": "scenecut=0:open-gop=0:repeat-headers=1:colormatrix=smpte170m",
+            "x264-params": "scenecut=0:open-gop=0:repeat-headers=1:colormatrix=smpte170m"
+            + _cap(site, settings),
         }
         context.open()
         self._context = context
@@ -71,3 +73,16 @@ class Encoder:
         data = b"".join(bytes(packet) for packet in self._context.encode(frame))
         self._last = pulse
         return AccessUnit(pulse, key, data)
+
+
+def _cap(site: Site | Canvas, settings: Encode | Canvas) -> str:
+    """Give x264 a leaky bucket (H.264, annex C) that lets no more than the cap through in any second.
+
+    A bucket that fills at a rate and holds so many seconds of it lets both through at once. It holds a GOP,
+    so that a key picture may take much of what the others leave.
+    """
+    if settings.max_kbps is None:
+        return ""
+    holds_s = min(settings.gop / site.fps, _LONGEST_BUFFER_S)
+    rate = settings.max_kbps / (1 + holds_s)
+    return f":vbv-maxrate={max(1, int(rate))}:vbv-bufsize={max(1, int(rate * holds_s))}"

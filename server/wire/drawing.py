@@ -28,6 +28,7 @@ class Canvas(msgspec.Struct, frozen=True, kw_only=True):
     gop: int
     preset: str
     crf: float
+    max_kbps: int | None
     jpeg_quality: int
     """0 to 100."""
 

@@ -25,7 +25,7 @@ from server.view.pictures.decided import first_pulse
 from server.wire.drawing import Canvas, Draw, Drawn, belongs, framed
 
 CANVAS = Canvas(
-    width=WIDTH, height=HEIGHT, fps=FPS, gop=GOP, preset="ultrafast", crf=18, jpeg_quality=90
+    width=WIDTH, height=HEIGHT, fps=FPS, gop=GOP, preset="ultrafast", crf=18, max_kbps=None, jpeg_quality=90
 )  # fmt: skip
 rates = st.floats(0.1, 60)
 

@@ -72,6 +72,7 @@ class Pictures:
             gop=config.encode.gop,
             preset=config.encode.preset,
             crf=config.encode.crf,
+            max_kbps=config.encode.max_kbps,
             jpeg_quality=config.http.jpeg_quality,
         )
         self._decided = Decided(service.board.resolve, config.site.fps, self._queue + _BESIDE)

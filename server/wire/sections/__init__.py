@@ -1,7 +1,8 @@
 """The sections of the configuration, one idea per file."""
 
 from server.wire.sections.base import Endpoint, Name, Polygon, Port, Section, Side
-from server.wire.sections.camera import Camera, Encode, Track
+from server.wire.sections.camera import Camera, Track
+from server.wire.sections.encode import Encode
 from server.wire.sections.serve import Http, Record
 from server.wire.sections.site import Site, Sync, Zenoh
 from server.wire.sections.sound import Sound

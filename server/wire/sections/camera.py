@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import Field, PositiveFloat, PositiveInt, ValidationInfo, field_validator
+from pydantic import PositiveFloat, ValidationInfo, field_validator
 
 from bestview import checked_homography
 from server.wire.library import validated
@@ -40,16 +40,6 @@ class Camera(Section):
         if ground is not None:
             checked_homography(ground, f"camera {info.data.get('id', '?')}")
         return ground
-
-
-class Encode(Section):
-    """H.264. Identical in all cameras: that is what makes cutting without re-encoding possible."""
-
-    gop: PositiveInt = 10
-    """Frames in a closed group of pictures; views can change only where one begins."""
-    crf: Annotated[int, Field(ge=0, le=51)] = 23
-    """x264's constant quality: smaller is better and larger; 18 to 28 is sensible."""
-    preset: Literal["ultrafast", "superfast", "veryfast", "faster", "fast", "medium"] = "ultrafast"
 
 
 class Track(Section):

@@ -1,0 +1,61 @@
+"""What an encoder keeps to: the key pictures' places, the same bytes each time, and a cap on the rate."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from server.camera.encode import AccessUnit, Encoder
+from server.view.h264 import nal_units, parameter_sets
+from server.wire.sections import Encode, Site
+
+SITE = Site(width=160, height=96, fps=25)
+FRAMES = 100
+SECOND = 25
+CAP = 400
+RESTLESS = range(33, 78)
+"""Pictures that are nothing but noise; it begins and ends in the middle of GOPs."""
+
+
+@cache
+def picture(pulse: int) -> NDArray[np.uint8]:
+    if pulse not in RESTLESS:
+        return np.full((SITE.height, SITE.width, 3), 100, dtype=np.uint8)
+    return np.random.default_rng(pulse).integers(0, 256, (SITE.height, SITE.width, 3), dtype=np.uint8)
+
+
+def encoded(settings: Encode) -> list[AccessUnit]:
+    encoder = Encoder(SITE, settings)
+    return [encoder.encode(pulse, picture(pulse)) for pulse in range(FRAMES)]
+
+
+def most_kbps(units: list[AccessUnit]) -> float:
+    """Give the kilobits of the fullest second, wherever it begins."""
+    kilobits = np.array([len(unit.data) * 8 / 1000 for unit in units])
+    return float(np.convolve(kilobits, np.ones(SECOND), "valid").max())
+
+
+@pytest.mark.parametrize("preset", ["ultrafast", "medium"])
+@pytest.mark.parametrize("gop", [1, 10, 50])
+def test_no_second_of_a_noisy_scene_takes_more_than_the_cap(gop: int, preset: str) -> None:
+    settings = Encode.model_validate({"gop": gop, "preset": preset, "max_kbps": CAP})
+    assert CAP / 2 < most_kbps(encoded(settings)) <= CAP
+    free = Encode.model_validate({"gop": gop, "preset": preset})
+    assert most_kbps(encoded(free)) > 2 * CAP, "or the cap would not be what holds it"
+
+
+def test_with_a_cap_too_keys_are_where_gops_begin_and_the_bytes_the_same_each_time() -> None:
+    settings = Encode(gop=10, max_kbps=CAP)
+    units = encoded(settings)
+    assert [unit.pulse for unit in units if unit.key] == list(range(0, FRAMES, 10))
+    assert units == encoded(settings)
+
+
+def test_what_a_capped_camera_sees_does_not_shape_its_parameter_sets() -> None:
+    settings = Encode(gop=10, max_kbps=CAP)
+    sets = {parameter_sets(nal_units(unit.data)) for unit in encoded(settings) if unit.key}
+    assert len(sets) == 1
+    assert None not in sets
