@@ -2,21 +2,26 @@
  * How the player stays live: pure arithmetic on what is buffered, no clock and no element of its own.
  *
  * Frames may come one by one or a GOP at a time, so the lead (seconds buffered beyond the frame now
- * shown) swings by itself. What counts is its lowest point over the last moments: the slack. Too much
- * slack is delay that nobody needs, none is a picture that stops.
+ * shown) swings by itself. What counts is its lowest point: the slack. Too much slack is delay that
+ * nobody needs, none is a picture that stops. How far the stream's edge runs behind the clock at worst
+ * does not depend on what is shown, so all of the last while tells the slack of the moment now shown.
  */
 
-const RECENT_S = 1.5; // over which the lowest lead is looked for: more than the longest GOP
-const CALM_S = 4; // before hurrying, over this: a rough network's next gap may be seconds away
-const SLACK_S = 0.12; // aimed at: three frames at 25 per second
+const RECENT_S = 15; // in which the edge was furthest behind at some time: a network's rough moments recur
+const CALM_S = 4; // before hurrying, so long at least: the next gap may be seconds away
+const SLACK_S = 0.08; // aimed at: two frames at 25 per second
 const MOST_SLACK_S = 1;
-const FASTER_AT_S = 0.15; // above the aim
-const SLOWER_AT = 0.35; // of the aim
-const FAR_S = 3; // beyond this a jump is kinder than minutes of hurry
-const FASTER = 1.25;
-const SLOWER = 0.94;
-const EDGE_S = 0.06; // closer to the end of a range than this, the picture stands
+const STALLED_S = 0.06; // more slack for each time the picture stood
 const CALM_PER_S = 0.01; // how fast the aim comes back after the network was rough
+const FASTER_AT_S = 0.03; // above the aim
+const FASTER_UNTIL_S = 0.005; // above the aim
+const FASTER_PER_S = 0.5; // faster for each second above the aim: to hurry a little is not seen
+const FASTER = 1.25; // at most
+const SLOWER_AT = 0.35; // of the aim
+const SLOWER_UNTIL = 0.8; // of the aim
+const SLOWER = 0.94;
+const FAR_S = 3; // beyond this a jump is kinder than minutes of hurry
+const EDGE_S = 0.06; // closer to the end of a range than this, the picture stands
 
 /**
  * @typedef {object} Step
@@ -25,21 +30,21 @@ const CALM_PER_S = 0.01; // how fast the aim comes back after the network was ro
  */
 
 export class Pace {
-  /** @type {{now: number, lead: number}[]} */
-  #leads = [];
+  /** @type {{now: number, edge: number}[]} where the stream ended, less the clock */
+  #edges = [];
   #aim = SLACK_S;
   #rate = 1;
   #last = 0;
 
-  /** After a jump or a switch the old leads say nothing. */
+  /** After a jump or a switch what was before says nothing. */
   reset() {
-    this.#leads = [];
+    this.#edges = [];
     this.#rate = 1;
   }
 
   /** The picture stood for want of frames: keep further away from the edge for a while. */
   stalled() {
-    this.#aim = Math.min(1.5 * this.#aim + 0.05, MOST_SLACK_S);
+    this.#aim = Math.min(this.#aim + STALLED_S, MOST_SLACK_S);
   }
 
   /**
@@ -56,21 +61,25 @@ export class Pace {
     if (lead > FAR_S) return this.#jump(Math.max(end - this.#aim, /** @type {any} */ (ranges.at(-1))[0]));
     this.#aim = Math.max(SLACK_S, this.#aim - CALM_PER_S * Math.max(0, now - this.#last));
     this.#last = now;
-    this.#leads.push({ now, lead });
-    this.#rate = this.#choose(now);
+    this.#edges.push({ now, edge: end - now });
+    this.#rate = this.#choose(now, time);
     return { rate: this.#rate, seek: null };
   }
 
-  /** @param {number} now */
-  #choose(now) {
-    const old = this.#leads.findIndex((sample) => sample.now >= now - CALM_S);
-    this.#leads.splice(0, old);
-    const slack = lowest(this.#leads.filter((sample) => sample.now >= now - RECENT_S));
+  /**
+   * @param {number} now
+   * @param {number} time
+   */
+  #choose(now, time) {
+    const old = this.#edges.findIndex((sample) => sample.now >= now - RECENT_S);
+    this.#edges.splice(0, old);
+    const slack = Math.min(...this.#edges.map((sample) => sample.edge)) + now - time;
+    const over = slack - this.#aim;
     if (slack < SLOWER_AT * this.#aim) return SLOWER;
-    if (this.#rate < 1) return slack < 0.8 * this.#aim ? SLOWER : 1;
-    if (this.#rate > 1) return slack > this.#aim + 0.02 ? FASTER : 1;
-    const calm = old > 0; // that long was seen; before, the lowest point may be to come
-    return calm && lowest(this.#leads) > this.#aim + FASTER_AT_S ? FASTER : 1;
+    if (this.#rate < 1 && slack < SLOWER_UNTIL * this.#aim) return SLOWER;
+    const calm = now - this.#edges[0].now >= CALM_S; // before, the lowest point may be to come
+    if (!calm || over < (this.#rate > 1 ? FASTER_UNTIL_S : FASTER_AT_S)) return 1;
+    return Math.min(1 + FASTER_PER_S * over, FASTER);
   }
 
   /**
@@ -81,11 +90,6 @@ export class Pace {
     this.reset();
     return { rate: 1, seek };
   }
-}
-
-/** @param {{lead: number}[]} samples */
-function lowest(samples) {
-  return Math.min(...samples.map((sample) => sample.lead));
 }
 
 /**

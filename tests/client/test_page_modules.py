@@ -73,14 +73,14 @@ async def test_the_player_settles_close_to_live_without_standing(
     log = await simulated(page, behind=behind + burst, burst=burst, seconds=40)
     late = [step for step in log if step["now"] > 25]
     assert min(step["lead"] for step in late) > 0.02
-    assert min(step["lead"] for step in late) < 0.4
+    assert min(step["lead"] for step in late) < 0.2
     jumps = [step for step in log if step["seek"] is not None]
     assert bool(jumps) == (behind + burst > 3)
 
 
 async def test_far_behind_the_player_jumps(page: Page) -> None:
     log = await simulated(page, behind=20, burst=0.4, seconds=1)
-    assert log[0]["seek"] == pytest.approx(20 - 0.12)
+    assert log[0]["seek"] == pytest.approx(20 - 0.08)
     assert all(step["seek"] is None for step in log[1:])
 
 
@@ -90,7 +90,7 @@ async def test_a_rough_network_is_kept_further_away_from(page: Page) -> None:
         "pace.js",
         """
         const pace = new m.Pace();
-        for (let i = 0; i < 3; i += 1) pace.stalled();
+        for (let i = 0; i < 8; i += 1) pace.stalled();
         return pace.step(0, 0, [[0, 9]]).seek;
         """,
     )
