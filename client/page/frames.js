@@ -24,7 +24,7 @@ const SAME_PLAYBACK_S = 0.5; // a VideoFrame whose time is further off than this
 export function watchFrames(video, wanted, tell) {
   if (!('requestVideoFrameCallback' in video)) return watchTime(video, wanted, tell);
   /** @type {VideoFrameRequestCallback} */
-  const shown = (now, { mediaTime, expectedDisplayTime }) => {
+  const shown = (_now, { mediaTime, expectedDisplayTime }) => {
     video.requestVideoFrameCallback(shown);
     const shownAt = Date.now() + expectedDisplayTime - performance.now();
     tell({ ...take(video, mediaTime, wanted()), shownAt });
