@@ -53,8 +53,7 @@ def init_segment(
         _box("ftyp", b"iso5" + struct.pack(">I", 512) + b"iso5iso6avc1mp41")
         + _box(
             "moov",
-            _full("mvhd", 0, 0, struct.pack(">5I", 0, 0, 1000, 0, 0x10000) + struct.pack(">H", 0x100)
-                  + bytes(10) + _MATRIX + bytes(24) + struct.pack(">I", last + 1)),
+            _movie_head(last),
             _box(
                 "trak",
                 _full("tkhd", 0, 3, struct.pack(">5I", 0, 0, _TRACK, 0, 0) + bytes(16) + _MATRIX
@@ -79,12 +78,25 @@ def init_segment(
                 ),
             ),
             b"" if sound is None else _sound_track(sound),
-            _box(
-                "mvex",
-                *(_full("trex", 0, 0, struct.pack(">5I", track + 1, 1, 0, 0, 0)) for track in range(last)),
-            ),
+            _box("mvex", *(_defaults(track + 1) for track in range(last))),
         )
     )  # fmt: skip
+
+
+def sound_init_segment(sound: SoundFormat) -> bytes:
+    """Give the same for the sound alone."""
+    return _box("ftyp", b"iso5" + struct.pack(">I", 512) + b"iso5iso6mp41") + _box(
+        "moov", _movie_head(_SOUND_TRACK), _sound_track(sound), _box("mvex", _defaults(_SOUND_TRACK))
+    )
+
+
+def _movie_head(last: int) -> bytes:
+    head = struct.pack(">5I", 0, 0, 1000, 0, 0x10000) + struct.pack(">H", 0x100) + bytes(10)
+    return _full("mvhd", 0, 0, head + _MATRIX + bytes(24) + struct.pack(">I", last + 1))
+
+
+def _defaults(track: int) -> bytes:
+    return _full("trex", 0, 0, struct.pack(">5I", track, 1, 0, 0, 0))
 
 
 def _sound_track(sound: SoundFormat) -> bytes:

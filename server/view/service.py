@@ -51,7 +51,7 @@ class BestViewService:
             config, homographies(config), lambda camera, pulse: self.shelves[camera].has(pulse)
         )
         self.board = Board()
-        self.past = Past(config, self.shelves, self.agreement, frames)
+        self.past = Past(config, self.shelves, self.agreement, frames, self.sound)
         self.pulse = -1
         self.pulse0: float | None = None
         """When pulse 0 was due, unix seconds; None before the first pulse."""

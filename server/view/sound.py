@@ -64,6 +64,15 @@ class SoundShelf:
         frames = tuple(self._frames.get(number, self._silence) for number in range(begin, end))
         return Heard(begin, frames, self.format)
 
+    @property
+    def patience(self) -> int:
+        """Frames that sound may be late by before it is taken to be silent."""
+        return round(_PATIENCE_S * self.format.rate / FRAME)
+
+    def get(self, number: int) -> bytes | None:
+        """Give a frame; None where it has not come, or is not kept any more."""
+        return self._frames.get(number)
+
     def come(self, begin: int, end: int, late: int) -> Heard:
         """Give frames from ``begin`` on up to one that may still come: neither here nor before ``late``."""
         at = begin
@@ -73,11 +82,14 @@ class SoundShelf:
 
 
 class Following:
-    """The sound of a stream that shows pictures as they come: at most a little behind them, no hole in it."""
+    """The sound of a stream that shows pictures as they come: at most a little behind them, no hole in it.
 
-    def __init__(self, shelf: SoundShelf) -> None:
+    ``begin`` is the number of its first frame; None: what sounds at the first picture.
+    """
+
+    def __init__(self, shelf: SoundShelf, begin: int | None = None) -> None:
         self._shelf = shelf
-        self._next: int | None = None
+        self._next = begin
 
     def beside(self, first: int, until: int) -> Heard:
         """Give what is to be heard next, now that the pulses ``first … until - 1`` are shown."""
@@ -86,7 +98,7 @@ class Following:
         begin, end = form.frame_at(first, fps), form.frame_at(until, fps)
         if self._next is None or begin < self._next - _ANEW_S * form.rate // FRAME:
             self._next = begin
-        late = end - round(_PATIENCE_S * form.rate / FRAME)
+        late = end - shelf.patience
         heard = shelf.come(self._next, end, late)
         self._next += len(heard.frames)
         return heard

@@ -10,8 +10,9 @@ from server.view.picture import Picture
 from server.view.reel import Reel
 from server.view.shelf import Shelf
 from server.view.sound import Following, SoundShelf
+from server.view.tally import Tally
 from server.view.timeline import Timeline
-from server.view.ts import Counters, packets, sound_packets
+from server.view.ts import Counters
 
 
 class LiveStream:
@@ -19,9 +20,8 @@ class LiveStream:
 
     def __init__(self, channel: Channel, time: Timeline, fps: float, sound: SoundShelf | None = None) -> None:
         self.channel = channel
-        self._time, self._fps = time, fps
+        self._time, self._tally = time, Tally(fps)
         self._sound = None if sound is None else Following(sound)
-        self._tables = self._packets = self._sound_packets = 0
 
     def take(self, frame: Picture) -> None:
         """Send a picture, after what bridges a hole before it."""
@@ -35,12 +35,8 @@ class LiveStream:
     def _send(self, pictures: list[Picture], *, fills: bool) -> None:
         if not pictures:
             return
-        counters = Counters(self._tables, self._packets, self._sound_packets, whole=False)
         heard = None if self._sound is None else self._sound.beside(pictures[0].pulse, pictures[-1].until)
-        self._sound_packets += 0 if heard is None else sound_packets(heard)
-        self._tables += pictures[0].key
-        self._packets += sum(packets(picture) for picture in pictures)
-        self.channel.publish(Footage(pictures, self._fps, counters, fills=fills, heard=heard))
+        self.channel.publish(self._tally.footage(pictures, heard, fills=fills))
 
 
 class DecidedStream:

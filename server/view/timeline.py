@@ -14,7 +14,7 @@ from server.view.skip import Continuing, UnfitError, continuing
 
 _LONG_S = 2
 """Holes up to so long get a picture for every pulse, longer ones a single picture that lasts."""
-_LONGEST_S = 3600
+LONGEST_S = 3600
 """Nobody waits that long: a longer hole stays one, and a duration fits into MP4's 32 bits."""
 _ANEW_S = 10
 """A key picture so far back is of pulses that began anew, not a late one."""
@@ -63,7 +63,7 @@ class Timeline:
     def fill(self, until: int) -> list[Picture]:
         """Give what repeats the last picture up to a pulse; nothing before the first picture."""
         how, missing = self._how(), until - self._until
-        if how is None or self._newest is None or not 0 < missing <= _LONGEST_S * self._fps:
+        if how is None or self._newest is None or not 0 < missing <= LONGEST_S * self._fps:
             return []
         each = 1 if missing <= _LONG_S * self._fps else missing
         number = how.frame_num(self._newest.sample)

@@ -9,8 +9,9 @@ from aiohttp import web
 
 from server.view.channel import Channel
 from server.view.fmp4 import init_segment
+from server.view.past.hearing import Hearing
 from server.view.past.moment import MomentError, moment_of, pulse_at
-from server.view.past.play import CameraPast, ObjectPast, Source, known
+from server.view.past.play import CameraPast, ObjectPast, Source, known, sounds
 from server.view.past.stream import PastStream, Wish
 from server.view.past.told import told
 from server.view.service import BestViewService
@@ -143,11 +144,14 @@ async def _stream(
         return live()
 
     timeline = Timeline(service.agreement, site.fps, service.config.encode.gop)
-    stream = PastStream(source, timeline, site.fps, joined)
+    sound = past.sound
+    hearing = None if sound is None else Hearing(sound, lambda: sounds(past), lambda: source.end)
+    stream = PastStream(source, timeline, site.fps, joined, hearing)
     past.viewers += 1
     try:
-        head = init_segment(parameters, site.width, site.height)
-        async with aclosing(stream.send(wish)) as data:
+        head = init_segment(parameters, site.width, site.height, service.config.sound.format)
+        async with aclosing(stream.send(wish)) as shown:
+            data = (piece.with_sound async for piece in shown)
             return await send_bytes(request, data, head, {"Content-Type": "video/mp4"})
     finally:
         past.viewers -= counted

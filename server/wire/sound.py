@@ -57,6 +57,11 @@ class SoundFormat:
         """Give the number of the frame that sounds when a pulse is due."""
         return round(pulse * self.rate / fps) // FRAME
 
+    def pulses(self, begin: int, end: int, fps: float) -> tuple[int, int]:
+        """Give pulses, the first and the one after the last, among which are all that some frames sound at."""
+        first = begin * FRAME * fps / self.rate
+        return max(0, int(first) - 1), int((end + 1) * FRAME * fps / self.rate) + 2
+
     def adts(self, size: int) -> bytes:
         """Give what comes before a frame of ``size`` bytes in a transport stream (1.A.2)."""
         whole = size + 7

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Iterator, Mapping
 from functools import cache
 from pathlib import Path
@@ -13,8 +14,8 @@ from numpy.typing import NDArray
 
 from server.view.agreement import Agreement
 from server.view.fmp4 import init_segment
-from server.view.past.media import Gop
-from server.view.past.run import RunHead
+from server.view.past.media import Gop, _fragments
+from server.view.past.run import Headers, RunHead
 from server.view.past.store import Bounds, Piece, Store
 from server.view.shelf import Shelf
 from server.wire.messages import GopChoices
@@ -80,8 +81,13 @@ def written(store: Store, pieces: list[Piece], began: float = PULSE0) -> Store:
     """Open a store and write the pieces."""
     store.open()
     for it in pieces:
-        store.write(it, head(began), filled()[1])
+        store.write(it, head(began), Headers(filled()[1]))
     return store
+
+
+def fragments(data: bytes) -> list[bytes]:
+    """Cut a piece of a stream into its fragments."""
+    return list(_fragments(io.BytesIO(data).read, len(data)))
 
 
 def pictures(path: Path) -> Iterator[tuple[int, Picture]]:

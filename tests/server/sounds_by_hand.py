@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from fractions import Fraction
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
 
@@ -12,17 +13,26 @@ import msgspec
 import numpy as np
 from av.audio.stream import AudioStream
 from av.video.stream import VideoStream
+from cameras_by_hand import GOP, FedService
 from numpy.typing import NDArray
 
-from server.camera.sound import Frame, runs
+from server.camera.encode import AccessUnit, Encoder
+from server.camera.sound import Frame, RecordedSound, runs
 from server.wire.inbox import Message
 from server.wire.messages import Keys, SoundHead
+from server.wire.sections import Encode, Site, Sound
 
 WIDTH, HEIGHT, FPS = 64, 48, 25
 EVERY = 20
 """Pictures from one flash to the next: 0.8 s."""
 _LASTS = 2
 """Pictures that a flash lasts."""
+
+GOPS = 24
+FRAMES = GOPS * GOP
+STEP = 0.04
+"""Seconds: sound that is so far from its picture is out of step."""
+BEEPS = [number / FPS for number in range(EVERY, FRAMES, EVERY)]
 
 
 def write_flashes(
@@ -68,6 +78,24 @@ def _some_sound(number: int, rate: int, layout: str) -> av.AudioFrame:
     frame = av.AudioFrame.from_ndarray(interleaved, format="s16", layout=layout)
     frame.sample_rate, frame.pts, frame.time_base = rate, number * samples, Fraction(1, rate)
     return frame
+
+
+@cache
+def flashing(recording: Path) -> tuple[AccessUnit, ...]:
+    """Give the recording's pictures as a camera of the hall sends them."""
+    encoder = Encoder(Site(width=64, height=48, fps=FPS), Encode(gop=GOP))
+    with av.open(str(recording)) as container:
+        pictures = [it.to_ndarray(format="bgr24") for it in container.decode(video=0)]
+    return tuple(encoder.encode(pulse, picture) for pulse, picture in enumerate(pictures))
+
+
+def sends(service: FedService, recording: Path, silent: range = range(0)) -> list[bytes]:
+    """Send all of the recording's sound, but for some frames; give its frames of AAC."""
+    sound = RecordedSound(str(recording), Sound(source="here"), FPS, 0, "stop")
+    frames = [*sound.until(0), *sound.until(FRAMES)]
+    for message in messages([it for it in frames if it.number not in silent]):
+        service.intake.sound(message)
+    return [frame.data for frame in frames]
 
 
 def messages(frames: list[Frame]) -> list[Message]:

@@ -20,6 +20,7 @@ from hypothesis import strategies as st
 from recorded_by_hand import AMPLE, PULSE0, A, B, filled, head, own_pictures, pictures, piece, written
 
 from server.view.past.media import CameraFile, gops
+from server.view.past.run import Headers
 from server.view.past.store import Bounds, Store
 
 needs_ffmpeg = pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="needs ffmpeg")
@@ -159,7 +160,7 @@ def test_what_is_too_old_goes_in_whole_segments_with_what_refers_to_it(tmp_path:
     store.open()
     for gop in range(40):
         now[0] = PULSE0 + gop * GOP / FPS
-        store.write(piece(gop, {1: A, 2 if gop < 10 else 3: B}), head(), filled()[1])
+        store.write(piece(gop, {1: A, 2 if gop < 10 else 3: B}), head(), Headers(filled()[1]))
     store.close()
     run = store.run
     assert run is not None
@@ -184,7 +185,7 @@ def test_the_disk_takes_no_more_than_it_may_and_what_is_found_again_is_what_was_
     store.open()
     slack = 2 * 8_000  # bytes: a GOP of both cameras, its line, its references
     for gop, choices in enumerate(shown):
-        store.write(piece(gop, choices), head(), filled()[1])
+        store.write(piece(gop, choices), head(), Headers(filled()[1]))
         on_disk = sum(it.stat().st_size for it in folder.rglob("*") if it.is_file())
         assert on_disk <= most_mb * 1e6 + slack
     store.close()
@@ -222,14 +223,14 @@ def test_when_the_disk_is_full_what_is_there_plays_and_later_it_goes_on(tmp_path
     assert store.run is not None
     size = store.run.camera_file(A, 0).stat().st_size
     with files_of_at_most(size + 300), pytest.raises(OSError, match="large") as refused:
-        store.write(piece(2, {1: A}), head(), filled()[1])
+        store.write(piece(2, {1: A}), head(), Headers(filled()[1]))
     assert refused.value.errno == errno.EFBIG
     store.abandon()
     assert store.run.camera_file(A, 0).stat().st_size == size
     with files_of_at_most(len(filled()[1]) + 300), pytest.raises(OSError, match="large"):
-        store.write(piece(3, {1: A}), head(), filled()[1])
+        store.write(piece(3, {1: A}), head(), Headers(filled()[1]))
     store.abandon()
-    store.write(piece(4, {1: A}), head(), filled()[1])
+    store.write(piece(4, {1: A}), head(), Headers(filled()[1]))
     store.close()
     assert [pulse // GOP for pulse, _ in pictures(store.run.objects[1].path)][::GOP] == [0, 1, 4]
     for path in everything_that_plays(tmp_path):

@@ -15,18 +15,33 @@ from cameras_by_hand import CAMERAS, GOP, LARGE, SMALL, Box
 from halls import Hall, opened
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from recorded_by_hand import AMPLE, FPS, PULSE0, A, B, Picture, filled, own_pictures, piece, written
+from recorded_by_hand import (
+    AMPLE,
+    FPS,
+    PULSE0,
+    A,
+    B,
+    Picture,
+    filled,
+    fragments,
+    own_pictures,
+    piece,
+    written,
+)
 
 from server.view.agreement import Agreement
-from server.view.channel import Channel, Chunk
+from server.view.channel import Channel
+from server.view.footage import Footage
 from server.view.past import stream as past_stream
-from server.view.past.media import fragments, pulse_of
+from server.view.past.media import pulse_of
 from server.view.past.moment import MomentError, pulse_at
 from server.view.past.play import Recorded, known
 from server.view.past.store import Store
 from server.view.past.stream import PastStream, Wish
 from server.view.past.stretch import Span
+from server.view.picture import Picture as Shown
 from server.view.timeline import Timeline
+from server.view.ts import Counters
 
 MOMENT = "say seconds back (-60), a pulse (p1250) or a time (2026-11-21T16:13:36Z)"
 IN_A: Mapping[str, Mapping[int, Box | None]] = {A: {1: LARGE}, B: {1: SMALL}}
@@ -247,7 +262,7 @@ async def test_any_part_of_any_past_is_played_without_a_hole(
     source = OnDisk(*tapes, end=len(shown) * GOP)
     agreement, header = site_of(store)
     stream = PastStream(source, Timeline(agreement, FPS, GOP), FPS, lambda: None)
-    data = b"".join([data async for data in stream.send(Wish(start, start + frames))])
+    data = b"".join([it.data async for it in stream.send(Wish(start, start + frames))])
     store.close()
     kept = [gop for gop, camera in enumerate(shown) if camera is not None]
     wanted = [gop for gop in kept if (gop + 1) * GOP > start and gop * GOP < start + frames]
@@ -271,7 +286,7 @@ async def test_what_retention_takes_away_meanwhile_is_left_out(tmp_path: Path) -
     source = OnDisk(Recorded(store.run, store.run.objects[1].tape), end=60)
     agreement, header = site_of(store)
     stream = PastStream(source, Timeline(agreement, FPS, GOP), FPS, lambda: None)
-    data = b"".join([data async for data in stream.send(Wish(0, 60))])
+    data = b"".join([it.data async for it in stream.send(Wish(0, 60))])
     assert [pulse for pulse, _ in decoded(header + data)] == list(range(60)), "bridged, as live"
     assert known(source) == [Span(0, 60)]
 
@@ -286,7 +301,7 @@ async def test_who_is_out_of_view_at_the_end_is_not_waited_for(tmp_path: Path, e
     source = OnDisk(Recorded(store.run, store.run.objects[1].tape), end=now)
     agreement, header = site_of(store)
     stream = PastStream(source, Timeline(agreement, FPS, GOP), FPS, Channel)  # in which nothing comes
-    data = b"".join([data async for data in stream.send(Wish(0, end))])
+    data = b"".join([it.data async for it in stream.send(Wish(0, end))])
     assert [pulse for pulse, _ in decoded(header + data)] == list(range(2 * GOP))
 
 
@@ -296,9 +311,10 @@ async def test_who_comes_back_after_the_end_does_not_make_the_past_longer(tmp_pa
     source = OnDisk(Recorded(store.run, store.run.objects[1].tape), end=4 * GOP)
     agreement, header = site_of(store)
     channel, back = Channel(), piece(8, {1: A}).cameras[A]
-    channel.publish(Chunk(b"".join(back.fragments), start=True))
+    came = [Shown(back.first + at, not at, it, boot=1) for at, it in enumerate(back.fragments)]
+    channel.publish(Footage(came, FPS, Counters()))
     stream = PastStream(source, Timeline(agreement, FPS, GOP), FPS, lambda: channel)
-    data = b"".join([data async for data in stream.send(Wish(0, 5 * GOP))])
+    data = b"".join([it.data async for it in stream.send(Wish(0, 5 * GOP))])
     assert [pulse for pulse, _ in decoded(header + data)] == list(range(2 * GOP))
     assert len(fragments(data)) == 2 * GOP, "and nothing that lasts up to then"
 

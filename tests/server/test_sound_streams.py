@@ -6,30 +6,35 @@ import asyncio
 import shutil
 import subprocess
 from collections.abc import AsyncIterator
-from functools import cache
 from pathlib import Path
 
-import av
 import numpy as np
 import pytest
 from cameras_by_hand import CAMERAS, FPS, GOP, NO_REASON, SMALL, FedService, encoded, small_config, video
 from halls import A, B, Hall, opened
-from sounds_by_hand import EVERY, beeps, flashes, heard, messages, packets, write_flashes
+from sounds_by_hand import (
+    BEEPS,
+    FRAMES,
+    GOPS,
+    STEP,
+    beeps,
+    flashes,
+    flashing,
+    heard,
+    messages,
+    packets,
+    sends,
+    write_flashes,
+)
 from test_ts import check_counters, taken_apart
 
 import client
 from benchmarks.browser import CHROMIUM, chromium
-from server.camera.encode import AccessUnit, Encoder
 from server.camera.sound import RecordedSound
 from server.view.decide import GopDecision, ObjectChoice
 from server.view.fmp4 import init_segment
-from server.wire.sections import Encode, Site, Sound
+from server.wire.sections import Sound
 from server.wire.sound import FRAME
-
-GOPS = 24
-FRAMES = GOPS * GOP
-STEP = 0.04
-BEEPS = [number / FPS for number in range(EVERY, FRAMES, EVERY)]
 
 
 @pytest.fixture(scope="module")
@@ -43,24 +48,6 @@ async def loud(recording: Path) -> AsyncIterator[Hall]:
     """A site that has that recording's sound."""
     async for hall in opened(sound={"source": str(recording)}):
         yield hall
-
-
-@cache
-def flashing(recording: Path) -> tuple[AccessUnit, ...]:
-    """Give the recording's pictures as a camera of the hall sends them."""
-    encoder = Encoder(Site(width=64, height=48, fps=FPS), Encode(gop=GOP))
-    with av.open(str(recording)) as container:
-        pictures = [it.to_ndarray(format="bgr24") for it in container.decode(video=0)]
-    return tuple(encoder.encode(pulse, picture) for pulse, picture in enumerate(pictures))
-
-
-def sends(service: FedService, recording: Path, silent: range = range(0)) -> list[bytes]:
-    """Send all of the recording's sound, but for some frames; give its frames of AAC."""
-    sound = RecordedSound(str(recording), Sound(source="here"), FPS, 0, "stop")
-    frames = [*sound.until(0), *sound.until(FRAMES)]
-    for message in messages([it for it in frames if it.number not in silent]):
-        service.intake.sound(message)
-    return [frame.data for frame in frames]
 
 
 def decide(service: FedService, gop: int, camera: str | None) -> None:

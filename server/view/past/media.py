@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import os
 import struct
 from collections.abc import Callable, Generator, Iterator
@@ -125,11 +124,6 @@ def gops(path: Path, offset: int, length: int, fps: float) -> Generator[Gop, Non
             waiting.append(fragment)
         if waiting:
             yield Gop(pulse_of(waiting[0], fps), tuple(waiting))
-
-
-def fragments(data: bytes) -> list[bytes]:
-    """Cut a piece of a stream into its fragments."""
-    return list(_fragments(io.BytesIO(data).read, len(data)))
 
 
 def is_key(fragment: bytes) -> bool:

@@ -9,12 +9,13 @@ from collections.abc import Mapping
 from weakref import WeakKeyDictionary
 
 from server.view.agreement import Agreement
-from server.view.fmp4 import init_segment
+from server.view.fmp4 import init_segment, sound_init_segment
 from server.view.past.recent import Recent
-from server.view.past.run import Run, RunHead
+from server.view.past.run import Headers, Run, RunHead
 from server.view.past.store import Bounds, Piece, Store
 from server.view.past.writer import Writer
 from server.view.shelf import Shelf
+from server.view.sound import SoundShelf
 from server.wire.config import Config
 from server.wire.errors import UserError
 from server.wire.messages import GopChoices
@@ -29,16 +30,23 @@ class Past:
     """Takes every decision over as it is made, and finds it again. ``frames`` is what the shelves keep."""
 
     def __init__(
-        self, config: Config, shelves: Mapping[str, Shelf], agreement: Agreement, frames: int
+        self,
+        config: Config,
+        shelves: Mapping[str, Shelf],
+        agreement: Agreement,
+        frames: int,
+        sound: SoundShelf | None = None,
     ) -> None:
         self._config, self._agreement = config, agreement
+        self.sound = sound
+        """The newest sound; None: the site has none."""
         self.recent = Recent(shelves, config.encode.gop, frames)
         self.pulse0: float | None = None
         self._held: deque[GopChoices] = deque()
         """Decided, but not all cameras' pictures have come."""
         self._patience = frames // 2
-        self._fitting: WeakKeyDictionary[Run, bool] = WeakKeyDictionary()
-        """Of earlier runs: whether they can be played as this one's past."""
+        self._read: WeakKeyDictionary[Run, Headers] = WeakKeyDictionary()
+        """Of earlier runs: what their files begin with."""
         self.viewers = 0
         """How many are watching the past."""
         record = config.record
@@ -100,7 +108,10 @@ class Past:
             camera: self.recent.delivered(camera, choices.first, choices.frames)
             for camera in self._config.camera_ids
         }
-        writer.put(Piece(choices, {camera: gop for camera, gop in delivered.items() if gop is not None}))
+        cameras = {camera: gop for camera, gop in delivered.items() if gop is not None}
+        end = choices.first + choices.frames
+        heard = None if self.sound is None else self.sound.between(choices.first, end)
+        writer.put(Piece(choices, cameras, heard))
 
     @property
     def run(self) -> Run | None:
@@ -115,19 +126,37 @@ class Past:
         current = [] if self.store.run is None else [self.store.run]
         return [*(run for run in tuple(self.store.earlier) if self._fits(run)), *current]
 
+    @property
+    def sounding(self) -> list[Run]:
+        """Those of them whose sound is that of this site."""
+        own = self._headers
+        return [] if own is None else [run for run in self.runs if self._headers_of(run).sound == own.sound]
+
     def _fits(self, run: Run) -> bool:
-        if run not in self._fitting:
-            site, parameters, pulse0 = self._config.site, self._agreement.parameters, self.pulse0
-            if parameters is None or pulse0 is None or run.head.pulse0 is None:
-                return False
-            same = run.head.fps == site.fps and abs(run.head.pulse0 - pulse0) < _SAME_S
-            self._fitting[run] = same and run.header == init_segment(parameters, site.width, site.height)
-        return self._fitting[run]
+        own, pulse0 = self._headers, self.pulse0
+        if own is None or pulse0 is None or run.head.pulse0 is None:
+            return False
+        same = run.head.fps == self._config.site.fps and abs(run.head.pulse0 - pulse0) < _SAME_S
+        return same and self._headers_of(run).pictures == own.pictures
+
+    def _headers_of(self, run: Run) -> Headers:
+        if run not in self._read:
+            self._read[run] = run.headers
+        return self._read[run]
+
+    @property
+    def _headers(self) -> Headers | None:
+        """What this service's files begin with; None: nobody knows yet."""
+        parameters, site, sound = self._agreement.parameters, self._config.site, self._config.sound.format
+        if parameters is None:
+            return None
+        pictures = init_segment(parameters, site.width, site.height)
+        return Headers(pictures, b"" if sound is None else sound_init_segment(sound))
 
     def _write(self, piece: Piece) -> None:
         """Write a piece, in the writer's thread."""
-        parameters, site = self._agreement.parameters, self._config.site
-        if self.store is None or parameters is None:
+        parameters, headers, site = self._agreement.parameters, self._headers, self._config.site
+        if self.store is None or parameters is None or headers is None:
             return
         head = RunHead(
             site=site.name,
@@ -136,7 +165,8 @@ class Past:
             height=site.height,
             codec=parameters.codec,
             cameras=list(self._config.camera_ids),
+            sound=None if self.sound is None else self.sound.format.codec,
             began=time.time(),
             pulse0=self.pulse0,
         )
-        self.store.write(piece, head, init_segment(parameters, site.width, site.height))
+        self.store.write(piece, head, headers)

@@ -91,6 +91,11 @@ class CameraPast:
         return self.past.recent.end_of_camera(self.camera)
 
 
+def sounds(past: Past) -> Sequence[Recorded]:
+    """Say what there is of the site's sound on the disk."""
+    return [Recorded(run, run.sound.tape) for run in past.sounding]
+
+
 def known(source: Source) -> list[Span]:
     """Say what there is, on the disk and in memory."""
     found: list[Stretch | Span] = [it for one in source.recorded for it in one.tape.all]

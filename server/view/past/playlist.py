@@ -33,12 +33,15 @@ def file_name(pulse: int) -> str:
 class Playlist:
     """One stream's references, in memory and on the disk.
 
-    ``cameras`` is the way from the playlist to the folder of the cameras; ``pulse0`` is when pulse 0 was due
-    (unix seconds), None where nobody knows.
+    ``cameras`` is the way from the playlist to the folder of the cameras, ``header`` that to what their files
+    begin with; ``pulse0`` is when pulse 0 was due (unix seconds), None where nobody knows.
     """
 
-    def __init__(self, path: Path, cameras: str, fps: float, pulse0: float | None, longest_s: float) -> None:
+    def __init__(
+        self, path: Path, cameras: str, header: str, fps: float, pulse0: float | None, longest_s: float
+    ) -> None:
         self.path = path
+        self._header = header
         self._cameras = cameras
         self._fps = fps
         self._pulse0 = pulse0
@@ -102,7 +105,7 @@ class Playlist:
             "#EXTM3U\n#EXT-X-VERSION:7\n"
             f"#EXT-X-TARGETDURATION:{math.ceil(longest)}\n"
             "#EXT-X-MEDIA-SEQUENCE:0\n#EXT-X-INDEPENDENT-SEGMENTS\n"
-            f'#EXT-X-MAP:URI="{self._cameras}init.mp4"\n'
+            f'#EXT-X-MAP:URI="{self._header}"\n'
         )
         end = None
         for stretch in stretches:

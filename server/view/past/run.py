@@ -7,6 +7,8 @@ Pulses and people's numbers may begin anew when a service does; so every run has
 ``RUN/cameras/init.mp4``              what a player needs before the first fragment, the same for all
 ``RUN/cameras/c0/000000001250.mp4``   a camera's frames from pulse 1250 on
 ``RUN/cameras/c0.m3u8``               all of that camera
+``RUN/sound/000000001250.mp4``        the site's sound from pulse 1250 on, and ``init.mp4``, likewise
+``RUN/sound.m3u8``                    all of it
 ``RUN/objects/3.m3u8``                the best view of object 3
 ``RUN/index/000000001250.jsonl``      a line per GOP from pulse 1250 on: choices, boxes, cuts
 ====================================  ====================================================================
@@ -21,6 +23,7 @@ from pathlib import Path
 import msgspec
 
 from server.view.past.playlist import Playlist, file_name
+from server.view.past.sounds import NAME as SOUND
 
 HEAD = "run.json"
 _HEADER = "init.mp4"
@@ -35,15 +38,26 @@ class RunHead(msgspec.Struct, frozen=True, kw_only=True):
     height: int
     codec: str
     cameras: list[str]
+    sound: str | None = None
+    """The codec of the sound; null: the site had none."""
     began: float
     """When the first GOP was written, unix seconds."""
     pulse0: float | None
     """When pulse 0 was due, unix seconds; null where it is not known."""
 
 
+@dataclass(frozen=True, slots=True)
+class Headers:
+    """What the files of a run begin with: ``ftyp`` and ``moov``."""
+
+    pictures: bytes
+    sound: bytes = b""
+    """Nothing where the site has no sound."""
+
+
 @dataclass(slots=True)
 class Segment:
-    """The files that begin with one pulse: one per camera, and their index."""
+    """The files that begin with one pulse: one per camera, that of the sound, and their index."""
 
     first: int
     bytes: int
@@ -62,17 +76,21 @@ class Run:
         self.cameras = {
             camera: self._playlist(folder / "cameras" / f"{camera}.m3u8") for camera in head.cameras
         }
+        self.sound = self._playlist(folder / f"{SOUND}.m3u8", header=f"{SOUND}/{_HEADER}")
 
     @classmethod
-    def begin(cls, folder: Path, head: RunHead, header: bytes, longest_s: float) -> Run:
-        """Make the folder of a new run; ``header`` is ``ftyp`` and ``moov``.
+    def begin(cls, folder: Path, head: RunHead, headers: Headers, longest_s: float) -> Run:
+        """Make the folder of a new run.
 
         Raises:
             OSError: it cannot be made.
         """
         for part in ("cameras", "objects", "index"):
             (folder / part).mkdir(parents=True, exist_ok=True)
-        (folder / "cameras" / _HEADER).write_bytes(header)
+        (folder / "cameras" / _HEADER).write_bytes(headers.pictures)
+        if headers.sound:
+            (folder / SOUND).mkdir(exist_ok=True)
+            (folder / SOUND / _HEADER).write_bytes(headers.sound)
         (folder / HEAD).write_bytes(msgspec.json.format(msgspec.json.encode(head)) + b"\n")
         return cls(folder, head, longest_s)
 
@@ -84,7 +102,7 @@ class Run:
             OSError, msgspec.DecodeError: it is no such folder.
         """
         run = cls(folder, msgspec.json.decode((folder / HEAD).read_bytes(), type=RunHead), longest_s)
-        for playlist in run.cameras.values():
+        for playlist in (*run.cameras.values(), run.sound):
             if playlist.path.exists():
                 playlist.read()
         for path in sorted((folder / "objects").glob("*.m3u8")):
@@ -100,30 +118,35 @@ class Run:
     @property
     def size(self) -> int:
         """Bytes on the disk."""
-        playlists = [*self.cameras.values(), *self.objects.values()]
-        return sum(it.bytes for it in self.segments) + sum(it.bytes for it in playlists)
+        return sum(it.bytes for it in self.segments) + sum(it.bytes for it in self._playlists)
+
+    @property
+    def _playlists(self) -> list[Playlist]:
+        return [*self.cameras.values(), self.sound, *self.objects.values()]
 
     def object(self, number: int) -> Playlist:
         """Give somebody's playlist, a new one where there is none."""
         if number not in self.objects:
-            self.objects[number] = self._playlist(self.folder / "objects" / f"{number}.m3u8", "../cameras/")
+            path = self.folder / "objects" / f"{number}.m3u8"
+            self.objects[number] = self._playlist(path, "../cameras/", f"../cameras/{_HEADER}")
         return self.objects[number]
 
     def camera_file(self, camera: str, first: int) -> Path:
         """Say where a camera's frames from a pulse on are."""
         return self.folder / "cameras" / camera / file_name(first)
 
+    def sound_file(self, first: int) -> Path:
+        """Say where the sound from a pulse on is."""
+        return self.folder / SOUND / file_name(first)
+
     def index_file(self, first: int) -> Path:
         """Say where the choices from a pulse on are."""
         return (self.folder / "index" / file_name(first)).with_suffix(".jsonl")
 
     @property
-    def header(self) -> bytes:
-        """What all its files begin with; empty where that cannot be read."""
-        try:
-            return (self.folder / "cameras" / _HEADER).read_bytes()
-        except OSError:
-            return b""
+    def headers(self) -> Headers:
+        """What its files begin with; empty where that cannot be read."""
+        return Headers(_read(self.folder / "cameras" / _HEADER), _read(self.folder / SOUND / _HEADER))
 
     def index_of(self, start: int, end: int) -> list[Path]:
         """List the indexes in which something may stand about pulses ``start … end - 1``, in order."""
@@ -137,7 +160,8 @@ class Run:
 
     def files(self, first: int) -> list[Path]:
         """List a segment's files; of cameras that were away there is none."""
-        return [*(self.camera_file(camera, first) for camera in self.head.cameras), self.index_file(first)]
+        cameras = (self.camera_file(camera, first) for camera in self.head.cameras)
+        return [*cameras, self.sound_file(first), self.index_file(first)]
 
     def drop(self, segments: Collection[Segment]) -> None:
         """Take segments away, and what refers to them: first from the playlists, then from the disk.
@@ -147,7 +171,7 @@ class Run:
         """
         files = {segment.first for segment in segments}
         self.segments = [segment for segment in self.segments if segment.first not in files]
-        for playlist in [*self.cameras.values(), *self.objects.values()]:
+        for playlist in self._playlists:
             if playlist.tape.drop(files):
                 playlist.tidy()
         self.objects = {number: it for number, it in self.objects.items() if it.tape.all}
@@ -155,5 +179,12 @@ class Run:
             for path in self.files(first):
                 path.unlink(missing_ok=True)
 
-    def _playlist(self, path: Path, cameras: str = "") -> Playlist:
-        return Playlist(path, cameras, self.head.fps, self.head.pulse0, self._longest_s)
+    def _playlist(self, path: Path, cameras: str = "", header: str = _HEADER) -> Playlist:
+        return Playlist(path, cameras, header, self.head.fps, self.head.pulse0, self._longest_s)
+
+
+def _read(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError:
+        return b""

@@ -17,8 +17,9 @@ from pathlib import Path
 import msgspec
 
 from server.view.past.media import Gop
-from server.view.past.run import HEAD, Run, RunHead, Segment
+from server.view.past.run import HEAD, Headers, Run, RunHead, Segment
 from server.view.past.segment import OpenSegment
+from server.view.sound import Heard
 from server.wire.messages import GopChoices
 
 _SHARE = 8
@@ -33,6 +34,8 @@ class Piece:
     choices: GopChoices
     cameras: dict[str, Gop]
     """What each camera delivered of it, from its first frame on."""
+    heard: Heard | None = None
+    """What is to be heard meanwhile; None at a site without sound."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,24 +75,24 @@ class Store:
                 continue  # not written by us, or not to its end: nothing that could be played
         self._retain()
 
-    def write(self, piece: Piece, head: RunHead, header: bytes) -> None:
-        """Write a GOP; ``head`` and ``header`` are what a run begins with, if it has not begun.
+    def write(self, piece: Piece, head: RunHead, headers: Headers) -> None:
+        """Write a GOP; ``head`` and ``headers`` are what a run begins with, if it has not begun.
 
         Raises:
             OSError: the disk does not take it; :meth:`abandon` is to be called.
         """
         first = piece.choices.first
         if self.run is None or first < self._end:
-            self._begin(head, header)
+            self._begin(head, headers)
         run = self.run
         assert run is not None  # noqa: S101 — just begun
         if self._open is not None and self._is_full(self._open.segment, first):
             self._finish()
         if self._open is None:
             self._retain()
-            self._open = OpenSegment(run, Segment(first, 0, self._now()), header)
+            self._open = OpenSegment(run, Segment(first, 0, self._now()), headers)
             run.segments.append(self._open.segment)
-        self._open.write(piece.choices, piece.cameras, self._now())
+        self._open.write(piece.choices, piece.cameras, piece.heard, self._now())
         self._end = first + piece.choices.frames
 
     def abandon(self) -> None:
@@ -108,13 +111,13 @@ class Store:
                 os.close(self._lock)
                 self._lock = None
 
-    def _begin(self, head: RunHead, header: bytes) -> None:
+    def _begin(self, head: RunHead, headers: Headers) -> None:
         self._finish()
         name = datetime.fromtimestamp(head.began, UTC).strftime("%Y%m%dT%H%M%SZ")
         taken = sorted(it.name for it in self.folder.glob(f"{name}*"))
         folder = self.folder / (f"{name}-{len(taken)}" if taken else name)
         try:
-            begun = Run.begin(folder, head, header, self._bounds.segment_s)
+            begun = Run.begin(folder, head, headers, self._bounds.segment_s)
         except OSError:
             shutil.rmtree(folder, ignore_errors=True)
             raise

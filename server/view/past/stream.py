@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncGenerator, Callable
+from collections.abc import AsyncGenerator, Callable, Iterator
 from contextlib import aclosing
 from dataclasses import dataclass
 
 from server.view.channel import Channel
-from server.view.past.media import Gop, fragments, is_key, pulse_of
+from server.view.footage import Footage
+from server.view.past.hearing import Hearing
+from server.view.past.media import is_key
 from server.view.past.play import Source, play
 from server.view.picture import Picture
-from server.view.timeline import Timeline
+from server.view.tally import Tally
+from server.view.timeline import LONGEST_S, Timeline
 
 _LEAD_S = 4.0
 """Seconds of the past that are sent at once: what a player likes to have before it begins."""
+_BRIDGED_S = 4.0
+"""A hole is bridged so many seconds at a time."""
 _LATE_S = 1.0
 """Seconds for which pictures of a time that is decided may still come."""
 
@@ -28,9 +33,10 @@ class Wish:
 
 
 class PastStream:
-    """The bytes of one viewer's stream, without a hole in its time.
+    """One viewer's stream, without a hole in its time.
 
-    ``live`` gives the stream's channel when the present is reached; None: there is none any more.
+    ``live`` gives the stream's channel when the present is reached; None: there is none any more. ``hearing``
+    is None at a site without sound.
     """
 
     def __init__(
@@ -39,59 +45,85 @@ class PastStream:
         timeline: Timeline,
         fps: float,
         live: Callable[[], Channel | None],
+        hearing: Hearing | None = None,
     ) -> None:
         self._source, self._timeline, self._fps, self._live = source, timeline, fps, live
+        self._hearing = hearing
+        self._tally = Tally(fps)
 
-    async def send(self, wish: Wish) -> AsyncGenerator[bytes, None]:
+    async def send(self, wish: Wish) -> AsyncGenerator[Footage, None]:
         """Give the past in real time after its first seconds; where it has an end, as fast as it is read."""
         at, pace = wish.start, _Pace(_LEAD_S)
         async with aclosing(play(self._source, wish.start)) as gops:
             async for gop in gops:
                 if wish.end is not None and gop.first >= wish.end:
                     return
-                data = self._filled(gop, wish.end)
-                if wish.end is None:
-                    await pace.wait(len(gop.fragments) / self._fps)
-                yield data
+                pictures = [
+                    Picture(gop.first + number, is_key(fragment), fragment, boot=0)
+                    for number, fragment in enumerate(gop.fragments)
+                    if wish.end is None or gop.first + number < wish.end
+                ]
+                for shown in self._shown(pictures):
+                    footage = await self._recalled(shown)
+                    if wish.end is None:
+                        await pace.wait((footage.until - footage.first) / self._fps)
+                    yield footage
                 at = gop.end
         if wish.end is not None and max(at, self._source.end - _LATE_S * self._fps) >= wish.end:
             return  # of that time nothing more will come
         channel = self._live()
         if channel is not None:  # nothing was awaited since the newest GOP: none can have come between
             async with aclosing(self._joined(channel, at, wish.end)) as joined:
-                async for data in joined:
-                    yield data
+                async for footage in joined:
+                    yield footage
 
-    async def _joined(self, channel: Channel, at: int, end: int | None) -> AsyncGenerator[bytes, None]:
+    async def _joined(self, channel: Channel, at: int, end: int | None) -> AsyncGenerator[Footage, None]:
         viewer = channel.join()
         begun = False
         try:
             async for piece in viewer.pieces():
-                shown = fragments(piece.data)
-                if not begun:
-                    shown = [it for it in shown if pulse_of(it, self._fps) >= at]
-                    if not shown:
-                        continue
+                came = piece.pictures if isinstance(piece, Footage) else ()
+                pictures = [it for it in came if begun or it.pulse >= at]
+                if not pictures:
+                    continue
+                over = end is not None and pictures[-1].until >= end
+                pictures = [it for it in pictures if end is None or it.pulse < end]
+                if not begun and pictures:
+                    for shown in self._bridged(pictures[0].pulse):
+                        yield await self._recalled(shown)
                     begun = True
-                    if end is not None and pulse_of(shown[0], self._fps) >= end:
-                        return
-                    filled = self._timeline.fill(pulse_of(shown[0], self._fps))
-                    shown = [*(picture.fragment for picture in filled), *shown]
-                if end is not None and pulse_of(shown[-1], self._fps) >= end:
-                    yield b"".join(it for it in shown if pulse_of(it, self._fps) < end)
+                if pictures:
+                    yield self._present(pictures)
+                if over:
                     return
-                yield b"".join(shown)
         finally:
             channel.leave(viewer)
 
-    def _filled(self, gop: Gop, end: int | None) -> bytes:
-        """Give a GOP's fragments before an end, and what repeats the picture before it up to there."""
-        shown = []
-        for number, fragment in enumerate(gop.fragments):
-            if end is None or gop.first + number < end:
-                picture = Picture(gop.first + number, is_key(fragment), fragment, boot=0)
-                shown += self._timeline.take(picture)
-        return b"".join(picture.fragment for picture in shown)
+    def _shown(self, pictures: list[Picture]) -> Iterator[list[Picture]]:
+        """Give a GOP's pictures as they can be shown, behind what repeats the picture before them."""
+        yield from self._bridged(pictures[0].pulse)
+        shown = [it for picture in pictures for it in self._timeline.take(picture)]
+        if shown:
+            yield shown
+
+    def _bridged(self, until: int) -> Iterator[list[Picture]]:
+        """Repeat the last picture up to a pulse, a few seconds at a time: sound goes on meanwhile."""
+        most = round(_BRIDGED_S * self._fps)
+        while (at := self._timeline.until) is not None and at < until <= at + LONGEST_S * self._fps:
+            shown = self._timeline.fill(min(until, at + most))
+            if not shown:
+                return
+            yield shown
+
+    async def _recalled(self, pictures: list[Picture]) -> Footage:
+        hearing, first, until = self._hearing, pictures[0].pulse, pictures[-1].until
+        heard = None if hearing is None else await hearing.beside(first, until)
+        return self._tally.footage(pictures, heard)
+
+    def _present(self, pictures: list[Picture]) -> Footage:
+        hearing, first, until = self._hearing, pictures[0].pulse, pictures[-1].until
+        heard = None if hearing is None else hearing.live(first, until)
+        return self._tally.footage(pictures, heard)
 
 
 class _Pace:

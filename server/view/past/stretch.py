@@ -77,6 +77,12 @@ class Tape:
             place = bisect_right(self._stretches, pulse, key=lambda it: it.end)
             return self._stretches[place] if place < len(self._stretches) else None
 
+    def between(self, start: int, end: int) -> list[Stretch]:
+        """Give the stretches that hold some of the pulses ``start … end - 1``, in order."""
+        with self._lock:
+            place = bisect_right(self._stretches, start, key=lambda it: it.end)
+            return [it for it in self._stretches[place:] if it.first < end]
+
     @property
     def all(self) -> tuple[Stretch, ...]:
         """All stretches in order."""
