@@ -42,9 +42,11 @@ class GivenNumbers:
     def __init__(self, people: Sequence[int]) -> None:
         self._people = people
 
-    def update(self, tracks: Sequence[LocalTrack], last_frame: int) -> IdentityUpdate:
+    def update(
+        self, tracks: Sequence[LocalTrack], last_frame: int, pictures: Mapping[str, tuple[int, int]]
+    ) -> IdentityUpdate:
         """Give everybody their number."""
-        del last_frame
+        del last_frame, pictures
         numbers = {EpisodeKey(*it.key, 0): self._people[it.key.local - 1] for it in tracks}
         return IdentityUpdate(numbers, **_NOTHING_NEW)
 

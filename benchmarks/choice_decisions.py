@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -92,9 +92,11 @@ class Spent:
 class _Given:
     """A registry that reads people's numbers off their looks."""
 
-    def update(self, tracks: Sequence[LocalTrack], last_frame: int) -> IdentityUpdate:
+    def update(
+        self, tracks: Sequence[LocalTrack], last_frame: int, pictures: Mapping[str, tuple[int, int]]
+    ) -> IdentityUpdate:
         """Give everybody their number."""
-        del last_frame
+        del last_frame, pictures
         numbers = {EpisodeKey(*it.key, 0): int(it.looks[0].histogram[0]) for it in tracks}
         return IdentityUpdate(numbers, born=(), returned=(), gone=(), merged=(), split=())
 

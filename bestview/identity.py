@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from bestview.between import LooksBetween
 from bestview.corrections import Corrections, Merge, Split
+from bestview.doubt import Doubt
 from bestview.episodes import Episodes
 from bestview.ground import checked_homography
-from bestview.groups import groups_of
+from bestview.groups import Group, groups_of
 from bestview.heights import HeightScale
 from bestview.identity_settings import IdentitySettings
 from bestview.keys import EpisodeKey
@@ -80,16 +81,25 @@ class IdentityRegistry:
         self._between = LooksBetween(settings, calibrated)
         self._episodes = Episodes(settings)
         self._people = People(settings)
+        self._doubt = Doubt(self._homographies)
+        self._pictures: Mapping[str, tuple[int, int]] = {}
         self._tables = PairTables()
         self._weighing = Weighing(settings, calibrated)
         self._corrections = Corrections()
         self._here: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
         self._last_frame: int | None = None
 
-    def update(self, tracks: Sequence[LocalTrack], last_frame: int) -> IdentityUpdate:
+    def update(
+        self,
+        tracks: Sequence[LocalTrack],
+        last_frame: int,
+        pictures: Mapping[str, tuple[int, int]] | None = None,
+    ) -> IdentityUpdate:
         """Take in what is new and final of all cameras' tracks, by now up to `last_frame`.
 
-        Single cameras may be ahead of it. A track that is missing may come back.
+        Single cameras may be ahead of it. A track that is missing may come back. `pictures` are the width and
+        height in pixels of the cameras that have spoken, of somebody or of nobody: only these can be said not
+        to see whom they should.
 
         Raises:
             ValueError: updates that do not advance, or tracks that make no sense (see `line_up`).
@@ -97,6 +107,7 @@ class IdentityRegistry:
         if self._last_frame is not None and last_frame <= self._last_frame:
             raise ValueError(f"the update for frame {last_frame} comes after that for {self._last_frame}")
         before, self._last_frame = self._last_frame, last_frame
+        self._pictures = pictures or {}
         seen = line_up(tracks, self._homographies, self._foot_error)
         self._scale.learn(seen.heights)
         rows, firm = self._episodes.take(seen, {track.key: track.looks for track in tracks})
@@ -124,6 +135,9 @@ class IdentityRegistry:
         settings = self._settings
         return settings.gate if settings.gate is not None else settings.gate_heights * self._scale.height
 
+    def _silent(self, group: Group) -> int:
+        return self._doubt.silent(group, self._pictures, self._scale.height)
+
     def _gather(
         self, seen: Sightings, rows: NDArray[np.int64], firm: NDArray[np.int64], last_frame: int
     ) -> None:
@@ -150,7 +164,7 @@ class IdentityRegistry:
         here = np.isin([person.number for person in past], self._here)
         group = self._weighing.grouped(episodes, past, here, self._tables, self._scale.height)
         groups = groups_of(episodes, past, group)
-        born, merged = self._people.name(groups, self._tables, self._between, last_frame)
+        born, merged = self._people.name(groups, self._tables, self._between, last_frame, self._silent)
         self._tables.make_room(merge.kept for merge in merged)
         for merge in merged:
             self._tables.absorb(merge.kept, merge.lost)

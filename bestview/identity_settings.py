@@ -67,6 +67,9 @@ class IdentitySettings:
     cap: float = 8.0
     # Frames, of all cameras together, in which someone must be seen before they are given a number.
     confirm: int = 25
+    # Times as many more for each camera that should see them too and does not, and that no second one which
+    # does makes up for: shadows, and ghosts of the background, are seen by one camera.
+    doubt: float = 4.0
     # Frames between two times at which everybody is grouped anew.
     regroup: int = 10
     # Frames after which a number was told, and weighs for staying.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
@@ -36,13 +36,21 @@ class People:
         return [it for _, it in sorted(self._persons.items()) if it.settled and it.last >= oldest]
 
     def name(
-        self, groups: Sequence[Group], tables: PairTables, between: LooksBetween, frame: int
+        self,
+        groups: Sequence[Group],
+        tables: PairTables,
+        between: LooksBetween,
+        frame: int,
+        silent: Callable[[Group], int],
     ) -> tuple[tuple[int, ...], tuple[Merge, ...]]:
-        """Give the groups their numbers, and those of their episodes; say who is new, and who was merged."""
+        """Give the groups their numbers, and those of their episodes; say who is new, and who was merged.
+
+        `silent` says how many cameras should see a group and do not.
+        """
         told = [{it: n for it, n in group.told.items() if it in self._persons} for group in groups]
         for group, number in zip(groups, named(told), strict=True):
             group.number = number
-        born = self._number_new(groups, tables, between, frame)
+        born = self._number_new(groups, tables, between, frame, silent)
         for group in groups:
             for episode in group.episodes:
                 episode.number = group.number
@@ -52,10 +60,15 @@ class People:
         return born, self._merge(groups, frame)
 
     def _number_new(
-        self, groups: Sequence[Group], tables: PairTables, between: LooksBetween, frame: int
+        self,
+        groups: Sequence[Group],
+        tables: PairTables,
+        between: LooksBetween,
+        frame: int,
+        silent: Callable[[Group], int],
     ) -> tuple[int, ...]:
         """Number those who were seen often enough: a new number, or that of the lost person they are."""
-        new = [it for it in groups if it.episodes and not it.number and it.frames >= self._settings.confirm]
+        new = [it for it in groups if it.episodes and not it.number and self._is_sure(it, frame, silent)]
         new.sort(key=lambda it: (it.first, it.rows[0]))
         here = {it.number: it for it in groups if it.number}
         lost = [
@@ -79,6 +92,14 @@ class People:
             born.append(group.number)
             self._next_number += 1
         return tuple(born)
+
+    def _is_sure(self, new: Group, frame: int, silent: Callable[[Group], int]) -> bool:
+        """Say whether a group is seen lately, and was seen often enough to be somebody."""
+        settings = self._settings
+        if new.frames < settings.confirm or new.last < frame - settings.gap - settings.regroup:
+            return False
+        doubted = max(0, silent(new) - len(new.cameras) + 1) if settings.doubt else 0
+        return new.frames >= settings.confirm * (1.0 + settings.doubt * doubted)
 
     def _may_be(
         self,

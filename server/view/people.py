@@ -80,7 +80,8 @@ class People:
         for window in windows:
             self._histories[window.message.camera].put(window, window.first, window.message.last)
         tracks = [track for window in windows for track in window.local_tracks()]
-        update = self._registry.update(tracks, epoch.last - self._lag)
+        pictures = {window.message.camera: window.message.size for window in windows}
+        update = self._registry.update(tracks, epoch.last - self._lag, pictures)
         for key, parts in _parts(update.numbers).items():
             self._parts[key] = self._with_settled(key, parts)
         keys = chain.from_iterable(window.keys for window in windows)

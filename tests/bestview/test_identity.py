@@ -82,13 +82,21 @@ def coat(which: int) -> NDArray[np.float64]:
 
 
 def play(
-    registry: IdentityRegistry, stays: Sequence[Stay], frames: int, begin: int = 0
+    registry: IdentityRegistry,
+    stays: Sequence[Stay],
+    frames: int,
+    begin: int = 0,
+    speaking: Mapping[str, tuple[int, int]] | None = None,
 ) -> list[IdentityUpdate]:
-    return list(updates(registry, stays, frames, begin))
+    return list(updates(registry, stays, frames, begin, speaking))
 
 
 def updates(
-    registry: IdentityRegistry, stays: Sequence[Stay], frames: int, begin: int = 0
+    registry: IdentityRegistry,
+    stays: Sequence[Stay],
+    frames: int,
+    begin: int = 0,
+    speaking: Mapping[str, tuple[int, int]] | None = None,
 ) -> Iterator[IdentityUpdate]:
     for last in range(begin + STRIDE - 1, frames, STRIDE):
         first = last - STRIDE + 1
@@ -101,7 +109,7 @@ def updates(
                     boxes = np.where(np.isnan(track.boxes), before.boxes, track.boxes)
                     track = replace(track, boxes=boxes, looks=(*before.looks, *track.looks))
                 tracks[stay.camera, stay.local] = track
-        yield registry.update(list(tracks.values()), last)
+        yield registry.update(list(tracks.values()), last, speaking)
 
 
 def registry(

@@ -134,9 +134,11 @@ def status(camera: str, **changes: Any) -> Message:
 class TrackNumbers:
     """An identity registry for which a track's number is the person's, in every camera."""
 
-    def update(self, tracks: Sequence[LocalTrack], last_frame: int) -> IdentityUpdate:
+    def update(
+        self, tracks: Sequence[LocalTrack], last_frame: int, pictures: Mapping[str, tuple[int, int]]
+    ) -> IdentityUpdate:
         """Give everybody their number."""
-        del last_frame
+        del last_frame, pictures
         return IdentityUpdate({EpisodeKey(*it.key, 0): it.local for it in tracks}, (), (), (), (), ())
 
 

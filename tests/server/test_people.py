@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -28,8 +29,10 @@ class Dictated:
     def __init__(self, *updates: IdentityUpdate) -> None:
         self._updates = list(updates)
 
-    def update(self, tracks: list[LocalTrack], last_frame: int) -> IdentityUpdate:
-        del tracks, last_frame
+    def update(
+        self, tracks: list[LocalTrack], last_frame: int, pictures: Mapping[str, tuple[int, int]]
+    ) -> IdentityUpdate:
+        del tracks, last_frame, pictures
         return self._updates.pop(0)
 
 
@@ -46,10 +49,14 @@ class Heard:
 
     def __init__(self, heard: list[LocalTrack]) -> None:
         self._heard = heard
+        self.pictures: dict[str, tuple[int, int]] = {}
 
-    def update(self, tracks: list[LocalTrack], last_frame: int) -> IdentityUpdate:
+    def update(
+        self, tracks: list[LocalTrack], last_frame: int, pictures: Mapping[str, tuple[int, int]]
+    ) -> IdentityUpdate:
         del last_frame
         self._heard += tracks
+        self.pictures.update(pictures)
         return said({})
 
 
@@ -98,8 +105,9 @@ def test_a_forgotten_track_that_comes_back_has_a_new_number() -> None:
 def test_feet_that_the_lower_edge_cuts_off_do_not_say_where_somebody_stands() -> None:
     it = people()
     heard: list[LocalTrack] = []
-    it._registry = Heard(heard)  # type: ignore[assignment]
-    it.update(epoch_of(0, word("c0", 0, {1: SMALL}, size=(WIDTH // 2, HEIGHT // 2))))
+    it._registry = registry = Heard(heard)  # type: ignore[assignment]
+    it.update(epoch_of(0, word("c0", 0, {1: SMALL}, size=(WIDTH // 2, HEIGHT // 2)), word("c1", 0, {})))
+    assert registry.pictures == {"c0": (WIDTH // 2, HEIGHT // 2), "c1": (WIDTH, HEIGHT)}, "also who sees none"
     [track] = heard
     assert track.picture_height == HEIGHT // 2, "of the camera's own picture, as its boxes"
     np.testing.assert_allclose(track.boxes, np.tile(np.array(SMALL) / 2, (STRIDE, 1)))

@@ -83,7 +83,7 @@ def test_an_old_numbers_stream_goes_on_at_its_own_service() -> None:
     class Merging:
         """First two people, then one."""
 
-        def update(self, given: Sequence[LocalTrack], last_frame: int) -> IdentityUpdate:
+        def update(self, given: Sequence[LocalTrack], last_frame: int, _: object) -> IdentityUpdate:
             if last_frame < 15:
                 return IdentityUpdate({EpisodeKey(*it.key, 0): it.local for it in given}, (), (), (), (), ())
             merged = (Merge(1, 2),) if last_frame < 20 else ()
