@@ -10,6 +10,7 @@ import { Overlay } from './overlay.js';
 import { People } from './people.js';
 import { Reason } from './reason.js';
 import { Strip } from './strip.js';
+import { copy, pictureInPicture, saveSnapshot } from './tools.js';
 import { Viewer } from './viewer.js';
 
 const READOUT_MS = 250;
@@ -32,6 +33,8 @@ const stage = element('stage');
 const video = element('video');
 /** @type {HTMLButtonElement} */
 const toggle = element('toggle-boxes');
+/** @type {HTMLButtonElement} */
+const followToggle = element('toggle-follow');
 /** @type {HTMLButtonElement} */
 const soundToggle = element('toggle-sound');
 const [title, text] = /** @type {HTMLElement[]} */ ([...element('status').children]);
@@ -87,24 +90,31 @@ function median(values) {
   return values.sort((a, b) => a - b)[Math.floor(values.length / 2)] ?? NaN;
 }
 
+/** Whether the picture is painted here, and not only shown by the video element. */
+function painted() {
+  return viewer.boxesOn || viewer.followOn;
+}
+
 /** @param {VideoFrame | null} image of the frame now shown */
 function paint(image) {
-  if (viewer.boxesOn && viewer.site) overlay.draw(viewer.boxes, viewer.object, viewer.site, image);
+  const { site, boxesOn, part } = viewer;
+  if (site && painted()) overlay.draw(boxesOn ? viewer.boxes : [], viewer.object, site, image, part);
   else overlay.clear();
+  video.style.transform = site && !image ? overlay.transform(site) : 'none';
   image?.close();
 }
 
 /** Between frames: another choice, boxes on or off, another size. */
 function repaint() {
   if (viewer.probe.pulse === null || viewer.player.landing) return;
-  const frame = take(video, viewer.mediaTime, viewer.boxesOn);
+  const frame = take(video, viewer.mediaTime, painted());
   if (frame.image) viewer.shown({ ...frame, shownAt: Date.now() });
   paint(frame.image);
 }
 
 /** @type {string | null | undefined} */
 let marked;
-watchFrames(video, () => viewer.boxesOn, (frame) => {
+watchFrames(video, painted, (frame) => {
   if (viewer.player.landing) return frame.image?.close(); // told of again, when it is known whose it is
   viewer.shown(frame);
   paint(frame.image);
@@ -123,6 +133,12 @@ function toggleBoxes() {
   repaint();
 }
 
+function toggleFollow() {
+  viewer.followOn = !viewer.followOn;
+  followToggle.setAttribute('aria-pressed', String(viewer.followOn));
+  repaint();
+}
+
 /** Muted at first, or no browser would play by itself. */
 function toggleSound() {
   if (!viewer.site?.sound) return;
@@ -135,6 +151,17 @@ function fullScreen() {
   else void stage.requestFullscreen?.();
 }
 
+function snapshot() {
+  const { site, object, probe } = viewer;
+  if (!site || probe.pulse === null || !video.videoWidth) return;
+  void saveSnapshot(video, `${site.name}-person-${object}-${probe.camera ?? 'camera'}-p${probe.pulse}`);
+}
+
+async function copyLink() {
+  const done = await copy(location.href);
+  viewer.say(done ? 'The link to this person is copied.' : `The link to this person: ${location.href}`);
+}
+
 /** @param {MouseEvent} event */
 function personAt(event) {
   return viewer.site ? overlay.hit(viewer.boxes, viewer.site, event) : null;
@@ -142,8 +169,27 @@ function personAt(event) {
 
 toggle.addEventListener('click', toggleBoxes);
 soundToggle.addEventListener('click', toggleSound);
+followToggle.addEventListener('click', toggleFollow);
 element('full-screen').addEventListener('click', fullScreen);
-listenToKeys({ step: (by) => viewer.step(by), boxes: toggleBoxes, sound: toggleSound, fullScreen });
+element('snapshot').addEventListener('click', snapshot);
+element('copy-link').addEventListener('click', copyLink);
+element('in-picture').addEventListener('click', () => void pictureInPicture(video).catch(() => undefined));
+const more = /** @type {HTMLDetailsElement} */ (element('more'));
+document.addEventListener('click', ({ target }) => {
+  if (target instanceof Element && target.closest('summary')?.parentElement !== more) more.open = false;
+});
+element('in-picture').hidden = !document.pictureInPictureEnabled;
+listenToKeys({
+  ArrowRight: () => viewer.step(1),
+  ArrowLeft: () => viewer.step(-1),
+  b: toggleBoxes,
+  z: toggleFollow,
+  m: toggleSound,
+  f: fullScreen,
+  s: snapshot,
+  l: copyLink,
+  Escape: () => (more.open = false),
+});
 stage.addEventListener('mousemove', (event) => stage.classList.toggle('over-person', personAt(event) !== null));
 stage.addEventListener('click', (event) => {
   if (video.paused) video.play().catch(() => undefined);

@@ -1,8 +1,9 @@
-/** A frame and its boxes: the chosen person in the accent, the others thin and neutral. */
+/** A frame, or a part of it, and its boxes: the chosen person in the accent, the others thin and neutral. */
 
 import { Surface } from './surface.js';
 
 /** @import {Box} from './contract.js' */
+/** @import {Part, Size} from './follow.js' */
 
 const ACCENT = '#3fdc7f';
 const NEUTRAL = 'rgba(255, 255, 255, 0.75)';
@@ -13,6 +14,9 @@ const FONT = '600 12px system-ui, sans-serif';
 const LABEL_HEIGHT = 17;
 
 export class Overlay {
+  /** @type {Part | null} what was drawn last; null: the whole picture */
+  #part = null;
+
   /**
    * @param {HTMLCanvasElement} canvas lies exactly over the video element
    */
@@ -21,16 +25,19 @@ export class Overlay {
   }
 
   clear() {
+    this.#part = null;
     this.surface.clear();
   }
 
   /**
    * @param {Box[]} boxes of the camera and the frame now shown
    * @param {number | null} chosen
-   * @param {{width: number, height: number}} picture pixels that the boxes are measured in
+   * @param {Size} picture pixels that the boxes are measured in
    * @param {VideoFrame | null} image the frame; null leaves the view of the video element below
+   * @param {Part | null} part of the picture that is to fill the canvas; null: all of it
    */
-  draw(boxes, chosen, picture, image) {
+  draw(boxes, chosen, picture, image, part) {
+    this.#part = part;
     const context = this.surface.clear();
     const { scale, left, top } = this.#place(picture);
     context.translate(left, top);
@@ -42,7 +49,7 @@ export class Overlay {
 
   /**
    * @param {Box[]} boxes
-   * @param {{width: number, height: number}} picture
+   * @param {Size} picture
    * @param {{offsetX: number, offsetY: number}} point CSS pixels from the canvas's corner
    * @returns {number | null} the smallest box's object at that point: who stands in front of a crowd
    */
@@ -55,14 +62,28 @@ export class Overlay {
   }
 
   /**
-   * Where the picture lies in the canvas: as large as fits, in the middle.
-   *
-   * @param {{width: number, height: number}} picture
+   * @param {Size} picture
+   * @returns {string} what makes the video element below show the part that was drawn last (CSS)
    */
-  #place(picture) {
+  transform(picture) {
+    if (!this.#part) return 'none';
+    const [before, after] = [this.#place(picture, null), this.#place(picture)];
+    const larger = after.scale / before.scale;
+    const [x, y] = [after.left - larger * before.left, after.top - larger * before.top];
+    return `translate(${x}px, ${y}px) scale(${larger})`;
+  }
+
+  /**
+   * Where the picture lies in the canvas: the part as large as fits, in the middle.
+   *
+   * @param {Size} picture
+   */
+  #place(picture, part = this.#part) {
     const { width, height } = this.surface;
-    const scale = Math.min(width / picture.width, height / picture.height);
-    return { scale, left: (width - picture.width * scale) / 2, top: (height - picture.height * scale) / 2 };
+    const shown = part ?? { left: 0, top: 0, ...picture };
+    const scale = Math.min(width / shown.width, height / shown.height);
+    const left = (width - shown.width * scale) / 2 - shown.left * scale;
+    return { scale, left, top: (height - shown.height * scale) / 2 - shown.top * scale };
   }
 }
 

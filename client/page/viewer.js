@@ -2,12 +2,14 @@
 
 import { onAddress, objectInAddress, writeAddress } from './address.js';
 import { Decisions } from './decisions.js';
+import { Follow } from './follow.js';
 import { Palette } from './palette.js';
 import { Player } from './player.js';
 import { Probe } from './probe.js';
 import { describe } from './status.js';
 
 /** @import {Box, Camera, Gop, Person, Site} from './contract.js' */
+/** @import {Part} from './follow.js' */
 /** @import {Frame} from './frames.js' */
 /** @import {Status} from './status.js' */
 
@@ -31,9 +33,14 @@ export class Viewer {
   connected = false;
   supported = true;
   boxesOn = true;
+  followOn = false;
+  /** @type {Part | null} of the frame now shown, where the person is followed; null: all of it */
+  part = null;
   mediaTime = 0; // seconds, of the frame now shown
   /** @type {Box[]} of the frame now shown */
   boxes = [];
+  #follow = new Follow();
+  #followed = ''; // whom, in which camera
   #asked = this.object !== null; // by the viewer, not by default
   #frameAt = -Infinity;
   #chosenAt = -Infinity;
@@ -83,7 +90,7 @@ export class Viewer {
   addGop(gop) {
     this.decisions.add(gop);
     for (const { kept, parted, camera } of gop.split ?? []) {
-      if (kept === this.object) this.#say(`${camera} took somebody else for person ${kept}: that is person ${parted}.`);
+      if (kept === this.object) this.say(`${camera} took somebody else for person ${kept}: that is person ${parted}.`);
     }
   }
 
@@ -122,6 +129,7 @@ export class Viewer {
   /** @param {Frame} frame */
   shown({ mediaTime, shownAt }) {
     const pulse = Math.round(mediaTime * (this.site?.fps ?? 1));
+    const passed = mediaTime - this.mediaTime;
     this.mediaTime = mediaTime;
     // The same moment may be shown again, of somebody else.
     if (pulse !== this.probe.pulse) {
@@ -133,7 +141,20 @@ export class Viewer {
       const camera = this.decisions.camera(object, pulse);
       this.probe.view(object, camera, shownAt);
       this.boxes = camera === null ? [] : this.decisions.boxes(camera, pulse);
+      this.part = this.#frame(`${object} ${camera}`, object, passed);
     }
+  }
+
+  /**
+   * @param {string} whom in which camera: where that changes, there is nothing to move from
+   * @param {number} object
+   * @param {number} passed seconds
+   */
+  #frame(whom, object, passed) {
+    if (whom !== this.#followed || !this.followOn) this.#follow.reset();
+    this.#followed = whom;
+    if (!this.followOn || !this.site) return null;
+    return this.#follow.step(this.boxes.find(([number]) => number === object), this.site, passed);
   }
 
   /** @returns {boolean} whether new frames are being shown */
@@ -182,13 +203,13 @@ export class Viewer {
     const { object } = this;
     const same = this.people?.find((person) => object !== null && person.also?.includes(object));
     if (!same || this.chosen) return;
-    this.#say(`Person ${object} turned out to be person ${same.object}.`);
+    this.say(`Person ${object} turned out to be person ${same.object}.`);
     this.#turnTo(same.object, this.#asked);
     writeAddress(same.object, false);
   }
 
-  /** @param {string} text */
-  #say(text) {
+  /** @param {string} text that is worth a moment's notice */
+  say(text) {
     this.#notice = text;
     this.#noticeAt = performance.now();
     this.changed();
