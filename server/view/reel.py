@@ -56,14 +56,14 @@ class Segment:
         return self._footage[0].first
 
     @property
-    def seconds(self) -> float:
-        """How long it is."""
-        return (self._footage[-1].until - self.first) / self._plan.fps
+    def until(self) -> int:
+        """The first pulse after it."""
+        return self._footage[-1].until
 
     @property
     def whole(self) -> bool:
         """Whether nothing will be added to it."""
-        return self._footage[-1].until >= (self.number + 1) * self._plan.frames
+        return self.until >= (self.number + 1) * self._plan.frames
 
     @property
     def data(self) -> bytes:

@@ -8,7 +8,6 @@ from contextlib import aclosing
 from aiohttp import web
 
 from server.view.channel import Channel
-from server.view.fmp4 import init_segment
 from server.view.past.hearing import Hearing
 from server.view.past.moment import MomentError, moment_of, pulse_at
 from server.view.past.play import CameraPast, ObjectPast, Source, known, sounds
@@ -17,6 +16,7 @@ from server.view.past.told import told
 from server.view.service import BestViewService
 from server.view.timeline import Timeline
 from server.web.api import answer, not_now, problem
+from server.web.forms import Form
 from server.web.keys import SERVICE
 from server.web.limits import no_place
 from server.web.schema import Past, PastSpan
@@ -30,36 +30,37 @@ def asks_for_the_past(request: web.Request) -> bool:
     return "from" in request.query or "to" in request.query
 
 
-async def best_of_the_past(request: web.Request) -> web.StreamResponse:
+async def best_of_the_past(request: web.Request, form: Form) -> web.StreamResponse:
     """Stream the best view of a person from a moment on."""
     service = request.app[SERVICE]
     number = int(request.match_info["object"])
-    source = _object_past(service, number)
+    source = object_past(service, number)
 
     def live() -> Channel | None:
         return service.splicer.objects.get(service.board.resolve(number))
 
     if live() is None and not known(source):
         return problem(404, f"there is no object {number}")
-    return await _stream(request, source, f"object {number}", live)
+    return await _stream(request, form, source, f"object {number}", live)
 
 
-async def camera_of_the_past(request: web.Request) -> web.StreamResponse:
+async def camera_of_the_past(request: web.Request, form: Form) -> web.StreamResponse:
     """Stream one camera from a moment on."""
     service = request.app[SERVICE]
     camera = request.match_info["camera"]
     if camera not in service.shelves:
         return problem(404, f"there is no camera {camera!r}; there are {', '.join(service.shelves)}")
     source = CameraPast(service.past, camera)
-    return await _stream(request, source, f"camera {camera}", lambda: service.splicer.cameras.get(camera))
+    what = f"camera {camera}"
+    return await _stream(request, form, source, what, lambda: service.splicer.cameras.get(camera))
 
 
 @routes.get("/api/objects/{object:[0-9]{1,9}}/past")
-async def get_object_past(request: web.Request) -> web.Response:
+async def getobject_past(request: web.Request) -> web.Response:
     """Say from when to when a person's best view can be seen again."""
     service = request.app[SERVICE]
     number = int(request.match_info["object"])
-    source = _object_past(service, number)
+    source = object_past(service, number)
     if not known(source):
         return problem(404, f"nothing is kept of object {number}")
     return answer(_past(service, source))
@@ -80,7 +81,7 @@ async def get_told(request: web.Request) -> web.StreamResponse:
     """Tell again who was where and which camera showed whom, a line for each GOP; from= and to= say when."""
     service = request.app[SERVICE]
     try:
-        wish = _wish(request, service, service.past.recent.end)
+        wish = wish_of(request, service, service.past.recent.end)
     except MomentError as error:
         return problem(400, str(error))
     end = service.past.recent.end if wish.end is None else wish.end
@@ -88,13 +89,14 @@ async def get_told(request: web.Request) -> web.StreamResponse:
     return await send_bytes(request, lines, b"", {"Content-Type": "application/x-ndjson"})
 
 
-def _object_past(service: BestViewService, number: int) -> ObjectPast:
+def object_past(service: BestViewService, number: int) -> ObjectPast:
+    """Give the past of whoever has a number, or had it."""
     now = service.board.resolve(number)
     return ObjectPast(service.past, (number,) if number == now else (now, number))
 
 
-def _wish(request: web.Request, service: BestViewService, now: int) -> Wish:
-    """Read from= and to=.
+def wish_of(request: web.Request, service: BestViewService, now: int) -> Wish:
+    """Read from= and to=; ``now`` is the pulse that seconds back are counted from.
 
     Raises:
         MomentError: they are no moments, or the second is not after the first.
@@ -115,12 +117,26 @@ def _wish(request: web.Request, service: BestViewService, now: int) -> Wish:
     return Wish(start, end)
 
 
+def nothing_kept(source: Source, wish: Wish, what: str) -> web.Response | None:
+    """Say that nothing is kept of the time that somebody wants to see, and what is; None: something is."""
+    there = known(source)
+    if any(it.end > wish.start and (wish.end is None or it.first < wish.end) for it in there):
+        return None
+    kept = ", ".join(f"p{it.first} to p{it.end - 1}" for it in there) or "nothing"
+    return problem(416, f"of {what} nothing is kept from p{wish.start} on; there is {kept}")
+
+
+def new_timeline(service: BestViewService) -> Timeline:
+    """Give the time of one viewer's stream."""
+    return Timeline(service.agreement, service.config.site.fps, service.config.encode.gop)
+
+
 async def _stream(
-    request: web.Request, source: Source, what: str, live: Callable[[], Channel | None]
+    request: web.Request, form: Form, source: Source, what: str, live: Callable[[], Channel | None]
 ) -> web.StreamResponse:
     service, past = request.app[SERVICE], request.app[SERVICE].past
-    parameters, site = service.agreement.parameters, service.config.site
-    if parameters is None:
+    head, fps = form.head(service), service.config.site.fps
+    if head is None:
         return not_now("no camera has delivered a picture yet")
     full = no_place(request)
     if full is not None:
@@ -128,13 +144,12 @@ async def _stream(
     if request.query.get("overlay", "0") != "0":
         return problem(400, "overlay: boxes are not burnt into the past; /api/past tells where they are")
     try:
-        wish = _wish(request, service, source.end)
+        wish = wish_of(request, service, source.end)
     except MomentError as error:
         return problem(400, str(error))
-    there = known(source)
-    if not any(it.end > wish.start and (wish.end is None or it.first < wish.end) for it in there):
-        kept = ", ".join(f"p{it.first} to p{it.end - 1}" for it in there) or "nothing"
-        return problem(416, f"of {what} nothing is kept from p{wish.start} on; there is {kept}")
+    missing = nothing_kept(source, wish, what)
+    if missing is not None:
+        return missing
     counted = 1
 
     def joined() -> Channel | None:
@@ -143,16 +158,14 @@ async def _stream(
         counted = 0  # from now on the channel counts
         return live()
 
-    timeline = Timeline(service.agreement, site.fps, service.config.encode.gop)
     sound = past.sound
     hearing = None if sound is None else Hearing(sound, lambda: sounds(past), lambda: source.end)
-    stream = PastStream(source, timeline, site.fps, joined, hearing)
+    stream = PastStream(source, new_timeline(service), fps, joined, hearing)
     past.viewers += 1
     try:
-        head = init_segment(parameters, site.width, site.height, service.config.sound.format)
         async with aclosing(stream.send(wish)) as shown:
-            data = (piece.with_sound async for piece in shown)
-            return await send_bytes(request, data, head, {"Content-Type": "video/mp4"})
+            data = (form.packed(piece) async for piece in shown)
+            return await send_bytes(request, data, head, {"Content-Type": form.content_type})
     finally:
         past.viewers -= counted
 

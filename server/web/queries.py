@@ -16,8 +16,18 @@ OVERLAY = {
     "/cameras/{camera}/live.jpg",
 }
 """What boxes can be burnt into."""
-PAST = {"/objects/{object}/best.mp4", "/cameras/{camera}/live.mp4", "/api/past"}
+PAST = {
+    "/objects/{object}/best.mp4",
+    "/objects/{object}/best.ts",
+    "/cameras/{camera}/live.mp4",
+    "/cameras/{camera}/live.ts",
+    "/objects/{object}/hls/index.m3u8",
+    "/cameras/{camera}/hls/index.m3u8",
+    "/api/past",
+}
 """What can begin in the past."""
+HELD = {"/objects/{object}/best.mp4", "/objects/{object}/best.ts"}
+"""What can be held to one camera."""
 _STREAMS = ("/objects/", "/cameras/")
 
 
@@ -25,7 +35,7 @@ _STREAMS = ("/objects/", "/cameras/")
 async def refuse_what_is_not_there(
     request: web.Request, handler: Callable[[web.Request], Awaitable[web.StreamResponse]]
 ) -> web.StreamResponse:
-    """Answer 400 where a stream is asked for boxes or a past that it does not have."""
+    """Answer 400 where a stream is asked for boxes, a past or a camera that it does not have."""
     resource = request.match_info.route.resource
     if resource is not None and request.query and request.path.startswith(_STREAMS):
         complaint = _complaint(request, resource.canonical)
@@ -40,7 +50,9 @@ def _complaint(request: web.Request, path: str) -> str | None:
         return f"overlay={overlay}: must be 0 or 1"
     if overlay == "1" and path not in OVERLAY:
         return "overlay: boxes are burnt into a person's best.mp4, and into .mjpeg and .jpg; not into this"
+    if "camera" in request.query and (path not in HELD or request.query.keys() & {"overlay", "from", "to"}):
+        return "camera: a person's live best.mp4 and best.ts can be held to one, and nothing else"
     for name in ("from", "to"):
         if name in request.query and path not in PAST:
-            return f"{name}: only best.mp4 and live.mp4 can begin in the past"
+            return f"{name}: only .mp4, .ts and HLS can begin in the past"
     return None

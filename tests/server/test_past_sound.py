@@ -28,6 +28,7 @@ from sounds_by_hand import (
     sends,
     write_flashes,
 )
+from test_ts import check_counters, taken_apart
 
 from server.view.decide import GopDecision, ObjectChoice
 from server.view.fmp4 import sound_fragment
@@ -116,7 +117,9 @@ async def test_in_the_past_a_beep_is_with_its_flash_whatever_file_it_is_in(
     assert beeps(camera) == pytest.approx(BEEPS, abs=STEP)
 
 
-@pytest.mark.parametrize("path", ["/objects/1/best.mp4", "/cameras/c0/live.mp4"])
+@pytest.mark.parametrize(
+    "path", ["/objects/1/best.mp4", "/cameras/c0/live.mp4", "/objects/1/best.ts", "/cameras/c0/live.ts"]
+)
 async def test_where_the_past_meets_the_present_the_sound_goes_on(
     hall: Hall, recording: Path, path: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -133,10 +136,14 @@ async def test_where_the_past_meets_the_present_the_sound_goes_on(
             await asyncio.sleep(0.005)
         service.splicer.close()
         data = await answer.read()
-    assert flashes(data) == pytest.approx(BEEPS, abs=0.001)
-    assert beeps(data) == pytest.approx(BEEPS, abs=STEP)
-    assert packets(data) == own[: len(packets(data))]
-    assert unbroken(data)[1] == pytest.approx(FRAMES / FPS, abs=0.03)
+    kind = "mpegts" if path.endswith("ts") else "mp4"
+    assert flashes(data, kind) == pytest.approx(BEEPS, abs=0.001)
+    assert beeps(data, kind) == pytest.approx(BEEPS, abs=STEP)
+    assert unbroken(data, kind)[1] == pytest.approx(FRAMES / FPS, abs=0.03)
+    if kind == "mpegts":
+        check_counters(taken_apart(data))
+    else:
+        assert packets(data) == own[: len(packets(data))]
 
 
 async def test_sound_goes_on_where_nobody_is_shown_for_long(hall: Hall, recording: Path) -> None:

@@ -238,6 +238,9 @@ class OnDisk:
     def recall(self, pulse: int) -> None:
         del pulse
 
+    def recall_before(self, pulse: int) -> None:
+        del pulse
+
 
 def site_of(store: Store) -> tuple[Agreement, bytes]:
     del store

@@ -41,9 +41,9 @@ async def test_what_is_not_there_is_404_and_one_line_of_json(busy: Hall, path: s
         ("/objects/1/best.jpg?overlay=", "overlay=: must be 0 or 1"),
         ("/objects/1/best.ts?overlay=1", "overlay: boxes are burnt into a person's best.mp4"),
         ("/cameras/c0/live.mp4?overlay=1", "overlay: boxes are burnt into a person's best.mp4"),
-        ("/objects/1/best.ts?from=-5", "from: only best.mp4 and live.mp4 can begin in the past"),
-        ("/objects/1/hls/index.m3u8?from=-5", "from: only best.mp4 and live.mp4 can begin in the past"),
-        ("/cameras/c0/live.mjpeg?to=-5", "to: only best.mp4 and live.mp4 can begin in the past"),
+        ("/objects/1/best.jpg?from=-5", "from: only .mp4, .ts and HLS can begin in the past"),
+        ("/objects/1/hls/0.m4s?from=-5", "from: only .mp4, .ts and HLS can begin in the past"),
+        ("/cameras/c0/live.mjpeg?to=-5", "to: only .mp4, .ts and HLS can begin in the past"),
     ],
 )
 async def test_what_a_stream_does_not_have_is_refused_and_not_left_out(
@@ -61,7 +61,7 @@ async def test_boxes_and_the_past_are_described_where_they_are(busy: Hall) -> No
         queries = {it["name"] for it in item["get"]["parameters"] if it["in"] == "query"}
         if path.startswith(("/objects/", "/cameras/")):
             asked = path.replace("{object}", "1").replace("{camera}", A).replace("{segment}", "0")
-            for query in ("overlay=1", "from=p0"):
+            for query in ("overlay=1", "from=p0", "camera=c0"):
                 async with busy.session.head(f"{asked}?{query}") as answer:
                     assert (answer.status == 400) == (query.split("=")[0] not in queries), asked
 

@@ -15,11 +15,15 @@ from server.view.timeline import LONGEST_S
 class Hearing:
     """Finds sound in memory, else on the disk; what was not kept is silent, what may come yet is waited for.
 
-    ``recorded`` gives what there is on the disk, ``now`` the pulse after the newest frame of the pictures.
+    ``recorded`` gives what there is on the disk, ``now`` the pulse after the newest frame of the pictures;
+    without it nothing is waited for.
     """
 
     def __init__(
-        self, shelf: SoundShelf, recorded: Callable[[], Sequence[Recorded]], now: Callable[[], int]
+        self,
+        shelf: SoundShelf,
+        recorded: Callable[[], Sequence[Recorded]],
+        now: Callable[[], int] | None = None,
     ) -> None:
         self._shelf, self._recorded, self._now = shelf, recorded, now
         self._next: int | None = None
@@ -33,7 +37,8 @@ class Hearing:
         longest = form.frame_at(round(LONGEST_S * shelf.fps), shelf.fps)
         if self._next is None or begin > self._next + longest:  # nor is such a hole bridged by pictures
             self._next = begin
-        begin, late = self._next, form.frame_at(self._now(), shelf.fps) - shelf.patience
+        begin = self._next
+        late = end if self._now is None else form.frame_at(self._now(), shelf.fps) - shelf.patience
         frames = {number: shelf.get(number) for number in range(begin, end)}
         missing = [number for number, frame in frames.items() if frame is None]
         if missing and (recorded := self._recorded()):

@@ -7,6 +7,7 @@ import struct
 from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import BinaryIO
 
 from server.view.fmp4 import TIMESCALE
 
@@ -108,22 +109,40 @@ def pulse_of(fragment: bytes, fps: float) -> int:
     return round(time * fps / TIMESCALE)
 
 
-def gops(path: Path, offset: int, length: int, fps: float) -> Generator[Gop, None, None]:
-    """Read the GOPs of a piece of a camera's file.
+def gops(path: Path, offset: int, length: int, fps: float, pulse: int = 0) -> Generator[Gop, None, None]:
+    """Read the GOPs of a piece of a camera's file, from the one that holds a pulse on.
 
     Raises:
         OSError: the file cannot be read: retention may have taken it away.
     """
     with path.open("rb") as file:
-        file.seek(offset)
+        skipped = _last_key(file, offset, length, fps, pulse) - offset
+        file.seek(offset + skipped)
         waiting: list[bytes] = []
-        for fragment in _fragments(file.read, length):
+        for fragment in _fragments(file.read, length - skipped):
             if is_key(fragment) and waiting:
                 yield Gop(pulse_of(waiting[0], fps), tuple(waiting))
                 waiting = []
             waiting.append(fragment)
         if waiting:
             yield Gop(pulse_of(waiting[0], fps), tuple(waiting))
+
+
+def _last_key(file: BinaryIO, offset: int, length: int, fps: float, pulse: int) -> int:
+    """Say where the last key frame up to a pulse is in a piece of a file; pictures are passed over."""
+    found, at = offset, offset
+    while at + _HEAD <= offset + length:
+        file.seek(at)
+        start = file.read(_TIMES_WITHIN)
+        if len(start) < _HEAD:
+            break
+        size, kind = struct.unpack_from(">I4s", start)
+        if kind == b"moof":
+            if pulse_of(start, fps) > pulse:
+                break
+            found = at if is_key(start) else found
+        at += max(_HEAD, size)
+    return found
 
 
 def is_key(fragment: bytes) -> bool:

@@ -36,6 +36,9 @@ class Source(Protocol):
     def recall(self, pulse: int) -> Gop | None:
         """Give the GOP in memory that holds a pulse, or the next one; None where nothing follows."""
 
+    def recall_before(self, pulse: int) -> Gop | None:
+        """Give the last GOP in memory that ends before a pulse; None where there is none."""
+
     @property
     def end(self) -> int:
         """The pulse after the newest frame."""
@@ -62,6 +65,12 @@ class ObjectPast:
         found = [gop for it in self.numbers if (gop := self.past.recent.of_object(it, pulse)) is not None]
         return min(found, key=lambda gop: gop.first, default=None)
 
+    def recall_before(self, pulse: int) -> Gop | None:
+        """Give their last GOP in memory that ends before a pulse."""
+        recent = self.past.recent
+        found = [gop for it in self.numbers if (gop := recent.of_object_before(it, pulse)) is not None]
+        return max(found, key=lambda gop: gop.first, default=None)
+
     @property
     def end(self) -> int:
         """The pulse after the newest decided frame."""
@@ -84,6 +93,10 @@ class CameraPast:
     def recall(self, pulse: int) -> Gop | None:
         """Give its GOP in memory that holds a pulse, or the next one, as far as it has come."""
         return self.past.recent.of_camera(self.camera, pulse)
+
+    def recall_before(self, pulse: int) -> Gop | None:
+        """Give its last GOP in memory that ends before a pulse."""
+        return self.past.recent.of_camera_before(self.camera, pulse)
 
     @property
     def end(self) -> int:
@@ -130,6 +143,20 @@ async def play(source: Source, start: int) -> AsyncGenerator[Gop, None]:
             return
 
 
+async def last_before(source: Source, pulse: int) -> Gop | None:
+    """Give the last GOP that begins before a pulse, up to there; None where nothing is kept of that time."""
+    found = [(one.run, it) for one in source.recorded if (it := one.tape.before(pulse)) is not None]
+    run, stretch = max(found, key=lambda it: it[1].first, default=(None, None))
+    gop = source.recall_before(pulse)
+    if run is None or stretch is None or (gop is not None and gop.end >= min(stretch.end, pulse)):
+        return gop
+    async with contextlib.aclosing(_read(run, stretch, min(stretch.end, pulse) - 1)) as reading:
+        async for last in reading:
+            if gop is None or last.first > gop.first:
+                return Gop(last.first, last.fragments[: pulse - last.first])
+    return gop
+
+
 def _next_on_disk(source: Source, pulse: int) -> tuple[Run, Stretch] | None:
     found = [(one.run, it) for one in source.recorded if (it := one.tape.at_or_after(pulse)) is not None]
     return min(found, key=lambda it: max(it[1].first, pulse), default=None)
@@ -142,7 +169,7 @@ def _from(gop: Gop, pulse: int) -> Gop:
 
 async def _read(run: Run, stretch: Stretch, pulse: int) -> AsyncGenerator[Gop, None]:
     path = run.camera_file(stretch.camera, stretch.file)
-    reading = gops(path, stretch.offset, stretch.length, run.head.fps)
+    reading = gops(path, stretch.offset, stretch.length, run.head.fps, pulse)
     try:
         while some := await asyncio.to_thread(_some, reading, pulse):
             for gop in some:

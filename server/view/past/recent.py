@@ -40,14 +40,18 @@ class Recent:
 
     def of_object(self, number: int, pulse: int) -> Gop | None:
         """Give somebody's GOP that holds a pulse, or the next one; None where nothing follows."""
-        for choices in self._choices:
-            camera = choices.choices.get(number)
-            if camera is None or choices.first + choices.frames <= pulse:
-                continue
-            gop = self.delivered(camera, choices.first, choices.frames)
-            if gop is not None and len(gop.fragments) == choices.frames:
-                return gop
-        return None
+        followed = (it for it in self._choices if it.first + it.frames > pulse)
+        return next((gop for it in followed if (gop := self._whole(number, it)) is not None), None)
+
+    def of_object_before(self, number: int, pulse: int) -> Gop | None:
+        """Give somebody's last GOP that ends before a pulse; None where there is none."""
+        before = (it for it in reversed(self._choices) if it.first + it.frames <= pulse)
+        return next((gop for it in before if (gop := self._whole(number, it)) is not None), None)
+
+    def _whole(self, number: int, choices: GopChoices) -> Gop | None:
+        camera = choices.choices.get(number)
+        gop = None if camera is None else self.delivered(camera, choices.first, choices.frames)
+        return gop if gop is not None and len(gop.fragments) == choices.frames else None
 
     def of_camera(self, camera: str, pulse: int) -> Gop | None:
         """Give a camera's GOP that holds a pulse, or the next one, as far as it has come."""
@@ -57,6 +61,16 @@ class Recent:
             gop = self.delivered(camera, first, self._gop)
             if gop is not None and gop.end > pulse:
                 return gop
+        return None
+
+    def of_camera_before(self, camera: str, pulse: int) -> Gop | None:
+        """Give a camera's last GOP that begins before a pulse, up to there; None where there is none."""
+        newest = self._shelves[camera].newest
+        begin = (min(pulse, newest + 1) - 1) // self._gop * self._gop
+        for first in range(begin, max(-1, newest - self._frames), -self._gop):
+            gop = self.delivered(camera, first, self._gop)
+            if gop is not None:
+                return Gop(gop.first, gop.fragments[: pulse - gop.first])
         return None
 
     def delivered(self, camera: str, first: int, frames: int) -> Gop | None:

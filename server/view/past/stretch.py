@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass, replace
 
@@ -76,6 +76,12 @@ class Tape:
         with self._lock:
             place = bisect_right(self._stretches, pulse, key=lambda it: it.end)
             return self._stretches[place] if place < len(self._stretches) else None
+
+    def before(self, pulse: int) -> Stretch | None:
+        """Give the last stretch that begins before a pulse; None where there is none."""
+        with self._lock:
+            place = bisect_left(self._stretches, pulse, key=lambda it: it.first)
+            return self._stretches[place - 1] if place else None
 
     def between(self, start: int, end: int) -> list[Stretch]:
         """Give the stretches that hold some of the pulses ``start … end - 1``, in order."""

@@ -1,0 +1,117 @@
+"""The past in segments (HLS), cut and numbered by pulses as the live ones are (:mod:`server.view.reel`).
+
+So a segment has one address, whether it is new or long past, and who plays the past comes to the present.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import aclosing
+from dataclasses import dataclass, replace
+
+from server.view.footage import Footage
+from server.view.past.hearing import Hearing
+from server.view.past.media import Gop, is_key
+from server.view.past.play import Source, known, last_before, play
+from server.view.picture import Picture
+from server.view.reel import Plan, Segment
+from server.view.timeline import Timeline
+from server.view.ts import Counters
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One segment in a list: pulses ``first … until - 1``."""
+
+    number: int
+    first: int
+    until: int
+
+
+class Rewound:
+    """One stream's past, in GOPs of ``gop`` pulses; ``timeline`` and ``hearing`` are asked for each segment.
+
+    ``decided`` is the pulse after the newest that a segment can have; ``over``: nothing follows what is kept.
+    """
+
+    def __init__(
+        self,
+        source: Source,
+        plan: Plan,
+        timeline: Callable[[], Timeline],
+        hearing: Callable[[], Hearing | None],
+        *,
+        gop: int,
+        decided: int,
+        over: bool,
+    ) -> None:
+        self._source, self._plan, self._gop = source, plan, gop
+        self._timeline, self._hearing = timeline, hearing
+        self._kept = known(source)
+        self._over = over
+        self.end = min(decided, self._kept[-1].end) if over and self._kept else decided
+        """The pulse after the last that there is, or will ever be where it is over."""
+
+    def entries(self, start: int, end: int | None) -> Sequence[Entry]:
+        """List the segments from the one that holds pulse ``start``, or what is kept after it, to the end.
+
+        Only whole ones, and the last one where it is over. In between, the last picture stands where
+        nothing was shown: no number is left out.
+        """
+        frames = self._plan.frames
+        begin = next((max(it.first, start) for it in self._kept if it.end > start), None)
+        if begin is None:
+            return []
+        last = -(-self.end // frames) if self._over else self.end // frames
+        last = last if end is None else min(last, -(-end // frames))
+        return [self._entry(number) for number in range(begin // frames, last)]
+
+    def _entry(self, number: int) -> Entry:
+        frames = self._plan.frames
+        first, until = number * frames, (number + 1) * frames
+        return Entry(number, max(self._kept[0].first, first), min(until, self.end) if self._over else until)
+
+    async def segment(self, number: int) -> Segment | None:
+        """Put a segment together; None where it is not whole yet, or nothing is kept of it or before it."""
+        first, until = number * self._plan.frames, (number + 1) * self._plan.frames
+        until = min(until, self.end) if self._over else until
+        if not first < until <= self.end:
+            return None
+        lead = await last_before(self._source, first)
+        timeline, hearing = self._timeline(), self._hearing()
+        led = [] if lead is None else _pictures(lead)
+        if led:  # as if it had been shown just now: what repeats it does not say how old it is
+            timeline.pass_by(replace(led[-1], pulse=first - 1))
+        came = await self._came(first, until)
+        footage: list[Footage] = []
+        for begin in range(first, until, self._gop):
+            end = min(begin + self._gop, until)
+            pictures = [it for one in came if begin <= one.pulse < end for it in timeline.take(one)]
+            pictures += timeline.fill(end)
+            if pictures:
+                heard = None if hearing is None else await hearing.beside(begin, end)
+                footage.append(Footage(pictures, self._plan.fps, Counters(), heard=heard))
+        if not footage:
+            return None
+        lead_footage = Footage(led, self._plan.fps, Counters()) if led else footage[0]
+        segment = Segment(number, self._plan, lead_footage)
+        for it in footage:
+            segment.add(it)
+        return segment
+
+    async def _came(self, first: int, until: int) -> list[Picture]:
+        """Give the pictures that there are of some pulses."""
+        came: list[Picture] = []
+        async with aclosing(play(self._source, first)) as gops:
+            async for gop in gops:
+                if gop.first >= until:
+                    break
+                came += _pictures(gop)
+        return came
+
+
+def _pictures(gop: Gop) -> list[Picture]:
+    return [
+        Picture(gop.first + place, is_key(fragment), fragment, boot=0)
+        for place, fragment in enumerate(gop.fragments)
+    ]

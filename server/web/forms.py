@@ -1,0 +1,42 @@
+"""What a stream can be sent as: one set of pictures and sound, several containers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from server.view.channel import Piece
+from server.view.fmp4 import init_segment
+from server.view.footage import Footage
+from server.view.service import BestViewService
+
+
+@dataclass(frozen=True, slots=True)
+class Form:
+    """A container."""
+
+    content_type: str
+    head: Callable[[BestViewService], bytes | None]
+    """What a stream begins with; None: nobody knows yet."""
+    packed: Callable[[Piece], bytes]
+    """Gives a piece of a stream."""
+
+
+def mp4_head(service: BestViewService) -> bytes | None:
+    """Give what every MP4 of a site begins with, the same for all; None before the first key frame."""
+    parameters, site = service.agreement.parameters, service.config.site
+    if parameters is None:
+        return None
+    return init_segment(parameters, site.width, site.height, service.config.sound.format)
+
+
+def _mp4(piece: Piece) -> bytes:
+    return piece.with_sound if isinstance(piece, Footage) else piece.data
+
+
+def _ts(piece: Piece) -> bytes:
+    return piece.ts if isinstance(piece, Footage) else piece.data
+
+
+MP4 = Form("video/mp4", mp4_head, _mp4)
+TS = Form("video/mp2t", lambda _: b"", _ts)
