@@ -362,6 +362,11 @@ async def test_a_cameras_past_goes_back_beyond_a_restart_of_the_service(tmp_path
         assert (await hall.get_json("/api/objects/1/past"))["spans"][0]["first"] == 5 * GOP, (
             "another person 1"
         )
+        async with hall.session.get("/api/past?from=p7") as answer:
+            lines = [json.loads(line) async for line in answer.content]
+        assert [line["first"] for line in lines] == [5, 10, 15, 25, 30]
+        (earlier,) = hall.service.past.store.earlier
+        assert [line.get("run") for line in lines] == [earlier.folder.name] * 3 + [None] * 2
     other = Store(tmp_path / "kept", AMPLE)
     other.open()
     assert len(other.earlier) == 2

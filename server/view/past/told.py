@@ -13,12 +13,16 @@ from server.wire.messages import GopChoices
 
 
 async def told(past: Past, start: int, end: int) -> AsyncIterator[bytes]:
-    """Give the choices about pulses ``start … end - 1`` in order, each as a line of JSON (event ``gop``)."""
-    at, run = start, past.run
-    for path in run.index_of(start, end) if run is not None else []:
-        for line, choices in await asyncio.to_thread(_lines, path, at, end):
-            yield line
-            at = choices.first + choices.frames
+    """Give the choices about pulses ``start … end - 1`` in order, each as a line of JSON (event ``gop``).
+
+    What an earlier run of the service has said has that run's name in it: its numbers are other people's.
+    """
+    at = start
+    for run in past.runs:
+        for path in run.index_of(at, end):
+            for line, choices in await asyncio.to_thread(_lines, path, at, end):
+                yield line if run is past.run else b'{"run":"%b",' % run.folder.name.encode() + line[1:]
+                at = choices.first + choices.frames
     for choices in past.recent.choices(at):
         if choices.first < end:
             yield msgspec.json.encode(choices) + b"\n"
