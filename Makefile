@@ -10,10 +10,10 @@ NODE_STAMP := node_modules/.installed
 demo: $(STAMP)
 	$(BIN)/myview demo
 
-test: $(STAMP)
+test: $(STAMP) $(NODE_STAMP)
 	$(BIN)/pytest -m "not slow"
 
-test-slow: $(STAMP)
+test-slow: $(STAMP) $(NODE_STAMP)
 	$(BIN)/pytest -m slow --timeout 1800
 
 lint: $(STAMP) $(NODE_STAMP)

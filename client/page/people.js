@@ -92,8 +92,10 @@ class Card {
     const picture = element('span', 'thumbnail');
     const number = element('span', 'number');
     number.textContent = String(object);
+    this.words = element('span', 'unseen'); // what is to be seen, for those who hear it
+    picture.ariaHidden = this.seenBy.ariaHidden = 'true';
     picture.append(this.image, number);
-    this.button.append(picture, this.seenBy);
+    this.button.append(picture, this.seenBy, this.words);
     this.item.append(this.button);
   }
 
@@ -106,8 +108,7 @@ class Card {
     this.button.setAttribute('aria-current', String(chosen));
     this.button.classList.toggle('away', !person.visible);
     const seen = person.cameras.length ? `seen by ${person.cameras.join(', ')}` : 'not in view';
-    this.button.setAttribute('aria-label', `Person ${person.object}, ${seen}`);
-    this.button.title = `Person ${person.object}, ${seen}`;
+    this.words.textContent = this.button.title = `Person ${person.object}, ${seen}`;
     this.#showCameras(person, palette);
     if (person.thumbnail && person.thumbnail !== this.#thumbnail) void this.#load(person.thumbnail);
   }
@@ -126,8 +127,8 @@ class Card {
       chip.textContent = camera;
       return chip;
     });
-    if (!chips.length) chips.push(element('span', 'nobody'));
-    this.seenBy.replaceChildren(...chips);
+    if (chips.length) this.seenBy.replaceChildren(...chips);
+    else this.seenBy.textContent = 'not in view';
   }
 
   /**

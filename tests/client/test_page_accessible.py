@@ -1,0 +1,56 @@
+"""The page with a keyboard and a screen reader: axe-core finds no serious fault in any of its states."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import pytest_asyncio
+from page_browser import Visit, needs_chromium, visiting
+from page_site import FakeSite
+from playwright.async_api import Browser
+
+from benchmarks.browser import chromium
+
+AXE = Path(__file__).parents[2] / "node_modules/axe-core/axe.min.js"
+SERIOUS = ("serious", "critical")
+
+pytestmark = [
+    needs_chromium,
+    pytest.mark.skipif(not AXE.exists(), reason="needs axe-core: make node_modules/.installed"),
+    pytest.mark.asyncio(loop_scope="module"),
+]
+
+
+@pytest_asyncio.fixture(scope="module", loop_scope="module")
+async def browser() -> AsyncIterator[Browser]:
+    async with chromium() as running:
+        yield running
+
+
+async def faults(visit: Visit) -> list[Any]:
+    """Give what axe-core finds serious: rule, help, and the elements."""
+    await visit.page.add_script_tag(path=AXE)
+    found = await visit.get("axe.run()")
+    return [
+        (it["id"], it["help"], [node["html"] for node in it["nodes"]])
+        for it in found["violations"]
+        if it["impact"] in SERIOUS
+    ]
+
+
+@pytest.mark.parametrize("width", [360, 800, 1600])
+async def test_while_somebody_is_watched(browser: Browser, width: int) -> None:
+    async with visiting(browser, FakeSite(people={1: True, 2: False}), width=width) as visit:
+        await visit.playing(1)
+        await visit.page.get_by_text("More", exact=True).click()
+        assert await faults(visit) == []
+
+
+@pytest.mark.parametrize(("people", "query"), [({}, ""), ({1: False}, "?object=1"), ({1: True}, "?object=9")])
+async def test_while_there_is_nobody_to_watch(browser: Browser, people: dict[int, bool], query: str) -> None:
+    async with visiting(browser, FakeSite(people=people), query) as visit:
+        await visit.until("['empty', 'away', 'unknown'].includes(myview.state)")
+        assert await faults(visit) == []
