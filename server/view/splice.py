@@ -105,7 +105,7 @@ class Splicer:
     @property
     def viewers(self) -> int:
         """How many streams are being watched."""
-        channels = [*self.objects.values(), *self.cameras.values()]
+        channels = [*self.objects.values(), *self.cameras.values(), *self.decided.values()]
         return sum(channel.viewers for channel in channels)
 
     def close(self) -> None:

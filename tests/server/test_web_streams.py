@@ -8,6 +8,7 @@ import io
 import aiohttp
 import av
 import numpy as np
+import pytest
 from cameras_by_hand import CAMERAS, FPS, GOP, LARGE, SMALL, encoded
 from halls import A, B, Hall, opened
 
@@ -44,6 +45,39 @@ async def test_the_best_view_is_playable_from_its_first_byte_at_the_pulses_times
         np.testing.assert_array_equal(
             picture.to_ndarray(format="yuv420p"), own[pulse].to_ndarray(format="yuv420p")
         )
+
+
+async def test_a_stream_that_is_held_to_a_camera_shows_that_one_whichever_is_best(busy: Hall) -> None:
+    assert (await busy.get_json("/api/objects/1/choice"))["camera"] == B
+    async with busy.session.get(f"/objects/1/best.mp4?camera={A}") as answer:
+        data = await read_stream(answer, GOP)
+    decoder = av.VideoCodecContext.create("h264", "r")
+    own = [picture for unit in encoded(0) for picture in decoder.decode(av.Packet(unit.data))]
+    with av.open(io.BytesIO(data), "r") as stream:
+        pictures = list(stream.decode(video=0))
+    assert len(pictures) == GOP
+    for picture in pictures:
+        pulse = round(float(picture.time or 0) * FPS)
+        np.testing.assert_array_equal(
+            picture.to_ndarray(format="yuv420p"), own[pulse].to_ndarray(format="yuv420p")
+        )
+
+
+@pytest.mark.parametrize(
+    ("path", "status"),
+    [
+        ("/objects/1/best.mp4?camera=c7", 404),
+        ("/objects/7/best.mp4?camera=c0", 404),
+        ("/objects/1/best.jpg?camera=c0", 400),
+        ("/objects/1/best.mp4?camera=c0&overlay=1", 400),
+        ("/objects/1/best.ts?camera=c0&from=-1", 400),
+        ("/cameras/c0/live.mp4?camera=c1", 400),
+    ],
+)
+async def test_what_cannot_be_held_to_a_camera_is_said(busy: Hall, path: str, status: int) -> None:
+    code, content = await busy.get(path)
+    assert code == status
+    assert "camera" in content["error"] or "object 7" in content["error"]
 
 
 async def test_a_cameras_own_stream_begins_with_its_newest_gop(busy: Hall) -> None:
