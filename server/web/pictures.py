@@ -18,6 +18,7 @@ from server.view.pictures import (
 )
 from server.view.pictures.multipart import BEGIN, CONTENT_TYPE, PULSE, part
 from server.web.api import not_now, problem
+from server.web.forms import MP4
 from server.web.keys import PICTURES, SERVICE
 from server.web.limits import no_place
 from server.web.streams import send_stream, send_viewer
@@ -54,31 +55,19 @@ def _or_refused(handler: Handler) -> Handler:
 
 
 @routes.get("/objects/{object:[0-9]{1,9}}/best.mjpeg")
-@_or_refused
-async def get_best_mjpeg(request: web.Request) -> web.StreamResponse:
-    """Stream the best view of a person as multipart JPEG, for whatever shows pictures but no video."""
-    return await _mjpeg(request, _person(request))
-
-
 @routes.get("/cameras/{camera}/live.mjpeg")
 @_or_refused
-async def get_live_mjpeg(request: web.Request) -> web.StreamResponse:
-    """Stream one camera as multipart JPEG."""
-    return await _mjpeg(request, _camera(request))
+async def get_mjpeg(request: web.Request) -> web.StreamResponse:
+    """Stream as multipart JPEG, for whatever shows pictures but no video."""
+    return await _mjpeg(request, _subject(request))
 
 
 @routes.get("/objects/{object:[0-9]{1,9}}/best.jpg")
-@_or_refused
-async def get_best_still(request: web.Request) -> web.StreamResponse:
-    """Give the newest picture of the best view of a person."""
-    return await _still(request, _person(request))
-
-
 @routes.get("/cameras/{camera}/live.jpg")
 @_or_refused
-async def get_live_still(request: web.Request) -> web.StreamResponse:
-    """Give one camera's newest picture."""
-    return await _still(request, _camera(request))
+async def get_still(request: web.Request) -> web.StreamResponse:
+    """Give the newest picture of a stream."""
+    return await _still(request, _subject(request))
 
 
 def wants_boxes(request: web.Request) -> bool:
@@ -100,7 +89,7 @@ async def best_with_boxes(request: web.Request) -> web.StreamResponse:
         film.wanted += 1
         try:
             head = await source.film_head()
-            return await send_stream(request, film.channel, head, headers)
+            return await send_stream(request, film.channel, head, headers, MP4.packed)
         finally:
             film.wanted -= 1
 
@@ -135,6 +124,10 @@ async def _still(request: web.Request, subject: Subject) -> web.StreamResponse:
 def _headers_only(headers: dict[str, str]) -> web.Response:
     always = {"Cache-Control": "no-store", "Access-Control-Allow-Origin": "*", **_EXPOSED}
     return web.Response(headers={**always, **headers})
+
+
+def _subject(request: web.Request) -> Subject:
+    return _camera(request) if "camera" in request.match_info else _person(request)
 
 
 def _person(request: web.Request) -> Subject:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import asyncio
-import shutil
-import subprocess
 from collections.abc import AsyncIterator, Mapping
 from pathlib import Path
 
 import numpy as np
 import pytest
 from cameras_by_hand import CAMERAS, FPS, GOP, NO_REASON, FedService, video
+from ffprobe_by_hand import needs_ffprobe, probed
 from halls import A, Hall, opened
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -219,7 +218,7 @@ async def test_sound_goes_with_the_segments_it_is_of(tmp_path: Path) -> None:
     assert again.earlier[0].sound.tape.all == run.sound.tape.all
 
 
-@pytest.mark.skipif(not shutil.which("ffprobe"), reason="needs ffprobe")
+@needs_ffprobe
 async def test_the_sound_plays_from_the_disk_by_itself(hall: Hall, recording: Path) -> None:
     sends(hall.service, recording)
     shows(hall, recording, range(GOPS))
@@ -227,14 +226,9 @@ async def test_the_sound_plays_from_the_disk_by_itself(hall: Hall, recording: Pa
     run = hall.service.past.run
     assert run is not None
     for path in (run.sound.path, run.sound_file(0)):
-        done = subprocess.run(
-            ["ffprobe", "-v", "warning", "-count_frames", "-show_entries", "stream=codec_name,nb_read_frames",
-             "-of", "csv=p=0", str(path)],
-            capture_output=True, text=True, timeout=30, check=True,
-        )  # fmt: skip
-        assert done.stderr == ""
-        assert done.stdout.splitlines()[0].startswith("aac,")
-        assert int(done.stdout.splitlines()[0].split(",")[1]) >= 18
+        ((codec, frames, *_),) = probed(path, "codec_name,nb_read_frames")
+        assert codec == "aac"
+        assert int(frames) >= 18
 
 
 async def test_a_site_without_sound_keeps_none(tmp_path: Path, recording: Path) -> None:

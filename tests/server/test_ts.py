@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import io
-import shutil
-import subprocess
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
 import av
 import numpy as np
-import pytest
 from cameras_by_hand import CAMERAS, FPS, GOP, encoded
+from ffprobe_by_hand import needs_ffprobe, probed
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -158,17 +156,7 @@ def test_a_decoder_shows_the_cameras_own_pixels_across_cuts() -> None:
         np.testing.assert_array_equal(it.to_ndarray(format="yuv420p"), own[camera][pulse])
 
 
-@pytest.mark.skipif(not shutil.which("ffprobe"), reason="needs ffprobe")
+@needs_ffprobe
 def test_ffprobe_has_nothing_to_say(tmp_path: Path) -> None:
     (tmp_path / "best.ts").write_bytes(spliced([0, 1, 1, 0])[0])
-    entries = "stream=nb_read_frames,r_frame_rate"
-    done = subprocess.run(
-        f"ffprobe -v warning -count_frames -show_entries {entries} -of csv=p=0 best.ts".split(),
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        timeout=30,
-        check=True,
-    )
-    assert done.stderr == ""
-    assert done.stdout.split()[0] == f"25/1,{4 * GOP}"
+    assert probed(tmp_path / "best.ts", "nb_read_frames,r_frame_rate") == [["25/1", f"{4 * GOP}"]]

@@ -1,4 +1,4 @@
-"""The film with boxes: encoded once, in fragments at the pulses' times, for any number of viewers."""
+"""The film with boxes: encoded once for all viewers, at the pulses' times, with the site's sound."""
 
 from __future__ import annotations
 
@@ -7,19 +7,26 @@ from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
 from server.view.agreement import Agreement
-from server.view.channel import Channel, Chunk
+from server.view.channel import Channel
 from server.view.fmp4 import Sample, fragment, init_segment
 from server.view.h264 import nal_units, parameter_sets, sample
 from server.view.picture import Picture
+from server.view.sound import Following, SoundShelf
+from server.view.tally import Tally
 from server.view.timeline import Timeline
 from server.wire.drawing import Canvas, Unit
 
 
 class Film:
-    """Takes frames as they are encoded. Processes come and go: its time has no hole and never goes back."""
+    """Takes frames as they are encoded. Processes come and go: its time has no hole and never goes back.
 
-    def __init__(self, canvas: Canvas, queue_gops: int) -> None:
-        self._canvas = canvas
+    ``sound`` is None at a site without.
+    """
+
+    def __init__(self, canvas: Canvas, queue_gops: int, sound: SoundShelf | None = None) -> None:
+        self._canvas, self._tally = canvas, Tally(canvas.fps)
+        self._format = None if sound is None else sound.format
+        self._sound = None if sound is None else Following(sound)
         self._agreement = Agreement()
         self._time = Timeline(self._agreement, canvas.fps, canvas.gop)
         self._process = 0
@@ -35,8 +42,8 @@ class Film:
         """Pass on encoded frames of one request, after what bridges a hole before them."""
         pictures = [shown for unit in units for shown in self._time.take(self._picture(unit))]
         for gop in _gops(pictures):
-            data = b"".join(picture.fragment for picture in gop)
-            self.channel.publish(Chunk(data, start=gop[0].key))
+            heard = None if self._sound is None else self._sound.beside(gop[0].pulse, gop[-1].until)
+            self.channel.publish(self._tally.footage(gop, heard))
 
     def interrupted(self) -> None:
         """Another process goes on from here: what it encodes builds on nothing that was before."""
@@ -52,7 +59,7 @@ class Film:
         if unit.key:
             self._agreement.check(parameter_sets(units))
         if self.head is None and self._agreement.parameters is not None:
-            self.head = init_segment(self._agreement.parameters, canvas.width, canvas.height)
+            self.head = init_segment(self._agreement.parameters, canvas.width, canvas.height, self._format)
             self.begun.set()
         made = fragment([Sample(sample(units), unit.key, unit.lasts)], unit.pulse, canvas.fps)
         return Picture(unit.pulse, unit.key, made, self._process, unit.lasts)

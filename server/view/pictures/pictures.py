@@ -177,7 +177,15 @@ class Pictures:
             case CameraView(camera):
                 stream, told = splicer.cameras[camera], _nothing
         live = isinstance(subject, CameraView) and not subject.decided
-        return Source(str(subject), stream, told, self._canvas, live=live, queue_gops=self._queue)
+        return Source(
+            str(subject),
+            stream,
+            told,
+            self._canvas,
+            live=live,
+            queue_gops=self._queue,
+            sound=self._service.sound,
+        )
 
     def _end(self, subject: Subject, running: _Running) -> None:
         running.task.cancel()

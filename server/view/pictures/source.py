@@ -13,6 +13,7 @@ from server.view.pictures.film import Film
 from server.view.pictures.process import DrawProcess, ProcessDiedError
 from server.view.pictures.series import AllSeries
 from server.view.pictures.stills import Stills
+from server.view.sound import SoundShelf
 from server.wire.drawing import Canvas, Draw, Jpeg, Still
 
 log = logging.getLogger(__name__)
@@ -30,7 +31,7 @@ class Source:
     """Decodes one stream while somebody uses it; what is made of it outlives the process that makes it.
 
     A slow process is a slow viewer: it loses whole GOPs, and nobody waits for it. ``told`` gives the boxes of
-    fragments. ``live`` pictures are shown as they come, others in pace.
+    fragments. ``live`` pictures are shown as they come, others in pace. ``sound`` goes under the film.
     """
 
     def __init__(
@@ -42,9 +43,10 @@ class Source:
         *,
         live: bool,
         queue_gops: int,
+        sound: SoundShelf | None = None,
     ) -> None:
         self._name, self._stream, self._told, self._canvas = name, stream, told, canvas
-        self._live, self._queue_gops = live, queue_gops
+        self._live, self._queue_gops, self._sound = live, queue_gops, sound
         self._begin()
         self._stills = Stills()
         self._used = asyncio.Event()
@@ -135,7 +137,7 @@ class Source:
 
     def _begin(self) -> None:
         """Begin anew what is made of it: whoever comes must not be shown what others saw before."""
-        self.film = Film(self._canvas, self._queue_gops)
+        self.film = Film(self._canvas, self._queue_gops, self._sound)
         self.series = AllSeries(self._canvas, live=self._live)
 
     async def _run_process(self) -> None:
