@@ -1,4 +1,4 @@
-/** The site's cameras: the key to the strip's colours, which one is live, and which are not well. */
+/** The site's cameras: the key to the strip's colours, which one is live or held, and which are not well. */
 
 /** @import {Camera} from './contract.js' */
 /** @import {Palette} from './palette.js' */
@@ -6,13 +6,19 @@
 /** @type {Record<Camera['state'], string>} */
 const WORDS = { live: '', gone: 'gone', ended: 'ended', starting: 'starting', refused: 'refused' };
 
+const KEYS = 9; // cameras that have a key
+
 export class Cameras {
   /** @type {Map<string, HTMLElement>} */
   #items = new Map();
 
-  /** @param {HTMLElement} list */
-  constructor(list) {
+  /**
+   * @param {HTMLElement} list
+   * @param {(camera: string) => void} hold
+   */
+  constructor(list, hold) {
     this.list = list;
+    this.hold = hold;
   }
 
   /**
@@ -21,7 +27,8 @@ export class Cameras {
    */
   configure(cameras, palette) {
     if (cameras.join() === [...this.#items.keys()].join()) return;
-    this.#items = new Map(cameras.map((camera) => [camera, makeItem(camera, palette.colour(camera))]));
+    const make = (/** @type {string} */ camera, /** @type {number} */ at) => this.#make(camera, at, palette.colour(camera));
+    this.#items = new Map(cameras.map((camera, at) => [camera, make(camera, at)]));
     this.list.replaceChildren(...this.#items.values());
   }
 
@@ -36,25 +43,37 @@ export class Cameras {
     }
   }
 
-  /** @param {string | null} live */
-  mark(live) {
+  /**
+   * @param {string | null} live
+   * @param {string | null} held
+   */
+  mark(live, held) {
     for (const [camera, item] of this.#items) {
       if (camera === live) item.setAttribute('aria-current', 'true');
       else item.removeAttribute('aria-current');
+      item.firstElementChild?.setAttribute('aria-pressed', String(camera === held));
     }
   }
-}
 
-/**
- * @param {string} camera
- * @param {string} colour
- */
-function makeItem(camera, colour) {
-  const item = document.createElement('li');
-  item.style.setProperty('--camera', colour);
-  const name = document.createElement('span');
-  name.className = 'chip';
-  name.textContent = camera;
-  item.append(name, document.createElement('small'));
-  return item;
+  /**
+   * @param {string} camera
+   * @param {number} at
+   * @param {string} colour
+   */
+  #make(camera, at, colour) {
+    const item = document.createElement('li');
+    item.style.setProperty('--camera', colour);
+    const name = document.createElement('button');
+    name.type = 'button';
+    name.className = 'chip';
+    name.textContent = camera;
+    name.title = `Hold ${camera}`;
+    if (at < KEYS) {
+      name.title += ` (${at + 1})`;
+      name.setAttribute('aria-keyshortcuts', String(at + 1));
+    }
+    name.addEventListener('click', () => this.hold(camera));
+    item.append(name, document.createElement('small'));
+    return item;
+  }
 }

@@ -10,7 +10,8 @@
  * @property {number} height
  * @property {number} gop frames between two moments at which the camera may change
  * @property {number} lookahead_frames
- * @property {string} codec RFC 6381, such as avc1.42C01F
+ * @property {string} codec RFC 6381, such as avc1.42C01F, or vp8
+ * @property {'mp4' | 'webm'} [container] what streams are in; mp4 where it is not said
  * @property {string | null} [sound] the same of the sound, such as mp4a.40.2; null: the site has none
  * @property {number | null} pulse0 unix seconds at which pulse 0 was due; null before the first pulse
  * @property {number} now unix seconds of the server's clock

@@ -1,13 +1,14 @@
-/** A live stream as whole MP4 segments, in bunches as they arrive. */
+/** A live stream as whole segments, in bunches as they arrive. */
 
 import { SegmentSplitter } from './mp4.js';
+import { ClusterSplitter } from './webm.js';
 
 /** @import {Segment} from './mp4.js' */
 
 const SILENCE_MS = 6000; // a live stream that says nothing for this long is dead, whatever TCP thinks
 
 /**
- * @param {string} address
+ * @param {string} address of an MP4, or of a WebM by its ending
  * @param {AbortSignal} signal
  * @returns {AsyncGenerator<Segment[], void>}
  * @throws {Error} when there is no such stream, or it fails or falls silent; returns when it ends
@@ -20,7 +21,7 @@ export async function* download(address, signal) {
     const response = await fetch(address, { cache: 'no-store', signal: either });
     if (!response.ok || !response.body) throw new Error(`${address}: ${response.status}`);
     const reader = response.body.getReader();
-    const splitter = new SegmentSplitter();
+    const splitter = address.split('?')[0].endsWith('.webm') ? new ClusterSplitter() : new SegmentSplitter();
     for (;;) {
       const { done, value } = await reader.read();
       if (done) return;

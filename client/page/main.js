@@ -41,7 +41,7 @@ const [title, text] = /** @type {HTMLElement[]} */ ([...element('status').childr
 
 const viewer = new Viewer(video, show);
 const people = new People(element('people'), element('earlier'), (object) => viewer.choose(object));
-const cameras = new Cameras(element('cameras'));
+const cameras = new Cameras(element('cameras'), (camera) => viewer.hold(camera));
 const overlay = new Overlay(element('boxes'));
 const strip = new Strip(element('strip'));
 const reason = new Reason(element('reason'));
@@ -58,6 +58,8 @@ function show() {
     document.body.classList.add('ready');
     cameras.configure(site.cameras, viewer.palette);
     cameras.show(viewer.cameras);
+    cameras.mark(viewer.probe.camera, viewer.held);
+    element('automatic').hidden = viewer.held === null;
   }
   if (viewer.people) {
     people.show(viewer.people, viewer.object, viewer.palette, (person) => viewer.isGone(person));
@@ -82,7 +84,17 @@ function readOut() {
   element('delay').textContent = viewer.flowing && delay > 0 ? `${(delay / 1000).toFixed(1)} s` : MISSING;
   if (!site || probe.pulse === null || viewer.object === null) return strip.clear();
   strip.draw({ pulse: probe.pulse, fps: site.fps, object: viewer.object, decisions, palette });
-  void reason.about(viewer.object, probe.camera);
+  if (viewer.held === null) void reason.about(viewer.object, probe.camera);
+  else reason.put(`Held by hand. ${best(decisions.camera(viewer.object, probe.pulse), viewer.held)}`);
+}
+
+/**
+ * @param {string | null} camera that would be shown
+ * @param {string} held
+ */
+function best(camera, held) {
+  if (camera === null) return '';
+  return camera === held ? 'It is the best view just now.' : `The best view just now is ${camera}.`;
 }
 
 /** @param {number[]} values */
@@ -121,7 +133,7 @@ watchFrames(video, painted, (frame) => {
   const { camera } = viewer.probe;
   if (camera === marked) return;
   marked = camera;
-  cameras.mark(camera);
+  cameras.mark(camera, viewer.held);
   element('camera').textContent = camera ?? '';
   element('camera').style.setProperty('--camera', camera ? viewer.palette.colour(camera) : 'none');
   if (viewer.probe.pulse !== null) readOut();
@@ -162,6 +174,12 @@ async function copyLink() {
   viewer.say(done ? 'The link to this person is copied.' : `The link to this person: ${location.href}`);
 }
 
+/** @param {number} number from 1, of a camera in the site's order */
+function holdNumber(number) {
+  const camera = viewer.site?.cameras[number - 1];
+  if (camera) viewer.hold(camera);
+}
+
 /** @param {MouseEvent} event */
 function personAt(event) {
   return viewer.site ? overlay.hit(viewer.boxes, viewer.site, event) : null;
@@ -171,6 +189,7 @@ toggle.addEventListener('click', toggleBoxes);
 soundToggle.addEventListener('click', toggleSound);
 followToggle.addEventListener('click', toggleFollow);
 element('full-screen').addEventListener('click', fullScreen);
+element('automatic').addEventListener('click', () => viewer.hold(null));
 element('snapshot').addEventListener('click', snapshot);
 element('copy-link').addEventListener('click', copyLink);
 element('in-picture').addEventListener('click', () => void pictureInPicture(video).catch(() => undefined));
@@ -188,6 +207,8 @@ listenToKeys({
   f: fullScreen,
   s: snapshot,
   l: copyLink,
+  0: () => viewer.hold(null),
+  ...Object.fromEntries([1, 2, 3, 4, 5, 6, 7, 8, 9].map((key) => [key, () => holdNumber(key)])),
   Escape: () => (more.open = false),
 });
 stage.addEventListener('mousemove', (event) => stage.classList.toggle('over-person', personAt(event) !== null));

@@ -21,10 +21,16 @@ const PAUSED_S = 30; // of video that waits behind a paused picture; then the do
 const INSIDE_S = 0.001; // a seek to the very start of a range may round to just before it
 
 /**
+ * @typedef {object} Subject
+ * @property {number} object who is to be seen
+ * @property {string | null} camera by which; null: by whichever sees them best
+ */
+
+/**
  * One download of one person's stream.
  *
  * @typedef {object} Run
- * @property {number} object
+ * @property {Subject} subject
  * @property {AbortController} leave
  * @property {number} start media time of its first frame; NaN before that came
  * @property {number} since performance.now() of when its first frame was in the buffer; NaN before
@@ -46,13 +52,14 @@ export class Player {
   #landing = null;
   #pace = new Pace();
   #codec = '';
-  /** @type {number | null} whose picture the element shows */
+  #container = 'mp4';
+  /** @type {Subject | null} whose picture the element shows */
   shown = null;
 
   /**
    * @param {HTMLVideoElement} video
    * @param {object} listener
-   * @param {(object: number) => void} listener.landed the picture is now of this person
+   * @param {() => void} listener.landed the picture is now of who was chosen last
    */
   constructor(video, listener) {
     this.video = video;
@@ -63,39 +70,41 @@ export class Player {
     });
     video.addEventListener('error', () => this.#reopen());
     video.addEventListener('play', () => {
-      if (!this.#run && this.shown !== null) this.choose(this.shown);
+      if (!this.#run && this.shown) this.choose(this.shown);
     });
     setInterval(() => this.#tick(), TICK_MS);
   }
 
   /**
+   * @param {string} container mp4 or webm
    * @param {string} codec of the pictures, and after a comma of the sound if there is any
    * @returns {boolean} whether this browser can play such streams at all
    */
-  configure(codec) {
-    if (!Source?.isTypeSupported(mime(codec))) return false;
-    if (codec !== this.#codec) {
+  configure(container, codec) {
+    if (!Source?.isTypeSupported(mime(container, codec))) return false;
+    if (container !== this.#container || codec !== this.#codec) {
+      this.#container = container;
       this.#codec = codec;
       this.#reopen();
     }
     return true;
   }
 
-  /** @param {number} object whom to show from now on */
-  choose(object) {
-    if (this.#run?.object === object) return;
+  /** @param {Subject} subject whom to show from now on */
+  choose(subject) {
+    if (this.#run && same(this.#run.subject, subject)) return;
     this.#run?.leave.abort();
-    this.#run = begin(object);
+    this.#run = begin(subject);
     void this.#follow(this.#run);
   }
 
   #reopen() {
-    const object = this.#run?.object;
+    const subject = this.#run?.subject;
     this.#run?.leave.abort();
     this.#run = this.#landing = null;
     this.#opened = null;
     this.#buffer = this.#open();
-    if (object !== undefined) this.choose(object);
+    if (subject) this.choose(subject);
   }
 
   /** @returns {Promise<MediaBuffer>} */
@@ -105,7 +114,7 @@ export class Player {
     this.video.src = address;
     await new Promise((resolve) => source.addEventListener('sourceopen', resolve, { once: true }));
     URL.revokeObjectURL(address);
-    this.#opened = new MediaBuffer(source.addSourceBuffer(mime(this.#codec)));
+    this.#opened = new MediaBuffer(source.addSourceBuffer(mime(this.#container, this.#codec)));
     this.video.play().catch(() => undefined); // the page says that it is paused, and how to go on
     return this.#opened;
   }
@@ -116,14 +125,14 @@ export class Player {
     const backoff = new Backoff();
     while (!signal.aborted) {
       try {
-        for await (const segments of download(`objects/${run.object}/best.mp4`, signal)) {
+        for await (const segments of download(address(run.subject, this.#container), signal)) {
           await this.#take(run, segments);
           if (signal.aborted) return;
           backoff.reset();
         }
       } catch (error) {
         // Whatever it was (the server away, the person not known yet), the answer is to try again.
-        if (!signal.aborted) console.info(`the stream of ${run.object}: ${error}`);
+        if (!signal.aborted) console.info(`the stream of ${run.subject.object}: ${error}`);
       }
       if (signal.aborted) return;
       run.start = run.since = NaN;
@@ -188,8 +197,8 @@ export class Player {
   #showing(run) {
     if (run !== this.#landing) return;
     this.#landing = null;
-    this.shown = run.object;
-    this.listener.landed(run.object);
+    this.shown = run.subject;
+    this.listener.landed();
   }
 
   /** @param {number} time */
@@ -223,14 +232,33 @@ export class Player {
 }
 
 /**
- * @param {number} object
- * @returns {Run}
+ * @param {Subject} subject
+ * @param {string} container
  */
-function begin(object) {
-  return { object, leave: new AbortController(), start: NaN, since: NaN, landed: false, early: [] };
+function address({ object, camera }, container) {
+  return `objects/${object}/best.${container}${camera === null ? '' : `?camera=${encodeURIComponent(camera)}`}`;
 }
 
-/** @param {string} codec */
-function mime(codec) {
-  return `video/mp4; codecs="${codec}"`;
+/**
+ * @param {Subject} one
+ * @param {Subject} other
+ */
+function same(one, other) {
+  return one.object === other.object && one.camera === other.camera;
+}
+
+/**
+ * @param {Subject} subject
+ * @returns {Run}
+ */
+function begin(subject) {
+  return { subject, leave: new AbortController(), start: NaN, since: NaN, landed: false, early: [] };
+}
+
+/**
+ * @param {string} container
+ * @param {string} codec
+ */
+function mime(container, codec) {
+  return `video/${container}; codecs="${codec}"`;
 }

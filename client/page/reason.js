@@ -36,6 +36,13 @@ export class Reason {
     }
   }
 
+  /** @param {string} text instead */
+  put(text) {
+    this.#about = '';
+    this.#asked = -Infinity;
+    this.place.textContent = this.place.title = text;
+  }
+
   /**
    * @param {string} about an answer to an older question is not said any more
    * @param {string} text

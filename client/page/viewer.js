@@ -1,6 +1,6 @@
 /** What the page knows and what follows from it: the one place where the parts meet. */
 
-import { onAddress, objectInAddress, writeAddress } from './address.js';
+import { onAddress, watchedInAddress, writeAddress } from './address.js';
 import { Decisions } from './decisions.js';
 import { Follow } from './follow.js';
 import { Palette } from './palette.js';
@@ -26,7 +26,8 @@ export class Viewer {
   /** @type {Camera[]} */
   cameras = [];
   /** @type {number | null} */
-  object = objectInAddress();
+  object = watchedInAddress().object;
+  #held = watchedInAddress().camera;
   palette = new Palette([]);
   decisions = new Decisions(1);
   probe = new Probe();
@@ -55,7 +56,10 @@ export class Viewer {
     this.changed = changed;
     this.player = new Player(video, { landed: changed });
     this.probe.object = this.object;
-    onAddress((object) => object !== null && this.#turnTo(object, true));
+    onAddress(({ object, camera }) => {
+      this.#held = camera;
+      if (object !== null) this.#turnTo(object, true);
+    });
   }
 
   /** @param {Site} site */
@@ -65,7 +69,8 @@ export class Viewer {
     if (anew) this.decisions = new Decisions(site.fps);
     this.site = this.probe.site = site;
     this.palette = new Palette(site.cameras);
-    this.supported = this.player.configure(site.sound ? `${site.codec},${site.sound}` : site.codec);
+    const codec = site.sound ? `${site.codec},${site.sound}` : site.codec;
+    this.supported = this.player.configure(site.container ?? 'mp4', codec);
     this.#play();
     this.changed();
   }
@@ -107,8 +112,23 @@ export class Viewer {
 
   /** @param {number} object as the viewer wishes */
   choose(object) {
+    if (object !== this.object) this.#held = null;
     this.#turnTo(object, true);
-    writeAddress(object, true);
+    this.#write(true);
+  }
+
+  /** @returns {string | null} the camera that is held by hand; null: the best is shown */
+  get held() {
+    return this.#held !== null && this.site?.cameras.includes(this.#held) ? this.#held : null;
+  }
+
+  /** @param {string | null} camera to stay with; once more, or null: the best is shown again */
+  hold(camera) {
+    if (this.object === null) return;
+    this.#held = camera === this.#held ? null : camera;
+    this.#write(true);
+    this.#play();
+    this.changed();
   }
 
   /** @param {number} by steps through those in view, around the end */
@@ -136,9 +156,9 @@ export class Viewer {
       this.#frameAt = performance.now();
       this.probe.frame({ pulse, shownAt, delayMs: this.#delay(pulse, shownAt) });
     }
-    const object = this.player.shown;
-    if (object !== null) {
-      const camera = this.decisions.camera(object, pulse);
+    if (this.player.shown) {
+      const { object, camera: held } = this.player.shown;
+      const camera = held ?? this.decisions.camera(object, pulse);
       this.probe.view(object, camera, shownAt);
       this.boxes = camera === null ? [] : this.decisions.boxes(camera, pulse);
       this.part = this.#frame(`${object} ${camera}`, object, passed);
@@ -174,7 +194,7 @@ export class Viewer {
       listed: this.chosen !== undefined,
       visible: this.chosen?.visible ?? false,
       paused: this.player.video.paused && this.probe.pulse !== null,
-      moving: flowing && (this.player.shown === this.object || performance.now() - this.#chosenAt < STANDING_MS),
+      moving: flowing && (this.player.shown?.object === this.object || performance.now() - this.#chosenAt < STANDING_MS),
     });
     this.probe.state = status.state;
     return status;
@@ -205,7 +225,7 @@ export class Viewer {
     if (!same || this.chosen) return;
     this.say(`Person ${object} turned out to be person ${same.object}.`);
     this.#turnTo(same.object, this.#asked);
-    writeAddress(same.object, false);
+    this.#write(false);
   }
 
   /** @param {string} text that is worth a moment's notice */
@@ -219,10 +239,15 @@ export class Viewer {
     const first = this.people?.filter((person) => person.visible).sort((a, b) => a.object - b.object)[0];
     if (first) {
       this.#turnTo(first.object, false);
-      writeAddress(first.object, false);
+      this.#write(false);
     } else if (!this.#asked) {
       this.object = this.probe.object = null;
     }
+  }
+
+  /** @param {boolean} chosen by the viewer */
+  #write(chosen) {
+    writeAddress({ object: this.object, camera: this.#held }, chosen);
   }
 
   /**
@@ -231,7 +256,10 @@ export class Viewer {
    */
   #turnTo(object, asked) {
     this.#asked = asked;
-    if (object === this.object) return;
+    if (object === this.object) {
+      this.#play();
+      return;
+    }
     this.object = object;
     this.#chosenAt = performance.now();
     this.probe.choose(object);
@@ -241,7 +269,7 @@ export class Viewer {
 
   #play() {
     if (!this.site || !this.supported || !this.people) return;
-    if (this.object !== null && this.chosen) this.player.choose(this.object);
+    if (this.object !== null && this.chosen) this.player.choose({ object: this.object, camera: this.held });
     else this.player.stop();
   }
 }

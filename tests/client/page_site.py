@@ -215,6 +215,7 @@ class SiteServer:
         site.opened.append(k)
         if k not in site.people:
             return web.json_response({"error": f"no object {k}"}, status=404)
+        held = request.query.get("camera")
         response = web.StreamResponse(headers={"Content-Type": "video/mp4"})
         await response.prepare(request)
         transport = request.transport
@@ -224,7 +225,8 @@ class SiteServer:
             await response.write(pattern(0).init)
             async for pulse in site.released(site.boundary()):
                 if pulse not in site.skipped:
-                    await response.write(pattern(site.camera(k, pulse)).fragment(pulse))
+                    shown = site.camera(k, pulse) if held is None else CAMERAS.index(held)
+                    await response.write(pattern(shown).fragment(pulse))
         return response
 
     async def _recording(self, request: web.Request) -> web.Response:

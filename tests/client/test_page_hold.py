@@ -1,0 +1,74 @@
+"""A camera held by hand: it stays, the page says so, and automatic is one press away."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+
+import numpy as np
+import pytest
+import pytest_asyncio
+from page_browser import Visit, needs_chromium, visiting
+from page_pattern import CAMERAS, GROUNDS
+from page_site import HOLD
+from playwright.async_api import Browser, expect
+
+from benchmarks.browser import chromium
+
+pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="module")]
+
+
+@pytest_asyncio.fixture(scope="module", loop_scope="module")
+async def browser() -> AsyncIterator[Browser]:
+    async with chromium() as running:
+        yield running
+
+
+async def camera_on_the_stage(visit: Visit) -> str:
+    """Give the camera whose tint the picture has."""
+    ground = np.median((await visit.screenshot()).reshape(-1, 3), axis=0)
+    return CAMERAS[int(np.abs(np.array(GROUNDS) - ground).sum(axis=1).argmin())]
+
+
+async def stays(visit: Visit, camera: str) -> None:
+    """Check that a camera is shown for as long as the best view would have gone through all of them."""
+    await visit.until(f"myview.camera === '{camera}'")
+    seen = await visit.get("myview.pulse")
+    cuts = await visit.get("myview.cuts.length")
+    for later in range(HOLD, len(CAMERAS) * HOLD + 1, HOLD):
+        await visit.until(f"myview.pulse > {seen + later}")
+        assert await camera_on_the_stage(visit) == camera
+    assert await visit.get("myview.cuts.length") == cuts
+
+
+async def test_a_held_camera_stays_until_automatic_is_pressed(browser: Browser) -> None:
+    async with visiting(browser) as visit:
+        await visit.playing(1)
+        await visit.get("window.before = [video, video.currentSrc]")
+        await visit.page.get_by_role("button", name="c1", exact=True).click()
+        await stays(visit, "c1")
+        await expect(visit.page.locator("#reason")).to_contain_text("Held by hand.")
+        assert visit.page.url.endswith("?object=1&camera=c1")
+        await visit.page.get_by_role("button", name="Automatic").click()
+        await visit.until("new Set(myview.cuts.slice(-2).map((cut) => cut.to)).size > 1")
+        assert visit.page.url.endswith("?object=1")
+        await expect(visit.page.get_by_role("button", name="Automatic")).to_be_hidden()
+        assert await visit.get("video === window.before[0] && video.currentSrc === window.before[1]")
+
+
+async def test_a_link_and_keys_hold_too_and_another_person_is_automatic(browser: Browser) -> None:
+    async with visiting(browser, query="?object=1&camera=c0") as visit:
+        await visit.playing(1)
+        await stays(visit, "c0")
+        await visit.page.keyboard.press("3")
+        await visit.until("myview.camera === 'c2'")
+        await visit.page.keyboard.press("ArrowRight")
+        await visit.playing(2)
+        assert visit.page.url.endswith("?object=2")
+        await visit.page.go_back()
+        await visit.until("myview.object === 1 && myview.camera === 'c2'")
+
+
+async def test_a_camera_that_is_not_there_is_held_by_nobody(browser: Browser) -> None:
+    async with visiting(browser, query="?object=1&camera=c9") as visit:
+        await visit.playing(1)
+        await visit.until("myview.cuts.length > 1")
