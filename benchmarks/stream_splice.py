@@ -14,8 +14,8 @@ from av.codec.context import Flags
 
 from benchmarks.stream_cameras import CAMERAS, ENCODE, SITE
 from server.camera.encode import AccessUnit, Encoder
-from server.view.agreement import Agreement
 from server.view.channel import Piece
+from server.view.codec import agreement_for
 from server.view.decide import GopDecision, ObjectChoice
 from server.view.shelf import Shelf
 from server.view.splice import Splicer
@@ -33,8 +33,7 @@ class Cut:
 
     def __init__(self, films: Sequence[Sequence[AccessUnit]], config: Config) -> None:
         self._films, self.gop = films, config.encode.gop
-        agreement = Agreement()
-        self.agreement = agreement
+        self.agreement = agreement = agreement_for(config)
         self._shelves = {name: Shelf(config.site.fps, 4 * self.gop, agreement) for name in config.camera_ids}
         self.splicer = Splicer(self._shelves, agreement, config)
 

@@ -132,8 +132,8 @@ def summary(found: Found) -> list[list[str]]:
         rows.append(["request to first picture, p95", f"{late:.1f} ms", "100 ms", f"decoded, {what}"])
     if found.right:
         it = found.right
-        good = min(it.mp4, it.ts)
-        how = f"{it.cuts} cuts; MP4 and transport stream, to the pixel"
+        good = it.contained if it.ts is None else min(it.contained, it.ts)
+        how = f"{it.cuts} cuts; {'WebM' if it.ts is None else 'MP4 and transport stream'}, to the pixel"
         rows.append(["right camera on every frame", f"{good} of {it.frames}", "all", how])
     if found.drift:
         rows += _drift_rows(found.drift)

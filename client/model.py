@@ -23,6 +23,8 @@ class Site(msgspec.Struct, frozen=True):
     now: float
     """The server's clock (unix seconds)."""
     cameras: tuple[str, ...]
+    container: str = "mp4"
+    """What streams are in: mp4, or webm where the codec is vp8."""
     sound: str | None = None
     """The codec of the sound beside the pictures; None: the site has none."""
 

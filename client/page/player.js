@@ -24,6 +24,11 @@ const INSIDE_S = 0.001; // a seek to the very start of a range may round to just
  * @typedef {object} Subject
  * @property {number} object who is to be seen
  * @property {string | null} camera by which; null: by whichever sees them best
+ * @property {Moment | null} past where to begin; null: live
+ *
+ * @typedef {object} Moment
+ * @property {number} pulse
+ * @property {number} time of that pulse: media time, seconds
  */
 
 /**
@@ -60,6 +65,7 @@ export class Player {
    * @param {HTMLVideoElement} video
    * @param {object} listener
    * @param {() => void} listener.landed the picture is now of who was chosen last
+   * @param {(subject: Subject) => void} listener.ended there is nothing more of this past
    */
   constructor(video, listener) {
     this.video = video;
@@ -70,7 +76,7 @@ export class Player {
     });
     video.addEventListener('error', () => this.#reopen());
     video.addEventListener('play', () => {
-      if (!this.#run && this.shown) this.choose(this.shown);
+      if (!this.#run && this.shown) this.choose({ ...this.shown, past: null });
     });
     setInterval(() => this.#tick(), TICK_MS);
   }
@@ -135,6 +141,7 @@ export class Player {
         if (!signal.aborted) console.info(`the stream of ${run.subject.object}: ${error}`);
       }
       if (signal.aborted) return;
+      if (run.subject.past) return this.listener.ended(run.subject);
       run.start = run.since = NaN;
       run.early = [];
       await pause(backoff.next(), signal);
@@ -156,7 +163,7 @@ export class Player {
     if (first && Number.isNaN(run.start)) {
       run.start = first.start;
       // Nothing of the old stream may be met again behind the edge of the new one.
-      const anew = run.start < this.video.currentTime - RESTARTED_S;
+      const anew = run.subject.past !== null || run.start < this.video.currentTime - RESTARTED_S;
       if (anew) run.landed = false;
       await buffer.remove(anew ? 0 : run.start, Infinity);
       if (run.leave.signal.aborted) return;
@@ -177,14 +184,27 @@ export class Player {
   #land(run, buffer) {
     if (run.landed || run !== this.#run || Number.isNaN(run.since)) return;
     const end = buffer.ranges.at(-1)?.[1] ?? 0;
+    const { past } = run.subject;
+    if (past) {
+      if (end > past.time) this.#landAt(run, Math.max(past.time, run.start) + INSIDE_S);
+      return;
+    }
     const time = this.video.currentTime;
     const within = run.start <= time && time < end;
     const before = time < run.start || run.start < time - RESTARTED_S;
     if (!within && !before && performance.now() - run.since < LANDING_MS) return;
+    this.#landAt(run, within ? time : run.start + INSIDE_S);
+  }
+
+  /**
+   * @param {Run} run
+   * @param {number} time
+   */
+  #landAt(run, time) {
     run.landed = true;
     this.#landing = run;
     this.video.addEventListener('seeked', () => this.#showing(run), { once: true });
-    this.#seek(within ? time : run.start + INSIDE_S);
+    this.#seek(time);
     if (this.video.paused) this.video.play().catch(() => undefined);
   }
 
@@ -219,6 +239,10 @@ export class Player {
       if ((ranges.at(-1)?.[1] ?? 0) - video.currentTime > PAUSED_S) this.stop();
       return;
     }
+    if (run.subject.past) {
+      video.playbackRate = 1;
+      return;
+    }
     const step = this.#pace.step(performance.now() / 1000, video.currentTime, ranges);
     if (step.seek !== null) this.#seek(step.seek);
     if (video.playbackRate !== step.rate) video.playbackRate = step.rate;
@@ -235,8 +259,11 @@ export class Player {
  * @param {Subject} subject
  * @param {string} container
  */
-function address({ object, camera }, container) {
-  return `objects/${object}/best.${container}${camera === null ? '' : `?camera=${encodeURIComponent(camera)}`}`;
+function address({ object, camera, past }, container) {
+  const name = encodeURIComponent(camera ?? '');
+  if (past && camera !== null) return `cameras/${name}/live.${container}?from=p${past.pulse}`;
+  const query = past ? `?from=p${past.pulse}` : camera === null ? '' : `?camera=${name}`;
+  return `objects/${object}/best.${container}${query}`;
 }
 
 /**
@@ -244,7 +271,7 @@ function address({ object, camera }, container) {
  * @param {Subject} other
  */
 function same(one, other) {
-  return one.object === other.object && one.camera === other.camera;
+  return one.object === other.object && one.camera === other.camera && one.past?.pulse === other.past?.pulse;
 }
 
 /**

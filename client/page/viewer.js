@@ -11,11 +11,13 @@ import { describe } from './status.js';
 /** @import {Box, Camera, Gop, Person, Site} from './contract.js' */
 /** @import {Part} from './follow.js' */
 /** @import {Frame} from './frames.js' */
+/** @import {Moment} from './player.js' */
 /** @import {Status} from './status.js' */
 
 const STANDING_MS = 1500; // without a new frame the picture counts as standing
 const RECENT_S = 10; // after this out of view a person belongs to the earlier ones
 const NOTICE_MS = 10_000; // for which it is said that a number was corrected
+const LIVE_S = 2; // who is less behind the newest decision than this is live
 const RESTART_S = 1; // pulse 0 moved by more than this: the pulses began anew
 
 export class Viewer {
@@ -28,6 +30,8 @@ export class Viewer {
   /** @type {number | null} */
   object = watchedInAddress().object;
   #held = watchedInAddress().camera;
+  /** @type {Moment | null} where the past that is watched began; null: it is live */
+  past = null;
   palette = new Palette([]);
   decisions = new Decisions(1);
   probe = new Probe();
@@ -54,7 +58,7 @@ export class Viewer {
    */
   constructor(video, changed) {
     this.changed = changed;
-    this.player = new Player(video, { landed: changed });
+    this.player = new Player(video, { landed: changed, ended: () => this.#losePast() });
     this.probe.object = this.object;
     onAddress(({ object, camera }) => {
       this.#held = camera;
@@ -66,7 +70,10 @@ export class Viewer {
   setSite(site) {
     const old = this.site;
     const anew = !old || old.fps !== site.fps || Math.abs((old.pulse0 ?? 0) - (site.pulse0 ?? 0)) > RESTART_S;
-    if (anew) this.decisions = new Decisions(site.fps);
+    if (anew) {
+      this.decisions = new Decisions(site.fps);
+      this.past = null;
+    }
     this.site = this.probe.site = site;
     this.palette = new Palette(site.cameras);
     const codec = site.sound ? `${site.codec},${site.sound}` : site.codec;
@@ -115,6 +122,44 @@ export class Viewer {
     if (object !== this.object) this.#held = null;
     this.#turnTo(object, true);
     this.#write(true);
+  }
+
+  /**
+   * @param {number} pulse to see again, from there on
+   */
+  watchFrom(pulse) {
+    if (!this.site || this.object === null || this.probe.pulse === null) return;
+    const { fps } = this.site;
+    if (pulse >= this.decisions.end - LIVE_S * fps) return this.live();
+    this.past = { pulse, time: pulse / fps };
+    this.#play();
+    this.changed();
+  }
+
+  /** From now on what happens now. */
+  live() {
+    this.past = null;
+    this.#play();
+    this.changed();
+    this.player.video.play().catch(() => undefined);
+  }
+
+  /** @param {number} seconds to go on, or back, from the frame now shown */
+  skip(seconds) {
+    if (this.site && this.probe.pulse !== null) this.watchFrom(this.probe.pulse + Math.round(seconds * this.site.fps));
+  }
+
+  /** Stop the picture, or go on with it where it stopped. */
+  pause() {
+    const { video } = this.player;
+    if (!video.paused) return video.pause();
+    if (this.past || this.probe.pulse === null) video.play().catch(() => undefined);
+    else this.watchFrom(this.probe.pulse);
+  }
+
+  #losePast() {
+    this.say('That is not kept any more: this is live.');
+    this.live();
   }
 
   /** @returns {string | null} the camera that is held by hand; null: the best is shown */
@@ -269,7 +314,7 @@ export class Viewer {
 
   #play() {
     if (!this.site || !this.supported || !this.people) return;
-    if (this.object !== null && this.chosen) this.player.choose({ object: this.object, camera: this.held });
+    if (this.object !== null && this.chosen) this.player.choose({ object: this.object, camera: this.held, past: this.past });
     else this.player.stop();
   }
 }

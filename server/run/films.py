@@ -9,7 +9,6 @@ from typing import BinaryIO
 
 from server.view.agreement import Agreement
 from server.view.decide import GopDecision
-from server.view.fmp4 import init_segment, rebased, ticks
 from server.view.shelf import Shelf
 from server.wire.sections import Site
 
@@ -21,10 +20,12 @@ class _Film:
     """The pulse that is at time 0."""
     wanted: int
     """Bytes up to the end of the last GOP in which the person was about."""
+    until: int
+    """The pulse after it."""
 
 
 class Films:
-    """Writes ``object-1.mp4`` and so on; the same fragments as live, moved to begin at time 0."""
+    """Writes ``object-1.mp4`` (or ``.webm``) and so on; the fragments of the streams, begun at time 0."""
 
     def __init__(self, folder: Path, shelves: Mapping[str, Shelf], agreement: Agreement, site: Site) -> None:
         folder.mkdir()
@@ -45,24 +46,27 @@ class Films:
             if film is None:
                 film = self._films[choice.number] = self._begin(choice.number, decision.first)
             shelf = self._shelves[choice.camera]
-            by = -ticks(film.origin, self._site.fps)
             for pulse in range(decision.first, decision.first + decision.frames):
                 frame = shelf.get(pulse)
                 if frame is not None:
-                    film.file.write(rebased(frame.fragment, by))
+                    begun = self._agreement.begun_at(film.origin, frame.fragment, self._site.fps)
+                    film.file.write(begun)
             if not choice.away:
-                film.wanted = film.file.tell()
+                film.wanted, film.until = film.file.tell(), decision.first + decision.frames
 
     def close(self) -> None:
         """Cut off what was shown after a person had left for good, and close the files."""
         for film in self._films.values():
             if not film.file.closed:
                 film.file.truncate(film.wanted)
+                film.file.seek(0)
+                film.file.write(self._head(film.until - film.origin))
                 film.file.close()
 
     def _begin(self, number: int, pulse: int) -> _Film:
-        file = (self._folder / f"object-{number}.mp4").open("wb")
-        parameters = self._agreement.parameters
-        if parameters is not None:
-            file.write(init_segment(parameters, self._site.width, self._site.height))
-        return _Film(file, pulse, file.tell())
+        file = (self._folder / f"object-{number}.{self._agreement.container}").open("wb")
+        file.write(self._head(0))
+        return _Film(file, pulse, file.tell(), pulse)
+
+    def _head(self, pulses: int) -> bytes:
+        return self._agreement.head(self._site, pulses=pulses) or b""

@@ -11,8 +11,8 @@ from server.run.offline import Batch, CameraWorkers
 from server.run.plots import plot_choices, plot_tracks
 from server.run.recorded import Size
 from server.run.site_file import write_site
-from server.view.agreement import Agreement
 from server.view.align import Aligner
+from server.view.codec import agreement_for
 from server.view.decide import Decider, GopDecision, homographies
 from server.view.record import Recorder
 from server.view.shelf import Shelf
@@ -31,7 +31,7 @@ class Renderer:
         self._config, self._folder = config, folder
         # What is to be decided, and what the camera that was run first has done since.
         frames = 4 * (config.view.lookahead + config.encode.gop + config.track.window.stride)
-        agreement = Agreement()
+        agreement = agreement_for(config)
         self._shelves = {camera: Shelf(config.site.fps, frames, agreement) for camera in cameras}
         self._aligner = Aligner(cameras, config.track.window.stride, grace=0)
         for camera in cameras:

@@ -9,11 +9,12 @@ from server.view.fmp4 import sample_of
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """One picture, ready as an MP4 fragment."""
+    """One picture, ready to be sent."""
 
     pulse: int
     key: bool
     fragment: bytes
+    """Of MP4, or a cluster of WebM."""
     boot: int
     """Which run of the camera's process it is from; pictures of two runs do not build on each other."""
     lasts: int = 1
@@ -26,5 +27,5 @@ class Picture:
 
     @property
     def sample(self) -> bytes:
-        """Its NAL units, each behind its length."""
+        """Its NAL units, each behind its length; of a fragment of MP4."""
         return sample_of(self.fragment)

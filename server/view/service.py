@@ -10,9 +10,9 @@ from pathlib import Path
 import msgspec
 
 from camsync import PulseClient
-from server.view.agreement import Agreement
 from server.view.align import Aligner, Epoch
 from server.view.board import Board
+from server.view.codec import agreement_for
 from server.view.decide import Decider, GopDecision, homographies
 from server.view.intake import Intake
 from server.view.past.past import Past
@@ -40,7 +40,7 @@ class BestViewService:
         frames = max(
             round(config.view.buffer_s * config.site.fps), 4 * (config.view.lookahead + grace + stride)
         )
-        self.agreement = Agreement()
+        self.agreement = agreement_for(config)
         self.shelves = {camera: Shelf(config.site.fps, frames, self.agreement) for camera in cameras}
         self.aligner = Aligner(cameras, stride, grace)
         form = config.sound.format

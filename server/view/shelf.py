@@ -5,8 +5,6 @@ from __future__ import annotations
 from typing import TypeAlias
 
 from server.view.agreement import Agreement
-from server.view.fmp4 import Sample, fragment
-from server.view.h264 import nal_units, parameter_sets, sample
 from server.view.picture import Picture
 
 Shelved: TypeAlias = Picture
@@ -16,7 +14,7 @@ Shelved: TypeAlias = Picture
 class Shelf:
     """Keeps the last ``frames`` frames of one camera; each is made into a fragment once, when it comes.
 
-    All shelves of a site have one ``agreement`` about the parameter sets.
+    All shelves of a site have one ``agreement`` about what its streams are made of.
     """
 
     def __init__(self, fps: float, frames: int, agreement: Agreement) -> None:
@@ -30,12 +28,9 @@ class Shelf:
         """Shelve an access unit.
 
         Raises:
-            ParameterMismatchError: its parameter sets are not the site's, and the camera must be refused.
+            ParameterMismatchError: its parameters are not the site's, and the camera must be refused.
         """
-        units = nal_units(access_unit)
-        if key:
-            self._agreement.check(parameter_sets(units))
-        made = fragment([Sample(sample(units), key)], pulse, self._fps)
+        made = self._agreement.pack(access_unit, pulse, self._fps, key=key)
         shelved = Shelved(pulse, key, made, boot)
         self._shelved[pulse] = shelved
         self.newest = max(self.newest, pulse)

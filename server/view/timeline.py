@@ -1,16 +1,14 @@
 """One stream's time: no hole in it, whatever does not come.
 
 A player that has nothing for a moment stops there, some for good. So where a picture is missing, the one
-before it is shown again, by a picture that says just that (:mod:`server.view.skip`): a decoder sees an
+before it is shown again, by a picture that says just that (:mod:`server.view.bridge`): a decoder sees an
 ordinary stream.
 """
 
 from __future__ import annotations
 
 from server.view.agreement import Agreement
-from server.view.fmp4 import Sample, fragment
 from server.view.picture import Picture
-from server.view.skip import Continuing, UnfitError, continuing
 
 _LONG_S = 2
 """Holes up to so long get a picture for every pulse, longer ones a single picture that lasts."""
@@ -18,10 +16,6 @@ LONGEST_S = 3600
 """Nobody waits that long: a longer hole stays one, and a duration fits into MP4's 32 bits."""
 _ANEW_S = 10
 """A key picture so far back is of pulses that began anew, not a late one."""
-_NUMBERS_TOLD = 15
-"""Pictures that may be missing before frame_num, at least four bits of it, has come round."""
-_NO_CAMERAS = -1
-"""As a boot."""
 
 
 class Timeline:
@@ -62,16 +56,11 @@ class Timeline:
 
     def fill(self, until: int) -> list[Picture]:
         """Give what repeats the last picture up to a pulse; nothing before the first picture."""
-        how, missing = self._how(), until - self._until
-        if how is None or self._newest is None or not 0 < missing <= LONGEST_S * self._fps:
+        bridge, missing = self._agreement.bridge(self._fps), until - self._until
+        if bridge is None or self._newest is None or not 0 < missing <= LONGEST_S * self._fps:
             return []
         each = 1 if missing <= _LONG_S * self._fps else missing
-        number = how.frame_num(self._newest.sample)
-        filled = []
-        for pulse in range(self._until, until, each):
-            number = how.next_num(number)
-            data = how.repeat(number, reference=True)
-            filled.append(self._made(data, pulse, each))
+        filled = bridge.after(self._newest, [(pulse, each) for pulse in range(self._until, until, each)])
         self._newest, self._until, self._broken = filled[-1], until, True
         return filled
 
@@ -85,17 +74,13 @@ class Timeline:
             return []
         if picture.key:
             return self.fill(picture.pulse)
-        how, lasts = self._how(), picture.pulse - self._until
-        if how is None:
-            return []
-        # The camera took no picture. The number is the next one's, so this is no reference, and only one.
-        number = how.frame_num(picture.sample)
-        return [self._made(how.repeat(number, reference=False), self._until, lasts)]
+        bridge = self._agreement.bridge(self._fps)
+        return [] if bridge is None else bridge.before(picture, (self._until, picture.pulse - self._until))
 
     def _lost_before(self, picture: Picture) -> bool:
         """Tell whether something is missing that a picture is decoded by."""
-        how, newest = self._how(), self._newest
-        if how is None or newest is None:
+        bridge, newest = self._agreement.bridge(self._fps), self._newest
+        if bridge is None or newest is None:
             return False
         if (
             self._broken
@@ -103,22 +88,7 @@ class Timeline:
             or picture.pulse // self._gop != newest.pulse // self._gop
         ):
             return True
-        missing = picture.pulse - self._until
-        if missing == 0 or missing >= _NUMBERS_TOLD:
-            return missing > 0
-        return how.frame_num(picture.sample) != how.next_num(how.frame_num(newest.sample))
+        return bridge.is_lost_between(newest, picture, picture.pulse - self._until)
 
     def _begins_anew(self, picture: Picture) -> bool:
         return picture.key and picture.pulse < self._until - _ANEW_S * self._fps
-
-    def _how(self) -> Continuing | None:
-        if self._agreement.parameters is None:
-            return None
-        try:
-            return continuing(self._agreement.parameters)
-        except UnfitError:
-            return None
-
-    def _made(self, data: bytes, pulse: int, lasts: int) -> Picture:
-        made = fragment([Sample(data, key=False, lasts=lasts)], pulse, self._fps)
-        return Picture(pulse, key=False, fragment=made, boot=_NO_CAMERAS, lasts=lasts)

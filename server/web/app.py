@@ -13,6 +13,7 @@ from server.view.pictures import Pictures
 from server.view.service import BestViewService
 from server.web import api, hls, openapi, page, past, pictures, video
 from server.web.api import problem
+from server.web.containers import refuse_other_containers
 from server.web.cors import preflight
 from server.web.events import Events
 from server.web.keys import EVENTS, METRICS, PICTURES, SERVICE
@@ -55,7 +56,13 @@ async def one_line_errors(
 def make_app(service: BestViewService) -> web.Application:
     """Give the application on top of a service."""
     app = web.Application(
-        middlewares=[one_line_errors, preflight, refuse_what_is_not_there, to_the_right_service]
+        middlewares=[
+            one_line_errors,
+            preflight,
+            refuse_what_is_not_there,
+            refuse_other_containers,
+            to_the_right_service,
+        ]
     )
     app[SERVICE], app[EVENTS], app[PICTURES] = service, Events(service), Pictures(service)
     app[METRICS] = registry(service, app[PICTURES])

@@ -40,3 +40,5 @@ def _ts(piece: Piece) -> bytes:
 
 MP4 = Form("video/mp4", mp4_head, _mp4)
 TS = Form("video/mp2t", lambda _: b"", _ts)
+WEBM = Form("video/webm", lambda service: service.agreement.head(service.config.site), lambda it: it.data)
+"""Of a site whose codec is VP8, and of no other."""

@@ -11,7 +11,7 @@ from typing import Any
 import msgspec
 from aiohttp import web
 
-from server.web.queries import OVERLAY, PAST
+from server.web.queries import HELD, OVERLAY, PAST
 from server.web.schema import Cameras, Choice, Objects, Past, Problem, SiteInfo
 
 routes = web.RouteTableDef()
@@ -27,6 +27,8 @@ _JSON = {
 _OTHER = {
     "/objects/{object}/best.mp4": "video/mp4",
     "/cameras/{camera}/live.mp4": "video/mp4",
+    "/objects/{object}/best.webm": "video/webm",
+    "/cameras/{camera}/live.webm": "video/webm",
     "/objects/{object}/best.ts": "video/mp2t",
     "/cameras/{camera}/live.ts": "video/mp2t",
     "/objects/{object}/hls/index.m3u8": "application/vnd.apple.mpegurl",
@@ -47,7 +49,7 @@ _OTHER = {
     "/metrics": "text/plain",
 }
 _UNAVAILABLE = {"/objects/{object}/best.mp4", "/cameras/{camera}/live.mp4", "/readyz"} | {
-    path for path in _OTHER if path.endswith((".ts", ".m3u8", ".mjpeg", "best.jpg", "live.jpg"))
+    path for path in _OTHER if path.endswith((".webm", ".ts", ".m3u8", ".mjpeg", "best.jpg", "live.jpg"))
 }
 _MOMENT = {"type": "string", "examples": ["-60", "p1250", "2026-11-21T16:13:36Z"]}
 _SCHEMAS: dict[str, Any] = {
@@ -57,6 +59,7 @@ _SCHEMAS: dict[str, Any] = {
     "overlay": {"enum": [0, 1], "default": 0, "description": "1: boxes are burnt in."},
     "from": {**_MOMENT, "description": "Begins there: seconds back, a pulse, or a time."},
     "to": {**_MOMENT, "description": "Ends there, likewise."},
+    "held": {"type": "string", "description": "Shows this camera, not the best: held by hand."},
     "fps": {"type": "number", "exclusiveMinimum": 0, "description": "Pictures a second; the site's at most."},
 }
 
@@ -91,7 +94,7 @@ def _operation(path: str, summary: str) -> dict[str, Any]:
     names = re.findall(r"\{(\w+)\}", path)
     if names:
         responses["404"] = {"description": "There is none of this name.", "content": error}
-    if path in OVERLAY | PAST:
+    if path in OVERLAY | PAST | HELD:
         responses["400"] = {"description": "The query asks for what there is not.", "content": error}
     if path in PAST - {"/api/past"}:
         responses["416"] = {"description": "Nothing is kept of that time.", "content": error}
@@ -100,6 +103,8 @@ def _operation(path: str, summary: str) -> dict[str, Any]:
     parameters = [{"name": name, "in": "path", "required": True, "schema": _SCHEMAS[name]} for name in names]
     queries = ["overlay"] * (path in OVERLAY) + ["fps"] * path.endswith(".mjpeg")
     queries += ["from", "to"] * (path in PAST)
+    if path in HELD:
+        parameters.append({"name": "camera", "in": "query", "required": False, "schema": _SCHEMAS["held"]})
     parameters += [
         {"name": it, "in": "query", "required": (path, it) == ("/api/past", "from"), "schema": _SCHEMAS[it]}
         for it in queries

@@ -26,7 +26,7 @@ PAST = {
     "/api/past",
 }
 """What can begin in the past."""
-HELD = {"/objects/{object}/best.mp4", "/objects/{object}/best.ts"}
+HELD = {"/objects/{object}/best.mp4", "/objects/{object}/best.webm", "/objects/{object}/best.ts"}
 """What can be held to one camera."""
 _STREAMS = ("/objects/", "/cameras/")
 

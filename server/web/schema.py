@@ -16,6 +16,8 @@ class SiteInfo(msgspec.Struct, frozen=True):
     lookahead_frames: int
     codec: str | None
     """RFC 6381 codec string of every stream; null before the first key frame."""
+    container: str
+    """What streams are in: mp4, or webm where the codec is vp8; best.mp4 or best.webm by that."""
     sound: str | None
     """The same of the sound beside the pictures; null: this site has none."""
     pulse0: float | None

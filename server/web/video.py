@@ -7,7 +7,7 @@ from aiohttp import web
 from server.view.channel import Channel
 from server.view.service import BestViewService
 from server.web.api import not_now, problem
-from server.web.forms import MP4, TS, Form
+from server.web.forms import MP4, TS, WEBM, Form
 from server.web.keys import SERVICE
 from server.web.limits import no_place
 from server.web.past import asks_for_the_past, best_of_the_past, camera_of_the_past
@@ -31,6 +31,12 @@ async def get_best_ts(request: web.Request) -> web.StreamResponse:
     return await _best(request, TS)
 
 
+@routes.get("/objects/{object:[0-9]{1,9}}/best.webm")
+async def get_best_webm(request: web.Request) -> web.StreamResponse:
+    """Stream the best view of a person as WebM, where the site's codec is VP8; across every cut."""
+    return await _best(request, WEBM)
+
+
 @routes.get("/cameras/{camera}/live.mp4")
 async def get_live(request: web.Request) -> web.StreamResponse:
     """Stream one camera as fragmented MP4."""
@@ -41,6 +47,12 @@ async def get_live(request: web.Request) -> web.StreamResponse:
 async def get_live_ts(request: web.Request) -> web.StreamResponse:
     """Stream one camera as an MPEG transport stream."""
     return await _live(request, TS)
+
+
+@routes.get("/cameras/{camera}/live.webm")
+async def get_live_webm(request: web.Request) -> web.StreamResponse:
+    """Stream one camera as WebM, likewise."""
+    return await _live(request, WEBM)
 
 
 async def _best(request: web.Request, form: Form) -> web.StreamResponse:

@@ -13,7 +13,7 @@ from server.web.schema import CameraInfo, Cameras, Choice, Elsewhere, ObjectInfo
 
 def site_info(service: BestViewService) -> SiteInfo:
     """Describe the site."""
-    config, parameters = service.config, service.agreement.parameters
+    config = service.config
     return SiteInfo(
         name=config.site.name,
         fps=config.site.fps,
@@ -21,7 +21,8 @@ def site_info(service: BestViewService) -> SiteInfo:
         height=config.site.height,
         gop=config.encode.gop,
         lookahead_frames=config.view.lookahead,
-        codec=None if parameters is None else parameters.codec,
+        codec=service.agreement.codec,
+        container=service.agreement.container,
         sound=None if service.sound is None else service.sound.format.codec,
         pulse0=service.pulse0,
         now=time.time(),

@@ -76,6 +76,13 @@ class Config(BaseSettings):
             )
         return self
 
+    @model_validator(mode="after")
+    def _streams_can_be_of_this_codec(self) -> Self:
+        for place, wanted in (("record.folder", self.record.folder), ("sound.source", self.sound.source)):
+            if self.encode.codec == "vp8" and wanted is not None:
+                raise ValueError(f"{place}: a site whose encode.codec is vp8 has none; take h264 for it")
+        return self
+
     @property
     def sounding(self) -> str | None:
         """The camera whose process sends the sound: the one whose sound it is, or the first; None: nobody."""

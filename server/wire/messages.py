@@ -1,13 +1,13 @@
 """The messages on the bus, and the keys they travel under.
 
 Everything but pictures is JSON, so that any zenoh subscriber can read it; video travels as plain Annex B
-H.264 with a small JSON head in zenoh's attachment. Numbers survive the way exactly: JSON floats are written
-with as many digits as they need.
+H.264 (or frames of VP8) with a small JSON head in zenoh's attachment. Numbers survive the way exactly: JSON
+floats are written with as many digits as they need.
 
 ========================================  =======================================  =====================
 key                                       payload                                  attachment
 ========================================  =======================================  =====================
-``myview/SITE/camera/ID/video``           one access unit, Annex B H.264           :class:`FrameHead`
+``myview/SITE/camera/ID/video``           one access unit, Annex B H.264 or VP8    :class:`FrameHead`
 ``myview/SITE/camera/ID/tracks``          :class:`CameraTracks`
 ``myview/SITE/camera/ID/status``          :class:`CameraStatus`
 ``myview/SITE/camera/ID/thumbs/LOCAL``    JPEG of one person                       :class:`ThumbHead`

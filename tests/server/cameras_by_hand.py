@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, Literal, cast
 
 import msgspec
 import numpy as np
@@ -46,9 +46,11 @@ def small_config(cameras: Sequence[str] = CAMERAS, **changes: Any) -> Config:
 
 
 @cache
-def encoded(seed: int, frames: int = 40, *, gop: int = GOP, crf: int = 23) -> tuple[AccessUnit, ...]:
+def encoded(
+    seed: int, frames: int = 40, *, gop: int = GOP, crf: int = 23, codec: Literal["h264", "vp8"] = "h264"
+) -> tuple[AccessUnit, ...]:
     """Encode pictures that differ from camera to camera (by seed) and from frame to frame."""
-    encoder = Encoder(Site(width=WIDTH, height=HEIGHT, fps=FPS), Encode(gop=gop, crf=crf))
+    encoder = Encoder(Site(width=WIDTH, height=HEIGHT, fps=FPS), Encode(gop=gop, crf=crf, codec=codec))
     rng = np.random.default_rng(seed)
     pictures = rng.integers(0, 255, (frames, HEIGHT // 8, WIDTH // 8, 3), dtype=np.uint8)
     return tuple(
@@ -155,7 +157,8 @@ class FedService(BestViewService):
         for seed, camera in enumerate(self.config.camera_ids):
             if camera not in seen:
                 continue
-            for unit in encoded(seed)[epoch * STRIDE : (epoch + 1) * STRIDE]:
+            units = encoded(seed, codec=self.config.encode.codec)
+            for unit in units[epoch * STRIDE : (epoch + 1) * STRIDE]:
                 self.intake.video(video(camera, unit))
             self.intake.tracks(tracks(word(camera, epoch, seen[camera])))
         self.pulse = end_of_epoch(epoch, STRIDE)

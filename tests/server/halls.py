@@ -33,11 +33,11 @@ class Hall:
         return content
 
 
-async def opened(**changes: Any) -> AsyncIterator[Hall]:
+async def opened(*, patience: float = PATIENCE, **changes: Any) -> AsyncIterator[Hall]:
     service = FedService(small_config(**changes))
     service.decider.people._registry = TrackNumbers()  # type: ignore[assignment]
     async with (
-        asyncio.timeout(PATIENCE),
+        asyncio.timeout(patience),
         serving(make_app(service), Http(port=0, **changes.get("http", {}))) as port,
         aiohttp.ClientSession(f"http://127.0.0.1:{port}") as session,
     ):

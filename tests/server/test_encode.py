@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 
+import av
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -47,11 +48,22 @@ def test_no_second_of_a_noisy_scene_takes_more_than_the_cap(gop: int, preset: st
     assert most_kbps(encoded(free)) > 2 * CAP, "or the cap would not be what holds it"
 
 
-def test_with_a_cap_too_keys_are_where_gops_begin_and_the_bytes_the_same_each_time() -> None:
-    settings = Encode(gop=10, max_kbps=CAP)
+@pytest.mark.parametrize("settings", [Encode(gop=10, max_kbps=CAP), Encode(gop=10, codec="vp8")])
+def test_keys_are_where_gops_begin_and_the_bytes_the_same_each_time(settings: Encode) -> None:
     units = encoded(settings)
+    codec = "h264" if settings.codec == "h264" else "vp8"
+    parser = av.CodecContext.create(codec, "r")
+    keys = [frame.key_frame for unit in units for frame in parser.decode(av.Packet(unit.data))]
+    assert keys == [unit.key for unit in units], "nor are there others, where noise begins and ends"
     assert [unit.pulse for unit in units if unit.key] == list(range(0, FRAMES, 10))
     assert units == encoded(settings)
+
+
+def test_of_vp8_too_a_pulse_is_a_frame_and_less_is_better() -> None:
+    fine, coarse = encoded(Encode(codec="vp8", quantizer=8)), encoded(Encode(codec="vp8", quantizer=40))
+    assert [unit.pulse for unit in fine] == [unit.pulse for unit in coarse] == list(range(FRAMES))
+    assert all(unit.data for unit in [*fine, *coarse])
+    assert most_kbps(fine) > 1.5 * most_kbps(coarse)
 
 
 def test_what_a_capped_camera_sees_does_not_shape_its_parameter_sets() -> None:

@@ -3,15 +3,28 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Literal
 
 import av
 import numpy as np
-from cameras_by_hand import CAMERAS, FPS, GOP, HEIGHT, LARGE, NO_REASON, SMALL, WIDTH, encoded
+import pytest
+from cameras_by_hand import (
+    CAMERAS,
+    FPS,
+    GOP,
+    HEIGHT,
+    LARGE,
+    NO_REASON,
+    SMALL,
+    WIDTH,
+    encoded,
+    small_config,
+)
 from test_splice import choice
 
 from bestview import Merge, Split
 from server.run.films import Films
-from server.view.agreement import Agreement
+from server.view.codec import agreement_for
 from server.view.decide import GopDecision, ObjectChoice
 from server.view.record import Recorder
 from server.view.shelf import Shelf
@@ -21,6 +34,7 @@ from server.wire.sections import Site
 
 A, B = CAMERAS
 SITE = Site(width=WIDTH, height=HEIGHT, fps=FPS)
+Codec = Literal["h264", "vp8"]
 
 
 def decision(
@@ -60,32 +74,37 @@ def test_the_files_are_these_bytes(tmp_path: Path) -> None:
     }
 
 
-def films(folder: Path) -> tuple[Films, dict[str, Shelf]]:
-    agreement = Agreement()
+def films(folder: Path, codec: Codec = "h264") -> tuple[Films, dict[str, Shelf]]:
+    agreement = agreement_for(small_config(encode={"codec": codec}))
     shelves = {camera: Shelf(FPS, 40, agreement) for camera in CAMERAS}
     for seed, camera in enumerate(CAMERAS):
-        for unit in encoded(seed):
+        for unit in encoded(seed, codec=codec):
             shelves[camera].put(unit.pulse, 1, unit.data, key=unit.key)
     return Films(folder, shelves, agreement, SITE), shelves
 
 
-def own_pictures(seed: int) -> list[np.ndarray[tuple[int, ...], np.dtype[np.uint8]]]:
-    decoder = av.VideoCodecContext.create("h264", "r")
-    decoded = [picture for unit in encoded(seed) for picture in decoder.decode(av.Packet(unit.data))]
+def own_pictures(seed: int, codec: Codec) -> list[np.ndarray[tuple[int, ...], np.dtype[np.uint8]]]:
+    decoder = av.VideoCodecContext.create(codec, "r")
+    units = encoded(seed, codec=codec)
+    decoded = [picture for unit in units for picture in decoder.decode(av.Packet(unit.data))]
     decoded += decoder.decode(None)
     return [np.asarray(picture.to_ndarray(format="yuv420p"), dtype=np.uint8) for picture in decoded]
 
 
-def test_a_film_begins_at_time_0_and_shows_the_chosen_cameras_pixels(tmp_path: Path) -> None:
-    it, _ = films(tmp_path / "best")
+@pytest.mark.parametrize(("codec", "container"), [("h264", "mp4"), ("vp8", "webm")])
+def test_a_film_begins_at_time_0_and_shows_the_chosen_cameras_pixels(
+    tmp_path: Path, codec: Codec, container: str
+) -> None:
+    it, _ = films(tmp_path / "best", codec)
     for gop, camera in [(2, A), (3, B), (4, A)]:
         it.write(decision(gop, choice(7, camera)))
     it.close()
     assert it.numbers == [7]
-    with av.open(str(tmp_path / "best" / "object-7.mp4"), "r") as film:
+    with av.open(str(tmp_path / "best" / f"object-7.{container}"), "r") as film:
+        assert film.duration == 3 * GOP / FPS * av.time_base
         pictures = list(film.decode(video=0))
     assert [picture.time for picture in pictures] == [number / FPS for number in range(3 * GOP)]
-    alone = [own_pictures(seed) for seed in range(2)]
+    alone = [own_pictures(seed, codec) for seed in range(2)]
     for number, picture in enumerate(pictures):
         seed = 1 if GOP <= number < 2 * GOP else 0
         np.testing.assert_array_equal(picture.to_ndarray(format="yuv420p"), alone[seed][2 * GOP + number])

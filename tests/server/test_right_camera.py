@@ -9,10 +9,16 @@ import pytest
 from benchmarks.stream_right import Right, judge, schedule
 from server.view.footage import Footage
 from server.view.streams import Gop
+from server.wire.sections import Encode
 
 
 async def test_every_frame_is_the_chosen_cameras_to_the_pixel() -> None:
-    assert await judge(300, 15, seed=1) == Right(300, 15, mp4=300, ts=300, alike=0)
+    assert await judge(300, 15, seed=1) == Right(300, 15, contained=300, ts=300, alike=0)
+
+
+async def test_every_frame_of_vp8_is_the_chosen_cameras_too() -> None:
+    vp8 = Encode(codec="vp8")
+    assert await judge(300, 15, seed=1, encode=vp8) == Right(300, 15, contained=300, ts=None, alike=0)
 
 
 async def test_another_cameras_gop_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -23,7 +29,9 @@ async def test_another_cameras_gop_is_noticed(monkeypatch: pytest.MonkeyPatch) -
         return original(self, "c0" if wrong and camera != "c0" else "c3" if wrong else camera)
 
     monkeypatch.setattr(Gop, "whole", mistaken)
-    assert await judge(100, 5, seed=1) == Right(100, 5, mp4=90, ts=90, alike=0)
+    assert await judge(100, 5, seed=1) == Right(100, 5, contained=90, ts=90, alike=0)
+    vp8 = Encode(codec="vp8")
+    assert await judge(100, 5, seed=1, encode=vp8) == Right(100, 5, contained=90, ts=None, alike=0)
 
 
 @pytest.mark.parametrize("cuts", [0, 7, 98])
@@ -34,4 +42,4 @@ def test_cuts_are_as_many_as_asked_for(cuts: int) -> None:
 
 @pytest.mark.slow
 async def test_ten_thousand_frames_over_five_hundred_cuts_are_all_right() -> None:
-    assert await judge(10_000, 500) == Right(10_000, 500, mp4=10_000, ts=10_000, alike=0)
+    assert await judge(10_000, 500) == Right(10_000, 500, contained=10_000, ts=10_000, alike=0)

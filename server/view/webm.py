@@ -1,0 +1,93 @@
+"""WebM by hand (RFC 9559, in EBML, RFC 8794): a header without an end, and clusters that stand alone.
+
+Every frame is a cluster of its own, which costs some twenty bytes. In return it carries its own time, as a
+fragment of MP4 does, and any can follow any: a cluster that holds a GOP would have to know what is in it.
+"""
+
+from __future__ import annotations
+
+import struct
+
+TICKS = 1000
+"""Ticks a second: WebM counts in milliseconds."""
+
+_UNKNOWN = b"\x01" + b"\xff" * 7
+"""A size that is not known (RFC 8794, 6.2): a live stream has no end."""
+_SEGMENT, _CLUSTER = b"\x18\x53\x80\x67", b"\x1f\x43\xb6\x75"
+_TIMESTAMP, _SIMPLE_BLOCK, _BLOCK_GROUP, _BLOCK = b"\xe7", b"\xa3", b"\xa0", b"\xa1"
+_BLOCK_DURATION, _REFERENCE = b"\x9b", b"\xfb"
+_TRACK = b"\x81"
+_KEY = 0x80
+_TIME_AT = len(_CLUSTER) + 4 + len(_TIMESTAMP) + 1
+"""Where the time stands: behind the heads of the cluster and of the time itself."""
+
+
+def ticks(pulse: int, fps: float) -> int:
+    """Give the presentation time of a pulse; from it the pulse can be told up to 500 frames a second."""
+    return round(pulse * TICKS / fps)
+
+
+def header(width: int, height: int, fps: float, frames: int | None = None) -> bytes:
+    """Give what a player needs before the first cluster; ``frames`` is how many there will be, if known."""
+    info = _number(b"\x2a\xd7\xb1", 1_000_000_000 // TICKS) + _text(b"\x4d\x80", "MyView")
+    info += _text(b"\x57\x41", "MyView")
+    if frames is not None:
+        info += _element(b"\x44\x89", struct.pack(">d", ticks(frames, fps)))
+    video = _number(b"\xb0", width) + _number(b"\xba", height)
+    track = b"".join((
+        _number(b"\xd7", 1),  # TrackNumber
+        _number(b"\x73\xc5", 1),  # TrackUID
+        _number(b"\x83", 1),  # TrackType: video
+        _number(b"\x9c", 0),  # FlagLacing
+        _text(b"\x22\xb5\x9c", "und"),
+        _text(b"\x86", "V_VP8"),
+        _number(b"\x23\xe3\x83", round(1e9 / fps)),  # DefaultDuration
+        _element(b"\xe0", video),
+    ))  # fmt: skip
+    ebml = _number(b"\x42\x86", 1) + _number(b"\x42\xf7", 1) + _number(b"\x42\xf2", 4)
+    ebml += _number(b"\x42\xf3", 8) + _text(b"\x42\x82", "webm")
+    ebml += _number(b"\x42\x87", 4) + _number(b"\x42\x85", 2)
+    return b"".join((
+        _element(b"\x1a\x45\xdf\xa3", ebml),
+        _SEGMENT + _UNKNOWN,
+        _element(b"\x15\x49\xa9\x66", info),
+        _element(b"\x16\x54\xae\x6b", _element(b"\xae", track)),
+    ))  # fmt: skip
+
+
+def cluster(frame: bytes, pulse: int, fps: float, *, key: bool, lasts: int = 1) -> bytes:
+    """Give a frame as a cluster; one that lasts for more than a pulse says so."""
+    time = ticks(pulse, fps)
+    head = _TRACK + struct.pack(">h", 0)  # of the track, at the cluster's own time
+    if lasts == 1:
+        block = _element(_SIMPLE_BLOCK, head + bytes([_KEY * key]) + frame)
+    else:
+        inside = _element(_BLOCK, head + b"\x00" + frame)
+        inside += _number(_BLOCK_DURATION, ticks(pulse + lasts, fps) - time)
+        if not key:
+            inside += _element(_REFERENCE, struct.pack(">b", -1))  # the frame before, whenever that was
+        block = _element(_BLOCK_GROUP, inside)
+    return _CLUSTER + _size(8 + 2 + len(block)) + _TIMESTAMP + b"\x88" + struct.pack(">Q", time) + block
+
+
+def rebased(frame: bytes, by: int) -> bytes:
+    """Move a cluster of :func:`cluster` in time by so many ticks."""
+    (time,) = struct.unpack_from(">Q", frame, _TIME_AT)
+    return frame[:_TIME_AT] + struct.pack(">Q", time + by) + frame[_TIME_AT + 8 :]
+
+
+def _element(name: bytes, content: bytes) -> bytes:
+    return name + _size(len(content)) + content
+
+
+def _number(name: bytes, value: int) -> bytes:
+    return _element(name, value.to_bytes(max(1, (value.bit_length() + 7) // 8), "big"))
+
+
+def _text(name: bytes, value: str) -> bytes:
+    return _element(name, value.encode("ascii"))
+
+
+def _size(size: int) -> bytes:
+    """Give a size in four bytes, always: so the time of a cluster stands at one place."""
+    return (size | 1 << 28).to_bytes(4, "big")

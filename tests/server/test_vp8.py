@@ -1,0 +1,173 @@
+"""VP8 in WebM: a picture that repeats another, clusters that stand alone, and cameras that do not fit."""
+
+from __future__ import annotations
+
+import io
+import shutil
+import subprocess
+from functools import cache
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from server.camera.encode import AccessUnit, Encoder
+from server.view.agreement import ParameterMismatchError
+from server.view.picture import Picture
+from server.view.shelf import Shelf
+from server.view.timeline import Timeline
+from server.view.vp8 import Vp8Agreement, size_of
+from server.view.vp8_skip import repeat
+from server.view.webm import cluster, header, rebased
+from server.wire.sections import Encode, Site
+
+FPS, GOP, FRAMES = 25.0, 5, 20
+Pixels = NDArray[np.uint8]
+sides = st.integers(8, 60).map(lambda half: 2 * half)
+
+
+@cache
+def encoded(width: int, height: int, seed: int = 0) -> tuple[AccessUnit, ...]:
+    """Encode pictures that move, so that frames build on the ones before them."""
+    encoder = Encoder(Site(width=width, height=height, fps=FPS), Encode(codec="vp8", gop=GOP))
+    noise = np.random.default_rng(seed).integers(0, 255, (height, width, 3), dtype=np.uint8)
+    return tuple(encoder.encode(pulse, np.roll(noise, 3 * pulse, axis=1)) for pulse in range(FRAMES))
+
+
+def decoded(frames: list[bytes], decoder: str) -> list[Pixels]:
+    context = av.CodecContext.create(decoder, "r")
+    return [it.to_ndarray(format="yuv420p") for data in frames for it in context.decode(av.Packet(data))]
+
+
+@settings(max_examples=25, deadline=None)
+@given(sides, sides, st.lists(st.integers(0, 3), min_size=FRAMES, max_size=FRAMES))
+def test_a_repeat_shows_the_picture_before_and_nothing_after_it_can_tell(
+    width: int, height: int, repeats: list[int]
+) -> None:
+    units, again = encoded(width, height), repeat(width, height)
+    plain = decoded([unit.data for unit in units], "vp8")
+    told = [n for n, count in enumerate(repeats) for _ in range(1 + count)]
+    frames = [
+        data for unit, count in zip(units, repeats, strict=True) for data in [unit.data, *[again] * count]
+    ]
+    for decoder in ("vp8", "libvpx"):  # FFmpeg's own, and that of browsers
+        np.testing.assert_array_equal(decoded(frames, decoder), [plain[n] for n in told], decoder)
+
+
+def test_a_repeat_is_small() -> None:
+    assert len(repeat(640, 360)) < 100
+
+
+@given(st.integers(16, 8192), st.integers(16, 8192))
+def test_the_size_is_read_from_key_frames_alone(width: int, height: int) -> None:
+    key = b"\x10\x00\x00\x9d\x01\x2a" + width.to_bytes(2, "little") + height.to_bytes(2, "little")
+    assert size_of(key) == (width, height)
+    assert size_of(b"\x11" + key[1:]) is None
+    assert size_of(key[:9]) is None
+
+
+def shelf(width: int = 64, height: int = 48) -> Shelf:
+    return Shelf(FPS, FRAMES, Vp8Agreement(width, height))
+
+
+def test_a_camera_of_another_size_or_codec_is_refused() -> None:
+    other = encoded(96, 48)[0]
+    with pytest.raises(ParameterMismatchError, match="not VP8 of the site's size"):
+        shelf().put(0, 1, other.data, key=True)
+    h264 = Encoder(Site(width=64, height=48), Encode()).encode(0, np.zeros((48, 64, 3), dtype=np.uint8))
+    with pytest.raises(ParameterMismatchError):
+        shelf().put(0, 1, h264.data, key=True)
+
+
+def shelved(units: tuple[AccessUnit, ...], boot: int = 1) -> list[Picture]:
+    on = shelf()
+    return [on.put(unit.pulse, boot, unit.data, key=unit.key) for unit in units]
+
+
+def read(data: bytes) -> list[tuple[float, Pixels]]:
+    """Give the pulses and pictures of a WebM."""
+    with av.open(io.BytesIO(data), format="matroska") as container:
+        return [(frame.time * FPS, frame.to_ndarray(format="yuv420p")) for frame in container.decode(video=0)]
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.sets(st.integers(0, FRAMES - 1)), st.integers(0, 10**6))
+def test_a_stream_has_a_picture_for_every_pulse_whatever_does_not_come(lost: set[int], start: int) -> None:
+    """What is shown is the camera's own picture, or stands still up to the next key picture."""
+    start -= start % GOP
+    units, plain = encoded(64, 48), decoded([unit.data for unit in encoded(64, 48)], "vp8")
+    agreement = Vp8Agreement(64, 48)
+    time, on = Timeline(agreement, FPS, GOP), Shelf(FPS, FRAMES, agreement)
+    shown: list[Picture] = []
+    expected: list[int] = []
+    standing = -1
+    for unit in units:
+        if unit.key:
+            standing = -1
+        if unit.pulse in lost:
+            standing = standing if standing >= 0 or not expected else expected[-1]
+            if expected:
+                expected.append(standing)
+            elif unit.key:
+                standing = -2  # nothing can be shown before the next key picture
+            continue
+        picture = on.put(start + unit.pulse, 1, unit.data, key=unit.key)
+        shown += time.take(picture)
+        if not expected and not unit.key:
+            continue
+        expected.append(unit.pulse if standing == -1 else standing)
+    shown += time.fill(start + FRAMES)
+    if not expected:
+        assert not shown
+        return
+    found = read(header(64, 48, FPS) + b"".join(picture.fragment for picture in shown))
+    first = FRAMES - len(expected)
+    assert [round(pulse, 3) for pulse, _ in found] == list(range(start + first, start + FRAMES))
+    np.testing.assert_array_equal([picture for _, picture in found], [plain[n] for n in expected])
+
+
+def test_a_long_hole_is_one_picture_that_lasts() -> None:
+    agreement = Vp8Agreement(64, 48)
+    time, (first, *_) = Timeline(agreement, FPS, GOP), encoded(64, 48)
+    shown = time.take(Picture(0, key=True, fragment=agreement.pack(first.data, 0, FPS, key=True), boot=1))
+    shown += time.fill(1000)
+    assert [(picture.pulse, picture.lasts) for picture in shown] == [(0, 1), (1, 999)]
+    data = header(64, 48, FPS) + b"".join(picture.fragment for picture in shown)
+    with av.open(io.BytesIO(data), format="matroska") as container:
+        packets = [packet for packet in container.demux(video=0) if packet.pts is not None]
+    assert [(packet.pts, packet.duration, packet.is_keyframe) for packet in packets] == [
+        (0, 40, True),
+        (40, 39_960, False),
+    ]
+
+
+@given(st.integers(0, 2**40), st.integers(-1000, 10**9), st.sampled_from([15, 25, 29.97, 30, 50, 60]))
+def test_a_cluster_is_moved_by_its_time_alone(pulse: int, by: int, fps: float) -> None:
+    moved = rebased(cluster(b"frame", pulse, fps, key=True), max(by, 0))
+    time = round(pulse * 1000 / fps) + max(0, by)
+    assert moved[10:18] == time.to_bytes(8, "big")
+    assert moved[:10] + moved[18:] == (whole := cluster(b"frame", pulse, fps, key=True))[:10] + whole[18:]
+
+
+@pytest.mark.skipif(not shutil.which("ffprobe"), reason="needs ffprobe")
+def test_ffprobe_has_nothing_to_complain_of(tmp_path: Path) -> None:
+    units = encoded(64, 48)
+    data = header(64, 48, FPS, FRAMES) + b"".join(it.fragment for it in shelved(units))
+    file = tmp_path / "film.webm"
+    file.write_bytes(data)
+    entries = "stream=codec_name,width,height,avg_frame_rate:format=format_name,duration"
+    command = ["ffprobe", "-v", "warning", "-of", "default=nw=1", "-show_entries", entries, str(file)]
+    said = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert said.stderr == ""
+    assert set(said.stdout.split()) == {
+        "codec_name=vp8",
+        "width=64",
+        "height=48",
+        "avg_frame_rate=25/1",
+        "format_name=matroska,webm",
+        "duration=0.800000",
+    }
