@@ -21,11 +21,11 @@ from server.camera.encode import Encoder
 from server.camera.scene import Scene
 from server.view.channel import Channel, Chunk, Viewer
 from server.view.fmp4 import Sample, fragment
-from server.view.h264 import nal_units, sample
 from server.view.pictures.decided import Told, first_pulse
 from server.view.pictures.series import Series
 from server.view.pictures.source import Source
 from server.wire.drawing import Canvas
+from server.wire.h264 import nal_units, sample
 from server.wire.sections import Encode, Site
 
 _MS = 1e3

@@ -6,8 +6,8 @@ from typing import Literal
 
 from server.view.bridge import Bridge, H264Bridge
 from server.view.fmp4 import Sample, fragment, init_segment, rebased, ticks
-from server.view.h264 import ParameterSets, nal_units, parameter_sets, sample
 from server.view.skip import UnfitError, continuing
+from server.wire.h264 import ParameterSets, nal_units, parameter_sets, sample
 from server.wire.sections import Site
 from server.wire.sound import SoundFormat
 

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import accumulate
 
-from server.view.h264 import ParameterSets
+from server.wire.h264 import ParameterSets
 from server.wire.sound import FRAME, SoundFormat
 
 TIMESCALE = 90_000

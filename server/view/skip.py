@@ -11,7 +11,7 @@ from functools import lru_cache
 
 from server.view import cabac
 from server.view.bits import BitReader, BitWriter, payload_of, unit_of
-from server.view.h264 import NAL_IDR, NAL_SLICE, ParameterSets, nal_type
+from server.wire.h264 import NAL_IDR, NAL_SLICE, ParameterSets, nal_type
 
 _HIGH_PROFILES = frozenset({44, 83, 86, 100, 110, 118, 122, 128, 134, 135, 138, 139, 244})
 """Those whose sequence parameter set says more of colours (7.3.2.1.1)."""

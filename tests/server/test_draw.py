@@ -20,9 +20,9 @@ from server.draw.boxes import CHOSEN, OTHER, Image, draw_boxes
 from server.draw.studio import Studio
 from server.draw.unpack import frames
 from server.view.fmp4 import Sample, fragment
-from server.view.h264 import nal_units, sample
 from server.view.pictures.decided import first_pulse
 from server.wire.drawing import Canvas, Draw, Drawn, belongs, framed
+from server.wire.h264 import nal_units, sample
 
 CANVAS = Canvas(
     width=WIDTH, height=HEIGHT, fps=FPS, gop=GOP, preset="ultrafast", crf=18, max_kbps=None, jpeg_quality=90

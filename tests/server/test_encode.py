@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from server.camera.encode import AccessUnit, Encoder
-from server.view.h264 import nal_units, parameter_sets
+from server.wire.h264 import nal_units, parameter_sets
 from server.wire.sections import Encode, Site
 
 SITE = Site(width=160, height=96, fps=25)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from server.camera.encode import AccessUnit, Encoder
 from server.view.fmp4 import Sample, fragment, init_segment, rebased, ticks
-from server.view.h264 import nal_type, nal_units, parameter_sets, sample
+from server.wire.h264 import nal_type, nal_units, parameter_sets, sample
 from server.wire.sections import Encode, Site
 
 SITE = Site(width=64, height=48, fps=25)

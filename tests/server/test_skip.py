@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from server.camera.encode import AccessUnit, Encoder
 from server.view.bits import BitReader, BitWriter, payload_of, unit_of
-from server.view.h264 import ParameterSets, nal_units, parameter_sets, sample
 from server.view.skip import Continuing, UnfitError, continuing
+from server.wire.h264 import ParameterSets, nal_units, parameter_sets, sample
 from server.wire.sections import Encode, Site
 
 PRESETS = ("ultrafast", "superfast", "medium")

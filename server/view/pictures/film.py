@@ -9,12 +9,12 @@ from itertools import pairwise
 from server.view.agreement import Agreement
 from server.view.channel import Channel
 from server.view.fmp4 import Sample, fragment, init_segment
-from server.view.h264 import nal_units, parameter_sets, sample
 from server.view.picture import Picture
 from server.view.sound import Following, SoundShelf
 from server.view.tally import Tally
 from server.view.timeline import Timeline
 from server.wire.drawing import Canvas, Unit
+from server.wire.h264 import nal_units, parameter_sets, sample
 
 
 class Film:
