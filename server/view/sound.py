@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from server.view.fmp4 import sound_fragment
+from server.view.mp4_sound import sound_fragment
 from server.wire.messages import SoundHead
-from server.wire.sound import FRAME, SoundFormat
+from server.wire.sound import SoundFormat
 
 _PATIENCE_S = 0.5
 """How long a camera's own stream, which is behind nobody, waits for sound before it has silence instead."""
@@ -26,7 +26,7 @@ class Heard:
     @cached_property
     def fragment(self) -> bytes:
         """The frames as a fragment of MP4; nothing where there are none."""
-        return sound_fragment(self.frames, self.first * FRAME) if self.frames else b""
+        return sound_fragment(self.format, self.frames, self.first) if self.frames else b""
 
 
 class SoundShelf:
@@ -35,7 +35,7 @@ class SoundShelf:
     def __init__(self, form: SoundFormat, fps: float, seconds: float) -> None:
         self.format = form
         self.fps = fps
-        self._most = round(seconds * form.rate / FRAME)
+        self._most = round(seconds * form.rate / form.samples)
         self._frames: dict[int, bytes] = {}
         self._silence = form.silence
 
@@ -67,7 +67,7 @@ class SoundShelf:
     @property
     def patience(self) -> int:
         """Frames that sound may be late by before it is taken to be silent."""
-        return round(_PATIENCE_S * self.format.rate / FRAME)
+        return round(_PATIENCE_S * self.format.rate / self.format.samples)
 
     def get(self, number: int) -> bytes | None:
         """Give a frame; None where it has not come, or is not kept any more."""
@@ -96,7 +96,7 @@ class Following:
         shelf = self._shelf
         form, fps = shelf.format, shelf.fps
         begin, end = form.frame_at(first, fps), form.frame_at(until, fps)
-        if self._next is None or begin < self._next - _ANEW_S * form.rate // FRAME:
+        if self._next is None or begin < self._next - _ANEW_S * form.rate // form.samples:
             self._next = begin
         late = end - shelf.patience
         heard = shelf.come(self._next, end, late)

@@ -15,7 +15,6 @@ from dataclasses import dataclass
 from server.view.fmp4 import TIMESCALE, ticks
 from server.view.picture import Picture
 from server.view.sound import Heard
-from server.wire.sound import FRAME
 
 PACKET_BYTES = 188
 COUNTERS = 16
@@ -58,16 +57,17 @@ def packets(picture: Picture) -> int:
 
 
 def sound_packets(heard: Heard) -> int:
-    """Give how many packets with content some sound becomes."""
+    """Give how many packets with content some sound becomes; there is none of Opus here."""
     return sum(_plain_packets(len(content)) for content in _sound_pes(heard))
 
 
 def pack(pictures: Sequence[Picture], fps: float, counters: Counters, heard: Heard | None = None) -> bytes:
-    """Give consecutive pictures as packets, behind what is to be heard with them.
+    """Give consecutive pictures as packets, behind what is to be heard with them, if that is AAC.
 
     The tables come before each whole GOP and each key picture.
     """
     out: list[bytes] = []
+    heard = heard if heard is not None and heard.format.coding == "aac" else None
     if counters.whole or pictures[0].key:
         out += [
             _table(_PAT_PID, _PAT, counters.tables),
@@ -101,9 +101,12 @@ def _pack_sound(heard: Heard, counters: Counters) -> Iterator[bytes]:
 
 def _sound_pes(heard: Heard) -> list[bytes]:
     """Give sound as PES packets, each frame behind its ADTS head."""
-    form, made = heard.format, []
+    form = heard.format
+    made: list[bytes] = []
+    if form.coding != "aac":
+        return made
     for place in range(0, len(heard.frames), _FRAMES_AT_ONCE):
-        stamp = _stamp(round((heard.first + place) * FRAME * TIMESCALE / form.rate) % _CLOCK)
+        stamp = _stamp(round((heard.first + place) * form.samples * TIMESCALE / form.rate) % _CLOCK)
         frames = heard.frames[place : place + _FRAMES_AT_ONCE]
         content = b"".join(form.adts(len(frame)) + frame for frame in frames)
         made.append(

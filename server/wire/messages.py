@@ -12,7 +12,7 @@ key                                       payload                               
 ``myview/SITE/camera/ID/status``          :class:`CameraStatus`
 ``myview/SITE/camera/ID/thumbs/LOCAL``    JPEG of one person                       :class:`ThumbHead`
 ``myview/SITE/camera/ID/alive``           liveliness token
-``myview/SITE/sound``                     frames of AAC, one after the other       :class:`SoundHead`
+``myview/SITE/sound``                     frames of sound, one after the other     :class:`SoundHead`
 ``myview/SITE/bestview/choices``          :class:`GopChoices`
 ``myview/SITE/bestview/INDEX/choices``    of a further service that shares the site
 ``myview/SITE/bestview/alive``            liveliness token
@@ -69,7 +69,7 @@ class SoundHead(msgspec.Struct, frozen=True, kw_only=True):
     """Which frames of the site's sound these are (:mod:`server.wire.sound`)."""
 
     first: Number
-    """The number of the first: it begins with sample 1024 · first, counted from pulse 0."""
+    """The number of the first: a frame has 1024 samples of AAC, 960 of Opus, counted from pulse 0."""
     sizes: list[Annotated[int, msgspec.Meta(ge=1, le=8184)]]
     """Bytes of each; a transport stream can say no more than 8191 with its head."""
 

@@ -1,78 +1,65 @@
-"""A site's sound: AAC frames, numbered on the clock of the pulses.
+"""A site's sound: frames of AAC or Opus, numbered on the clock of the pulses.
 
-Frame *k* is the 1024 samples from sample 1024 · *k* on, counted from pulse 0 at the site's rate. So which
+Frame *k* begins with sample *k* times those in a frame, counted from pulse 0 at the site's rate. So which
 frames belong to some pulses follows from their numbers alone, whatever is shown meanwhile.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
-FRAME = 1024
-"""Samples in a frame of AAC (ISO/IEC 14496-3)."""
+from server.wire.aac import SAMPLES as AAC_SAMPLES
+from server.wire.aac import adts, audio_specific_config, silent_frame
 
-RATES = (96_000, 88_200, 64_000, 48_000, 44_100, 32_000, 24_000, 22_050, 16_000, 12_000, 11_025, 8_000, 7_350)
-"""samplingFrequencyIndex (1.6.3.3)."""
+Coding = Literal["aac", "opus"]
 
-_LOW_COMPLEXITY = 2
-"""audioObjectType."""
-_ICS_INFO = "0" + "00" + "0" + "000000" + "0"
-"""A long window whose spectrum has no bands, not predicted (4.4.2.1)."""
-_QUIET = "000"
-"""No pulses, no noise shaping, no gain control."""
-_END = "111"
+OPUS_RATE = 48_000
+"""Samples a second that times of Opus are counted in, whatever it was made of (RFC 7845, 4)."""
+_OPUS_SAMPLES = 960
+"""In a frame of 20 ms, which is what nearly everybody sends."""
+_OPUS_SILENCE = (b"\xf8\xff\xfe", b"\xfc\xff\xfe")
+"""By channels: 20 ms in the full band by CELT (RFC 6716, 3.1), with the flag for silence set (4.3)."""
 
 
 @dataclass(frozen=True, slots=True)
 class SoundFormat:
-    """AAC with low complexity; all that a decoder has to be told."""
+    """All that a decoder has to be told."""
 
     rate: int
     """Samples a second."""
     channels: int
+    coding: Coding = "aac"
 
     @property
     def codec(self) -> str:
         """RFC 6381."""
-        return f"mp4a.40.{_LOW_COMPLEXITY}"
+        return "mp4a.40.2" if self.coding == "aac" else "opus"
+
+    @property
+    def samples(self) -> int:
+        """Samples in a frame."""
+        return AAC_SAMPLES if self.coding == "aac" else _OPUS_SAMPLES
 
     @property
     def config(self) -> bytes:
-        """AudioSpecificConfig (1.6.2.1)."""
-        return (_LOW_COMPLEXITY << 11 | RATES.index(self.rate) << 7 | self.channels << 3).to_bytes(2, "big")
+        """What AAC is described by (AudioSpecificConfig)."""
+        return audio_specific_config(self.rate, self.channels)
 
     @property
     def silence(self) -> bytes:
         """A frame in which there is nothing to hear."""
-        gain = "00000000"
-        if self.channels == 1:
-            bits = "000" + "0000" + gain + _ICS_INFO + _QUIET
-        else:
-            bits = "001" + "0000" + "1" + _ICS_INFO + "00" + 2 * (gain + _QUIET)
-        bits += _END
-        bits += "0" * (-len(bits) % 8)
-        return int(bits, 2).to_bytes(len(bits) // 8, "big")
+        return silent_frame(self.channels) if self.coding == "aac" else _OPUS_SILENCE[self.channels - 1]
 
     def frame_at(self, pulse: int, fps: float) -> int:
         """Give the number of the frame that sounds when a pulse is due."""
-        return round(pulse * self.rate / fps) // FRAME
+        return round(pulse * self.rate / fps) // self.samples
 
     def pulses(self, begin: int, end: int, fps: float) -> tuple[int, int]:
-        """Give pulses, the first and the one after the last, among which are all that some frames sound at."""
-        first = begin * FRAME * fps / self.rate
-        return max(0, int(first) - 1), int((end + 1) * FRAME * fps / self.rate) + 2
+        """Give the first pulse, and the one after the last, among which are all that some frames sound at."""
+        first = begin * self.samples * fps / self.rate
+        return max(0, int(first) - 1), int((end + 1) * self.samples * fps / self.rate) + 2
 
     def adts(self, size: int) -> bytes:
-        """Give what comes before a frame of ``size`` bytes in a transport stream (1.A.2)."""
-        whole = size + 7
-        return bytes(
-            (
-                0xFF,
-                0xF1,  # MPEG-4, no checksum
-                (_LOW_COMPLEXITY - 1) << 6 | RATES.index(self.rate) << 2 | self.channels >> 2,
-                (self.channels & 3) << 6 | whole >> 11,
-                whole >> 3 & 0xFF,
-                (whole & 7) << 5 | 0x1F,
-                0xFC,
-            )
-        )
+        """Give what comes before a frame of AAC of ``size`` bytes in a transport stream."""
+        return adts(self.rate, self.channels, size)

@@ -20,7 +20,7 @@ from server.camera.encode import AccessUnit, Encoder
 from server.camera.sound import Frame, RecordedSound, runs
 from server.wire.inbox import Message
 from server.wire.messages import Keys, SoundHead
-from server.wire.sections import Encode, Site, Sound
+from server.wire.sections import Encode, Site
 
 WIDTH, HEIGHT, FPS = 64, 48, 25
 EVERY = 20
@@ -43,11 +43,12 @@ def write_flashes(
     rate: int = 48_000,
     channels: int = 2,
     pictures: bool = True,
+    options: dict[str, str] | None = None,
 ) -> Path:
     """Write a recording that flashes and beeps at its pictures EVERY, 2 · EVERY and so on."""
     with av.open(str(path), "w") as container:
         video = container.add_stream("libx264", rate=FPS) if pictures else None
-        audio = container.add_stream(codec, rate=rate)
+        audio = container.add_stream(codec, rate=rate, options=options or {})
         assert isinstance(audio, AudioStream)
         audio.layout = "mono" if channels == 1 else "stereo"
         if isinstance(video, VideoStream):
@@ -90,8 +91,8 @@ def flashing(recording: Path) -> tuple[AccessUnit, ...]:
 
 
 def sends(service: FedService, recording: Path, silent: range = range(0)) -> list[bytes]:
-    """Send all of the recording's sound, but for some frames; give its frames of AAC."""
-    sound = RecordedSound(str(recording), Sound(source="here"), FPS, 0, "stop")
+    """Send all of the recording's sound, but for some frames; give its frames."""
+    sound = RecordedSound(str(recording), service.config.sound, FPS, 0, "stop")
     frames = [*sound.until(0), *sound.until(FRAMES)]
     for message in messages([it for it in frames if it.number not in silent]):
         service.intake.sound(message)

@@ -30,13 +30,14 @@ from sounds_by_hand import (
 from test_ts import check_counters, taken_apart
 
 from server.view.decide import GopDecision, ObjectChoice
-from server.view.fmp4 import sound_fragment
+from server.view.mp4_sound import sound_fragment
 from server.view.past.run import Headers
 from server.view.past.sounds import frames_in
 from server.view.past.store import Bounds, Piece, Store
 from server.view.sound import Heard
+from server.wire.aac import SAMPLES as FRAME
 from server.wire.messages import GopChoices
-from server.wire.sound import FRAME, SoundFormat
+from server.wire.sound import SoundFormat
 
 FORM = SoundFormat(48_000, 2)
 
@@ -256,11 +257,11 @@ def test_frames_are_found_by_their_numbers(
     path = tmp_path_factory.mktemp("frames") / "sound.mp4"
     content, number, all_of_them = b"junk", first, {}
     for frames in written:
-        content += sound_fragment(frames, number * FRAME) if frames else b""
+        content += sound_fragment(FORM, frames, number) if frames else b""
         all_of_them |= dict(enumerate(frames, start=number))
         number += len(frames) + data.draw(st.integers(0, 2))
     path.write_bytes(content + b"junk")
     begin, end = (data.draw(st.integers(0, number + 2)) for _ in range(2))
-    assert frames_in(path, 4, len(content) - 4, begin, end) == {
+    assert frames_in(path, 4, len(content) - 4, begin, end, FORM) == {
         number: frame for number, frame in all_of_them.items() if begin <= number < end
     }

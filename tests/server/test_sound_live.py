@@ -17,8 +17,9 @@ from sounds_by_hand import EVERY, FPS, beeps, write_flashes
 
 from server.camera.sound import Frame, LiveSound
 from server.camera.sources.stream import Stream
+from server.wire.aac import SAMPLES as FRAME
 from server.wire.sections import Sound
-from server.wire.sound import FRAME, SoundFormat
+from server.wire.sound import SoundFormat
 
 FRAMES = 3 * EVERY
 PATIENCE_S = 20.0  # until a test that awaits something has failed

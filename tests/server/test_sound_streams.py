@@ -32,8 +32,8 @@ from benchmarks.browser import CHROMIUM, chromium
 from server.camera.sound import RecordedSound
 from server.view.decide import GopDecision, ObjectChoice
 from server.view.fmp4 import init_segment
+from server.wire.aac import SAMPLES as FRAME
 from server.wire.sections import Sound
-from server.wire.sound import FRAME
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,4 @@
-"""A site's sound from what a camera or a file has: AAC frames on the clock of the pulses."""
+"""A site's sound from what a camera or a file has: frames on the clock of the pulses."""
 
 from __future__ import annotations
 

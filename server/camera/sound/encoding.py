@@ -1,4 +1,4 @@
-"""Sound of any kind, encoded once to AAC."""
+"""Sound of any kind, encoded once to what the site's is."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from av.audio.resampler import AudioResampler
 from numpy.typing import NDArray
 
 from server.camera.sound.frames import Frame, Packet
-from server.wire.sound import FRAME, SoundFormat
+from server.wire.sound import SoundFormat
 
 log = logging.getLogger(__name__)
 
@@ -27,8 +27,9 @@ class Encoding:
     """Decodes, resamples and encodes. Where nothing comes there is silence; what comes twice is left out."""
 
     def __init__(self, form: SoundFormat, kbps: int) -> None:
-        self._rate = form.rate
+        self._rate, self._each = form.rate, form.samples
         self._layout = "mono" if form.channels == 1 else "stereo"
+        self._format = "fltp" if form.coding == "aac" else "flt"
         self._resampler = self._new_resampler()
         self._encoder = self._new_encoder(form, kbps)
         self._samples: NDArray[np.float32] = np.zeros((form.channels, 0), dtype=np.float32)
@@ -57,7 +58,7 @@ class Encoding:
     def _place(self, at: int) -> None:
         """Make sample number ``at`` the next one, if it is not nearly so."""
         if self._first is None or at > self._first + _LONG_S * self._rate:
-            self._first, self._samples = max(0, at) // FRAME * FRAME, self._samples[:, :0]
+            self._first, self._samples = max(0, at) // self._each * self._each, self._samples[:, :0]
         ahead = at - (self._first + self._samples.shape[1])
         if abs(ahead) <= _OFF_S * self._rate and self._samples.shape[1]:
             return
@@ -73,23 +74,31 @@ class Encoding:
 
     def _encoded(self) -> list[Frame]:
         found: list[Frame] = []
-        while self._first is not None and self._samples.shape[1] >= FRAME:
-            samples = np.ascontiguousarray(self._samples[:, :FRAME])
-            frame = AudioFrame.from_ndarray(samples, format="fltp", layout=self._layout)
+        while self._first is not None and self._samples.shape[1] >= self._each:
+            samples = np.ascontiguousarray(self._samples[:, : self._each])
+            frame = AudioFrame.from_ndarray(*self._laid_out(samples), layout=self._layout)
             frame.sample_rate, frame.pts, frame.time_base = self._rate, self._first, Fraction(1, self._rate)
-            # The encoder's first packet is what comes before its first sample: its time says so.
-            packets = [it for it in self._encoder.encode(frame) if it.pts is not None and it.pts >= 0]
-            found += [Frame(it.pts // FRAME, bytes(it)) for it in packets if it.pts is not None]
-            self._samples, self._first = self._samples[:, FRAME:], self._first + FRAME
+            for packet in self._encoder.encode(frame):
+                # Its time says what the encoder looks ahead: of AAC the first is all before the first sample.
+                number = -1 if packet.pts is None else round(packet.pts / self._each)
+                if number >= 0:
+                    found.append(Frame(number, bytes(packet)))
+            self._samples, self._first = self._samples[:, self._each :], self._first + self._each
         return found
 
     def _new_resampler(self) -> AudioResampler:
         return AudioResampler(format="fltp", layout=self._layout, rate=self._rate)
 
+    def _laid_out(self, samples: NDArray[np.float32]) -> tuple[NDArray[np.float32], str]:
+        """Give samples ``(channels, samples)`` as the encoder likes them, with its name for that."""
+        if self._format == "fltp":
+            return samples, "fltp"
+        return np.ascontiguousarray(samples.T).reshape(1, -1), "flt"
+
     def _new_encoder(self, form: SoundFormat, kbps: int) -> AudioCodecContext:
-        encoder = av.CodecContext.create("aac", "w")
-        assert isinstance(encoder, AudioCodecContext)  # noqa: S101 — tells mypy what aac is
-        encoder.sample_rate, encoder.layout, encoder.format = form.rate, self._layout, "fltp"
+        encoder = av.CodecContext.create({"aac": "aac", "opus": "libopus"}[form.coding], "w")
+        assert isinstance(encoder, AudioCodecContext)  # noqa: S101 — tells mypy what they are
+        encoder.sample_rate, encoder.layout, encoder.format = form.rate, self._layout, self._format
         encoder.time_base = Fraction(1, form.rate)
         encoder.bit_rate = kbps * 1000
         encoder.open()

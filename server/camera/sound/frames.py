@@ -1,4 +1,4 @@
-"""Frames of AAC by number (:mod:`server.wire.sound`)."""
+"""Frames of AAC or Opus by number (:mod:`server.wire.sound`)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Packet: TypeAlias = "av.Packet[AudioStream]"
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """One frame of AAC."""
+    """One frame."""
 
     number: int
     data: bytes

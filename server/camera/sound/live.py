@@ -9,11 +9,9 @@ from fractions import Fraction
 
 from av.audio.stream import AudioStream
 
-from server.camera.sound.encoding import Encoding
 from server.camera.sound.frames import Frame, Packet, Way
-from server.camera.sound.passing import Passing, fits
+from server.camera.sound.ways import way_for
 from server.wire.sections import Sound
-from server.wire.sound import FRAME
 
 log = logging.getLogger(__name__)
 
@@ -42,7 +40,7 @@ class LiveSound:
         self._shifts: deque[float] = deque(maxlen=max(1, round(_MEAN_S * fps)))
         """Of the last pictures: how much later they are shown, counted from pulse 0."""
         self._shift: Fraction | None = None
-        self._frames: deque[Frame] = deque(maxlen=round(_WAITING_S * form.rate / FRAME))
+        self._frames: deque[Frame] = deque(maxlen=round(_WAITING_S * form.rate / form.samples))
         self._way: Way | None = None
         self._last = -1
 
@@ -52,8 +50,7 @@ class LiveSound:
         if stream is None:
             log.warning("there is no sound in what the camera sends; the site is silent")
         else:
-            passes = fits(stream, self._form)
-            self._way = Passing(self._form) if passes else Encoding(self._form, self._kbps)
+            self._way = way_for(stream, self._form, self._kbps)
 
     def picture(self, time: Fraction) -> None:
         """Note when the newest picture was taken, by the camera's clock."""

@@ -12,9 +12,8 @@ import av
 from av.audio.stream import AudioStream
 from av.container import InputContainer
 
-from server.camera.sound.encoding import Encoding
 from server.camera.sound.frames import Frame, Packet, Way
-from server.camera.sound.passing import Passing, fits
+from server.camera.sound.ways import way_for
 from server.wire.errors import UserError
 from server.wire.sections import Sound
 
@@ -30,7 +29,7 @@ _SPEED_OFF = 0.002
 class RecordedSound:
     """Sounds at pulse *n* as the recording does with its picture ``n - offset``.
 
-    AAC of the site's format is passed on; all else is encoded.
+    What is of the site's format is passed on; all else is encoded.
 
     Raises:
         UserError: it cannot be opened, there is no sound in it, or its pictures have another rate.
@@ -48,12 +47,10 @@ class RecordedSound:
         container, stream = _open(path)
         try:
             self._start, self._speed = self._of_pictures(container)
-            self.passes = fits(stream, form)
-            """Whether it is passed on as it is."""
+            self._way: Way = way_for(stream, form, settings.kbps)
             self._lasts = self._length(container, stream) if at_end == "loop" else None
         finally:
             container.close()
-        self._way: Way = Passing(form) if self.passes else Encoding(form, settings.kbps)
         self._packets: Iterator[tuple[Fraction, Packet]] | None = None
         self._waiting: tuple[Fraction, Packet] | None = None
 

@@ -10,6 +10,7 @@ from server.view.past.sounds import frames_in
 from server.view.past.stretch import Stretch
 from server.view.sound import Following, Heard, SoundShelf
 from server.view.timeline import LONGEST_S
+from server.wire.sound import SoundFormat
 
 
 class Hearing:
@@ -58,13 +59,15 @@ class Hearing:
         found: dict[int, bytes] = {}
         for one in recorded:
             for it in one.tape.between(*form.pulses(begin, end, fps)):
-                found |= _frames_of(one, it, begin, end)
+                found |= _frames_of(one, it, begin, end, form)
         return found
 
 
-def _frames_of(recorded: Recorded, stretch: Stretch, begin: int, end: int) -> dict[int, bytes]:
+def _frames_of(
+    recorded: Recorded, stretch: Stretch, begin: int, end: int, form: SoundFormat
+) -> dict[int, bytes]:
     path = recorded.run.sound_file(stretch.file)
     try:
-        return frames_in(path, stretch.offset, stretch.length, begin, end)
+        return frames_in(path, stretch.offset, stretch.length, begin, end, form)
     except FileNotFoundError:  # retention has just taken it away
         return {}

@@ -9,7 +9,8 @@ from collections.abc import Mapping
 from weakref import WeakKeyDictionary
 
 from server.view.agreement import Agreement
-from server.view.fmp4 import init_segment, sound_init_segment
+from server.view.fmp4 import init_segment
+from server.view.mp4_sound import sound_init_segment
 from server.view.past.recent import Recent
 from server.view.past.run import Headers, Run, RunHead
 from server.view.past.store import Bounds, Piece, Store

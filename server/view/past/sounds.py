@@ -12,7 +12,7 @@ from io import BufferedReader
 from itertools import accumulate, pairwise
 from pathlib import Path
 
-from server.wire.sound import FRAME
+from server.wire.sound import SoundFormat
 
 NAME = "sound"
 """Of the folder, and what a reference has instead of a camera."""
@@ -21,7 +21,9 @@ _HEAD = 8
 """Bytes of a box's size and kind."""
 
 
-def frames_in(path: Path, offset: int, length: int, begin: int, end: int) -> dict[int, bytes]:
+def frames_in(
+    path: Path, offset: int, length: int, begin: int, end: int, form: SoundFormat
+) -> dict[int, bytes]:
     """Read the frames ``begin … end - 1``, as far as they are in a piece of a file of sound.
 
     Raises:
@@ -29,7 +31,8 @@ def frames_in(path: Path, offset: int, length: int, begin: int, end: int) -> dic
     """
     found: dict[int, bytes] = {}
     with path.open("rb") as file:
-        for number, sizes, at in _fragments(file, offset, offset + length):
+        for sample, sizes, at in _fragments(file, offset, offset + length):
+            number = sample // form.samples
             if number >= end:
                 break
             if number + len(sizes) <= begin:
@@ -42,7 +45,7 @@ def frames_in(path: Path, offset: int, length: int, begin: int, end: int) -> dic
 
 
 def _fragments(file: BufferedReader, at: int, end: int) -> Iterator[tuple[int, tuple[int, ...], int]]:
-    """Give each fragment's first number, the sizes of its frames, and where they are."""
+    """Give each fragment's first sample, the sizes of its frames, and where they are."""
     moof = b""
     while at + _HEAD <= end:
         file.seek(at)
@@ -60,8 +63,8 @@ def _fragments(file: BufferedReader, at: int, end: int) -> Iterator[tuple[int, t
 
 
 def _told(moof: bytes) -> tuple[int, tuple[int, ...]]:
-    """Give what a fragment of :func:`server.view.fmp4.sound_fragment` says: its first number, its sizes."""
+    """Give what a fragment of :func:`server.view.mp4_sound.sound_fragment` says: first sample, sizes."""
     (sample,) = struct.unpack_from(">Q", moof, moof.index(b"tfdt") + 8)
     at = moof.index(b"trun") + 8
     (count,) = struct.unpack_from(">I", moof, at)
-    return sample // FRAME, struct.unpack_from(f">{count}I", moof, at + 8)
+    return sample, struct.unpack_from(f">{count}I", moof, at + 8)

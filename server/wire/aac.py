@@ -1,0 +1,50 @@
+"""Advanced Audio Coding (ISO/IEC 14496-3), with low complexity: its headers, and silence."""
+
+from __future__ import annotations
+
+SAMPLES = 1024
+"""In a frame."""
+
+RATES = (96_000, 88_200, 64_000, 48_000, 44_100, 32_000, 24_000, 22_050, 16_000, 12_000, 11_025, 8_000, 7_350)
+"""samplingFrequencyIndex (1.6.3.3)."""
+
+_LOW_COMPLEXITY = 2
+"""audioObjectType."""
+_ICS_INFO = "0" + "00" + "0" + "000000" + "0"
+"""A long window whose spectrum has no bands, not predicted (4.4.2.1)."""
+_QUIET = "000"
+"""No pulses, no noise shaping, no gain control."""
+_END = "111"
+
+
+def audio_specific_config(rate: int, channels: int) -> bytes:
+    """Give AudioSpecificConfig (1.6.2.1): all that a decoder has to be told."""
+    return (_LOW_COMPLEXITY << 11 | RATES.index(rate) << 7 | channels << 3).to_bytes(2, "big")
+
+
+def silent_frame(channels: int) -> bytes:
+    """Give a frame in which there is nothing to hear."""
+    gain = "00000000"
+    if channels == 1:
+        bits = "000" + "0000" + gain + _ICS_INFO + _QUIET
+    else:
+        bits = "001" + "0000" + "1" + _ICS_INFO + "00" + 2 * (gain + _QUIET)
+    bits += _END
+    bits += "0" * (-len(bits) % 8)
+    return int(bits, 2).to_bytes(len(bits) // 8, "big")
+
+
+def adts(rate: int, channels: int, size: int) -> bytes:
+    """Give what comes before a frame of ``size`` bytes in a transport stream (1.A.2)."""
+    whole = size + 7
+    return bytes(
+        (
+            0xFF,
+            0xF1,  # MPEG-4, no checksum
+            (_LOW_COMPLEXITY - 1) << 6 | RATES.index(rate) << 2 | channels >> 2,
+            (channels & 3) << 6 | whole >> 11,
+            whole >> 3 & 0xFF,
+            (whole & 7) << 5 | 0x1F,
+            0xFC,
+        )
+    )
