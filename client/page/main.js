@@ -17,6 +17,7 @@ const READOUT_MS = 250;
 const CLOCK_EVERY_MS = 10_000;
 const CLOCK_SAMPLES = 4; // one after the other, at every connection
 const DELAY_FRAMES = 25; // whose median is shown
+const SKIP_S = 5;
 const MISSING = '–';
 
 /**
@@ -60,6 +61,7 @@ function show() {
     cameras.show(viewer.cameras);
     cameras.mark(viewer.probe.camera, viewer.held);
     element('automatic').hidden = viewer.held === null;
+    element('live').hidden = viewer.past === null;
   }
   if (viewer.people) {
     people.show(viewer.people, viewer.object, viewer.palette, (person) => viewer.isGone(person));
@@ -83,7 +85,8 @@ function readOut() {
   const delay = median(probe.delays.slice(-DELAY_FRAMES).map(({ delayMs }) => delayMs ?? NaN));
   element('delay').textContent = viewer.flowing && delay > 0 ? `${(delay / 1000).toFixed(1)} s` : MISSING;
   if (!site || probe.pulse === null || viewer.object === null) return strip.clear();
-  strip.draw({ pulse: probe.pulse, fps: site.fps, object: viewer.object, decisions, palette });
+  const live = viewer.past === null;
+  strip.draw({ pulse: probe.pulse, live, fps: site.fps, object: viewer.object, decisions, palette });
   if (viewer.held === null) void reason.about(viewer.object, probe.camera);
   else reason.put(`Held by hand. ${best(decisions.camera(viewer.object, probe.pulse), viewer.held)}`);
 }
@@ -189,6 +192,19 @@ toggle.addEventListener('click', toggleBoxes);
 soundToggle.addEventListener('click', toggleSound);
 followToggle.addEventListener('click', toggleFollow);
 element('full-screen').addEventListener('click', fullScreen);
+const stripElement = element('strip');
+stripElement.addEventListener('click', ({ offsetX }) => {
+  const pulse = strip.pulseAt(offsetX);
+  if (pulse === null) viewer.live();
+  else viewer.watchFrom(pulse);
+});
+element('live').addEventListener('click', () => viewer.live());
+element('pause').addEventListener('click', () => viewer.pause());
+for (const name of ['play', 'pause']) {
+  video.addEventListener(name, () => {
+    element('pause').textContent = video.paused ? 'Play' : 'Pause';
+  });
+}
 element('automatic').addEventListener('click', () => viewer.hold(null));
 element('snapshot').addEventListener('click', snapshot);
 element('copy-link').addEventListener('click', copyLink);
@@ -201,6 +217,10 @@ element('in-picture').hidden = !document.pictureInPictureEnabled;
 listenToKeys({
   ArrowRight: () => viewer.step(1),
   ArrowLeft: () => viewer.step(-1),
+  ' ': () => viewer.pause(),
+  ',': () => viewer.skip(-SKIP_S),
+  '.': () => viewer.skip(SKIP_S),
+  End: () => viewer.live(),
   b: toggleBoxes,
   z: toggleFollow,
   m: toggleSound,
@@ -213,9 +233,9 @@ listenToKeys({
 });
 stage.addEventListener('mousemove', (event) => stage.classList.toggle('over-person', personAt(event) !== null));
 stage.addEventListener('click', (event) => {
-  if (video.paused) video.play().catch(() => undefined);
   const object = personAt(event);
   if (object !== null) viewer.choose(object);
+  else if (video.paused) viewer.pause();
 });
 
 async function setClock() {

@@ -65,7 +65,8 @@ export class Player {
    * @param {HTMLVideoElement} video
    * @param {object} listener
    * @param {() => void} listener.landed the picture is now of who was chosen last
-   * @param {(subject: Subject) => void} listener.ended there is nothing more of this past
+   * @param {() => void} listener.ended there is nothing more of this past
+   * @param {() => void} listener.resumed the picture is to go on where it stopped, and its stream has been left
    */
   constructor(video, listener) {
     this.video = video;
@@ -76,7 +77,7 @@ export class Player {
     });
     video.addEventListener('error', () => this.#reopen());
     video.addEventListener('play', () => {
-      if (!this.#run && this.shown) this.choose({ ...this.shown, past: null });
+      if (!this.#run && this.shown) this.listener.resumed();
     });
     setInterval(() => this.#tick(), TICK_MS);
   }
@@ -141,7 +142,7 @@ export class Player {
         if (!signal.aborted) console.info(`the stream of ${run.subject.object}: ${error}`);
       }
       if (signal.aborted) return;
-      if (run.subject.past) return this.listener.ended(run.subject);
+      if (run.subject.past) return this.listener.ended();
       run.start = run.since = NaN;
       run.early = [];
       await pause(backoff.next(), signal);

@@ -14,6 +14,7 @@ const DECIDED_ALPHA = 0.45; // decided, not yet shown
 /**
  * @typedef {object} Moment what the strip shows
  * @property {number} pulse now shown
+ * @property {boolean} live whether it is the newest
  * @property {number} fps
  * @property {number} object
  * @property {Decisions} decisions
@@ -21,20 +22,38 @@ const DECIDED_ALPHA = 0.45; // decided, not yet shown
  */
 
 export class Strip {
+  /** @type {{end: number, fps: number} | null} of what was drawn last */
+  #moment = null;
+
   /** @param {HTMLCanvasElement} canvas */
   constructor(canvas) {
     this.surface = new Surface(canvas);
   }
 
   clear() {
+    this.#moment = null;
     this.surface.clear();
   }
 
+  /**
+   * @param {number} x CSS pixels from the left edge
+   * @returns {number | null} the pulse that is drawn there; null: none, or it is yet to come
+   */
+  pulseAt(x) {
+    if (!this.#moment) return null;
+    const { end, fps } = this.#moment;
+    const pulse = Math.round(end - PAST_S * fps + (x / this.surface.width) * (PAST_S + AHEAD_S) * fps);
+    return pulse < end ? pulse : null;
+  }
+
   /** @param {Moment} moment */
-  draw({ pulse, fps, object, decisions, palette }) {
+  draw({ pulse, live, fps, object, decisions, palette }) {
     const context = this.surface.clear();
     const { width, height } = this.surface;
-    const from = pulse - PAST_S * fps;
+    // The band stands at the newest; what is watched of the past is a mark on it.
+    const end = live ? pulse : Math.max(pulse, decisions.end);
+    this.#moment = { end, fps };
+    const from = end - PAST_S * fps;
     const perFrame = width / ((PAST_S + AHEAD_S) * fps);
     /** @param {number} at */
     const x = (at) => (at - from) * perFrame;
@@ -44,7 +63,8 @@ export class Strip {
       context.fillRect(left, 0, right - left, height);
       writeName(context, run.camera, left, right, height);
     }
-    shadeUndone(context, x(pulse), width, height);
+    shadeUndone(context, x(end), width, height);
+    if (!live) mark(context, x(pulse), height);
   }
 }
 
@@ -67,13 +87,24 @@ function writeName(context, camera, left, right, height) {
 
 /**
  * @param {CanvasRenderingContext2D} context
- * @param {number} now where the frame now shown is
+ * @param {number} now where what is decided and not yet shown begins
  * @param {number} width
  * @param {number} height
  */
 function shadeUndone(context, now, width, height) {
   context.fillStyle = `rgba(16, 17, 18, ${1 - DECIDED_ALPHA})`;
   context.fillRect(now, 0, width - now, height);
+  mark(context, now, height);
+}
+
+/**
+ * @param {CanvasRenderingContext2D} context
+ * @param {number} at
+ * @param {number} height
+ */
+function mark(context, at, height) {
+  context.fillStyle = '#101112';
+  context.fillRect(at - 2, 0, 4, height);
   context.fillStyle = '#fff';
-  context.fillRect(now - 1, 0, 2, height);
+  context.fillRect(at - 1, 0, 2, height);
 }

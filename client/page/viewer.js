@@ -58,7 +58,11 @@ export class Viewer {
    */
   constructor(video, changed) {
     this.changed = changed;
-    this.player = new Player(video, { landed: changed, ended: () => this.#losePast() });
+    this.player = new Player(video, {
+      landed: changed,
+      ended: () => this.#losePast(),
+      resumed: () => this.#resume(),
+    });
     this.probe.object = this.object;
     onAddress(({ object, camera }) => {
       this.#held = camera;
@@ -132,6 +136,7 @@ export class Viewer {
     const { fps } = this.site;
     if (pulse >= this.decisions.end - LIVE_S * fps) return this.live();
     this.past = { pulse, time: pulse / fps };
+    this.player.video.play().catch(() => undefined);
     this.#play();
     this.changed();
   }
@@ -152,8 +157,12 @@ export class Viewer {
   /** Stop the picture, or go on with it where it stopped. */
   pause() {
     const { video } = this.player;
-    if (!video.paused) return video.pause();
-    if (this.past || this.probe.pulse === null) video.play().catch(() => undefined);
+    if (video.paused) this.#resume();
+    else video.pause();
+  }
+
+  #resume() {
+    if (this.probe.pulse === null) this.player.video.play().catch(() => undefined);
     else this.watchFrom(this.probe.pulse);
   }
 

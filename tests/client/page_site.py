@@ -38,6 +38,7 @@ class FakeSite:
         first_pulse: Pulse of about the moment at which the site is made.
         skipped: Pulses whose frames are missing from every stream.
         opened: Whose stream was asked for, in order.
+        kept_from: The first pulse that can be seen again.
         pulse0: Unix seconds at which pulse 0 was due.
     """
 
@@ -48,6 +49,7 @@ class FakeSite:
     first_pulse: int = STARTS_AT
     skipped: range = range(0)
     opened: list[int] = field(default_factory=list)
+    kept_from: int = 0
     pulse0: float = field(init=False)
 
     def __post_init__(self) -> None:
@@ -175,6 +177,7 @@ class SiteServer:
         app.router.add_get("/api/events", self._events)
         app.router.add_get("/api/objects/{k}/choice", self._choice)
         app.router.add_get("/objects/{k}/best.mp4", self._best)
+        app.router.add_get("/cameras/{camera}/live.mp4", self._best)
         app.router.add_get("/objects/{k}/thumb.jpg", self._thumbnail)
         app.router.add_get("/recording.mp4", self._recording)
         self._runner = web.AppRunner(app, shutdown_timeout=0.05, handler_cancellation=True)
@@ -211,11 +214,15 @@ class SiteServer:
         return web.Response(body=thumbnail(int(request.match_info["k"])), content_type="image/jpeg")
 
     async def _best(self, request: web.Request) -> web.StreamResponse:
-        site, k = self.site, int(request.match_info["k"])
+        site, k = self.site, int(request.match_info.get("k", 1))
         site.opened.append(k)
         if k not in site.people:
             return web.json_response({"error": f"no object {k}"}, status=404)
-        held = request.query.get("camera")
+        held = request.match_info.get("camera", request.query.get("camera"))
+        first = int(request.query.get("from", f"p{site.boundary()}")[1:])
+        if "from" in request.query and first < site.kept_from:
+            return web.json_response({"error": "nothing is kept there"}, status=416)
+        first -= first % GOP
         response = web.StreamResponse(headers={"Content-Type": "video/mp4"})
         await response.prepare(request)
         transport = request.transport
@@ -223,7 +230,7 @@ class SiteServer:
         self._streams.add(transport)
         with contextlib.suppress(ConnectionError):
             await response.write(pattern(0).init)
-            async for pulse in site.released(site.boundary()):
+            async for pulse in site.released(first):
                 if pulse not in site.skipped:
                     shown = site.camera(k, pulse) if held is None else CAMERAS.index(held)
                     await response.write(pattern(shown).fragment(pulse))
