@@ -9,13 +9,19 @@ from typing import BinaryIO
 
 from server.view.agreement import Agreement
 from server.view.decide import GopDecision
+from server.view.footage import Footage
+from server.view.mp4_sound import sound_fragment
 from server.view.shelf import Shelf
+from server.view.sound import Heard, SoundShelf
+from server.view.streams import Gop, Showing
+from server.view.timeline import Timeline
 from server.wire.sections import Site
 
 
 @dataclass(slots=True)
 class _Film:
     file: BinaryIO
+    showing: Showing
     origin: int
     """The pulse that is at time 0."""
     wanted: int
@@ -25,11 +31,22 @@ class _Film:
 
 
 class Films:
-    """Writes ``object-1.mp4`` (or ``.webm``) and so on; the fragments of the streams, begun at time 0."""
+    """Writes ``object-1.mp4`` (or ``.webm``) and so on; the fragments of the streams, begun at time 0.
 
-    def __init__(self, folder: Path, shelves: Mapping[str, Shelf], agreement: Agreement, site: Site) -> None:
+    ``sound`` is None where there is none.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        shelves: Mapping[str, Shelf],
+        agreement: Agreement,
+        site: Site,
+        sound: SoundShelf | None = None,
+    ) -> None:
         folder.mkdir()
         self._folder, self._shelves, self._agreement, self._site = folder, shelves, agreement, site
+        self._sound = sound
         self._films: dict[int, _Film] = {}
 
     @property
@@ -39,18 +56,15 @@ class Films:
 
     def write(self, decision: GopDecision) -> None:
         """Append one GOP to everybody's film."""
+        gop = Gop(self._shelves, decision.first, decision.frames, self._site.fps, 0, self._sound)
         for choice in decision.choices:
-            if choice.camera is None:
-                continue
             film = self._films.get(choice.number)
+            if film is None and choice.camera is None:
+                continue
             if film is None:
-                film = self._films[choice.number] = self._begin(choice.number, decision.first)
-            shelf = self._shelves[choice.camera]
-            for pulse in range(decision.first, decision.first + decision.frames):
-                frame = shelf.get(pulse)
-                if frame is not None:
-                    begun = self._agreement.begun_at(film.origin, frame.fragment, self._site.fps)
-                    film.file.write(begun)
+                film = self._films[choice.number] = self._begin(choice.number, decision)
+            for footage in film.showing.show(choice.camera, gop):
+                self._write(film, footage)
             if not choice.away:
                 film.wanted, film.until = film.file.tell(), decision.first + decision.frames
 
@@ -63,10 +77,27 @@ class Films:
                 film.file.write(self._head(film.until - film.origin))
                 film.file.close()
 
-    def _begin(self, number: int, pulse: int) -> _Film:
+    def _begin(self, number: int, decision: GopDecision) -> _Film:
         file = (self._folder / f"object-{number}.{self._agreement.container}").open("wb")
         file.write(self._head(0))
-        return _Film(file, pulse, file.tell(), pulse)
+        showing = Showing(Timeline(self._agreement, self._site.fps, decision.frames))
+        return _Film(file, showing, decision.first, file.tell(), decision.first)
+
+    def _write(self, film: _Film, footage: Footage) -> None:
+        if footage.heard is not None:
+            film.file.write(_begun_at(film.origin, footage.heard, self._site.fps))
+        for picture in footage.pictures:
+            film.file.write(self._agreement.begun_at(film.origin, picture.fragment, self._site.fps))
 
     def _head(self, pulses: int) -> bytes:
-        return self._agreement.head(self._site, pulses=pulses) or b""
+        sound = None if self._sound is None else self._sound.format
+        return self._agreement.head(self._site, sound, pulses=pulses) or b""
+
+
+def _begun_at(origin: int, heard: Heard, fps: float) -> bytes:
+    """Give sound as it is in a film that has this pulse at time 0; a frame that begins before is left out."""
+    form = heard.format
+    sample = round(origin * form.rate / fps)
+    early = max(0, -((heard.first * form.samples - sample) // form.samples))
+    first, frames = heard.first + early, heard.frames[early:]
+    return sound_fragment(form, frames, first, sample) if frames else b""

@@ -11,6 +11,7 @@ from server.run.offline import Batch, CameraWorkers
 from server.run.plots import plot_choices, plot_tracks
 from server.run.recorded import Size
 from server.run.site_file import write_site
+from server.run.soundtrack import Soundtrack
 from server.view.align import Aligner
 from server.view.codec import agreement_for
 from server.view.decide import Decider, GopDecision, homographies
@@ -40,7 +41,9 @@ class Renderer:
             config, homographies(config), lambda camera, pulse: self._shelves[camera].has(pulse)
         )
         self._recorder = Recorder(folder, cameras, self._decider.people.fits)
-        self._films = Films(folder / "best", self._shelves, agreement, config.site)
+        self._soundtrack = Soundtrack(config)
+        shelf = self._soundtrack.shelf
+        self._films = Films(folder / "best", self._shelves, agreement, config.site, shelf)
         self._sizes: dict[str, Size] = {}
         self.ended: dict[str, int] = {}
         """The last pulse of each camera whose recording is over."""
@@ -79,6 +82,7 @@ class Renderer:
 
     def _write(self, decision: GopDecision) -> None:
         self._recorder.write(decision)
+        self._soundtrack.read(decision.first, decision.first + decision.frames)
         self._films.write(decision)
 
 

@@ -73,12 +73,15 @@ def _descriptor(tag: int, body: bytes) -> bytes:
     return bytes([tag, len(body)]) + body
 
 
-def sound_fragment(sound: SoundFormat, frames: Sequence[bytes], first: int) -> bytes:
-    """Give ``moof`` and ``mdat`` of consecutive frames of sound, of which the first has number ``first``."""
+def sound_fragment(sound: SoundFormat, frames: Sequence[bytes], first: int, origin: int = 0) -> bytes:
+    """Give ``moof`` and ``mdat`` of consecutive frames of sound, of which the first has number ``first``.
+
+    ``origin`` is the sample that is at time 0.
+    """
     sizes = struct.pack(f">{len(frames)}I", *map(len, frames))
     header = full("mfhd", 0, 0, struct.pack(">I", (first + 1) & 0xFFFFFFFF))
     track = full("tfhd", 0, 0x020008, struct.pack(">2I", SOUND_TRACK, sound.samples)) + full(
-        "tfdt", 1, 0, struct.pack(">Q", first * sound.samples)
+        "tfdt", 1, 0, struct.pack(">Q", first * sound.samples - origin)
     )
     moof_bytes = 8 + len(header) + 8 + len(track) + 8 + 4 + 4 + 4 + len(sizes)
     run = full("trun", 0, 0x000201, struct.pack(">Ii", len(frames), moof_bytes + 8) + sizes)

@@ -39,6 +39,28 @@ class LiveStream:
         self.channel.publish(self._tally.footage(pictures, heard, fills=fills))
 
 
+class Showing:
+    """What one stream shows, GOP after GOP, each of one camera: there is no hole in its time."""
+
+    def __init__(self, time: Timeline) -> None:
+        self._time = time
+        self._camera: str | None = None
+
+    def show(self, camera: str | None, gop: Gop) -> list[Footage]:
+        """Give a camera's GOP, or what bridges it where it is not whole or there is none."""
+        before = self._time.fill(gop.first)
+        shown = [gop.footage(before)] if before else []
+        whole = None if camera is None else gop.whole(camera)
+        self._camera = camera or self._camera
+        if whole is not None:
+            self._time.pass_by(whole.pictures[-1])
+            return [*shown, whole]
+        came = [] if self._camera is None else gop.pictures(self._camera)
+        pictures = [it for picture in came for it in self._time.take(picture)]
+        pictures += self._time.fill(gop.until)
+        return [*shown, gop.footage(pictures)] if pictures else shown
+
+
 class DecidedStream:
     """A stream of whole GOPs, each of one camera; those that many streams show are put together once.
 
@@ -47,32 +69,13 @@ class DecidedStream:
 
     def __init__(self, channel: Channel, time: Timeline, reel: Reel) -> None:
         self.channel, self.reel = channel, reel
-        self._time = time
-        self._camera: str | None = None
+        self._showing = Showing(time)
 
     def show(self, camera: str | None, gop: Gop) -> None:
         """Send a camera's GOP, or what bridges it where it is not whole or there is none."""
-        self._fill(gop.first, gop)
-        whole = None if camera is None else gop.whole(camera)
-        self._camera = camera or self._camera
-        if whole is None:
-            came = [] if self._camera is None else gop.pictures(self._camera)
-            pictures = [shown for picture in came for shown in self._time.take(picture)]
-            self._send(pictures + self._time.fill(gop.until), gop)
-            return
-        self._time.pass_by(whole.pictures[-1])
-        self._publish(whole)
-
-    def _fill(self, until: int, gop: Gop) -> None:
-        self._send(self._time.fill(until), gop)
-
-    def _send(self, pictures: list[Picture], gop: Gop) -> None:
-        if pictures:
-            self._publish(gop.footage(pictures))
-
-    def _publish(self, footage: Footage) -> None:
-        self.reel.put(footage)
-        self.channel.publish(footage)
+        for footage in self._showing.show(camera, gop):
+            self.reel.put(footage)
+            self.channel.publish(footage)
 
     def close(self) -> None:
         """End the stream."""

@@ -20,10 +20,13 @@ from cameras_by_hand import (
     encoded,
     small_config,
 )
+from sounds_by_hand import BEEPS, STEP, beeps, flashes, flashing, heard, write_flashes
+from sounds_by_hand import FRAMES as SOUNDING
 from test_splice import choice
 
 from bestview import Merge, Split
 from server.run.films import Films
+from server.run.soundtrack import Soundtrack
 from server.view.codec import agreement_for
 from server.view.decide import GopDecision, ObjectChoice
 from server.view.record import Recorder
@@ -120,11 +123,53 @@ def test_a_film_ends_with_the_last_gop_in_which_the_person_was_about(tmp_path: P
         assert len(list(film.decode(video=0))) == 3 * GOP, "who comes back is shown all the way"
 
 
-def test_what_cannot_be_shown_is_a_hole_in_time(tmp_path: Path) -> None:
-    it, _ = films(tmp_path / "best")
-    for gop, camera in [(0, A), (1, None), (2, B)]:
+@pytest.mark.parametrize(("codec", "container"), [("h264", "mp4"), ("vp8", "webm")])
+def test_what_cannot_be_shown_or_did_not_come_is_bridged_as_it_is_live(
+    tmp_path: Path, codec: Codec, container: str
+) -> None:
+    it, shelves = films(tmp_path / "best", codec)
+    for pulse in (3 * GOP + 2, *range(5 * GOP, 6 * GOP)):
+        del shelves[A]._shelved[pulse]
+    shown: list[str | None] = [A, None, B, A, B, A, B]
+    for gop, camera in enumerate(shown):
+        if camera is None:
+            for shelf in shelves.values():
+                for pulse in range(gop * GOP, (gop + 1) * GOP):
+                    del shelf._shelved[pulse]
         it.write(decision(gop, choice(1, camera)))
     it.close()
-    with av.open(str(tmp_path / "best" / "object-1.mp4"), "r") as film:
-        times = [round(float(picture.time or 0) * FPS) for picture in film.decode(video=0)]
-    assert times == [*range(GOP), *range(2 * GOP, 3 * GOP)]
+    with av.open(str(tmp_path / "best" / f"object-1.{container}"), "r") as film:
+        pictures = list(film.decode(video=0))
+    assert [round(float(picture.time or 0) * FPS) for picture in pictures] == list(range(7 * GOP))
+    alone = {A: own_pictures(0, codec), B: own_pictures(1, codec)}
+    last = pictures[0].to_ndarray(format="yuv420p")
+    for pulse, picture in enumerate(pictures):
+        camera = shown[pulse // GOP]
+        if camera is not None and shelves[camera].has(pulse) and not 3 * GOP + 2 < pulse < 4 * GOP:
+            last = alone[camera][pulse]
+        np.testing.assert_array_equal(picture.to_ndarray(format="yuv420p"), last, str(pulse))
+
+
+@pytest.mark.parametrize("codec", ["aac", "opus"])
+def test_a_film_has_the_sites_sound_in_step(tmp_path: Path, codec: Literal["aac", "opus"]) -> None:
+    recording = write_flashes(tmp_path / "flashes.mkv", SOUNDING)
+    config = small_config(sound={"source": str(recording), "codec": codec})
+    agreement, track = agreement_for(config), Soundtrack(config)
+    shelves = {camera: Shelf(FPS, SOUNDING, agreement) for camera in CAMERAS}
+    for unit in flashing(recording):
+        for shelf in shelves.values():
+            shelf.put(unit.pulse, 1, unit.data, key=unit.key)
+    it = Films(tmp_path / "best", shelves, agreement, config.site, track.shelf)
+    begin = 3
+    for gop in range(begin, SOUNDING // GOP):
+        track.read(gop * GOP, (gop + 1) * GOP)
+        it.write(decision(gop, choice(1, CAMERAS[gop % 2])))
+    it.close()
+    data = (tmp_path / "best" / "object-1.mp4").read_bytes()
+    expected = [at - begin * GOP / FPS for at in BEEPS]
+    assert flashes(data) == pytest.approx(expected, abs=0.001)
+    assert beeps(data) == pytest.approx(expected, abs=STEP)
+    times, _ = heard(data)
+    assert np.diff(times) == pytest.approx(1 / 48_000, abs=1e-4)
+    assert 0 <= times[0] < 0.022
+    assert times[-1] == pytest.approx((SOUNDING - begin * GOP) / FPS, abs=0.03)

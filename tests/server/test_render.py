@@ -16,6 +16,7 @@ import av
 import cv2
 import numpy as np
 import pytest
+from sounds_by_hand import EVERY, beeps, write_flashes
 from videos_by_hand import damage, write_video
 
 from server.camera.scene import Scene, write_recording
@@ -75,6 +76,22 @@ def test_two_views_become_films_tracks_choices_and_plots_and_the_shorter_one_is_
         assert pictures[0].time == 0
         assert 0 < len(pictures) <= 80
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
+@pytest.mark.slow
+def test_the_sound_of_the_configuration_is_under_every_film(views: Path, tmp_path: Path) -> None:
+    write_flashes(tmp_path / "beeps.wav", 80, codec="pcm_s16le", pictures=False)
+    (tmp_path / "site.yaml").write_text("sound: {source: beeps.wav}", encoding="utf-8")
+    out = tmp_path / "out"
+    done = render(views / "long" / "c0.mp4", "--config", tmp_path / "site.yaml", "--out", out)
+    assert done.returncode == 0, done.stderr
+    with (out / "choices.csv").open(encoding="ascii", newline="") as file:
+        rows = [(int(row["object"]), int(row["frame"]) - 1) for row in csv.DictReader(file)]
+    for number in {number for number, _ in rows}:
+        frames = [frame for it, frame in rows if it == number]
+        data = (out / "best" / f"object-{number}.mp4").read_bytes()
+        expected = [at - frames[0] for at in range(EVERY, 80, EVERY) if frames[0] <= at <= frames[-1]]
+        assert [25 * at for at in beeps(data)] == pytest.approx(expected, abs=1)
 
 
 def test_an_error_on_the_way_leaves_nothing(tmp_path: Path) -> None:
