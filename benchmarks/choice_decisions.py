@@ -107,7 +107,7 @@ def decision_times(crowd: Crowd, gop: int, epochs: int, *, all_terms: bool) -> S
     ground = np.array([[1.0, 0.0, 0.0], [0.0, 3.0, 0.0], [0.0, 0.002, 1.0]])
     decider = Decider(config, dict.fromkeys(config.camera_ids, ground), lambda _camera, _pulse: True)
     decider.people._registry = _Given()  # type: ignore[assignment]  # noqa: SLF001 — joining is measured elsewhere
-    board, watch = Board(), Stopwatch()
+    board, watch = Board(25.0), Stopwatch()
     stages = (
         (Reader, "read", "reading"),
         (Sight, "put", "quality"),

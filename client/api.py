@@ -32,13 +32,20 @@ async def cameras(url: str, settings: HttpSettings = _DEFAULT) -> tuple[Camera, 
     return (await get_json(server_url(url) / "api/cameras", Cameras, settings)).cameras
 
 
-async def choice(url: str, number: int, settings: HttpSettings = _DEFAULT) -> Choice:
+async def choice(
+    url: str, number: int, settings: HttpSettings = _DEFAULT, *, at: str | None = None
+) -> Choice:
     """Give which camera shows object ``number`` and what every camera would cost; errors as ``site``.
 
+    ``at`` is a moment of the last minute, as in ``past``; what was before the first question about an object
+    is not kept.
+
     Raises:
-        NotFoundError: there is no such object.
+        NotFoundError: there is no such object, or nothing is kept of that moment.
+        RefusedError: it is no moment.
     """
-    return await get_json(server_url(url) / f"api/objects/{number}/choice", Choice, settings)
+    address = server_url(url) / f"api/objects/{number}/choice"
+    return await get_json(address if at is None else address.with_query({"at": at}), Choice, settings)
 
 
 async def spans(url: str, number: int, settings: HttpSettings = _DEFAULT) -> tuple[Span, ...]:

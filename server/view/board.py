@@ -2,36 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from bestview import Merge, Split
 from server.view.decide import GopDecision, ObjectChoice
-from server.view.why import Explanation, Why
+from server.view.reasons import Reason, Reasons, Standing
+from server.view.why import Explanation
 from server.wire.messages import Cut, GopChoices, Merged, Parted
 
 
-@dataclass(slots=True)
-class Standing:
-    """One object's present view."""
-
-    choice: ObjectChoice
-    first: int
-    """First frame of the newest decided GOP."""
-    frames: int
-    since: int
-    """The frame of the last cut."""
-    cameras: tuple[str, ...]
-    """Who sees the object at the end of that GOP."""
-
-
 class Board:
-    """Remembers every object's newest decision."""
+    """Remembers every object's newest decision, and the reasons of the last minute."""
 
-    def __init__(self) -> None:
+    def __init__(self, fps: float) -> None:
         self.standings: dict[int, Standing] = {}
         self.merged: dict[int, int] = {}
         self.cuts = 0
-        self._why: Why | None = None
+        self.end = 0
+        """The first pulse that nothing is decided about."""
+        self._reasons = Reasons(fps)
 
     def put(self, decision: GopDecision) -> GopChoices:
         """Take a decision over; give it as the message that is published and sent to the page."""
@@ -47,8 +34,10 @@ class Board:
             self._stand(decision, choice, tuple(seen_by.get(choice.number, ())))
         numbers = {choice.number for choice in decision.choices}
         self.standings = {number: it for number, it in self.standings.items() if number in numbers}
-        self.merged, self._why = decision.merged, decision.why
+        self.merged = decision.merged
+        self._reasons.put(self.standings, decision.first, decision.why)
         self.cuts += len(cuts)
+        self.end = decision.first + decision.frames
         return GopChoices(
             first=decision.first,
             frames=decision.frames,
@@ -69,15 +58,19 @@ class Board:
         """Give the number that a merged one goes by now."""
         return self.merged.get(number, number)
 
-    def explain(self, number: int) -> Explanation:
-        """Give the numbers behind an object's newest choice.
+    def explain(self, number: int, pulse: int | None = None) -> Reason | None:
+        """Explain an object's newest view, or that at a pulse of the last minute.
 
-        Raises:
-            KeyError: there is none.
+        What was before the first question about an object is not kept.
+
+        Returns:
+            None: there is no such object, or nothing is kept of that time.
         """
-        if self._why is None:
-            raise KeyError(number)
-        return self._why.of(number)
+        standing = self.standings.get(self.resolve(number))
+        if standing is None:
+            return None
+        newest = self._reasons.newest(standing)
+        return newest if pulse is None else self._reasons.at(standing.choice.number, pulse)
 
     def _stand(self, decision: GopDecision, choice: ObjectChoice, cameras: tuple[str, ...]) -> None:
         known = self.standings.get(choice.number)

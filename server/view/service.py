@@ -50,7 +50,7 @@ class BestViewService:
         self.decider = Decider(
             config, homographies(config), lambda camera, pulse: self.shelves[camera].has(pulse)
         )
-        self.board = Board()
+        self.board = Board(config.site.fps)
         self.past = Past(config, self.shelves, self.agreement, frames, self.sound)
         self.pulse = -1
         self.pulse0: float | None = None

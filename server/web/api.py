@@ -8,6 +8,7 @@ import msgspec
 from aiohttp import web
 from prometheus_client import CollectorRegistry, generate_latest
 
+from server.view.past.moment import MomentError, pulse_at
 from server.view.service import BestViewService
 from server.web.events import Events
 from server.web.keys import EVENTS, METRICS, SERVICE
@@ -66,10 +67,24 @@ async def get_cameras(request: web.Request) -> web.Response:
 
 @routes.get("/api/objects/{object:[0-9]{1,9}}/choice")
 async def get_choice(request: web.Request) -> web.Response:
-    """Say which camera shows this person, since when, and why."""
-    number = int(request.match_info["object"])
-    choice = choice_info(_service(request), number)
-    return problem(404, f"there is no object {number}") if choice is None else answer(choice)
+    """Say which camera shows this person, or did at a moment of the last minute, since when, and why."""
+    service, number = _service(request), int(request.match_info["object"])
+    if "at" not in request.query:
+        choice = choice_info(service, number)
+        return problem(404, f"there is no object {number}") if choice is None else answer(choice)
+    try:
+        pulse = pulse_at(
+            request.query["at"],
+            now=service.board.end - 1,
+            fps=service.config.site.fps,
+            pulse0=service.pulse0,
+        )
+    except MomentError as error:
+        return problem(400, f"at: {error}")
+    choice = choice_info(service, number, pulse)
+    if choice is None:
+        return problem(404, f"nothing is kept of why object {number} was shown as it was at pulse {pulse}")
+    return answer(choice)
 
 
 @routes.get("/objects/{object:[0-9]{1,9}}/thumb.jpg")

@@ -59,6 +59,7 @@ _SCHEMAS: dict[str, Any] = {
     "overlay": {"enum": [0, 1], "default": 0, "description": "1: boxes are burnt in."},
     "from": {**_MOMENT, "description": "Begins there: seconds back, a pulse, or a time."},
     "to": {**_MOMENT, "description": "Ends there, likewise."},
+    "at": {**_MOMENT, "description": "Of the last minute; what was before the first question is not kept."},
     "held": {"type": "string", "description": "Shows this camera, not the best: held by hand."},
     "fps": {"type": "number", "exclusiveMinimum": 0, "description": "Pictures a second; the site's at most."},
 }
@@ -94,7 +95,7 @@ def _operation(path: str, summary: str) -> dict[str, Any]:
     names = re.findall(r"\{(\w+)\}", path)
     if names:
         responses["404"] = {"description": "There is none of this name.", "content": error}
-    if path in OVERLAY | PAST | HELD:
+    if path in OVERLAY | PAST | HELD or path.endswith("/choice"):
         responses["400"] = {"description": "The query asks for what there is not.", "content": error}
     if path in PAST - {"/api/past"}:
         responses["416"] = {"description": "Nothing is kept of that time.", "content": error}
@@ -102,7 +103,7 @@ def _operation(path: str, summary: str) -> dict[str, Any]:
         responses["503"] = {"description": "Not now; try again later."}
     parameters = [{"name": name, "in": "path", "required": True, "schema": _SCHEMAS[name]} for name in names]
     queries = ["overlay"] * (path in OVERLAY) + ["fps"] * path.endswith(".mjpeg")
-    queries += ["from", "to"] * (path in PAST)
+    queries += ["from", "to"] * (path in PAST) + ["at"] * path.endswith("/choice")
     if path in HELD:
         parameters.append({"name": "camera", "in": "query", "required": False, "schema": _SCHEMAS["held"]})
     parameters += [

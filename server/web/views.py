@@ -73,12 +73,12 @@ def cameras_info(service: BestViewService) -> Cameras:
     return Cameras(cameras)
 
 
-def choice_info(service: BestViewService, number: int) -> Choice | None:
-    """Explain an object's view; None for an unknown object."""
-    standing = service.board.standings.get(service.board.resolve(number))
-    if standing is None:
+def choice_info(service: BestViewService, number: int, pulse: int | None = None) -> Choice | None:
+    """Explain an object's newest view, or that at a pulse; None: there is none, or it is not kept."""
+    explained = service.board.explain(number, pulse)
+    if explained is None:
         return None
-    why = service.board.explain(standing.choice.number)
+    standing, why = explained.standing, explained.why
     return Choice(
         object=standing.choice.number,
         first=standing.first,

@@ -7,17 +7,89 @@ from typing import cast
 from bestview import Merge, Split
 from server.view.board import Board
 from server.view.decide import GopDecision, ObjectChoice
-from server.view.why import Why
+from server.view.why import Explanation, Why
 from server.wire.messages import Cut, Merged, Parted
 
 _UNTOLD = cast("Why", None)
 
 
+class Counted:
+    """Explains by counting."""
+
+    def __init__(self) -> None:
+        self.asked: list[int] = []
+
+    def of(self, number: int) -> Explanation:
+        self.asked.append(number)
+        return Explanation(25, {}, {}, None, None, None, float(number))
+
+
 def test_a_decision_is_told_with_its_cuts_and_corrections() -> None:
     choices = (ObjectChoice(1, "c1", "c0", away=False), ObjectChoice(2, "c0", "c0", away=False))
     turned_out = (Merge(kept=1, lost=5), Split(kept=2, parted=3, camera="c1"))
-    told = Board().put(GopDecision(20, 10, choices, {"c0": [], "c1": []}, {5: 1}, turned_out, _UNTOLD))
+    told = Board(25.0).put(GopDecision(20, 10, choices, {"c0": [], "c1": []}, {5: 1}, turned_out, _UNTOLD))
     assert told.choices == {1: "c1", 2: "c0"}
     assert told.cuts == [Cut(object=1, pulse=20, from_camera="c0", to_camera="c1")]
     assert told.merged == [Merged(kept=1, lost=5)]
     assert told.split == [Parted(kept=2, parted=3, camera="c1")]
+
+
+def decided(board: Board, first: int, numbers: tuple[int, ...] = (1, 2)) -> Counted:
+    """Put a GOP of ten frames; give what explains it."""
+    choices = tuple(ObjectChoice(number, "c0", "c0", away=False) for number in numbers)
+    why = Counted()
+    board.put(GopDecision(first, 10, choices, {}, {7: 1}, (), cast("Why", why)))
+    return why
+
+
+def test_nobody_is_explained_whom_nobody_asks_about() -> None:
+    board = Board(25.0)
+    assert all(decided(board, first).asked == [] for first in range(0, 500, 10))
+    assert board.explain(9) is None
+    assert board.explain(2, 480) is None, "that was before the first question"
+
+
+def test_from_the_first_question_on_a_minute_is_explained_and_each_gop_once() -> None:
+    board = Board(25.0)
+    whys = [decided(board, 0)]
+    for first in range(10, 4000, 10):
+        newest = board.explain(7 if first % 20 else 1)
+        assert newest is not None
+        assert newest.standing.first == first - 10
+        whys.append(decided(board, first))
+    assert all(why.asked == [1] for why in whys)
+    assert board.explain(1, 3990 - 60 * 25) is not None
+    assert board.explain(1, 3990 - 70 * 25) is None
+    for pulse in (3990, 3985, 3000):
+        then = board.explain(1, pulse)
+        assert then is not None
+        assert then.standing.first == pulse - pulse % 10
+    assert board.explain(1, 4000) is None, "not decided yet"
+
+
+def test_who_is_not_asked_about_any_more_is_not_explained() -> None:
+    board = Board(25.0)
+    decided(board, 0)
+    board.explain(1)
+    asked = [decided(board, first).asked for first in range(10, 2000, 10)]
+    assert asked.index([]) == 75, "half a minute later"
+    assert not any(asked[75:])
+    assert board.explain(1, 500) is None
+
+
+def test_pulses_that_begin_anew_take_their_reasons_with_them() -> None:
+    board = Board(25.0)
+    decided(board, 1000)
+    board.explain(1)
+    decided(board, 1010)
+    decided(board, 0)
+    assert board.explain(1, 1015) is None
+    assert board.explain(1, 5) is not None
+
+
+def test_who_is_gone_is_not_explained() -> None:
+    board = Board(25.0)
+    decided(board, 0)
+    board.explain(2)
+    decided(board, 10, (1,))
+    assert board.explain(2) is None

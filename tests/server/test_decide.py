@@ -152,7 +152,7 @@ def test_the_same_epochs_give_the_same_decisions_and_none_shows_what_is_missing(
 
 def test_a_cut_is_told_once_with_both_cameras() -> None:
     it = decider(has=lambda camera, pulse: (camera, pulse // GOP) != (A, 1))
-    board = Board()
+    board = Board(25.0)
     told = [board.put(decision) for decision in decide(it, [{A: {1: LARGE}, B: {}}] * 4, end=19)]
     assert [[(cut.from_camera, cut.to_camera, cut.pulse) for cut in it.cuts] for it in told] == [
         [],
@@ -169,7 +169,7 @@ def test_a_cut_is_told_once_with_both_cameras() -> None:
 
 def test_after_a_hole_the_same_camera_is_no_cut() -> None:
     it = decider(has=lambda _camera, pulse: pulse // GOP != 1)
-    board = Board()
+    board = Board(25.0)
     for decision in decide(it, [{A: {1: LARGE}, B: {}}] * 4, end=19):
         board.put(decision)
     assert board.cuts == 0

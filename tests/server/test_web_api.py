@@ -6,7 +6,7 @@ import math
 import re
 
 import pytest
-from cameras_by_hand import CAMERAS, FPS, GOP, HEIGHT, WIDTH, encoded, status, thumbnail, video
+from cameras_by_hand import CAMERAS, FPS, GOP, HEIGHT, LARGE, SMALL, WIDTH, encoded, status, thumbnail, video
 from halls import A, B, Hall
 
 
@@ -76,6 +76,23 @@ async def test_a_refused_camera_says_why(busy: Hall) -> None:
     c0 = (await busy.get_json("/api/cameras"))["cameras"][0]
     assert c0["state"] == "refused"
     assert "parameter sets differ" in c0["message"]
+
+
+async def test_a_choice_of_the_last_minute_is_explained_from_the_first_question_on(busy: Hall) -> None:
+    newest = await busy.get_json("/api/objects/1/choice")
+    busy.service.feed(3, {A: {1: SMALL}, B: {1: LARGE}})
+    assert (await busy.get_json("/api/objects/1/choice"))["first"] == newest["first"] + GOP
+    for at in (f"p{newest['first']}", f"p{newest['first'] + GOP - 1}", f"-{GOP / FPS}"):
+        assert await busy.get_json(f"/api/objects/1/choice?at={at}") == newest
+    for asked, expected, words in (
+        ("1/choice?at=p0", 404, "nothing is kept"),
+        ("1/choice?at=p999999", 404, "nothing is kept"),
+        ("9/choice?at=-1", 404, "object 9"),
+        ("1/choice?at=soon", 400, "at: 'soon' is no moment"),
+    ):
+        code, content = await busy.get(f"/api/objects/{asked}")
+        assert code == expected
+        assert words in content["error"]
 
 
 async def test_a_choice_is_explained(busy: Hall) -> None:
