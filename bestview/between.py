@@ -72,14 +72,16 @@ class LooksBetween:
         apart: list[Floats] = []
         for camera in reversed(cameras):
             if sum(one.size for one in apart) < KNOWN_PAIRS:
-                within, rivals = unlike(camera, camera), tables.apart[np.ix_(row_of[camera], row_of[camera])]
-                apart.append(within[np.triu(rivals) & ~np.isnan(within)])
+                within = unlike(camera, camera)
+                i, j = np.nonzero(np.triu(~np.isnan(within), 1))
+                rivals = tables.apart(row_of[camera][i], row_of[camera][j])
+                apart.append(within[i[rivals], j[rivals]])
         self.appearances.learn_different(np.concatenate([np.zeros(0), *reversed(apart)]))
         scores = appearance_scores(
             cameras, [self._calibrated[names[camera.start]] for camera in cameras], unlike, self.gate
         )
         one, two = row_of[scores.one], row_of[scores.two]
-        tables.add_alike(one, two, scores.score, self._settings.memory, self._settings.cap)
+        tables.add_alike(one, two, scores.score)
 
     def _curves(self, episodes: Sequence[Episode], cameras: Sequence[slice]) -> Floats:
         """Equalised cumulative histograms (P, 33), NaN where a look is not settled yet."""

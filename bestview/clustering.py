@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview.likelihood import CameraLooks, LookWeights, distance_of, look_evidence
+from bestview.likelihood import CameraLooks, LookWeights, distance_of
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -17,6 +18,7 @@ def cluster(
     evidence: Floats,
     apart: NDArray[np.bool_],
     past: NDArray[np.bool_],
+    linked: NDArray[np.bool_],
     looks: Sequence[CameraLooks],
     weights: LookWeights,
     join: float,
@@ -26,18 +28,20 @@ def cluster(
     The evidence between two groups is the sum over their pairs of rows, plus that of their looks, which are
     compared as wholes in every camera that has seen both: means of many frames tell more than the sum of
     what single glimpses tell. The two groups with the most evidence become one, until no two reach `join`.
-    Groups of which any two rows are `apart` never do, nor do two that are `past` only: where nothing is seen
-    nothing changes. Deterministic; ties go to the lowest rows.
+    Groups of which any two rows are `apart` never do, nor those of which no two are `linked`, nor two that
+    are `past` only: where nothing is seen nothing changes. So rows between which no chain of links leads have
+    no say in each other's groups. Deterministic; ties go to the lowest rows.
 
     Args:
         evidence: (N, N) symmetric, for (above 0) and against two rows being one person.
         apart: (N, N) symmetric, surely two people.
         past: (N,) not seen lately.
+        linked: (N, N) symmetric, something speaks for their being one person.
         looks: how rows look, camera by camera.
         weights: of looks.
         join: the least evidence that joins.
     """
-    groups = _Groups(evidence, apart, past, looks, weights)
+    groups = _Groups(evidence, apart, past, linked, looks, weights)
     while True:
         keep = int(np.argmax(groups.best)) if groups.best.size else 0
         if not groups.best.size or not groups.best[keep] >= join:
@@ -46,45 +50,69 @@ def cluster(
         groups.merge(min(keep, lose), max(keep, lose))
 
 
-class _Camera:
-    """One camera's looks, by group."""
+class _Looks:
+    """All cameras' looks, L of them, by group.
 
-    def __init__(self, looks: CameraLooks, rows: int, weights: LookWeights) -> None:
-        self._total, self._count = looks.total.copy(), looks.count.astype(np.float64)
-        self._scale, self._weights = looks.scale, weights
+    Args:
+        looks: camera by camera.
+        rows: N.
+        weights: of looks.
+    """
+
+    def __init__(self, looks: Sequence[CameraLooks], rows: int, weights: LookWeights) -> None:
+        self._weights = weights
+        bins = max((camera.total.shape[1] for camera in looks), default=0)
+        size = [camera.rows.size for camera in looks]
+        self._total = np.concatenate(
+            [np.zeros((0, bins)), *(_padded(camera.total, bins) for camera in looks)]
+        )
+        self._count = np.concatenate([np.zeros(0), *(camera.count for camera in looks)]).astype(np.float64)
         self._root = np.sqrt(self._total / self._count[:, None])
         """Square roots of the mean histograms, whose products are how alike two are."""
-        self._place = np.full(rows, -1)
-        """Of each group among these, -1: it was not seen here."""
-        self._place[looks.rows] = np.arange(looks.rows.size)
-        self._group = looks.rows.copy()
-
-    def every(self) -> tuple[Ints, Floats]:
-        """Give the rows, (K,), and what their looks say of all pairs, (K, K)."""
-        distance = distance_of(self._root @ self._root.T)
-        return self._group, look_evidence(
-            distance, self._count[:, None], self._count, self._scale, self._weights
-        )
+        self._group = np.concatenate([np.zeros(0, dtype=np.int64), *(camera.rows for camera in looks)])
+        self._slope = np.repeat([camera.scale.slope(weights) for camera in looks], size)
+        self._middle = np.repeat([camera.scale.middle for camera in looks], size)
+        start = np.cumsum([0, *size])
+        self._camera = [np.arange(a, b) for a, b in pairwise(start.tolist())]
+        """(K,) of each camera: which looks are of it."""
+        self._of: list[dict[int, int]] = [{} for _ in range(rows)]
+        """Of each group, the look by camera."""
+        for number, (camera, first) in enumerate(zip(looks, start.tolist(), strict=False)):
+            for at, row in enumerate(camera.rows.tolist(), first):
+                self._of[row][number] = at
 
     def add_evidence(self, row: int, to: Floats) -> None:
-        """Add to (N,) what the looks here say about a group and all others."""
-        at = self._place[row]
-        distance = distance_of(self._root @ self._root[at])
+        """Add to (N,) what looks say about a group and all others."""
+        mine = self._of[row]
+        if not mine:
+            return
+        others = np.concatenate([self._camera[number] for number in mine])
+        own = np.repeat(list(mine.values()), [self._camera[number].size for number in mine])
+        distance = distance_of(np.einsum("ij,ij->i", self._root[others], self._root[own]))
+        known = self._weights.known(self._count[own], self._count[others])
         # Who was merged away has no frames, and so no evidence.
-        to[self._group] += look_evidence(distance, self._count[at], self._count, self._scale, self._weights)
+        told = self._weights.told(distance, self._slope[others], self._middle[others]) * known
+        to += np.bincount(self._group[others], told, to.size)
 
-    def merge(self, keep: int, lose: int) -> bool:
-        """Give one group's looks to another; say whether it had none here."""
-        one, two = self._place[keep], self._place[lose]
-        if one < 0:
-            self._place[keep], self._group[two] = two, keep
-        else:
+    def merge(self, keep: int, lose: int) -> None:
+        """Give one group's looks to another."""
+        mine = self._of[keep]
+        for number, two in self._of[lose].items():
+            one = mine.setdefault(number, two)
+            if one == two:
+                self._group[two] = keep
+                continue
             self._total[one] += self._total[two]
             self._count[one] += self._count[two]
             self._count[two] = 0.0
             self._root[one] = np.sqrt(self._total[one] / self._count[one])
-        self._place[lose] = -1
-        return bool(one < 0)
+        self._of[lose] = {}
+
+
+def _padded(table: Floats, columns: int) -> Floats:
+    if table.shape[1] == columns:
+        return table
+    return np.pad(table, ((0, 0), (0, columns - table.shape[1])))
 
 
 class _Groups:
@@ -101,31 +129,27 @@ class _Groups:
         evidence: Floats,
         apart: NDArray[np.bool_],
         past: NDArray[np.bool_],
+        linked: NDArray[np.bool_],
         looks: Sequence[CameraLooks],
         weights: LookWeights,
     ) -> None:
         count = len(evidence)
         self._evidence, self._apart, self._past = evidence.copy(), apart.copy(), past.copy()
+        self._linked = linked.copy()
         np.fill_diagonal(self._apart, val=True)
-        self._cameras = [_Camera(camera, count, weights) for camera in looks]
-        self._seen_by: list[list[_Camera]] = [[] for _ in range(count)]
-        for camera, mine in zip(self._cameras, looks, strict=True):
-            for row in mine.rows.tolist():
-                self._seen_by[row].append(camera)
+        self._looks = _Looks(looks, count, weights)
         self.label = np.arange(count)
         self._value = self._evidence.copy()
-        for camera in self._cameras:
-            rows, alike = camera.every()
-            self._value[np.ix_(rows, rows)] += alike
-        self._value[self._apart | (self._past[:, None] & self._past)] = -np.inf
+        for camera in looks:
+            self._value[np.ix_(camera.rows, camera.rows)] += camera.every(weights)
+        self._value[self._apart | ~self._linked | (self._past[:, None] & self._past)] = -np.inf
         self.best = self._value.max(axis=1, initial=-np.inf)
         self.at = self._value.argmax(axis=1) if count else np.zeros(0, dtype=np.int64)
 
     def _row(self, row: int) -> Floats:
         value = self._evidence[row].copy()
-        for camera in self._seen_by[row]:
-            camera.add_evidence(row, value)
-        value[self._apart[row] | (self._past[row] & self._past)] = -np.inf
+        self._looks.add_evidence(row, value)
+        value[self._apart[row] | ~self._linked[row] | (self._past[row] & self._past)] = -np.inf
         return np.asarray(value)
 
     def merge(self, keep: int, lose: int) -> None:
@@ -136,10 +160,10 @@ class _Groups:
         self._apart[keep] |= self._apart[lose]
         self._apart[:, keep] = self._apart[keep]
         self._apart[lose] = self._apart[:, lose] = True
+        self._linked[keep] |= self._linked[lose]
+        self._linked[:, keep] = self._linked[keep]
         self._past[keep] &= self._past[lose]
-        for camera in self._seen_by[lose]:
-            if camera.merge(keep, lose):
-                self._seen_by[keep].append(camera)
+        self._looks.merge(keep, lose)
         row = self._row(keep)
         self._value[lose] = self._value[:, lose] = -np.inf
         self._value[keep] = self._value[:, keep] = row

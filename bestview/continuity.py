@@ -69,26 +69,34 @@ class Places:
 
 
 def lost_and_found(
-    places: Places, settings: IdentitySettings, height: float
+    places: Places,
+    one: NDArray[np.int64],
+    two: NDArray[np.int64],
+    settings: IdentitySettings,
+    height: float,
 ) -> tuple[Floats, NDArray[np.bool_]]:
-    """Compare where episodes end with where others begin a moment later.
+    """Compare where one of a pair ends with where the other one begins a moment later.
 
     The way between is measured in what somebody can walk in that time: on the ground, or where the camera
     has none in its picture, by box heights.
 
     Args:
-        places: of N episodes.
+        places: of episodes.
+        one: (P,) of them.
+        two: (P,) others; which of a pair comes first does not matter.
         settings: `found` and what belongs to it.
         height: of a person in ground units; NaN: not known yet.
 
     Returns:
-        (N, N) symmetric evidence of being one person, of pairs in one camera; (N, N) symmetric: too far.
+        (P,) evidence of being one person, of pairs in one camera; (P,) too far.
     """
-    count = places.camera.size
-    evidence, too_far = np.zeros((count, count)), np.zeros((count, count), dtype=np.bool_)
-    gap = places.first[None, :] - places.last[:, None]
-    lost, found = np.nonzero((gap > 0) & (gap <= settings.found_frames))
-    reach = settings.reach_heights + settings.speed_heights * gap[lost, found]
+    evidence, too_far = np.zeros(one.size), np.zeros(one.size, dtype=np.bool_)
+    later = places.first[two] > places.last[one]
+    lost, found = np.where(later, one, two), np.where(later, two, one)
+    gap = places.first[found] - places.last[lost]
+    pair = np.flatnonzero((gap > 0) & (gap <= settings.found_frames))
+    lost, found, gap = lost[pair], found[pair], gap[pair]
+    reach = settings.reach_heights + settings.speed_heights * gap
     same_camera = places.camera[lost] == places.camera[found]
     apart = np.hypot(*(places.end_ground[lost] - places.begin_ground[found]).T) / height
     # A camera that has a ground but does not see the feet knows nothing: pixels would not tell better.
@@ -96,11 +104,9 @@ def lost_and_found(
     apart[in_picture] = _picture_heights(places.end[lost[in_picture]], places.begin[found[in_picture]])
     share = apart / reach
     known = ~np.isnan(share)
-    lost, found, share, same_camera = lost[known], found[known], share[known], same_camera[known]
     worth = np.where(same_camera, settings.found * np.maximum(1.0 - share, 0.0), 0.0)
-    evidence[lost, found] = worth
-    evidence[found, lost] = worth
-    too_far[lost, found] = too_far[found, lost] = share > _TOO_FAR
+    evidence[pair[known]] = worth[known]
+    too_far[pair[known]] = share[known] > _TOO_FAR
     return evidence, too_far
 
 

@@ -79,6 +79,14 @@ class Episode:
         """The number it was told most often, 0 before the first; of equals the lowest."""
         return max(sorted(self.told), key=self.told.__getitem__, default=0)
 
+    def sight(self, frame: int, *, crowded: bool) -> None:
+        """Count a sighting, in a crowd or not."""
+        self.frames += 1
+        self.free += not crowded
+        self.crowd = self.crowd + 1 if crowded else 0
+        if not self.firm:
+            self.untold.append(frame)
+
     def tell(self, upto: int) -> bool:
         """Count the frames up to `upto` as told by today's number; say whether any was."""
         told = [frame for frame in self.untold if frame <= upto]
@@ -122,39 +130,39 @@ class Episodes:
             that it is settled to be, 0: it is not.
         """
         rows, firm = np.full(seen.visible.shape, -1), np.zeros(seen.visible.shape, dtype=np.int64)
-        crowded = seen.crowded(self._settings.crowd)
-        for track, (key, columns) in enumerate(zip(seen.keys, seen.visible, strict=True)):
+        crowds = seen.crowded(self._settings.crowd).tolist()
+        for track, (key, visible) in enumerate(zip(seen.keys, seen.visible.tolist(), strict=True)):
+            crowded = crowds[track]
             ends = {look.last - seen.first: look for look in looks.get(key, ())}
-            for column in np.flatnonzero(columns).tolist():
-                at = End(seen.first + column, seen.boxes[track, column], seen.ground[track, column])
-                episode = self._sight(key, at, bool(crowded[track, column]))
-                rows[track, column] = self._row.get(episode.key, -1)
-                firm[track, column] = episode.firm
+            episode, row, last = self._current.get(key), -1, -1
+            if episode is not None:
+                row, last = self._row.get(episode.key, -1), episode.end.frame
+            for column in (column for column, there in enumerate(visible) if there):
+                frame = seen.first + column
+                if episode is None or self._ends(episode, frame - last, crowded=crowded[column]):
+                    # Only here and at last: where it ends meanwhile nobody asks.
+                    _end_at(episode, seen, track, last)
+                    episode, row = self._begin(key, _end(seen, track, column), episode), len(self.open) - 1
+                last = frame
+                episode.sight(frame, crowded=crowded[column])
+                rows[track, column], firm[track, column] = row, episode.firm
                 look = ends.get(column)
-                if look is not None and not crowded[track, look.first - seen.first : column + 1].any():
+                if look is not None and not any(crowded[look.first - seen.first : column + 1]):
                     episode.looks.add(key.camera, Look.of(look.histogram, look.last - look.first + 1))
+            _end_at(episode, seen, track, last)
         return rows, firm
 
-    def _sight(self, key: TrackKey, at: End, crowded: bool) -> Episode:
-        episode = self._current.get(key)
-        if episode is None or self._ends(episode, at.frame, crowded):
-            # Copies: an end is remembered for long, and must not keep a whole update.
-            at = End(at.frame, at.box.copy(), at.ground.copy())
-            before, crowd = episode, episode.crowd if episode is not None else 0
-            episode = Episode(EpisodeKey(*key, at.frame), at, at, before, crowd)
-            self._current[key] = episode
-            self._row[episode.key] = len(self.open)
-            self.open.append(episode)
-        episode.end = at
-        episode.frames += 1
-        episode.free += not crowded
-        episode.crowd = episode.crowd + 1 if crowded else 0
-        if not episode.firm:
-            episode.untold.append(at.frame)
+    def _begin(self, key: TrackKey, at: End, before: Episode | None) -> Episode:
+        episode = Episode(
+            EpisodeKey(*key, at.frame), at, at, before, before.crowd if before is not None else 0
+        )
+        self._current[key] = episode
+        self._row[episode.key] = len(self.open)
+        self.open.append(episode)
         return episode
 
-    def _ends(self, episode: Episode, frame: int, crowded: bool) -> bool:
-        """Say whether a sighting in `frame` begins a new episode.
+    def _ends(self, episode: Episode, unseen: int, *, crowded: bool) -> bool:
+        """Say whether a sighting, so many frames after the last one, begins a new episode.
 
         Where nothing is known of how somebody looks there is nothing to ask by: the tracker is believed.
         """
@@ -162,7 +170,7 @@ class Episodes:
             return False
         settings = self._settings
         out_of_crowd = not crowded and episode.crowd >= settings.crowd_frames and episode.free >= _ROOTED
-        return out_of_crowd or frame - episode.end.frame > settings.gap
+        return out_of_crowd or unseen > settings.gap
 
     def told_anew(self, lost: int, kept: int) -> None:
         """Take over that two numbers turned out to be one person's."""
@@ -206,3 +214,14 @@ class Episodes:
             for key, it in self._current.items()
             if it.key in self._row or (it.firm and it.end.frame > oldest)
         }
+
+
+def _end(seen: Sightings, track: int, column: int) -> End:
+    # Copies: an end is remembered for long, and must not keep a whole update.
+    return End(seen.first + column, seen.boxes[track, column].copy(), seen.ground[track, column].copy())
+
+
+def _end_at(episode: Episode | None, seen: Sightings, track: int, frame: int) -> None:
+    """Let an episode end with its last sighting, if that is of this update."""
+    if episode is not None and frame >= seen.first:
+        episode.end = _end(seen, track, frame - seen.first)

@@ -47,7 +47,10 @@ class Group:
     @property
     def cameras(self) -> set[str]:
         """Those that see the person, or have."""
-        return {episode.key.camera for episode in self.episodes} | set(self.looks.by_camera)
+        seen = {episode.key.camera for episode in self.episodes}
+        return seen.union(
+            *(it.looks.by_camera for it in self.episodes), *(it.looks.by_camera for it in self.past)
+        )
 
     @property
     def looks(self) -> Looks:

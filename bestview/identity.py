@@ -17,7 +17,7 @@ from bestview.groups import Group, groups_of
 from bestview.heights import HeightScale
 from bestview.identity_settings import IdentitySettings
 from bestview.keys import EpisodeKey
-from bestview.meeting import at_once, near
+from bestview.meeting import Standing, at_once, near
 from bestview.pairs import PairTables
 from bestview.people import People
 from bestview.sightings import FootError, LocalTrack, Sightings, line_up
@@ -83,7 +83,7 @@ class IdentityRegistry:
         self._people = People(settings)
         self._doubt = Doubt(self._homographies)
         self._pictures: Mapping[str, tuple[int, int]] = {}
-        self._tables = PairTables()
+        self._tables = PairTables(settings)
         self._weighing = Weighing(settings, calibrated)
         self._corrections = Corrections()
         self._here: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
@@ -153,9 +153,10 @@ class IdentityRegistry:
         camera = np.array([self._camera[key.camera] for key in seen.keys], dtype=np.int64)
         tables.add_apart(*at_once(rows, camera))
         if self._gate() > 0:
-            met = near(seen, rows, camera, self._gate(), count)
-            evidence = met.score / self._settings.ground_frames
-            tables.add_near(met.one, met.two, evidence, met.frames, self._settings.ground_cap)
+            stands = Standing.of(seen, rows, camera)
+            met = near(stands, self._gate(), count, tables.met(), len(tables))
+            tables.add_near(met.one, met.two, met.score, met.frames)
+            tables.stand(stands.rows, stands.frames)
         self._between.update(self._episodes.open, np.unique(rows[(rows >= 0) & (rows < count)]), tables)
 
     def _regroup(self, last_frame: int) -> tuple[tuple[int, ...], tuple[Merge, ...]]:
@@ -166,8 +167,8 @@ class IdentityRegistry:
         groups = groups_of(episodes, past, group)
         born, merged = self._people.name(groups, self._tables, self._between, last_frame, self._silent)
         self._tables.make_room(merge.kept for merge in merged)
+        self._tables.absorb([(merge.kept, merge.lost) for merge in merged])
         for merge in merged:
-            self._tables.absorb(merge.kept, merge.lost)
             self._episodes.told_anew(merge.lost, merge.kept)
         return born, merged
 
@@ -176,10 +177,9 @@ class IdentityRegistry:
         rows = self._episodes.old(last_frame)
         self._weighing.remember(rows, self._episodes.open, self._tables)
         old = [self._episodes.open[row] for row in rows]
-        self._tables.make_room(episode.mostly for episode in old if episode.mostly)
-        for episode in old:
-            if episode.mostly:
-                self._tables.absorb(episode.mostly, episode.key)
+        theirs = [(episode.mostly, episode.key) for episode in old if episode.mostly]
+        self._tables.make_room(number for number, _ in theirs)
+        self._tables.absorb(theirs)
         self._people.settle(old)
         self._episodes.settle(old, last_frame)
         self._people.forget(last_frame)

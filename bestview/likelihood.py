@@ -35,6 +35,16 @@ class LookScale:
         within = float(np.median(own)) if own.size >= _FEW else _OWN_SHARE * between
         return cls(min(within, _MOST_SHARE * between), between)
 
+    @property
+    def middle(self) -> float:
+        """Distance that says nothing."""
+        return (self.own + self.others) / 2.0
+
+    def slope(self, weights: LookWeights) -> float:
+        """Evidence by distance."""
+        half = (self.others - self.own) / 2.0
+        return weights.look / half if half > 0 else 0.0
+
 
 @dataclass(frozen=True, slots=True)
 class LookWeights:
@@ -43,6 +53,15 @@ class LookWeights:
     look: float
     cap: float
     frames: int
+
+    def told(self, distance: Floats, slope: Floats | float, middle: Floats | float) -> Floats:
+        """Give the evidence of distances between looks that are known well, any shape."""
+        # Not np.clip, which takes longer than all the rest for the few of a group.
+        return np.asarray(np.minimum(np.maximum(slope * (middle - distance), -self.cap), self.cap))
+
+    def known(self, one: Floats, two: Floats) -> Floats:
+        """Give how much it counts where looks are of so many frames, shapes that fit together."""
+        return np.asarray(np.minimum(one / self.frames, 1.0) * np.minimum(two / self.frames, 1.0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,6 +80,12 @@ class CameraLooks:
     count: Floats
     scale: LookScale
 
+    def every(self, weights: LookWeights, first: int | None = None) -> Floats:
+        """Say what looks say of the `first` rows, of all without it, and all: (K or `first`, K)."""
+        root = np.sqrt(self.total / self.count[:, None])
+        distance = distance_of(root[:first] @ root.T)
+        return look_evidence(distance, self.count[:first, None], self.count, self.scale, weights)
+
 
 def look_distances(one: Floats, two: Floats) -> Floats:
     """Bhattacharyya distances of mean histograms: (I, B) and (J, B) -> (I, J), 0 alike to 1."""
@@ -69,7 +94,7 @@ def look_distances(one: Floats, two: Floats) -> Floats:
 
 def distance_of(likeness: Floats) -> Floats:
     """Bhattacharyya distances of what histograms have in common: sums of roots of products, any shape."""
-    return np.asarray(np.sqrt(np.clip(1.0 - likeness, 0.0, 1.0)))
+    return np.asarray(np.sqrt(np.minimum(np.maximum(1.0 - likeness, 0.0), 1.0)))
 
 
 def look_evidence(
@@ -80,7 +105,4 @@ def look_evidence(
     In between it is a straight line, beyond it goes on up to `cap`. Who was seen alone in fewer frames, (N,)
     `one` and `two`, than `frames` weighs less.
     """
-    middle, half = (scale.own + scale.others) / 2.0, (scale.others - scale.own) / 2.0
-    slope = weights.look / half if half > 0 else 0.0
-    known = np.minimum(one / weights.frames, 1.0) * np.minimum(two / weights.frames, 1.0)
-    return np.asarray(np.clip(slope * (middle - distance), -weights.cap, weights.cap) * known)
+    return weights.told(distance, scale.slope(weights), scale.middle) * weights.known(one, two)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Collection, Sequence
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 from bestview.episodes import Episode
 from bestview.likelihood import LookScale, look_distances
 from bestview.looks import Look
+from bestview.pairs import PairTables
 
 Floats = NDArray[np.float64]
 
@@ -29,50 +29,69 @@ class LookScales:
 
     def __init__(self, frames: int) -> None:
         self._frames = frames
-        self._own: dict[str, deque[float]] = {}
-        self._others: dict[str, deque[float]] = {}
+        self._own: dict[str, Floats] = {}
+        self._others: dict[str, Floats] = {}
 
-    def of(self, camera: str, episodes: Sequence[Episode], apart: NDArray[np.bool_]) -> LookScale:
+    def of(
+        self, camera: str, rows: Sequence[int], episodes: Sequence[Episode], tables: PairTables
+    ) -> LookScale:
         """Give the scale of a camera, with what the open episodes teach.
 
         Args:
             camera: its name.
-            episodes: N of all cameras.
-            apart: (N, N) seen at once.
+            rows: of its episodes.
+            episodes: of all cameras.
+            tables: who of them was seen at once.
         """
-        own, others = self._distances(camera, episodes, apart, range(len(episodes)))
-        return LookScale.learned(
-            np.array([*self._own.get(camera, ()), *own]), np.array([*self._others.get(camera, ()), *others])
-        )
+        own, others = self._distances(camera, rows, episodes, tables, rows)
+        return LookScale.learned(_with(self._own, camera, own), _with(self._others, camera, others))
 
-    def remember(self, old: Collection[int], episodes: Sequence[Episode], apart: NDArray[np.bool_]) -> None:
+    def remember(self, old: Collection[int], episodes: Sequence[Episode], tables: PairTables) -> None:
         """Keep what episodes that are about to be settled teach, by their rows among all open ones."""
-        for camera in sorted({episodes[row].key.camera for row in old}):
-            own, others = self._distances(camera, episodes, apart, old)
-            self._own.setdefault(camera, deque(maxlen=_REMEMBERED)).extend(own)
-            self._others.setdefault(camera, deque(maxlen=_REMEMBERED)).extend(others)
+        rows_of: dict[str, list[int]] = {episodes[row].key.camera: [] for row in old}
+        for row, episode in enumerate(episodes):
+            if episode.key.camera in rows_of:
+                rows_of[episode.key.camera].append(row)
+        for camera, rows in sorted(rows_of.items()):
+            own, others = self._distances(camera, rows, episodes, tables, old)
+            self._own[camera] = _with(self._own, camera, own)[-_REMEMBERED:]
+            self._others[camera] = _with(self._others, camera, others)[-_REMEMBERED:]
 
     def _distances(
-        self, camera: str, episodes: Sequence[Episode], apart: NDArray[np.bool_], of: Collection[int]
-    ) -> tuple[list[float], list[float]]:
+        self,
+        camera: str,
+        rows: Sequence[int],
+        episodes: Sequence[Episode],
+        tables: PairTables,
+        of: Collection[int],
+    ) -> tuple[Floats, Floats]:
         """Distances of some episodes to the one before each, and to all that are apart from them."""
-        looks = {row: look for row, it in enumerate(episodes) if (look := self._look(it, camera)) is not None}
+        looks = {row: look for row in rows if (look := self._look(episodes[row], camera)) is not None}
         if not looks:
-            return [], []
+            return np.zeros(0), np.zeros(0)
         bins = next(reversed(looks.values())).total.size
         rows = [row for row, look in looks.items() if look.total.size == bins]
         place = {id(episodes[row]): i for i, row in enumerate(rows)}
         mean = np.array([looks[row].mean for row in rows])
         distance = look_distances(mean, mean)
-        mine = np.isin(rows, list(of))
-        pairs = np.triu(apart[np.ix_(rows, rows)], 1) & (mine[:, None] | mine)
-        own = []
+        row_of = np.array(rows, dtype=np.int64)
+        mine = np.isin(row_of, np.array(list(of), dtype=np.int64))
+        own: list[float] = []
         for i in np.flatnonzero(mine).tolist():
             episode = episodes[rows[i]]
             if episode.before is not None and id(episode.before) in place and episode.gap <= _UNBROKEN:
                 own.append(float(distance[i, place[id(episode.before)]]))
-        return own, distance[pairs].tolist()
+        one, two = np.triu_indices(len(rows), 1)
+        asked = mine[one] | mine[two]
+        one, two = one[asked], two[asked]
+        rivals = tables.apart(row_of[one], row_of[two])
+        return np.array(own, dtype=np.float64), distance[one[rivals], two[rivals]]
 
     def _look(self, episode: Episode, camera: str) -> Look | None:
         look = episode.looks.by_camera.get(camera)
         return look if look is not None and look.count >= self._frames else None
+
+
+def _with(known: dict[str, Floats], camera: str, more: Floats) -> Floats:
+    """Distances known of a camera, and more."""
+    return np.concatenate([known[camera], more]) if camera in known else more

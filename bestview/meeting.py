@@ -7,13 +7,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bestview.ranges import distinct, pairs_within, written_out
 from bestview.sightings import Sightings
+from bestview.sweep import overlapping
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-_WORST = -2.0
+WORST = -2.0
 """Least score of a frame: feet 1.7 gates apart or 17 say the same."""
+_SLACK = 1.0 + 1e-6
+"""What rounding may make of a reach."""
 
 
 def at_once(rows: Ints, camera: Ints) -> tuple[Ints, Ints]:
@@ -23,9 +27,12 @@ def at_once(rows: Ints, camera: Ints) -> tuple[Ints, Ints]:
         rows: (T, W) of each track's sightings by frame, -1: hidden.
         camera: (T,) number of each track's camera.
     """
-    one, two = np.nonzero(np.triu(camera[:, None] == camera, 1))
-    both = (rows[one] >= 0) & (rows[two] >= 0) & (rows[one] != rows[two])
-    return rows[one][both], rows[two][both]
+    one, two = pairs_within(camera)
+    a, b = rows[one], rows[two]
+    both = (a >= 0) & (b >= 0) & (a != b)
+    # Mostly a pair is the same in every frame: the first one will do.
+    both[:, 1:] &= ~both[:, :-1] | (a[:, 1:] != a[:, :-1]) | (b[:, 1:] != b[:, :-1])
+    return a[both], b[both]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,7 +41,7 @@ class Nearness:
 
     Attributes:
         one: (P,) rows.
-        two: (P,) rows; a pair is there once, or once for each track of somebody settled.
+        two: (P,) rows, above `one`; a pair is there once, or once for each track of somebody settled.
         score: (P,) sums over frames.
         frames: (P,) how many.
     """
@@ -45,43 +52,98 @@ class Nearness:
     frames: Ints
 
 
-def near(seen: Sightings, rows: Ints, camera: Ints, gate: float, open_rows: int) -> Nearness:
+@dataclass(frozen=True, slots=True, eq=False)
+class Standing:
+    """Where L lines stand on the ground: a line for each track and row of the update, in the order of rows.
+
+    A track that is cut within the update has two lines, and a row whose tracks are settled one for each.
+
+    Attributes:
+        row: (L,) rising.
+        camera: (L,) number of the track's camera.
+        place: (L, W, 2) ground units, NaN where it stands nowhere.
+        spread: (L, W, 3) of its covariance xx, xy, yy.
+        rows: (S,) of each sighting.
+        frames: (S,) likewise, the number of the frame.
+    """
+
+    row: Ints
+    camera: Ints
+    place: Floats
+    spread: Floats
+    rows: Ints
+    frames: Ints
+
+    @classmethod
+    def of(cls, seen: Sightings, rows: Ints, camera: Ints) -> Standing:
+        """Collect them: (T, W) `rows` of the sightings, -1: hidden, and (T,) `camera` of the tracks."""
+        known = np.isfinite(seen.ground[..., 0]) & np.isfinite(seen.spread[..., 0, 0])
+        track, frame = np.nonzero(known & (rows >= 0))
+        code = rows[track, frame] * max(len(rows), 1) + track
+        code, first, line = np.unique(code, return_index=True, return_inverse=True)
+        place = np.full((code.size, rows.shape[1], 2), np.nan)
+        spread = np.full((code.size, rows.shape[1], 3), np.nan)
+        place[line, frame] = seen.ground[track, frame]
+        spread[line, frame] = seen.spread[track, frame][:, [0, 0, 1], [0, 1, 1]]
+        row = rows[track, frame]
+        return cls(row[first], camera[track[first]], place, spread, row, seen.first + frame)
+
+    def scores(self, one: Ints, two: Ints, gate: float) -> Floats:
+        """Score (P,) pairs of lines in each frame: (P, W); NaN where not both stand somewhere."""
+        x, y = np.moveaxis(self.place[one] - self.place[two], -1, 0)
+        xx, xy, yy = np.moveaxis(self.spread[one] + self.spread[two], -1, 0)
+        xx, yy = xx + gate**2, yy + gate**2
+        # Squared length of (x, y) in the metric of the inverse covariance, the 2x2 inverse written out.
+        squared = (yy * x * x - 2.0 * xy * x * y + xx * y * y) / (xx * yy - xy * xy)
+        return np.asarray(np.maximum(1.0 - squared, WORST))
+
+    def close(self, gate: float) -> tuple[Ints, Ints]:
+        """Give the pairs of lines that might score more than the least: (P,) and (P,), the lower first."""
+        xx, xy, yy = np.moveaxis(self.spread, -1, 0)
+        longest = (xx + yy) / 2.0 + np.hypot((xx - yy) / 2.0, xy)
+        # D^2 is at least the squared distance over gate^2 and both longest variances together.
+        reach = np.sqrt((1.0 - WORST) * (longest + gate**2 / 2.0) * _SLACK)[..., None]
+        low = np.fmin.reduce(self.place - reach, axis=1, initial=np.nan)
+        high = np.fmax.reduce(self.place + reach, axis=1, initial=np.nan)
+        return overlapping(low, high)
+
+
+def near(stands: Standing, gate: float, open_rows: int, met: tuple[Ints, Ints], rows: int) -> Nearness:
     """Score how near to each other different cameras' tracks stand.
 
     The score of a frame is ``1 - D^2``, at least -2, with D the distance of the feet in gates: 1 for the
     very same place, 0 a gate apart. Where feet are uncertain, which is along the lines of sight, the gate
-    is stretched by their covariance.
+    is stretched by their covariance. Pairs that have never scored more than -2, now or before, are left out.
 
     Args:
-        seen: the tracks.
-        rows: (T, W) of their sightings, -1: hidden.
-        camera: (T,) number of each track's camera.
+        stands: who stands where.
         gate: distance at which feet are as likely one person's as two's, ground units.
         open_rows: rows from this one on are settled: two of them are not compared.
+        met: pairs of rows that have met before, (P,) and (P,), the lower row first.
+        rows: how many there are.
     """
-    known = np.isfinite(seen.ground[..., 0]) & np.isfinite(seen.spread[..., 0, 0])
-    track, frame = np.nonzero(known & (rows >= 0))
-    # One line for each track and row: a track that is cut within the update has two, and a row whose tracks
-    # are settled one for each of them.
-    code = rows[track, frame] * max(len(rows), 1) + track
-    code, first, line = np.unique(code, return_index=True, return_inverse=True)
-    row, camera = rows[track[first], frame[first]], camera[track[first]]
-    # Lines are in the order of the rows: those of open episodes come first.
-    count = int(np.searchsorted(row, open_rows))
-    one, two = np.nonzero(np.triu(camera[:count, None] != camera, 1))
-    spread = seen.spread[track, frame]
-    stands = np.full((rows.shape[1], 5, code.size), np.nan)
-    stands[frame, :2, line] = seen.ground[track, frame]
-    stands[frame, 2:, line] = spread[:, [0, 0, 1], [0, 1, 1]]
-    score, frames = np.zeros(one.shape), np.zeros(one.shape, dtype=np.int64)
-    for x, y, *about in stands:
-        dx, dy = x[one] - x[two], y[one] - y[two]
-        xx, xy, yy = (part[one] + part[two] for part in about)
-        xx, yy = xx + gate**2, yy + gate**2
-        # Squared length of (dx, dy) in the metric of the inverse covariance, the 2x2 inverse written out.
-        squared = (yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy) / (xx * yy - xy * xy)
-        there = ~np.isnan(squared)
-        score += np.where(there, np.maximum(1.0 - squared, _WORST), 0.0)
-        frames += there
-    met = frames > 0
-    return Nearness(row[one[met]], row[two[met]], score[met], frames[met])
+    one, two = stands.close(gate)
+    asked = (stands.row[one] < open_rows) & (stands.camera[one] != stands.camera[two])
+    one, two = one[asked], two[asked]
+    meet = (stands.scores(one, two, gate) > WORST).any(axis=1)
+    first, last = (np.searchsorted(stands.row, np.arange(rows), side=side) for side in ("left", "right"))
+    again = (met[0] < open_rows) & (last[met[0]] > first[met[0]]) & (last[met[1]] > first[met[1]])
+    pair = np.concatenate(
+        [stands.row[one[meet]] * rows + stands.row[two[meet]], met[0][again] * rows + met[1][again]]
+    )
+    pair = distinct(pair)
+    # All lines of both: an open row has one, unless its track is cut and begins anew within the update.
+    a, b = pair // max(rows, 1), pair % max(rows, 1)
+    of, which = written_out((last[a] - first[a]) * (last[b] - first[b]))
+    a, b, wide = a[of], b[of], (last[b] - first[b])[of]
+    one, two = first[a] + which // wide, first[b] + which % wide
+    different = stands.camera[one] != stands.camera[two]
+    a, b, one, two = a[different], b[different], one[different], two[different]
+    score = stands.scores(one, two, gate)
+    there = ~np.isnan(score)
+    total, frames = np.zeros(one.size), there.sum(axis=1)
+    # One after the other, in the order of the frames, whatever NumPy would do.
+    for column in range(score.shape[1]):
+        total += np.where(there[:, column], score[:, column], 0.0)
+    stood = frames > 0
+    return Nearness(a[stood], b[stood], total[stood], frames[stood])

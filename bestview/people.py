@@ -116,7 +116,7 @@ class People:
             return person.last < frame - self._settings.recent
         # Where there was something to compare by, grouping has had its say.
         compared = bool(new.cameras & before.cameras) or between.share_ground(new.cameras, before.cameras)
-        return not compared and not tables.apart[np.ix_(new.rows, before.rows)].any()
+        return not compared and not tables.any_apart(new.rows, before.rows)
 
     def _merge(self, groups: Sequence[Group], frame: int) -> tuple[Merge, ...]:
         """Merge numbers that have been nobody's for long: whoever had them is in somebody else's group."""

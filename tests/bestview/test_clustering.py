@@ -25,15 +25,18 @@ class Case:
     evidence: NDArray[np.float64]
     apart: NDArray[np.bool_]
     past: NDArray[np.bool_]
+    linked: NDArray[np.bool_]
     looks: list[CameraLooks]
 
     def grouped(self) -> list[int]:
-        found = cluster(self.evidence, self.apart, self.past, self.looks, WEIGHTS, JOIN)
+        found = cluster(self.evidence, self.apart, self.past, self.linked, self.looks, WEIGHTS, JOIN)
         return [int(label) for label in found]
 
     def value(self, one: list[int], two: list[int]) -> float:
         """Evidence between two groups, from the beginning."""
         if self.apart[np.ix_(one, two)].any() or self.past[[*one, *two]].all():
+            return -np.inf
+        if not self.linked[np.ix_(one, two)].any():
             return -np.inf
         return float(self.evidence[np.ix_(one, two)].sum()) + sum(
             self._look(it, one, two) for it in self.looks
@@ -64,7 +67,8 @@ def cases(draw: st.DrawFn, most: int = 9) -> Case:
             frames = rng.integers(1, 12, rows.size).astype(float)
             total = rng.dirichlet(np.ones(4), rows.size) * frames[:, None]
             looks.append(CameraLooks(rows, total, frames, LookScale(0.1, 0.3)))
-    return Case(evidence, apart | apart.T, rng.random(count) < 0.3, looks)
+    linked = np.triu(rng.random((count, count)) < draw(st.sampled_from([0.2, 0.6, 1.0])), 1)
+    return Case(evidence, apart | apart.T, rng.random(count) < 0.3, linked | linked.T, looks)
 
 
 def plainly(case: Case) -> list[int]:
@@ -125,7 +129,8 @@ def test_where_evidence_is_right_on_the_whole_groups_are_the_best_of_all_partiti
     evidence = np.where(same, rng.uniform(1, 4, same.shape), rng.uniform(-4, -0.1, same.shape))
     evidence = np.triu(evidence, 1) + np.triu(evidence, 1).T
     nobody = np.zeros(count, dtype=np.bool_)
-    case = Case(evidence, np.zeros(same.shape, dtype=np.bool_), nobody, [])
+    all_of_them = np.ones(same.shape, dtype=np.bool_)
+    case = Case(evidence, ~all_of_them, nobody, all_of_them, [])
     best = max(
         partitions(list(range(count))),
         key=lambda groups: sum(float(np.triu(evidence[np.ix_(g, g)], 1).sum()) for g in groups),

@@ -327,7 +327,7 @@ def test_memory_does_not_grow_with_the_length_of_the_recording() -> None:
     sizes = []
     for _ in updates(who, stays, 3000):
         open_ = who._episodes
-        sizes.append((len(who._people), len(open_.open), len(open_._current), len(who._tables.apart)))
+        sizes.append((len(who._people), len(open_.open), len(open_._current), len(who._tables)))
     assert max(max(size) for size in sizes) <= 20
     assert sizes[-1][0] <= 10
 

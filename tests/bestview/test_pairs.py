@@ -6,40 +6,64 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from bestview import IdentitySettings
 from bestview.keys import EpisodeKey, TrackKey
-from bestview.meeting import at_once, near
+from bestview.meeting import Standing, at_once, near
 from bestview.pairs import PairTables, Row
+from bestview.presence import Presence
 from bestview.sightings import Sightings
 
-FRAMES, CAP = 4, 5.0
+FRAMES = 4
+SETTINGS = IdentitySettings(ground_cap=5.0, ground_frames=2.0, recent=100)
+CAP = SETTINGS.ground_cap
+ROWS = range(10)
 
 PAIR = st.tuples(st.integers(0, 9), st.integers(0, 9)).filter(lambda pair: pair[0] != pair[1])
 
 
-class Dense:
+class Plain:
     """The same by names: what is known of each pair in a dictionary."""
 
     def __init__(self) -> None:
         self.rows: list[Row] = []
         self.apart: set[frozenset[Row]] = set()
-        self.near: dict[frozenset[Row], float] = {}
-        self.common: dict[frozenset[Row], int] = {}
+        self.met: dict[frozenset[Row], tuple[float, int]] = {}
+        self.stood: dict[Row, set[int]] = {}
 
     def arrange(self, rows: list[Row]) -> None:
         self.rows = rows
         self.apart = {pair for pair in self.apart if pair <= set(rows)}
-        for table in (self.near, self.common):
-            for pair in [pair for pair in table if not pair <= set(rows)]:
-                del table[pair]
+        self.met = {pair: known for pair, known in self.met.items() if pair <= set(rows)}
+        self.stood = {row: self.stood.get(row, set()) for row in rows}
+
+    def elsewhere(self, one: Row, two: Row) -> tuple[float, int]:
+        """What there is to say of two who never met: they were about at once."""
+        common = len(self.stood[one] & self.stood[two])
+        return max(-2.0 * common / SETTINGS.ground_frames, -CAP), min(common, 3)
+
+    def near(self, one: Row, two: Row) -> tuple[float, int]:
+        return self.met.get(frozenset((one, two)), self.elsewhere(one, two))
+
+    def stand(self, row: Row, frame: int) -> None:
+        self.stood[row].add(frame)
+
+    def let_go(self) -> None:
+        """Forget that those met who are elsewhere as much as anybody."""
+        for pair, (evidence, _) in list(self.met.items()):
+            if evidence <= -CAP and self.elsewhere(*pair)[0] <= -CAP:
+                del self.met[pair]
 
     def absorb(self, kept: Row, lost: Row) -> None:
         for other in self.rows:
             one, two = frozenset((kept, other)), frozenset((lost, other))
-            if other not in {kept, lost}:
-                if two in self.apart:
-                    self.apart.add(one)
-                self.near[one] = self.near.get(one, 0.0) + self.near.get(two, 0.0)
-                self.common[one] = max(self.common.get(one, 0), self.common.get(two, 0))
+            if other in {kept, lost}:
+                continue
+            if two in self.apart:
+                self.apart.add(one)
+            if one in self.met or two in self.met:
+                (a, b), (c, d) = self.near(kept, other), self.near(lost, other)
+                self.met[one] = a + c, max(b, d)
+        self.stood[kept] |= self.stood[lost]
         self.arrange([row for row in self.rows if row != lost])
 
 
@@ -48,42 +72,96 @@ def name(row: int) -> Row:
     return EpisodeKey("c0", row, 0) if row % 2 == 0 else row
 
 
-@settings(deadline=None, max_examples=100)
+@settings(deadline=None, max_examples=150)
 @given(st.data())
 def test_tables_keep_what_is_known_of_pairs_however_rows_come_and_go(data: st.DataObject) -> None:
-    tables, dense = PairTables(), Dense()
-    for _ in range(data.draw(st.integers(1, 6))):
+    tables, plain = PairTables(SETTINGS), Plain()
+    for time in range(data.draw(st.integers(1, 6))):
         rows: list[Row] = [
             name(row) for row in data.draw(st.lists(st.integers(0, 9), unique=True, min_size=2))
         ]
         tables.arrange(rows)
-        dense.arrange(rows)
+        plain.arrange(rows)
         for i, j in data.draw(st.lists(PAIR, max_size=5, unique_by=frozenset)):
             one, two = i % len(rows), j % len(rows)
             pair = frozenset((rows[one], rows[two]))
             if one == two:
                 continue
             if data.draw(st.booleans()):
-                tables.add_apart(np.array([one]), np.array([two]))
-                dense.apart.add(pair)
+                tables.add_apart(np.array([one, two]), np.array([two, one]))
+                plain.apart.add(pair)
                 continue
-            evidence, frames = data.draw(st.integers(-4, 4)), data.draw(st.integers(1, 2))
-            tables.add_near(
-                np.array([one]), np.array([two]), np.array([float(evidence)]), np.array([frames]), CAP
-            )
-            dense.near[pair] = min(max(dense.near.get(pair, 0.0) + evidence, -CAP), CAP)
-            dense.common[pair] = dense.common.get(pair, 0) + frames
+            score, frames = data.draw(st.integers(-9, 9)), data.draw(st.integers(1, 2))
+            tables.add_near(np.array([one]), np.array([two]), np.array([float(score)]), np.array([frames]))
+            evidence, common = plain.near(rows[one], rows[two])
+            evidence = min(max(evidence + score / SETTINGS.ground_frames, -CAP), CAP)
+            plain.met[pair] = evidence, min(common + frames, 3)
+        for row in data.draw(st.lists(st.integers(0, len(rows) - 1), max_size=4, unique=True)):
+            frames_of = data.draw(st.sets(st.integers(0, 9), max_size=8))
+            about = np.array(sorted(frames_of), dtype=np.int64) + 10 * time
+            tables.stand(np.full(about.size, row), about)
+            for frame in about.tolist():
+                plain.stand(rows[row], frame)
+            if about.size:
+                plain.let_go()
         if data.draw(st.booleans()):
-            tables.absorb(rows[0], rows[1])
-            dense.absorb(rows[0], rows[1])
-            tables.arrange(dense.rows)
-        for i, a in enumerate(dense.rows):
-            for j, b in enumerate(dense.rows):
-                pair = frozenset((a, b))
-                if i != j:
-                    assert tables.apart[i, j] == (pair in dense.apart)
-                    told = dense.near.get(pair, 0.0) if dense.common.get(pair, 0) >= 3 else 0.0
-                    assert tables.near[i, j] == told
+            tables.absorb([(rows[0], rows[1])])
+            plain.absorb(rows[0], rows[1])
+            tables.arrange(plain.rows)
+        size = len(plain.rows)
+        one, two = (side.ravel() for side in np.indices((size, size)))
+        different = one != two
+        one, two = one[different], two[different]
+        pairs = [(plain.rows[i], plain.rows[j]) for i, j in zip(one.tolist(), two.tolist(), strict=True)]
+        assert tables.apart(one, two).tolist() == [frozenset(pair) in plain.apart for pair in pairs]
+        known = [plain.near(*pair) for pair in pairs]
+        expected = [evidence if common >= 3 else 0.0 for evidence, common in known]
+        assert tables.near(one, two).tolist() == expected
+        met = {frozenset((plain.rows[i], plain.rows[j])) for i, j in zip(*tables.met(), strict=True)}
+        assert met == set(plain.met)
+
+
+@settings(deadline=None, max_examples=100)
+@given(st.data())
+def test_many_rows_absorbed_at_once_are_as_many_one_after_the_other(data: st.DataObject) -> None:
+    rng = np.random.default_rng(data.draw(st.integers(0, 2**32)))
+    into = {row: int(rng.integers(4)) for row in range(4, 10) if rng.random() < 0.7}
+    at_once, in_turn = PairTables(SETTINGS), PairTables(SETTINGS)
+    one, two = np.triu_indices(10, 1)
+    met, apart, alike = (np.flatnonzero(rng.random(one.size) < 0.4) for _ in range(3))
+    # Whole numbers, so that the order of sums does not matter; those who never met were not about.
+    score, worth = rng.integers(-4, 5, one.size) * 2.0, rng.integers(1, 3, one.size) * 1.0
+    for tables in (at_once, in_turn):
+        tables.arrange([name(row) for row in ROWS])
+        tables.add_near(one[met], two[met], score[met], np.full(met.size, 3))
+        tables.add_apart(one[apart], two[apart])
+        tables.add_alike(one[alike], two[alike], worth[alike])
+    at_once.absorb([(name(kept), name(lost)) for lost, kept in into.items()])
+    for lost, kept in into.items():
+        in_turn.absorb([(name(kept), name(lost))])
+    left = [name(row) for row in ROWS if row not in into]
+    one, two = np.triu_indices(len(left), 1)
+    for tables in (at_once, in_turn):
+        tables.arrange(left)
+    for table in ("near", "apart", "alike"):
+        assert getattr(at_once, table)(one, two).tolist() == getattr(in_turn, table)(one, two).tolist()
+
+
+@settings(deadline=None, max_examples=100)
+@given(st.lists(st.tuples(st.integers(0, 3), st.integers(0, 60)), max_size=12), st.sampled_from([10, 100]))
+def test_presence_counts_the_frames_in_common_of_late(steps: list[tuple[int, int]], frames: int) -> None:
+    presence, stood, now = Presence(frames), [set[int]() for _ in range(4)], 0
+    presence.arrange(np.full(4, -1))
+    for row, later in steps:
+        now += later
+        stood[row] |= {now, now + 1}
+        stood[0] |= {now}
+        presence.stand(np.array([row, row, 0]), np.array([now, now + 1, now]))
+    one, two = np.triu_indices(4, 1)
+    common = presence.common(one, two)
+    for i, j, count in zip(one.tolist(), two.tolist(), common.tolist(), strict=True):
+        both = stood[i] & stood[j]
+        assert len([frame for frame in both if frame > now - frames]) <= count <= len(both)
 
 
 @st.composite
@@ -95,7 +173,7 @@ def updates(draw: st.DrawFn) -> tuple[Sightings, np.ndarray, np.ndarray]:
     rows = np.where(rng.random((tracks, FRAMES)) < 0.3, -1, np.arange(tracks)[:, None])
     cut = rng.random(tracks) < 0.3
     rows[:, FRAMES // 2 :] += np.where(cut[:, None] & (rows[:, FRAMES // 2 :] >= 0), tracks, 0)
-    ground = rng.normal(0, 1, (tracks, FRAMES, 2))
+    ground = rng.normal(0, draw(st.sampled_from([1.0, 4.0])), (tracks, FRAMES, 2))
     ground[(rows < 0) | (rng.random(rows.shape) < 0.2)] = np.nan
     half = rng.normal(0, 0.5, (tracks, FRAMES, 2, 2))
     spread = half @ half.swapaxes(-1, -2)
@@ -111,6 +189,8 @@ def test_nearness_is_the_sum_over_frames_in_which_both_stand_somewhere(
     update: tuple[Sightings, np.ndarray, np.ndarray], gate: float
 ) -> None:
     seen, rows, camera = update
+    count = int(rows.max(initial=-1)) + 1
+    met_before = [(i, j) for i in range(count) for j in range(i + 1, count) if (i * j) % 5 == 1]
     expected: dict[frozenset[int], list[float]] = {}
     for one in range(len(rows)):
         for two in range(one):
@@ -122,7 +202,11 @@ def test_nearness_is_the_sum_over_frames_in_which_both_stand_somewhere(
                 score = max(1.0 - float(apart @ np.linalg.solve(metric, apart)), -2.0)
                 pair = frozenset((int(rows[one, frame]), int(rows[two, frame])))
                 expected.setdefault(pair, []).append(score)
-    met = near(seen, rows, camera, gate, int(rows.max(initial=-1)) + 1)
+    # Who is far away all the time, and always was, is not worth a line.
+    met_rows = {frozenset(pair) for pair in met_before}
+    expected = {it: of for it, of in expected.items() if max(of) > -2.0 or it in met_rows}
+    before = np.array(met_before, dtype=np.int64).reshape(-1, 2)
+    met = near(Standing.of(seen, rows, camera), gate, count, (before[:, 0], before[:, 1]), count)
     pairs = [frozenset(pair) for pair in zip(met.one.tolist(), met.two.tolist(), strict=True)]
     assert len(set(pairs)) == len(pairs)
     assert dict(zip(pairs, met.frames.tolist(), strict=True)) == {it: len(of) for it, of in expected.items()}

@@ -1,0 +1,50 @@
+"""Sweeping finds every pair that overlaps, and pairs are written out as loops would."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bestview.ranges import distinct, pairs_within, written_out
+from bestview.sweep import overlapping
+
+
+@settings(deadline=None, max_examples=100)
+@given(st.integers(0, 60), st.integers(0, 2**32), st.sampled_from([0.0, 0.5, 5.0]), st.booleans())
+def test_rectangles_that_overlap_are_all_found_once(count: int, seed: int, size: float, whole: bool) -> None:
+    rng = np.random.default_rng(seed)
+    low = rng.uniform(0, 10, (count, 2))
+    high = low + rng.uniform(0, size, (count, 2)) * rng.choice([1.0, 100.0], (count, 1), p=[0.9, 0.1])
+    if whole:
+        # Corners that meet exactly, and many at one place.
+        low, high = np.floor(low), np.floor(high)
+    one, two = overlapping(low, high)
+    expected = [
+        (i, j)
+        for i in range(count)
+        for j in range(i + 1, count)
+        if (low[i] <= high[j]).all() and (low[j] <= high[i]).all()
+    ]
+    assert list(zip(one.tolist(), two.tolist(), strict=True)) == expected
+
+
+@settings(deadline=None, max_examples=100)
+@given(st.lists(st.integers(-1, 3), max_size=9))
+def test_pairs_within_are_those_of_the_same_label(labels: list[int]) -> None:
+    one, two = pairs_within(np.array(labels, dtype=np.int64))
+    expected = {
+        (i, j) for j, label in enumerate(labels) for i in range(j) if label >= 0 and labels[i] == label
+    }
+    found = list(zip(one.tolist(), two.tolist(), strict=True))
+    assert len(found) == len(expected)
+    assert set(found) == expected
+
+
+@settings(deadline=None, max_examples=50)
+@given(st.lists(st.integers(0, 4), max_size=6))
+def test_counts_are_written_out_one_after_the_other(counts: list[int]) -> None:
+    owner, which = written_out(np.array(counts, dtype=np.int64))
+    expected = [(i, k) for i, count in enumerate(counts) for k in range(count)]
+    assert list(zip(owner.tolist(), which.tolist(), strict=True)) == expected
+    assert distinct(np.array(counts, dtype=np.int64)).tolist() == sorted(set(counts))
