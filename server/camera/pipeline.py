@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from server.camera.encode import AccessUnit, Encoder
 from server.camera.observe import make_detector
+from server.camera.own import Passing, open_own
 from server.camera.report import Reporter
 from server.camera.sharpness import Sharpness
 from server.camera.sound import LiveSound
-from server.camera.sources import Image, open_source
+from server.camera.sources import Image, Source, open_source
 from server.wire.config import Config
 from server.wire.fit import Fit
 from server.wire.messages import CameraTracks
@@ -27,9 +28,14 @@ class CameraPipeline:
         self, config: Config, camera_id: str, boot: int = 0, listener: LiveSound | None = None
     ) -> None:
         camera, site = config.camera(camera_id), config.site
-        self.source = open_source(camera, site, listener)
+        own = open_own(config, camera, listener)
+        self.passes = own.source is not None
+        """The source's own H.264 is passed on."""
+        self.why_encoded = own.why
+        """Why it is not, where it could have been; empty: nobody wished it."""
+        self.source: Source = own.source or open_source(camera, site, listener)
         self._fit = Fit(self.source.size, (site.width, site.height))
-        self._encoder = Encoder(site, config.encode)
+        self._encoder = Passing(own.source) if own.source else Encoder(site, config.encode)
         self._detector = make_detector(config, camera, self._fit)
         window = config.track.window
         self._tracker = OnlineTracker(window, config.track.costs, solver_named(config.track.solver))
@@ -49,7 +55,7 @@ class CameraPipeline:
         return None if own is None else self._fit.image(own)
 
     def encode(self, pulse: int, image: Image) -> AccessUnit:
-        """Encode the picture of a pulse."""
+        """Encode the picture of a pulse, the last one that was taken."""
         return self._encoder.encode(pulse, image)
 
     def track(self, pulse: int, image: Image | None) -> CameraTracks | None:

@@ -45,6 +45,10 @@ class CameraProcess:
         self._sound = open_sound(config, camera_id)
         listener = self._sound if isinstance(self._sound, LiveSound) else None
         self._pipeline = CameraPipeline(config, camera_id, self._boot, listener)
+        if self._pipeline.passes:
+            log.info("camera %s: its own H.264 passes through", camera_id)
+        elif self._pipeline.why_encoded:
+            log.warning("camera %s is encoded: its own H.264: %s", camera_id, self._pipeline.why_encoded)
         self._video = ThreadPoolExecutor(1, "video")
         self._tracking = ThreadPoolExecutor(1, "tracking")
         fps = config.site.fps

@@ -81,6 +81,9 @@ class Config(BaseSettings):
         for place, wanted in (("record.folder", self.record.folder), ("sound.source", self.sound.source)):
             if self.encode.codec == "vp8" and wanted is not None:
                 raise ValueError(f"{place}: a site whose encode.codec is vp8 has none; take h264 for it")
+        for camera in self.cameras:
+            if self.encode.codec == "vp8" and camera.h264 != "encode":
+                raise ValueError(f"cameras: {camera.id}: h264: {camera.h264}: encode.codec is vp8")
         return self
 
     @property

@@ -31,12 +31,12 @@ NO_REASON = cast("Why", None)
 """Of decisions that a test makes up: nobody will ask why."""
 
 
-def small_config(cameras: Sequence[str] = CAMERAS, **changes: Any) -> Config:
+def small_config(cameras: Sequence[str | dict[str, Any]] = CAMERAS, **changes: Any) -> Config:
     """Give a site in which every epoch is a GOP, and whoever is seen once is somebody."""
     content: dict[str, Any] = {
         "site": {"name": "hall", "fps": FPS, "width": WIDTH, "height": HEIGHT},
         "encode": {"gop": GOP},
-        "cameras": [{"id": camera, "source": "scene:room"} for camera in cameras],
+        "cameras": [{"id": it, "source": "scene:room"} if isinstance(it, str) else it for it in cameras],
         "track": {"window": {"window": 5, "stride": STRIDE, "birth_window": 5}},
         "view": {"lookahead": 2 * GOP, "switch_cost_s": 0.04, "identity": {"confirm": 1, "regroup": 1}},
     }

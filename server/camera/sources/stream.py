@@ -20,7 +20,8 @@ from server.wire.errors import UserError
 
 log = logging.getLogger(__name__)
 
-_OPEN_S, _READ_S = 10.0, 5.0
+OPEN_S, READ_S = 10.0, 5.0
+"""Seconds in which a camera must answer, and send something."""
 _RETRY_FIRST_S, _RETRY_MAX_S = 0.5, 10.0
 _STALE_S = 2.0
 """A picture older than this is not shown again: the camera counts as away."""
@@ -33,7 +34,7 @@ class Stream:
 
     def __init__(self, url: str, options: Mapping[str, str], listener: LiveSound | None = None) -> None:
         self._url, self._options, self._listener = url, options, listener
-        opened = open_video(url, options, (_OPEN_S, _READ_S))
+        opened = open_video(url, options, (OPEN_S, READ_S))
         self.size = opened.size
         self._lock = threading.Lock()
         self._newest: VideoFrame | None = None
@@ -52,7 +53,7 @@ class Stream:
     def close(self) -> None:
         """Stop reading."""
         self._closing.set()
-        self._thread.join(_READ_S)
+        self._thread.join(READ_S)
 
     def _run(self, opened: Opened | None) -> None:
         pause = _RETRY_FIRST_S
@@ -63,7 +64,7 @@ class Stream:
                 return
             pause = min(2 * pause, _RETRY_MAX_S)
             try:
-                opened = open_video(self._url, self._options, (_OPEN_S, _READ_S))
+                opened = open_video(self._url, self._options, (OPEN_S, READ_S))
             except UserError as error:
                 opened = None
                 log.warning("%s; trying again in %.1f s", error, pause)
@@ -101,7 +102,10 @@ class Stream:
         if pictures:
             with self._lock:
                 self._newest, self._newest_at = pictures[-1], time.monotonic()
-            newest = pictures[-1]
-            if self._listener is not None and newest.pts is not None and newest.time_base is not None:
-                self._listener.picture(newest.pts * newest.time_base)
+            self._told_of(pictures[-1])
         return bool(pictures)
+
+    def _told_of(self, newest: VideoFrame | av.Packet[VideoStream]) -> None:
+        """Tell who listens when the newest picture was."""
+        if self._listener is not None and newest.pts is not None and newest.time_base is not None:
+            self._listener.picture(newest.pts * newest.time_base)

@@ -23,6 +23,8 @@ class Camera(Section):
     """A recording shows its frame n - offset at pulse n."""
     at_end: Literal["stop", "loop"] = "stop"
     """What a recording does after its last frame."""
+    h264: Literal["encode", "auto", "pass"] = "encode"
+    """The source's own: its pictures are encoded anew; it passes where it fits; it passes or is refused."""
     options: dict[str, str] = {}
     """Options for FFmpeg's opener, e.g. rtsp_transport: tcp."""
     ignore: list[Polygon] = []

@@ -1,0 +1,116 @@
+"""A recording whose own access units are passed on, frame by frame."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Literal
+
+import av
+from av.video.frame import VideoFrame
+from av.video.stream import VideoStream
+
+from server.camera.own.annexb import is_key, packing_of
+from server.camera.own.fitting import Fitting, MisfitError, Wanted
+from server.camera.own.passing import Unit
+from server.camera.sources.base import Image, SourceEnded
+from server.camera.sources.opening import Opened, bgr, open_video
+from server.wire.errors import UserError
+
+
+class OwnRecording:
+    """Shows its frame ``pulse - offset``, as :class:`server.camera.sources.Recording` does.
+
+    Raises:
+        UserError: there is no such file, or no video in it.
+        MisfitError: not all of it can stand in the site's streams; it is read through to find out.
+    """
+
+    recorded = True
+
+    def __init__(self, path: str, offset: int, at_end: Literal["stop", "loop"], wanted: Wanted) -> None:
+        if not Path(path).exists():
+            raise UserError(f"{path}: no such file or folder")
+        self._path, self._offset, self._loop = path, offset, at_end == "loop"
+        self._length = _checked(path, offset, wanted)
+        if self._loop and self._length % wanted.gop:
+            raise MisfitError(f"its {self._length} frames are not whole GOPs: it cannot begin again (at_end)")
+        self.size = wanted.size
+        self.taken: Unit | None = None
+        self._begin()
+
+    def take(self, pulse: int) -> Image | None:
+        """Give frame ``pulse - offset``; None before the recording begins."""
+        index = pulse - self._offset
+        if index < 0:
+            return None
+        if index >= self._length:
+            if not self._loop:
+                raise SourceEnded(self._path)
+            index %= self._length
+        if index < self._next - 1:
+            self._opened.container.close()
+            self._begin()
+        while self._next <= index:
+            self._read()
+        return None if self.taken is None else self.taken.image
+
+    def close(self) -> None:
+        """Close the file."""
+        self._opened.container.close()
+
+    def _begin(self) -> None:
+        self._opened = open_video(self._path)
+        self._packing = packing_of(self._opened.stream.codec_context.extradata)
+        self._packets, self._next = packets(self._opened), 0
+
+    def _read(self) -> None:
+        packet = next(self._packets, None)
+        if packet is None:  # shorter than when it was looked through
+            raise SourceEnded(self._path)
+        data = self._packing.annex_b(bytes(packet))
+        image = decoded(packet)
+        if image is None and self.taken is not None:
+            image = self.taken.image  # damaged, which a viewer sees too
+        self.taken = None if image is None else Unit(is_key(data), data, image)
+        self._next += 1
+
+
+def decoded(packet: av.Packet[VideoStream]) -> Image | None:
+    """Give the picture of an access unit; None where it cannot be decoded, or not yet."""
+    try:
+        pictures = [picture for picture in packet.decode() if isinstance(picture, VideoFrame)]
+    except av.error.FFmpegError:
+        return None
+    return bgr(pictures[-1]) if pictures else None
+
+
+def at_once(opened: Opened) -> None:
+    """Let the decoder give each picture with its own access unit, whatever may come later."""
+    opened.stream.codec_context.flags |= av.codec.context.Flags.low_delay
+
+
+def packets(opened: Opened) -> Iterator[av.Packet[VideoStream]]:
+    """Give the packets that hold access units."""
+    at_once(opened)
+    for packet in opened.container.demux(opened.stream):
+        if packet.size:
+            yield packet
+
+
+def _checked(path: str, offset: int, wanted: Wanted) -> int:
+    """Look at all of it; give the number of its frames."""
+    opened, fitting, frame = open_video(path), Fitting(wanted), -1
+    try:
+        fitting.opened(opened)
+        packing = packing_of(opened.stream.codec_context.extradata)
+        for frame, packet in enumerate(packets(opened)):
+            data = packing.annex_b(bytes(packet))
+            fitting.unit(frame, frame + offset, data, packet.pts, packet.dts)
+    except (av.error.FFmpegError, ValueError) as error:
+        raise MisfitError(f"it cannot be read: {error}") from error
+    finally:
+        opened.container.close()
+    if frame < 0:
+        raise UserError(f"{path}: there is not one picture in this video; is the file whole?")
+    return frame + 1

@@ -1,0 +1,90 @@
+"""A network camera whose own access units are passed on."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Mapping
+
+import av
+from av.video.stream import VideoStream
+
+from server.camera.own.annexb import is_key, packing_of
+from server.camera.own.fitting import Fitting, MisfitError, Wanted
+from server.camera.own.passing import Unit
+from server.camera.own.recording import at_once, decoded, packets
+from server.camera.own.waiting import Waiting
+from server.camera.sound import LiveSound
+from server.camera.sources.base import Image
+from server.camera.sources.opening import Opened, open_video
+from server.camera.sources.stream import OPEN_S, READ_S, Stream
+
+_LOOKED_AT_GOPS = 2
+"""GOPs that a camera sends before it is known to fit."""
+
+
+class OwnStream(Stream):
+    """Reads the camera in a thread, as :class:`Stream` does; gives each access unit once, in order.
+
+    Raises:
+        UserError: it cannot be opened.
+        MisfitError: what it sends cannot stand in the site's streams.
+    """
+
+    def __init__(
+        self, url: str, options: Mapping[str, str], listener: LiveSound | None, wanted: Wanted
+    ) -> None:
+        _check(url, options, wanted)
+        self._waiting = Waiting(wanted.gop)
+        self._waiting_lock = threading.Lock()
+        self._unbroken = False
+        """Nothing has been lost since the last key unit."""
+        self.taken: Unit | None = None
+        super().__init__(url, options, listener)
+
+    def take(self, pulse: int) -> Image | None:
+        """Give the picture of the access unit that goes with a pulse; None where none can."""
+        with self._waiting_lock:
+            self.taken = self._waiting.take(pulse)
+        return None if self.taken is None else self.taken.image
+
+    def _read(self, opened: Opened) -> bool:
+        at_once(opened)
+        return super()._read(opened)
+
+    def _decode(self, packet: av.Packet[VideoStream]) -> bool:
+        """Queue an access unit with its picture; tell whether there is one."""
+        if not packet.size:
+            return False
+        try:
+            data = packing_of(packet.stream.codec_context.extradata).annex_b(bytes(packet))
+        except ValueError:
+            data = b""
+        key, image = is_key(data), decoded(packet)
+        self._unbroken = image is not None and bool(data) and (self._unbroken or key)
+        if image is not None and self._unbroken:
+            self._told_of(packet)
+            with self._waiting_lock:
+                self._waiting.put(Unit(key, data, image))
+        return image is not None
+
+
+def _check(url: str, options: Mapping[str, str], wanted: Wanted) -> None:
+    """Look at what a camera sends, from its first key unit on."""
+    opened, fitting = open_video(url, options, (OPEN_S, READ_S)), Fitting(wanted)
+    try:
+        fitting.opened(opened)
+        packing, begun = packing_of(opened.stream.codec_context.extradata), -1
+        for frame, packet in enumerate(packets(opened)):
+            data = packing.annex_b(bytes(packet))
+            if begun < 0 and is_key(data):
+                begun = frame
+            if begun >= 0:
+                fitting.unit(frame - begun, frame - begun, data, packet.pts, packet.dts)
+            if frame - max(begun, 0) >= _LOOKED_AT_GOPS * wanted.gop:
+                break
+        if begun < 0:
+            raise MisfitError(f"no GOP begins within {_LOOKED_AT_GOPS * wanted.gop} frames (encode.gop)")
+    except (av.error.FFmpegError, ValueError) as error:
+        raise MisfitError(f"it cannot be read: {error}") from error
+    finally:
+        opened.container.close()
