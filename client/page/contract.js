@@ -57,6 +57,16 @@
  * @property {string | null} camera
  * @property {number} since pulse
  * @property {string} reason one plain sentence
+ * @property {Record<string, number | null>} costs by camera, mean of a frame; null: it cannot be shown
+ * @property {Record<string, number>} seen by camera, share of the look-ahead
+ * @property {Record<string, Record<string, number>>} terms by camera: what its quality is made of
+ * @property {Record<string, number>} weights by term
+ * @property {string | null} before the camera of the GOP before
+ * @property {number | null} stay what the look-ahead costs with it
+ * @property {string | null} cut_to the best other camera
+ * @property {number | null} cut what the look-ahead costs with that, the cut included
+ * @property {number} switch_cost frames of not seeing the person
+ * @property {number} lookahead frames
  */
 
 export {};

@@ -12,6 +12,7 @@ import { Reason } from './reason.js';
 import { Strip } from './strip.js';
 import { copy, pictureInPicture, saveSnapshot } from './tools.js';
 import { Viewer } from './viewer.js';
+import { Why } from './why.js';
 
 const READOUT_MS = 250;
 const CLOCK_EVERY_MS = 10_000;
@@ -46,6 +47,8 @@ const cameras = new Cameras(element('cameras'), (camera) => viewer.hold(camera))
 const overlay = new Overlay(element('boxes'));
 const strip = new Strip(element('strip'));
 const reason = new Reason(element('reason'));
+const stripElement = element('strip');
+const why = new Why(element('why'));
 const clock = new ServerClock();
 Object.assign(window, { myview: viewer.probe });
 
@@ -87,6 +90,7 @@ function readOut() {
   if (!site || probe.pulse === null || viewer.object === null) return strip.clear();
   const live = viewer.past === null;
   strip.draw({ pulse: probe.pulse, live, fps: site.fps, object: viewer.object, decisions, palette });
+  if (whyOn && !stripElement.matches(':hover')) explain(probe.pulse);
   if (viewer.held === null) void reason.about(viewer.object, probe.camera);
   else reason.put(`Held by hand. ${best(decisions.camera(viewer.object, probe.pulse), viewer.held)}`);
 }
@@ -177,6 +181,23 @@ async function copyLink() {
   viewer.say(done ? 'The link to this person is copied.' : `The link to this person: ${location.href}`);
 }
 
+let whyOn = false;
+
+function toggleWhy() {
+  whyOn = !whyOn;
+  element('toggle-why').setAttribute('aria-pressed', String(whyOn));
+  if (whyOn) explain(viewer.probe.pulse);
+  else why.hide();
+}
+
+/** @param {number | null} pulse */
+function explain(pulse) {
+  const { site, object, probe } = viewer;
+  if (!site || object === null || pulse === null || probe.pulse === null) return why.hide();
+  const ago = (probe.pulse - pulse) / site.fps;
+  void why.show(object, pulse, site.gop, ago < site.gop / site.fps ? 'Now' : `${ago.toFixed(1)} s before`);
+}
+
 /** @param {number} number from 1, of a camera in the site's order */
 function holdNumber(number) {
   const camera = viewer.site?.cameras[number - 1];
@@ -192,12 +213,16 @@ toggle.addEventListener('click', toggleBoxes);
 soundToggle.addEventListener('click', toggleSound);
 followToggle.addEventListener('click', toggleFollow);
 element('full-screen').addEventListener('click', fullScreen);
-const stripElement = element('strip');
 stripElement.addEventListener('click', ({ offsetX }) => {
   const pulse = strip.pulseAt(offsetX);
   if (pulse === null) viewer.live();
   else viewer.watchFrom(pulse);
 });
+stripElement.addEventListener('pointermove', ({ offsetX, pointerType }) => {
+  if (pointerType === 'mouse') explain(strip.pulseAt(offsetX));
+});
+stripElement.addEventListener('pointerleave', () => whyOn || why.hide());
+element('toggle-why').addEventListener('click', toggleWhy);
 element('live').addEventListener('click', () => viewer.live());
 element('pause').addEventListener('click', () => viewer.pause());
 for (const name of ['play', 'pause']) {
@@ -223,6 +248,7 @@ listenToKeys({
   End: () => viewer.live(),
   b: toggleBoxes,
   z: toggleFollow,
+  w: toggleWhy,
   m: toggleSound,
   f: fullScreen,
   s: snapshot,

@@ -126,6 +126,30 @@ class FakeSite:
             if self.people.get(k)
         ]
 
+    def choice(self, person: int, first: int) -> dict[str, Any]:
+        """Give why a person is shown as they are in the GOP [first, first + GOP)."""
+        shown = self.camera(person, first)
+        costs = {camera: 0.0 if n == shown else 0.25 * (n + 1) for n, camera in enumerate(CAMERAS)}
+        return {
+            "object": person,
+            "first": first,
+            "frames": GOP,
+            "camera": CAMERAS[shown],
+            "since": first,
+            "costs": costs | {CAMERAS[shown - 1]: None},
+            "seen": {camera: 1.0 - cost for camera, cost in costs.items()},
+            "quality": {camera: 1.0 - cost for camera, cost in costs.items()},
+            "terms": {camera: {"size": 1.0 - cost, "whole": 1.0} for camera, cost in costs.items()},
+            "weights": {"size": 1.0, "whole": 0.1},
+            "before": CAMERAS[shown],
+            "lookahead": LOOKAHEAD,
+            "switch_cost": 7.5,
+            "stay": 0.0,
+            "cut": 9.25,
+            "cut_to": CAMERAS[(shown + 1) % len(CAMERAS)],
+            "reason": REASON,
+        }
+
     async def released(self, first: int) -> AsyncIterator[int]:
         """Yield the pulses from `first` on, each when it may be sent."""
         pulse = first
@@ -206,9 +230,10 @@ class SiteServer:
         return web.json_response(self.site.site())
 
     async def _choice(self, request: web.Request) -> web.Response:
-        k = int(request.match_info["k"])
-        camera = CAMERAS[self.site.camera(k, self.site.edge)]
-        return web.json_response({"object": k, "camera": camera, "reason": REASON})
+        k, pulse = int(request.match_info["k"]), int(request.query.get("at", f"p{self.site.edge}")[1:])
+        if pulse < self.site.kept_from:
+            return web.json_response({"error": "nothing is kept of that"}, status=404)
+        return web.json_response(self.site.choice(k, pulse - pulse % GOP))
 
     async def _thumbnail(self, request: web.Request) -> web.Response:
         return web.Response(body=thumbnail(int(request.match_info["k"])), content_type="image/jpeg")

@@ -1,0 +1,61 @@
+"""The numbers behind a view: of the present one by a button, of another moment under the mouse."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+
+import pytest
+import pytest_asyncio
+from page_browser import needs_chromium, visiting
+from page_pattern import FPS
+from page_site import STARTS_AT, FakeSite
+from playwright.async_api import Browser, expect
+
+from benchmarks.browser import chromium
+
+pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="module")]
+
+
+@pytest_asyncio.fixture(scope="module", loop_scope="module")
+async def browser() -> AsyncIterator[Browser]:
+    async with chromium() as running:
+        yield running
+
+
+async def test_the_present_view_is_explained_camera_by_camera(browser: Browser) -> None:
+    async with visiting(browser, query="?object=2") as visit:
+        await visit.playing(2)
+        await visit.page.keyboard.press("w")
+        why = visit.page.locator("#why")
+        await expect(why).to_contain_text("Now: c2.")
+        await expect(why.locator("tbody tr")).to_have_count(3)
+        await expect(why.locator("tr[aria-current]")).to_have_text("c20.001.001.001.00")
+        await expect(why.locator("tbody tr").nth(1)).to_contain_text("0.500.501.00")
+        await expect(why).to_contain_text("A cut costs as much as 7.5 frames of not seeing the person.")
+        await expect(why).to_contain_text("Over 10 frames: staying with c2 0, c0 9.3 with its cut.")
+        await visit.page.get_by_role("button", name="Why").click()
+        await expect(why).to_be_hidden()
+
+
+async def test_a_moment_under_the_mouse_is_explained(browser: Browser) -> None:
+    async with visiting(browser) as visit:
+        await visit.playing(1)
+        seen = await visit.get("myview.pulse")
+        await visit.until(f"myview.pulse > {seen + 5 * FPS}")
+        strip = visit.page.locator("#strip")
+        box = await strip.bounding_box()
+        assert box is not None
+        await strip.hover(position={"x": box["width"] * (60 - 3) / 62, "y": 5})
+        why = visit.page.locator("#why")
+        await expect(why).to_contain_text("s before: c")
+        words = await why.locator("p").first.text_content() or ""
+        assert 2 < float(words.split(maxsplit=1)[0]) < 5
+        await visit.page.mouse.move(5, 5)
+        await expect(why).to_be_hidden()
+
+
+async def test_a_moment_whose_reasons_are_not_kept_is_said(browser: Browser) -> None:
+    async with visiting(browser, FakeSite(kept_from=STARTS_AT + 100_000)) as visit:
+        await visit.playing(1)
+        await visit.page.keyboard.press("w")
+        await expect(visit.page.locator("#why")).to_contain_text("not known")
