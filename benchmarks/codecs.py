@@ -1,0 +1,162 @@
+"""What a camera's pictures cost and weigh: encoded as H.264 or VP8, or the camera's own passed through.
+
+    OPENBLAS_NUM_THREADS=1 python -m benchmarks.codecs --out out/bench
+
+A camera's process without its network, on a recording of the synthetic room in the site's own H.264. Times
+are processor time; the ways take turns, round by round, and the median of the rounds is printed. Quality is
+against the pictures of the recording, which of the camera's own H.264 are the same.
+"""
+
+from __future__ import annotations
+
+import statistics
+import tempfile
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import av
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.report import Report
+from benchmarks.surroundings import parser
+from server.camera.encode import Encoder
+from server.camera.pipeline import CameraPipeline
+from server.camera.scene import Scene
+from server.wire.config import Config
+from server.wire.loading import build_config
+from server.wire.sections import Encode, Site
+
+_MS = 1e3
+_START = 200
+"""The scene's first frame: people are in sight."""
+_PEAK = 255.0
+
+
+@dataclass(frozen=True, slots=True)
+class Way:
+    """One way to a camera's stream."""
+
+    name: str
+    encode: dict[str, Any]
+    h264: str = "encode"
+
+
+@dataclass(frozen=True, slots=True)
+class Cost:
+    """What it costs and gives; milliseconds are of processor time, for a frame."""
+
+    taken: float
+    """To read and decode the picture."""
+    encoded: float
+    tracked: float
+    """To find and follow the people in it."""
+    kbps: float
+    quality: float
+    """Decibels (PSNR) against the recording; infinite: the same."""
+
+    @property
+    def whole(self) -> float:
+        """All of it."""
+        return self.taken + self.encoded + self.tracked
+
+
+WAYS = (
+    Way("H.264 (the default)", {}),
+    Way("H.264, preset veryfast", {"preset": "veryfast"}),
+    Way("H.264, max_kbps 500", {"max_kbps": 500}),
+    Way("VP8 (quantizer 16, speed 10)", {"codec": "vp8"}),
+    Way("VP8, quantizer 24", {"codec": "vp8", "quantizer": 24}),
+    Way("its own H.264, passed through", {}, "pass"),
+)
+
+
+def record(path: Path, site: Site, frames: int) -> Path:
+    """Write the room as the site's own encoder sends it."""
+    scene, encoder = Scene("room", 3, 4, 1, site.width, site.height, site.fps), Encoder(site, Encode())
+    units = (encoder.encode(pulse, scene.image(0, _START + pulse)) for pulse in range(frames))
+    path.write_bytes(b"".join(unit.data for unit in units))
+    return path
+
+
+def measure(way: Way, film: Path, site: Site, frames: int) -> Cost:
+    """Run a camera over a recording."""
+    pipeline = CameraPipeline(_config(way, film, site), "c0")
+    spent, sizes, error = np.zeros(3), 0, 0.0
+    decoder = av.CodecContext.create(way.encode.get("codec", "h264"), "r")
+    assert isinstance(decoder, av.VideoCodecContext)  # noqa: S101 — tells mypy what it is
+    decoder.thread_count = 1
+    for pulse in range(frames):
+        at = [time.process_time()]
+        image = pipeline.take(pulse)
+        assert image is not None  # noqa: S101 — the recording is so long
+        at.append(time.process_time())
+        unit = pipeline.encode(pulse, image)
+        at.append(time.process_time())
+        pipeline.track(pulse, image)
+        at.append(time.process_time())
+        spent += np.diff(at)
+        sizes += len(unit.data)
+        (picture,) = decoder.decode(av.Packet(unit.data))
+        error += _squared(picture.to_ndarray(format="bgr24"), image)
+    pipeline.close()
+    taken, encoded, tracked = _MS * spent / frames
+    quality = 10 * np.log10(_PEAK**2 * frames / error) if error else float("inf")
+    return Cost(taken, encoded, tracked, sizes * 8 * site.fps / frames / 1e3, float(quality))
+
+
+def _squared(one: NDArray[Any], other: NDArray[Any]) -> float:
+    return float(np.mean((one.astype(np.float32) - other.astype(np.float32)) ** 2))
+
+
+def _config(way: Way, film: Path, site: Site) -> Config:
+    content = {
+        "site": site.model_dump(),
+        "encode": way.encode,
+        "cameras": [{"id": "c0", "source": str(film), "h264": way.h264}],
+    }
+    return build_config(content, where="codecs", folder=film.parent)
+
+
+def middle(costs: Sequence[Cost]) -> Cost:
+    """Give the median of each number."""
+    return Cost(
+        statistics.median(it.taken for it in costs),
+        statistics.median(it.encoded for it in costs),
+        statistics.median(it.tracked for it in costs),
+        costs[0].kbps,
+        costs[0].quality,
+    )
+
+
+def main() -> None:
+    """Measure and print."""
+    options = parser(__doc__ or "", "codecs")
+    options.add_argument("--size", default="640x360", help="of the picture, WIDTHxHEIGHT")
+    options.add_argument("--frames", type=int, default=150, help="measured in a round")
+    options.add_argument("--rounds", type=int, default=3)
+    chosen = options.parse_args()
+    width, height = map(int, chosen.size.split("x"))
+    site, report = Site(width=width, height=height), Report()
+    with tempfile.TemporaryDirectory() as folder:
+        film = record(Path(folder) / "room.h264", site, chosen.frames)
+        rounds = [[measure(way, film, site, chosen.frames) for way in WAYS] for _ in range(chosen.rounds)]
+    rows = []
+    for way, *costs in zip(WAYS, *rounds, strict=True):
+        it = middle(costs)
+        quality = "the same" if np.isinf(it.quality) else f"{it.quality:.1f}"
+        times = [f"{it.taken:.2f}", f"{it.encoded:.2f}", f"{it.tracked:.2f}", f"{it.whole:.2f}"]
+        rows.append([way.name, *times, f"{it.kbps:.0f}", quality])
+    report.table(
+        f"One camera, {chosen.size} at {site.fps:g} a second; milliseconds of processor time a frame",
+        ["way", "take", "encode", "track", "all", "kbit/s", "PSNR, dB"],
+        rows,
+    )
+    report.save(chosen.out / "codecs.txt")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,29 @@
+"""The benchmark of codecs runs a real camera: what passes through is the same and costs no encoding."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from benchmarks.codecs import WAYS, Cost, measure, middle, record
+from server.wire.sections import Site
+
+SITE = Site(width=160, height=96)
+FRAMES = 20
+
+
+def test_what_passes_through_is_the_same_and_costs_no_encoding(tmp_path: Path) -> None:
+    film = record(tmp_path / "room.h264", SITE, FRAMES)
+    costs = {way.name: measure(way, film, SITE, FRAMES) for way in WAYS}
+    passed = costs.pop("its own H.264, passed through")
+    assert passed.quality == float("inf")
+    assert passed.kbps == film.stat().st_size * 8 * SITE.fps / FRAMES / 1000
+    for cost in costs.values():
+        assert 25 < cost.quality < 60
+        assert passed.encoded < cost.encoded / 5
+    assert costs["VP8, quantizer 24"].kbps < costs["VP8 (quantizer 16, speed 10)"].kbps
+
+
+def test_the_median_of_the_rounds_is_taken_of_each_time() -> None:
+    rounds = [Cost(1, 6, 2, 9, 40), Cost(3, 4, 1, 9, 40), Cost(2, 5, 3, 9, 40)]
+    assert middle(rounds) == Cost(2, 5, 2, 9, 40)
+    assert middle(rounds).whole == 9
