@@ -3,7 +3,8 @@
     python -m benchmarks.page --out out/bench
 
 A switch is a press on another person's card. It is over when the first frame of their best view has been
-shown, by the browser's own clock. Memory is the JavaScript heap after a collection, and what the player keeps buffered.
+shown, by the browser's own clock. Memory is the JavaScript heap after a collection, and what the player keeps
+buffered.
 """
 
 from __future__ import annotations
