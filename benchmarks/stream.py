@@ -21,6 +21,7 @@ import numpy as np
 from benchmarks.report import Report
 from benchmarks.stream_cameras import ENCODE, SITE, draw_room
 from benchmarks.stream_drift import drift
+from benchmarks.stream_hls import hls_delays
 from benchmarks.stream_load import first_pictures, step_up, watch_objects
 from benchmarks.stream_peers import ffmpeg_switching, hls_here, hls_of_nginx
 from benchmarks.stream_right import judge
@@ -30,7 +31,7 @@ from benchmarks.stream_tables import Found, describe, plot
 from benchmarks.surroundings import parser
 from server.camera.encode import AccessUnit
 
-PARTS = ("splice", "objects", "viewers", "first", "right", "drift")
+PARTS = ("splice", "objects", "viewers", "first", "right", "drift", "hls")
 _OBJECTS = 50
 _FILM = 50
 """Frames of each camera; they go round."""
@@ -55,6 +56,8 @@ def carry_out(options: argparse.Namespace, films: Films, folder: Path) -> Found:
         found.right = asyncio.run(judge(1000 if quick else 10_000, 50 if quick else 500))
     if "drift" in parts:
         found.drift = asyncio.run(drift(films, round((60 if quick else _HOUR) * SITE.fps)))
+    if "hls" in parts:
+        found.hls = asyncio.run(hls_delays(films, 6 if quick else 30))
     if {"objects", "viewers", "first"} & set(parts):
         _watch(options, parts, films, folder, found)
     return found

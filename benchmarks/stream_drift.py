@@ -46,7 +46,7 @@ class Drift:
     """Processor milliseconds a pulse, in each tenth."""
 
 
-class _Source:
+class Source:
     """Cameras that send at whatever pace they are asked."""
 
     def __init__(self, service: BestViewService, films: Sequence[Sequence[AccessUnit]], hall: Hall) -> None:
@@ -84,7 +84,7 @@ async def drift(films: Sequence[Sequence[AccessUnit]], pulses: int) -> Drift:
         for name, ground in zip(hall.ids, hall.grounds, strict=True)
     ]
     service = BestViewService(Config(site=SITE, encode=ENCODE, cameras=cameras))
-    source, decided = _Source(service, films, hall), list[GopChoices]()
+    source, decided = Source(service, films, hall), list[GopChoices]()
     service.on_decision.append(decided.append)
     viewer = service.splicer.decided[hall.ids[0]].join().pieces()
     delays: list[int] = []

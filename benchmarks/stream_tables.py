@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from benchmarks.report import Report
 from benchmarks.stream_cameras import SITE
 from benchmarks.stream_drift import Drift
+from benchmarks.stream_hls import Late
 from benchmarks.stream_load import Step, Watched
 from benchmarks.stream_peers import Served
 from benchmarks.stream_right import Right
@@ -42,6 +43,8 @@ class Found:
     """(requests,) milliseconds."""
     right: Right | None = None
     drift: Drift | None = None
+    hls: tuple[Late, Late] | None = None
+    """Without parts, and with them."""
 
 
 def describe(report: Report, found: Found) -> None:
@@ -137,7 +140,21 @@ def summary(found: Found) -> list[list[str]]:
         rows.append(["right camera on every frame", f"{good} of {it.frames}", "all", how])
     if found.drift:
         rows += _drift_rows(found.drift)
+    if found.hls:
+        rows += _hls_rows(*found.hls)
     return rows
+
+
+def _hls_rows(segments: Late, parts: Late) -> list[list[str]]:
+    return [
+        [
+            f"HLS, {what}: decided to shown, p50",
+            f"{it.shown:.1f} s",
+            "",
+            f"fetched after {it.fetched:.2f} s; {it.stalls} stalls",
+        ]
+        for what, it in (("whole segments", segments), ("parts", parts))
+    ]
 
 
 def _watched_rows(watched: Watched) -> list[list[str]]:

@@ -16,6 +16,7 @@ from benchmarks.report import Report
 from benchmarks.stream_cameras import draw_room, load, save
 from benchmarks.stream_crowd import Crowd, Heard
 from benchmarks.stream_drift import drift, times
+from benchmarks.stream_hls import hls_delays
 from benchmarks.stream_load import Step, end_of_first_fragment, first_pictures, send_delays, watch_objects
 from benchmarks.stream_peers import ffmpeg_switching
 from benchmarks.stream_right import Right
@@ -48,6 +49,14 @@ def test_a_splice_is_much_cheaper_than_encoding_and_cheaper_still_for_many(films
     assert 0 < many.spliced < one.spliced < again.whole / 20
     assert many.shelved_share == pytest.approx(4 * many.shelved / 50)
     assert many.spliced < again.whole / 300
+
+
+@pytest.mark.slow
+def test_with_parts_hls_shows_a_frame_seconds_sooner(films: Films) -> None:
+    segments, parts = asyncio.run(hls_delays(films, 5))
+    assert parts.shown < segments.shown - 1
+    assert parts.shown > 3 * GOP / 25 - GOP / 25, "no player shows what it may not"
+    assert parts.fetched < segments.fetched
 
 
 def test_the_delay_is_the_same_to_the_end_and_the_times_are_the_pulses(films: Films) -> None:

@@ -1,11 +1,13 @@
-"""The newest GOPs of a stream as segments, for players that fetch (HLS): references, not copies.
+"""The newest GOPs of a stream as segments, and each GOP as a part of one, for players that fetch (HLS).
 
-Which segment a GOP is in follows from its pulse alone, and so does the segment's number. So nothing has to be
-remembered about who watches, and after a restart of the service the numbers go on where they were.
+They are references, not copies. Which segment a GOP is in follows from its pulse alone, and so does the
+segment's number. So nothing has to be remembered about who watches, and after a restart of the service the
+numbers go on where they were.
 """
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import takewhile
@@ -19,6 +21,8 @@ class Plan:
     """How a site's streams are cut into segments."""
 
     fps: float
+    gop: int
+    """Pulses in a GOP."""
     frames: int
     """Pulses in a segment: whole GOPs."""
     listed: int
@@ -33,7 +37,36 @@ class Plan:
 def plan(fps: float, gop: int, segment_s: float, window_s: float) -> Plan:
     """Plan segments of as many whole GOPs as fit, at least one, and a window of at least three of them."""
     frames = gop * max(1, int(segment_s * fps / gop + 1e-9))
-    return Plan(fps, frames, max(3, -(-int(window_s * fps) // frames)))
+    return Plan(fps, gop, frames, max(3, -(-int(window_s * fps) // frames)))
+
+
+@dataclass(frozen=True)
+class Part:
+    """One GOP of a segment. ``lead`` is what stands if nothing has been shown in the segment yet."""
+
+    segment: int
+    footage: Footage
+    lead: Footage | None
+    fps: float
+
+    @property
+    def independent(self) -> bool:
+        """Whether it can be decoded without the parts before."""
+        return self.footage.start or self.lead is not None
+
+    @property
+    def data(self) -> bytes:
+        """The part as fragments of MP4."""
+        shown = self.footage
+        if self.lead is None:
+            return shown.with_sound
+        return shown.sound + _standing(self.lead, shown.first, shown.until, self.fps)
+
+
+def _standing(lead: Footage, first: int, until: int, fps: float) -> bytes:
+    """Show the lead's last picture for some pulses: what it is decoded by passes within a few ticks."""
+    samples = [Sample(picture.sample, picture.key) for picture in lead.pictures]
+    return still(samples, first, until, fps)
 
 
 class Segment:
@@ -71,12 +104,21 @@ class Segment:
         standing = list(takewhile(lambda it: not it.start, self._footage))
         rest = b"".join(it.with_sound for it in self._footage[len(standing) :])
         heard = b"".join(it.sound for it in standing)
-        return heard + self._stand(standing[-1].until) + rest if standing else rest
+        if not standing:
+            return rest
+        return heard + _standing(self._lead, self.first, standing[-1].until, self._plan.fps) + rest
 
-    def _stand(self, until: int) -> bytes:
-        """Show the lead's last picture until a pulse: what it is decoded by passes within a few ticks."""
-        samples = [Sample(picture.sample, picture.key) for picture in self._lead.pictures]
-        return still(samples, self.first, until, self._plan.fps)
+    @property
+    def parts(self) -> Sequence[Part]:
+        """The parts that there are by now; none where it is not made of whole GOPs."""
+        gop, fps, began = self._plan.gop, self._plan.fps, False
+        parts: list[Part] = []
+        for it in self._footage:
+            if it.first % gop or it.until - it.first != gop:
+                return ()
+            began |= it.start
+            parts.append(Part(self.number, it, None if began else self._lead, fps))
+        return parts
 
 
 class Reel:
@@ -87,6 +129,7 @@ class Reel:
         self.ended = False
         self._segments: dict[int, Segment] = {}
         self._lead: Footage | None = None
+        self._grown = asyncio.Event()
         self.until = 0
         """The first pulse that is not here yet."""
 
@@ -109,6 +152,39 @@ class Reel:
         # RFC 8216, 6.2.2: what leaves the playlist stays available for as long as the playlist was.
         while next(iter(self._segments)) < number - 2 * self.plan.listed:
             del self._segments[next(iter(self._segments))]
+        self._tell()
+
+    def end(self) -> None:
+        """Add nothing any more."""
+        self.ended = True
+        self._tell()
+
+    def _tell(self) -> None:
+        self._grown.set()
+        self._grown = asyncio.Event()
+
+    async def more(self) -> None:
+        """Wait until there is more, or the end."""
+        await self._grown.wait()
+
+    @property
+    def growing(self) -> Segment | None:
+        """The segment that is not whole yet; None where there is nothing of it."""
+        newest = next(reversed(self._segments.values()), None)
+        return None if newest is None or self._is_listed(newest) else newest
+
+    def part(self, number: int, index: int) -> Part | None:
+        """Give a part of a segment, which need not be whole."""
+        segment = self._segments.get(number)
+        parts = () if segment is None else segment.parts
+        return parts[index] if index < len(parts) else None
+
+    def reaches(self, number: int, index: int | None) -> bool:
+        """Tell whether a segment is here as a whole; or, with ``index``, that part of it or what follows."""
+        frames, gop = self.plan.frames, self.plan.gop
+        if index is None:
+            return self.until >= (number + 1) * frames
+        return self.until >= number * frames + min((index + 1) * gop, frames + gop)
 
     def get(self, number: int) -> Segment | None:
         """Give a segment that is or was in the playlist."""

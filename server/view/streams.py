@@ -79,7 +79,7 @@ class DecidedStream:
 
     def close(self) -> None:
         """End the stream."""
-        self.reel.ended = True
+        self.reel.end()
         self.channel.close()
 
 

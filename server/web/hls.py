@@ -7,8 +7,8 @@ from aiohttp import web
 from server.view.past.play import CameraPast
 from server.web.api import not_now, problem
 from server.web.forms import mp4_head
+from server.web.hls_live import coming_part, newest
 from server.web.hls_past import Stream, playlist_of_the_past, segment_of_the_past
-from server.web.hls_playlist import Listed, playlist, playlist_answer
 from server.web.keys import SERVICE
 from server.web.past import asks_for_the_past, object_past
 
@@ -29,11 +29,7 @@ async def get_playlist(request: web.Request) -> web.Response:
         return playlist_of_the_past(request, stream)
     if stream is None or stream.reel is None:
         return _nobody(request)
-    reel = stream.reel
-    if not reel.listed:
-        return not_now("the first segment is not whole yet")
-    listed = [Listed(it.number, it.first, it.until) for it in reel.listed]
-    return playlist_answer(playlist(listed, reel.plan, request.app[SERVICE].pulse0, ended=reel.ended))
+    return await newest(request, stream.reel, request.app[SERVICE].pulse0)
 
 
 @routes.get(_OBJECT + "/init.mp4")
@@ -59,6 +55,20 @@ async def get_segment(request: web.Request) -> web.Response:
     if segment is None:
         return problem(404, f"there is no segment {number} here, or not any more")
     return _media(request, segment.data)
+
+
+@routes.get(_OBJECT + f"/{_NUMBER}.{{part:[0-9]{{1,6}}}}.m4s")
+@routes.get(_CAMERA + f"/{_NUMBER}.{{part:[0-9]{{1,6}}}}.m4s")
+async def get_part(request: web.Request) -> web.Response:
+    """Give a part of a segment of a stream (HLS); one that is yet to come is waited for."""
+    stream = _stream(request)
+    if stream is None or stream.reel is None:
+        return _nobody(request)
+    number, index = int(request.match_info["segment"]), int(request.match_info["part"])
+    part = await coming_part(stream.reel, number, index)
+    if part is None:
+        return problem(404, f"there is no part {number}.{index} here, or not any more")
+    return _media(request, part.data)
 
 
 def _media(request: web.Request, data: bytes) -> web.Response:

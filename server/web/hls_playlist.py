@@ -1,8 +1,8 @@
-"""Playlists of HLS as text (RFC 8216)."""
+"""Playlists of HLS as text (RFC 8216; parts: draft-pantos-hls-rfc8216bis)."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
@@ -23,15 +23,37 @@ class Listed:
     number: int
     first: int
     until: int
+    parts: Sequence[ListedPart] = ()
+    whole: bool = True
+    """Else only its parts are there."""
+
+
+@dataclass(frozen=True, slots=True)
+class ListedPart:
+    """A part of a segment in a playlist."""
+
+    pulses: int
+    independent: bool
+
+
+def part_name(segment: int, index: int) -> str:
+    """Name a part of a segment."""
+    return f"{segment}.{index}.m4s"
 
 
 def playlist(
-    segments: Iterable[Listed], plan: Plan, pulse0: float | None, extra: Iterable[str] = (), *, ended: bool
+    segments: Iterable[Listed],
+    plan: Plan,
+    pulse0: float | None,
+    extra: Iterable[str] = (),
+    *,
+    ended: bool,
+    hint: str | None = None,
 ) -> str:
     """Write the playlist of a stream; ``pulse0`` is when pulse 0 was due, unix seconds.
 
     Segments are numbered by their pulses: whoever writes the playlist anew writes the same numbers. ``extra``
-    are further lines about the whole of it.
+    are further lines about the whole of it, ``hint`` names the part that comes next.
     """
     listed = list(segments)
     lines = [
@@ -45,6 +67,7 @@ def playlist(
     ]
     for segment in listed:
         lines += _lines(segment, plan, pulse0)
+    lines += [] if hint is None else [f'#EXT-X-PRELOAD-HINT:TYPE=PART,URI="{hint}"']
     lines += ["#EXT-X-ENDLIST"] if ended else []
     return "\n".join(lines) + "\n"
 
@@ -60,13 +83,20 @@ def master(address: str, bandwidth: int, codecs: str, site: Site) -> str:
 
 
 def _lines(segment: Listed, plan: Plan, pulse0: float | None) -> list[str]:
-    seconds = (segment.until - segment.first) / plan.fps
-    lines = [f"#EXTINF:{seconds:.5f},", f"{segment.number}.m4s"]
+    lines = [_part_line(segment.number, index, it, plan.fps) for index, it in enumerate(segment.parts)]
+    if segment.whole:
+        seconds = (segment.until - segment.first) / plan.fps
+        lines += [f"#EXTINF:{seconds:.5f},", f"{segment.number}.m4s"]
     if pulse0 is None:
         return lines
     when = datetime.fromtimestamp(pulse0 + segment.first / plan.fps, UTC)
     told = when.isoformat(timespec="milliseconds").replace("+00:00", "Z")
     return [f"#EXT-X-PROGRAM-DATE-TIME:{told}", *lines]
+
+
+def _part_line(segment: int, index: int, part: ListedPart, fps: float) -> str:
+    can_begin = ",INDEPENDENT=YES" * part.independent
+    return f'#EXT-X-PART:DURATION={part.pulses / fps:.5f},URI="{part_name(segment, index)}"{can_begin}'
 
 
 def playlist_answer(text: str) -> web.Response:

@@ -34,9 +34,11 @@ _OTHER = {
     "/objects/{object}/hls/index.m3u8": "application/vnd.apple.mpegurl",
     "/objects/{object}/hls/init.mp4": "video/mp4",
     "/objects/{object}/hls/{segment}.m4s": "video/mp4",
+    "/objects/{object}/hls/{segment}.{part}.m4s": "video/mp4",
     "/cameras/{camera}/hls/index.m3u8": "application/vnd.apple.mpegurl",
     "/cameras/{camera}/hls/init.mp4": "video/mp4",
     "/cameras/{camera}/hls/{segment}.m4s": "video/mp4",
+    "/cameras/{camera}/hls/{segment}.{part}.m4s": "video/mp4",
     "/objects/{object}/best.mjpeg": "multipart/x-mixed-replace",
     "/cameras/{camera}/live.mjpeg": "multipart/x-mixed-replace",
     "/objects/{object}/best.jpg": "image/jpeg",
@@ -56,6 +58,9 @@ _SCHEMAS: dict[str, Any] = {
     "object": {"type": "integer", "minimum": 0},
     "camera": {"type": "string"},
     "segment": {"type": "integer", "minimum": 0},
+    "part": {"type": "integer", "minimum": 0},
+    "_HLS_msn": {"type": "integer", "minimum": 0, "description": "Waits until this segment is there."},
+    "_HLS_part": {"type": "integer", "minimum": 0, "description": "Waits until this part of it is there."},
     "overlay": {"enum": [0, 1], "default": 0, "description": "1: boxes are burnt in."},
     "from": {**_MOMENT, "description": "Begins there: seconds back, a pulse, or a time."},
     "to": {**_MOMENT, "description": "Ends there, likewise."},
@@ -104,6 +109,7 @@ def _operation(path: str, summary: str) -> dict[str, Any]:
     parameters = [{"name": name, "in": "path", "required": True, "schema": _SCHEMAS[name]} for name in names]
     queries = ["overlay"] * (path in OVERLAY) + ["fps"] * path.endswith(".mjpeg")
     queries += ["from", "to"] * (path in PAST) + ["at"] * path.endswith("/choice")
+    queries += ["_HLS_msn", "_HLS_part"] * path.endswith(".m3u8")
     if path in HELD:
         parameters.append({"name": "camera", "in": "query", "required": False, "schema": _SCHEMAS["held"]})
     parameters += [

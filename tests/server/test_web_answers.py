@@ -60,7 +60,12 @@ async def test_boxes_and_the_past_are_described_where_they_are(busy: Hall) -> No
     for path, item in described["paths"].items():
         queries = {it["name"] for it in item["get"]["parameters"] if it["in"] == "query"}
         if path.startswith(("/objects/", "/cameras/")):
-            asked = path.replace("{object}", "1").replace("{camera}", A).replace("{segment}", "0")
+            asked = (
+                path.replace("{object}", "1")
+                .replace("{camera}", A)
+                .replace("{segment}", "0")
+                .replace("{part}", "0")
+            )
             for query in ("overlay=1", "from=p0", "camera=c0"):
                 async with busy.session.head(f"{asked}?{query}") as answer:
                     assert (answer.status == 400) == (query.split("=")[0] not in queries), asked

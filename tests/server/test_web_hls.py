@@ -36,7 +36,8 @@ def entries(text: str) -> list[tuple[float, str, datetime]]:
     assert text.index("#EXT-X-MEDIA-SEQUENCE") < text.index("#EXTINF"), "4.3.3.2"
     assert text.index("#EXT-X-MAP") < text.index("#EXTINF"), "4.3.2.5"
     assert not re.search(r"#EXT-X-(STREAM-INF|MEDIA:|PLAYLIST-TYPE)", text), "4.3.4: a media playlist, live"
-    found = re.findall(r"^#EXT-X-PROGRAM-DATE-TIME:(\S+)\n#EXTINF:([\d.]+),\n(\S+)$", text, re.MULTILINE)
+    whole = re.sub(r"^#EXT-X-PART:.*\n", "", text, flags=re.MULTILINE)
+    found = re.findall(r"^#EXT-X-PROGRAM-DATE-TIME:(\S+)\n#EXTINF:([\d.]+),\n(\S+)$", whole, re.MULTILINE)
     assert len(found) == text.count("#EXTINF")
     target = int(tag(text, "TARGETDURATION"))
     listed = [(float(seconds), uri, datetime.fromisoformat(when)) for when, seconds, uri in found]
