@@ -11,10 +11,10 @@ the number of the person it is at, and the same with short gaps bridged; *own tr
 with the number of the person it is mostly at; *again*: all as MyView numbered it at last, known at once, and
 nobody ever away. The mean of *own tracks, not joined* is what each camera's tracker is worth by itself.
 
-*Calibrated* has the homographies that `myview calibrate` makes of the cameras' own tracks. *Largest* chooses
-frame by frame the camera with the largest box. *Nearest feet* joins whole tracks of our cameras (or of
-ByteTrack, on the same boxes) by the median distance of their feet, and chooses so, too. The sweeps are on
-true boxes.
+*No evidence* is without what the cameras tell each other about each frame. *Calibrated* has the homographies
+that `myview calibrate` makes of the cameras' own tracks. *Largest* chooses frame by frame the camera with the
+largest box. *Nearest feet* joins whole tracks of our cameras, each by itself (or of ByteTrack, on the same
+boxes), by the median distance of their feet, and chooses so, too. The sweeps are on true boxes.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from benchmarks.bestview_cases import Case, auditorium, room, terrace
 from benchmarks.bestview_join import own_tracks
 from benchmarks.bestview_plot import plot_sweeps, plot_ways
 from benchmarks.bestview_sweep import Swept, sweep, sweep_tables
-from benchmarks.bestview_watch import Watched
+from benchmarks.bestview_watch import Watched, followed
 from benchmarks.bestview_ways import Outcome, outcome, ways
 from benchmarks.bestview_why import Losses, losses
 from benchmarks.peer_environment import PeerEnvironment, PeersAwayError, default_folder, peer_environment
@@ -97,7 +97,7 @@ def peers_of(options: argparse.Namespace, report: Report) -> PeerEnvironment | N
 def walked_of(case: Case, seen: Watched, folder: Path, report: Report) -> Case | None:
     """Give the scene calibrated by its own tracks, or say why it cannot be."""
     try:
-        return calibrated(case, own_tracks(seen.messages), folder)
+        return calibrated(case, own_tracks(followed(case.config(ground=False), seen.frames)), folder)
     except CannotCalibrateError as problem:
         report.say(f"{case.name}: not calibrated by its own tracks: {problem}")
         return None

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from benchmarks.bestview_watch import Rows, Watched, from_detections, from_pictures
+from benchmarks.bestview_watch import Rows, Watched, in_file, in_pictures, sure_rows
 from benchmarks.surroundings import CannotRunError
 from benchmarks.views import Views, find_views
 from server.camera.scene import Scene, write_recording
@@ -15,7 +15,7 @@ from server.run.evaluate_truth import Truth, truth_of
 from server.run.recorded import Size
 from server.wire.config import Config
 from server.wire.loading import build_config
-from tracking.motchallenge import MotRow, read_rows
+from tracking.motchallenge import read_rows
 
 _AUDITORIUM = ("HC3", "HC4", "IP2", "IP5")
 _AUDITORIUM_SIZE, _AUDITORIUM_FPS = (1920, 1080), 30.0
@@ -65,19 +65,16 @@ class Case:
         return truth_of(self.gt, self.sizes, self.least_shown)
 
     def watch(self) -> Watched:
-        """Let every camera track by itself."""
+        """Let every camera look for people by itself."""
         config = self.config()
         if self.detections is not None:
             files = self.detections
             return Watched(
-                {camera: list(from_detections(config, camera, files[camera])) for camera in self.gt},
+                {camera: in_file(config, files[camera]) for camera in self.gt},
                 {camera: read_rows(files[camera]) for camera in self.gt},
             )
-        messages, boxes = {}, {}
-        for camera in self.gt:
-            boxes[camera] = found = list[MotRow]()
-            messages[camera] = list(from_pictures(config, camera, found))
-        return Watched(messages, boxes)
+        frames = {camera: in_pictures(config, camera) for camera in self.gt}
+        return Watched(frames, {camera: sure_rows(it) for camera, it in frames.items()})
 
 
 def terrace(data: Path) -> Case:

@@ -17,7 +17,7 @@ from benchmarks.bestview_join import (
     own_tracks,
     tracks_by_truth,
 )
-from benchmarks.bestview_watch import Rows, Watched
+from benchmarks.bestview_watch import Rows, Watched, followed
 from benchmarks.peer_environment import PEERS, PeerEnvironment
 from bestview import ViewScore
 from server.run.evaluate_choices import Choice
@@ -84,26 +84,30 @@ def ways(
     there = visible_rows(case, truth)
     yield Way(TRUE, chosen(there), given=True)
     yield Way(TRUE_LARGEST, simple(there), given=True)
-    own = own_tracks(seen.messages)
+    own = own_tracks(followed(config, seen.frames))
     named = boxes_by_truth(own, case.gt)
     yield Way("own boxes, true ids", chosen(named))
     yield Way("  and gaps bridged", chosen(bridged(named, BRIDGE)))
     yield Way("own tracks, true joins", chosen(tracks_by_truth(own, case.gt)))
     yield Way("own tracks, not joined", simple(not_joined(own)))
-    bare = decide(case.config(ground=False), seen.messages)
+    uncalibrated = case.config(ground=False)
+    apart = followed(uncalibrated, seen.frames)
+    bare = decide(uncalibrated, apart)
     yield Way(WITHOUT, bare)
     if not case.calibrated:
         yield Way(f"{WITHOUT}, largest", simple(bare.tracks))
     for name, scene in ((OURS, case if case.calibrated else None), (CALIBRATED, walked)):
         if scene is None:
             continue
-        ours = decide(scene.config(), seen.messages)
+        said = followed(scene.config(), seen.frames)
+        ours = decide(scene.config(), said)
         yield Way(name, ours)
+        yield Way(f"{name}, no evidence", decide(scene.config(), apart))
         yield Way(f"{name}, again", chosen(ours.tracks))
         yield Way(f"{name}, largest", simple(ours.tracks))
         ground = {camera: it for camera, it in homographies(scene.config()).items() if it is not None}
         short = "nearest feet" if scene is case else "nearest feet, calibr."
-        yield Way(short, simple(by_nearest_feet(own, ground)))
+        yield Way(short, simple(by_nearest_feet(own_tracks(apart), ground)))
         if peers is not None:
             theirs = by_nearest_feet(_peer_tracks(peers, seen.boxes), ground)
             yield Way(f"{PEER}, {short}", simple(theirs))

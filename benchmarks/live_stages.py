@@ -27,6 +27,7 @@ STAGES = {
     "take": "the recording's H.264 to a picture of the site's size",
     "encode": "the picture to H.264, once",
     "detect": "background, silhouettes, looks",
+    "witness": "scores again, by what the other cameras found",
     "track": "networks, births, templates",
     "solve": "the network programs",
     "report": "tracks to messages",
@@ -106,6 +107,7 @@ def time_camera(folder: str, camera: str) -> None:
     """Time the stages of this process, which is about to be a camera's."""
     # What is timed is imported here: the benchmark itself need not load it.
     from server.camera.pipeline import CameraPipeline  # noqa: PLC0415
+    from server.camera.witness import Witness  # noqa: PLC0415
     from server.wire.bus import Bus  # noqa: PLC0415
     from tracking import DEFAULT_SOLVER, OnlineTracker, solver_named  # noqa: PLC0415
     from tracking.detectors import BackgroundDetector  # noqa: PLC0415
@@ -124,7 +126,10 @@ def time_camera(folder: str, camera: str) -> None:
 
     watch.wrap(CameraPipeline, "take", "take", taken)
     watch.wrap(CameraPipeline, "encode", "encode")
-    watch.wrap(CameraPipeline, "track", "report")
+    watch.wrap(CameraPipeline, "search", "report")
+    watch.wrap(CameraPipeline, "follow", "report")
+    watch.wrap(Witness, "word", "witness")
+    watch.wrap(Witness, "scored", "witness")
     watch.wrap(BackgroundDetector, "detect", "detect")
     watch.wrap(OnlineTracker, "push", "track")
     watch.wrap(type(solver_named(DEFAULT_SOLVER)), "solve", "solve")

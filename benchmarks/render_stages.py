@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from benchmarks.stopwatch import Stopwatch
 from benchmarks.views import Views
 from server.camera.pipeline import CameraPipeline
-from server.run.offline import Batch, run_camera
+from server.camera.witness import Witness
+from server.run.offline import run_cameras
 from server.run.render import Renderer
 from server.run.setup import config_for_videos
 from server.view.align import Aligner
@@ -23,6 +23,7 @@ STAGES = {
     "decode": "the recording's H.264 to a picture of the site's size",
     "encode": "the picture to H.264, once",
     "detect": "background, box filters, histograms",
+    "witness": "scores again, by what the other cameras found",
     "track": "networks, births, templates",
     "solve": "the network programs",
     "publish": "tracks to messages",
@@ -49,10 +50,12 @@ def time_stages(views: Views, config_path: Path, folder: Path) -> StageTimes:
         (CameraPipeline, "take", "decode"),
         (CameraPipeline, "encode", "encode"),
         (BackgroundDetector, "detect", "detect"),
+        (Witness, "word", "witness"),
+        (Witness, "scored", "witness"),
         (OnlineTracker, "push", "track"),
         (OnlineTracker, "flush", "track"),
         (type(solver_named(config.track.solver)), "solve", "solve"),
-        (CameraPipeline, "track", "publish"),
+        (CameraPipeline, "follow", "publish"),
         (CameraPipeline, "finish", "publish"),
         (Decider, "step", "decide"),
         (Decider, "finish", "decide"),
@@ -68,21 +71,9 @@ def _render(config: Config, folder: Path) -> int:
     renderer = Renderer(config, folder)
     pipelines = {camera: CameraPipeline(config, camera) for camera in config.camera_ids}
     try:
-        for batch in _in_turn([run_camera(pipeline, camera) for camera, pipeline in pipelines.items()]):
+        for batch in run_cameras(pipelines):
             renderer.take(batch)
         renderer.finish()
     finally:
         renderer.close()
     return renderer.frames
-
-
-def _in_turn(cameras: list[Iterator[Batch]]) -> Iterator[Batch]:
-    """Give the cameras' batches in turn, so that all are at the same pulse."""
-    running = list(cameras)
-    while running:
-        for camera in list(running):
-            batch = next(camera, None)
-            if batch is None:
-                running.remove(camera)
-            else:
-                yield batch

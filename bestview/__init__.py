@@ -14,6 +14,7 @@ from bestview.score import ViewScore, cuts_of, score_views
 from bestview.score_objects import NOBODY, stands_for
 from bestview.score_truth import ViewTruth, best_views, true_views
 from bestview.sightings import Glimpse, LocalTrack
+from bestview.witness import Findings, Vantage, WitnessSettings, overlook, witnessed
 
 __all__ = [
     "HIDDEN_COST",
@@ -22,6 +23,7 @@ __all__ = [
     "NO_VIEW_COST",
     "Choices",
     "EpisodeKey",
+    "Findings",
     "Glimpse",
     "Gops",
     "IdentityRegistry",
@@ -34,8 +36,10 @@ __all__ = [
     "SeenViews",
     "Split",
     "TrackKey",
+    "Vantage",
     "ViewScore",
     "ViewTruth",
+    "WitnessSettings",
     "best_views",
     "checked_homography",
     "choose_by_gops",
@@ -43,6 +47,7 @@ __all__ = [
     "cuts_of",
     "feet",
     "foot_spread",
+    "overlook",
     "person_heights",
     "score_views",
     "size_quality",
@@ -51,4 +56,5 @@ __all__ = [
     "true_views",
     "view_cost",
     "with_missed",
+    "witnessed",
 ]

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+_EDGE = 0.01
+"""Share of the picture's height, on both sides of its lower edge, in which feet count as cut off."""
 _MAX_CONDITION = 1e12
 """Above this a 3x3 matrix, scaled by rows and columns, has no inverse worth the name in float64."""
 
@@ -52,6 +54,29 @@ def to_ground(homography: NDArray[np.float64], points: NDArray[np.float64]) -> N
     mapped = _homogeneous(homography, points)
     depth = _depth(homography, mapped)
     return np.asarray(mapped[..., :2] / np.where(depth > 0, mapped[..., 2], np.nan)[..., None])
+
+
+def from_ground(homography: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Map places on the ground back into the picture: (..., 2) ground units -> (..., 2) pixels.
+
+    A place that the camera has behind it, and a NaN, becomes NaN.
+    """
+    mapped = _homogeneous(np.asarray(np.linalg.inv(homography), dtype=np.float64), points)
+    pixels = mapped[..., :2] / np.where(mapped[..., 2] != 0, mapped[..., 2], np.nan)[..., None]
+    # Behind the camera lines of sight meet the picture upside down: above the horizon.
+    there = _depth(homography, _homogeneous(homography, pixels)) > 0
+    return np.where(there[..., None], pixels, np.nan)
+
+
+def feet_cut_off(
+    boxes: NDArray[np.float64], picture_height: float | NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """Tell whose feet the picture's lower edge cuts off: (..., 4), and heights that fit -> (...).
+
+    They stand below it, and nowhere that is known. A box that reaches beyond the edge was guessed by
+    somebody who knew, and is believed.
+    """
+    return np.asarray(np.abs(boxes[..., 3] / picture_height - 1.0) < _EDGE)
 
 
 def person_heights(homography: NDArray[np.float64], boxes: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -9,11 +9,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview.ground import feet, foot_spread, person_heights, to_ground
+from bestview.ground import feet, feet_cut_off, foot_spread, person_heights, to_ground
 from bestview.keys import TrackKey
-
-_EDGE = 0.01
-"""Share of the picture's height, on both sides of its lower edge, in which feet count as cut off."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -124,8 +121,7 @@ def line_up(
 ) -> Sightings:
     """Put the tracks of one update on one time axis.
 
-    Feet on the lower edge of the picture are not the person's: they stand below it, and nowhere that is
-    known. A box that reaches beyond the edge was guessed by somebody who knew, and is believed.
+    Feet on the lower edge of the picture are not the person's, and stand nowhere that is known.
 
     Raises:
         ValueError: a track given twice, boxes that are not (M, 4), a camera without an entry in
@@ -151,8 +147,8 @@ def line_up(
     rows = [i for i, matrix in enumerate(matrices) if matrix is not None]
     if rows:
         homography = np.array([matrices[i] for i in rows])[:, None]
-        edge = np.array([ordered[i].picture_height for i in rows])[:, None, None]
-        whole = np.where(np.abs(boxes[rows, :, 3:] / edge - 1.0) < _EDGE, np.nan, boxes[rows])
+        edge = np.array([ordered[i].picture_height for i in rows])[:, None]
+        whole = np.where(feet_cut_off(boxes[rows], edge)[..., None], np.nan, boxes[rows])
         ground[rows] = to_ground(homography, feet(whole))
         spread[rows] = foot_spread(homography, whole, foot_error.sideways, foot_error.upwards)
         heights[rows] = person_heights(homography, whole)

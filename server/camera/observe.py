@@ -30,11 +30,16 @@ _NO_PICTURE = np.empty((0, 0, 3), dtype=np.uint8)
 
 
 class Observer(Detector, Protocol):
-    """A detector that says how long the rows of its histograms are."""
+    """A detector that says how long the rows of its histograms are, and when it cannot see."""
 
     @property
     def bins(self) -> int:
         """Give that length: what a frame without a picture has to fit."""
+        ...
+
+    @property
+    def blind(self) -> bool:
+        """Whether the last frame could not be searched: that nobody was found in it says nothing."""
         ...
 
 
@@ -85,6 +90,8 @@ def _told(where: str) -> Iterator[None]:
 
 class FittedDetections:
     """Detections from a file, which are in the camera's own pixels, moved into the site's picture."""
+
+    blind = False
 
     def __init__(self, file: MotFileDetector, fit: Fit, settings: DetectSettings) -> None:
         self._file, self._fit = file, fit

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from server.camera.encode import AccessUnit, Encoder
 from server.camera.observe import make_detector
 from server.camera.own import Passing, open_own
@@ -9,16 +11,43 @@ from server.camera.report import Reporter
 from server.camera.sharpness import Sharpness
 from server.camera.sound import LiveSound
 from server.camera.sources import Image, Source, open_source
+from server.camera.witness import Heard, Witness
 from server.wire.config import Config
 from server.wire.fit import Fit
-from server.wire.messages import CameraTracks
+from server.wire.messages import CameraTracks, Found
 from tracking import Detections, OnlineTracker, solver_named
+
+_BY_ITSELF = Heard()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Searched:
+    """A frame that people were looked for in.
+
+    Attributes:
+        pulse: its pulse.
+        image: the picture; None: there was none to search.
+        detections: what was found.
+        looked: whether it could be searched; otherwise it says nothing that nobody was found.
+        word: that, for the other cameras; None where nobody goes by it.
+    """
+
+    pulse: int
+    image: Image | None
+    detections: Detections
+    looked: bool
+    word: Found | None
+
+    @property
+    def asks(self) -> bool:
+        """Whether what others found in this frame can change anything."""
+        return self.word is not None and len(self.detections) > 0
 
 
 class CameraPipeline:
     """Source, encoder, detector and tracker of one camera, without a clock and without a network.
 
-    ``take`` and ``encode`` may run in one thread and ``track`` in another: they share nothing.
+    ``take`` and ``encode`` may run in one thread, ``search`` and ``follow`` in another: they share nothing.
 
     Raises:
         UserError: the source or the detections cannot be opened.
@@ -41,6 +70,9 @@ class CameraPipeline:
         self._tracker = OnlineTracker(window, config.track.costs, solver_named(config.track.solver))
         self._reporter = Reporter(camera_id, boot, self.source.size, window.stride)
         self._sharpness = Sharpness() if config.view.quality.sharp > 0 else None
+        self.witness = (
+            Witness(config, camera_id, self.source.size, boot) if config.witnesses(camera_id) else None
+        )
         self.begins = camera.offset if self.source.recorded else 0
         """The pulse at which the pictures begin."""
         self._last: int | None = None
@@ -59,22 +91,45 @@ class CameraPipeline:
         return self._encoder.encode(pulse, image)
 
     def track(self, pulse: int, image: Image | None) -> CameraTracks | None:
-        """Follow everybody into this frame; give the tracks when a window has ended.
+        """Search a frame and follow everybody into it by what this camera sees itself."""
+        return self.follow(self.search(pulse, image))
 
-        Pulses must grow. One that is left out, or has no image, is a frame in which nobody was seen; the
-        camera's report says which those were, but for the time before a recording begins.
+    def search(self, pulse: int, image: Image | None) -> Searched:
+        """Look for people in a frame, which has no image where it was not taken, or has to be left out.
+
+        Pulses must grow.
         """
+        if image is None:
+            detections, looked = Detections.empty(self._detector.bins), False
+        else:
+            detections = self._detector.detect(image, pulse)
+            looked = not self._detector.blind
+        word = self.witness.word(pulse, detections if looked else None) if self.witness else None
+        return Searched(pulse, image, detections, looked, word)
+
+    def follow(self, searched: Searched, heard: Heard = _BY_ITSELF) -> CameraTracks | None:
+        """Follow everybody into a frame; give the tracks when a window has ended.
+
+        A pulse that is left out, or has no image, is a frame in which nobody was seen; the camera's report
+        says which those were, but for the time before a recording begins. It also says in which frames
+        some other camera's word was not there.
+        """
+        pulse, detections = searched.pulse, searched.detections
         if self._last is not None:
             self._reporter.shed(range(self._last + 1, pulse))
         self._last = pulse
-        if image is None:
-            if pulse >= self.begins:
-                self._reporter.shed([pulse])
-            detections = Detections.empty(self._detector.bins)
-        else:
-            detections = self._detector.detect(image, pulse)
+        if searched.image is None and pulse >= self.begins:
+            self._reporter.shed([pulse])
+        if self.witness is not None and searched.asks:
+            detections = self.witness.scored(detections, heard.words)
+            if heard.alone:
+                self._reporter.alone(pulse)
         result = self._tracker.push(pulse, detections)
-        return None if result is None else self._measured(self._reporter.regular(result), image)
+        return None if result is None else self._measured(self._reporter.regular(result), searched.image)
+
+    def last_word(self, end: int) -> Found | None:
+        """Give what the other cameras are told when the recording has no frame ``end``."""
+        return None if self.witness is None else self.witness.word(end, None, ended=True)
 
     def finish(self, end: int) -> CameraTracks:
         """Close the recording, which has no frame ``end``: what is provisional becomes final.

@@ -13,6 +13,7 @@ from typing import TypeVar
 import msgspec
 
 from camsync import ClientSettings, Pulse, PulseClient
+from server.camera.exchange import Exchange
 from server.camera.meter import Meter
 from server.camera.pipeline import CameraPipeline
 from server.camera.sound import LiveSound, open_sound, runs
@@ -56,6 +57,7 @@ class CameraProcess:
         self._backlog: asyncio.Queue[tuple[int, Image | None] | None] = asyncio.Queue(
             maxsize=_MARKS_PER_PICTURE * self._backlog_pictures
         )
+        self._exchange = Exchange(config, camera_id, self._pipeline.witness, self._backlog.maxsize)
         self._meter = Meter(fps)
         self._state = "starting"
         self._end = 0
@@ -68,6 +70,7 @@ class CameraProcess:
         try:
             await self._wait_for_bestview(bus)
             bus.declare_alive(self._keys.camera(self._id, "alive"))
+            await self._exchange.join()
             tasks = [
                 asyncio.create_task(self._follow_pulses(), name="pulses"),
                 asyncio.create_task(self._track(), name="track"),
@@ -81,6 +84,7 @@ class CameraProcess:
                     task.cancel()
                 await asyncio.gather(*tasks, return_exceptions=True)
         finally:
+            await self._exchange.leave()
             bus.close()
             self._video.shutdown(wait=True)
             self._tracking.shutdown(wait=True)
@@ -168,7 +172,9 @@ class CameraProcess:
         thumbs_every = round(self._config.site.fps)
         while (item := await self._backlog.get()) is not None:
             pulse, image = item
-            tracks = await self._in(self._tracking, partial(self._pipeline.track, pulse, image))
+            searched = await self._in(self._tracking, partial(self._pipeline.search, pulse, image))
+            heard = await self._exchange.of(searched.pulse, searched.word, needed=searched.asks)
+            tracks = await self._in(self._tracking, partial(self._pipeline.follow, searched, heard))
             if tracks is None:
                 continue
             self._send_tracks(tracks)
@@ -176,6 +182,7 @@ class CameraProcess:
                 self._config.track.window.stride
             ):
                 await self._send_thumbnails(image, tracks)
+        await self._exchange.end(self._pipeline.last_word(self._end))
         self._send_tracks(await self._in(self._tracking, lambda: self._pipeline.finish(self._end)))
 
     def _send_tracks(self, tracks: CameraTracks) -> None:

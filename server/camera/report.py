@@ -22,10 +22,15 @@ class Reporter:
     def __init__(self, camera: str, boot: int, size: tuple[int, int], stride: int) -> None:
         self._camera, self._boot, self._size, self._stride = camera, boot, size, stride
         self._shed: list[int] = []
+        self._alone: list[int] = []
 
     def shed(self, pulses: Iterable[int]) -> None:
         """Note frames that nobody was looked for in; the next message says so."""
         self._shed.extend(pulses)
+
+    def alone(self, pulse: int) -> None:
+        """Note a frame for which some other camera's word was not there; the next message says so."""
+        self._alone.append(pulse)
 
     def regular(self, result: WindowResult) -> CameraTracks:
         """Report a window."""
@@ -46,6 +51,7 @@ class Reporter:
             final_to=last,
             ended=True,
             shed=self._taken_shed(),
+            alone=self._taken_alone(),
             tracks=[],
             solve=None,
         )
@@ -61,6 +67,7 @@ class Reporter:
             final_to=result.final_to,
             ended=ended,
             shed=self._taken_shed(),
+            alone=self._taken_alone(),
             tracks=[_track(track) for track in result.tracks],
             solve=_solve(result.report),
         )
@@ -68,6 +75,10 @@ class Reporter:
     def _taken_shed(self) -> list[int]:
         shed, self._shed = self._shed, []
         return shed
+
+    def _taken_alone(self) -> list[int]:
+        alone, self._alone = self._alone, []
+        return alone
 
 
 def _track(track: WindowTrack) -> Track:

@@ -5,19 +5,21 @@ from __future__ import annotations
 import multiprocessing
 import queue
 import signal
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from multiprocessing.process import BaseProcess
 from multiprocessing.queues import Queue
 from typing import TypeAlias
 
 from server.camera.encode import AccessUnit
-from server.camera.pipeline import CameraPipeline
+from server.camera.pipeline import CameraPipeline, Searched
 from server.camera.sources import SourceEnded
+from server.camera.witness import Heard
 from server.run.ending import end_at_once_again, end_with_parent, ending_later
+from server.run.pipes import Others, Pipes, Piping
 from server.wire.config import Config
 from server.wire.errors import UserError
-from server.wire.messages import CameraTracks
+from server.wire.messages import CameraTracks, Found
 
 _AHEAD = 8
 """Batches a camera may be ahead of the others: bounds memory however long the recording is."""
@@ -60,13 +62,15 @@ class CameraWorkers:
     def start(self) -> None:
         """Start all workers; a signal waits until each is known, so that :meth:`close` ends every one."""
         context = multiprocessing.get_context("spawn")
+        piping = Piping({camera: self._config.witnesses(camera) for camera in self._config.camera_ids})
         with ending_later():
             for camera in self._config.camera_ids:
                 outbox: Outbox = context.Queue(_AHEAD)
-                process = context.Process(
-                    target=_work, args=(self._config, camera, outbox), name=camera, daemon=True
-                )
-                process.start()
+                with piping.of(camera) as pipes:
+                    process = context.Process(
+                        target=_work, args=(self._config, camera, outbox, pipes), name=camera, daemon=True
+                    )
+                    process.start()
                 self._outboxes[camera], self._processes[camera] = outbox, process
 
     def __iter__(self) -> Iterator[Batch]:
@@ -102,13 +106,13 @@ class CameraWorkers:
             return item
 
 
-def _work(config: Config, camera: str, outbox: Outbox) -> None:
+def _work(config: Config, camera: str, outbox: Outbox, others: Pipes) -> None:
     end_with_parent()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent, which ends its workers
     end_at_once_again()
     try:
         pipeline = CameraPipeline(config, camera)
-        for batch in run_camera(pipeline, camera):
+        for batch in run_camera(pipeline, camera, others):
             outbox.put(batch)
     except UserError as error:
         outbox.put(Failure(str(error), bad_input=True))
@@ -116,24 +120,71 @@ def _work(config: Config, camera: str, outbox: Outbox) -> None:
         outbox.put(Failure(f"camera {camera}: {type(error).__name__}: {error}", bad_input=False))
 
 
-def run_camera(pipeline: CameraPipeline, camera: str) -> Iterator[Batch]:
-    """Run a recording through a camera's pipeline, epoch by epoch."""
-    units: list[AccessUnit] = []
-    pulse = 0
-    while True:
+def run_camera(pipeline: CameraPipeline, camera: str, others: Others | None = None) -> Iterator[Batch]:
+    """Run a recording through a camera's pipeline, epoch by epoch, in step with the others."""
+    run = CameraRun(pipeline, camera)
+    while not run.ended:
+        word = run.search()
+        batch = run.follow(others.exchange(word) if others is not None and word is not None else ())
+        if batch is not None:
+            yield batch
+
+
+def run_cameras(pipelines: Mapping[str, CameraPipeline]) -> Iterator[Batch]:
+    """Run all cameras' recordings in this process, in step."""
+    runs = {camera: CameraRun(pipeline, camera) for camera, pipeline in pipelines.items()}
+    while runs:
+        words = {camera: run.search() for camera, run in runs.items()}
+        for camera, run in list(runs.items()):
+            said = [word for other, word in words.items() if other != camera and word is not None]
+            batch = run.follow(said)
+            if batch is not None:
+                yield batch
+            if run.ended:
+                del runs[camera]
+
+
+class CameraRun:
+    """One camera's recording, frame by frame: it is searched, and then everybody is followed."""
+
+    def __init__(self, pipeline: CameraPipeline, camera: str) -> None:
+        self._pipeline, self._camera = pipeline, camera
+        self._units: list[AccessUnit] = []
+        self._pulse = 0
+        self._searched: Searched | None = None
+        self.ended = False
+
+    def search(self) -> Found | None:
+        """Take, encode and search the next frame; give what the other cameras are told, if they are."""
         try:
-            image = pipeline.take(pulse)
+            image = self._pipeline.take(self._pulse)
         except SourceEnded:
-            break
+            self._searched = None
+            return self._pipeline.last_word(self._pulse)
         if image is not None:
-            units.append(pipeline.encode(pulse, image))
-        tracks = pipeline.track(pulse, image)
-        if tracks is not None:
-            yield Batch(camera, units, tracks, ended=False)
-            units = []
-        pulse += 1
-    tracks = pipeline.finish(pulse)
-    pipeline.close()
-    if pulse <= max(0, pipeline.begins):
-        raise UserError(f"camera {camera}: there is not one picture in its recording")
-    yield Batch(camera, units, tracks, ended=True)
+            self._units.append(self._pipeline.encode(self._pulse, image))
+        self._searched = self._pipeline.search(self._pulse, image)
+        return self._searched.word
+
+    def follow(self, words: Sequence[Found]) -> Batch | None:
+        """Follow everybody into it, by what the others found, too; give what an epoch's end brings.
+
+        Raises:
+            UserError: the recording is over, and there was not one picture in it.
+        """
+        if self._searched is None:
+            return self._finish()
+        tracks = self._pipeline.follow(self._searched, Heard(tuple(words)))
+        self._pulse += 1
+        if tracks is None:
+            return None
+        units, self._units = self._units, []
+        return Batch(self._camera, units, tracks, ended=False)
+
+    def _finish(self) -> Batch:
+        self.ended = True
+        tracks = self._pipeline.finish(self._pulse)
+        self._pipeline.close()
+        if self._pulse <= max(0, self._pipeline.begins):
+            raise UserError(f"camera {self._camera}: there is not one picture in its recording")
+        return Batch(self._camera, self._units, tracks, ended=True)

@@ -184,3 +184,4 @@ class BestViewService:
             self._recorder.late(camera, range(epoch.last - stride + 1, epoch.last + 1), "tracks late")
         for camera, message in epoch.tracks.items():
             self._recorder.late(camera, message.shed, "not searched")
+            self._recorder.late(camera, message.alone, "others not heard")

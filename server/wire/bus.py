@@ -15,6 +15,8 @@ from server.wire.sections import Zenoh
 _DROP_AFTER_US = 20_000
 """zenoh drops a message after 1 ms in a full queue by default: too soon for an I picture's burst."""
 
+_OPEN_WITHIN_MS = 5_000
+
 
 class Bus:
     """One zenoh session. Close it, or the process never ends: zenoh's threads are not daemons."""
@@ -63,6 +65,23 @@ class Bus:
         return cls._connected(settings, "router")
 
     @classmethod
+    def hearing(cls, settings: Zenoh) -> Self:
+        """Open a session that hears the router's other clients, too.
+
+        The router must be there; later it may go and come back. Blocks for some seconds at most.
+
+        Raises:
+            UserError: the router is not there.
+        """
+        config = _config(settings, "client")
+        try:
+            config.insert_json5("connect/timeout_ms", str(_OPEN_WITHIN_MS))
+            config.insert_json5("connect/endpoints", json.dumps([settings.connect]))
+            return cls(zenoh.open(config))
+        except zenoh.ZError as error:
+            raise UserError(f"zenoh.connect: nobody is at {settings.connect}") from error
+
+    @classmethod
     def _connected(cls, settings: Zenoh, mode: str) -> Self:
         config = _config(settings, mode)
         config.insert_json5("connect/timeout_ms", "-1")  # keep trying in the background
@@ -99,6 +118,18 @@ class Bus:
 
         self._undeclare.append(self._session.declare_subscriber(key, receive).undeclare)
         return inbox
+
+    def listen(self, key: str, handler: Callable[[Message], None]) -> Callable[[], None]:
+        """Subscribe until what is returned is called."""
+        self.subscribe(key, handler)
+        undeclare = self._undeclare[-1]
+
+        def end() -> None:
+            if undeclare in self._undeclare:
+                self._undeclare.remove(undeclare)
+                undeclare()
+
+        return end
 
     def declare_alive(self, key: str) -> None:
         """Say that this process is there, until it closes its session or is gone."""

@@ -92,6 +92,12 @@ class Config(BaseSettings):
         source = self.sound.source
         return source if source is None or source in self.camera_ids else self.camera_ids[0]
 
+    def witnesses(self, camera_id: str) -> Sequence[str]:
+        """Give the cameras that may look at the same ground as this one, if it goes by what others find."""
+        if not self.track.witness.use or self.camera(camera_id).ground is None:
+            return ()
+        return tuple(it.id for it in self.cameras if it.ground is not None and it.id != camera_id)
+
     def camera(self, camera_id: str) -> Camera:
         """Give one camera.
 

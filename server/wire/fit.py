@@ -43,6 +43,10 @@ class Fit:
         """Map points ``(…, 2)`` from the camera's own picture into the site's."""
         return points * self.scale + (self._left, self._top)
 
+    def to_own(self, points: Floats) -> Floats:
+        """Map points ``(…, 2)`` from the site's picture into the camera's own."""
+        return (points - (self._left, self._top)) / self.scale
+
     def boxes_to_own(self, boxes: Floats) -> Floats:
         """Map boxes ``(N, 4)`` from the site's picture into the camera's own."""
         return (boxes - (self._left, self._top, self._left, self._top)) / self.scale

@@ -11,6 +11,8 @@ key                                       payload                               
 ``myview/SITE/camera/ID/tracks``          :class:`CameraTracks`
 ``myview/SITE/camera/ID/status``          :class:`CameraStatus`
 ``myview/SITE/camera/ID/thumbs/LOCAL``    JPEG of one person                       :class:`ThumbHead`
+``myview/SITE/camera/ID/found``           :class:`Found`
+``myview/SITE/camera/ID/hears``           liveliness token: it hears what the other cameras find
 ``myview/SITE/camera/ID/alive``           liveliness token
 ``myview/SITE/sound``                     frames of sound, one after the other     :class:`SoundHead`
 ``myview/SITE/bestview/choices``          :class:`GopChoices`
@@ -117,10 +119,35 @@ class CameraTracks(msgspec.Struct, frozen=True, kw_only=True):
     """The recording is over: nothing follows."""
     shed: list[Pulse]
     """Frames of this epoch that were missed or not searched for people because the machine was too busy."""
+    alone: list[Pulse] = []
+    """Frames in which people were followed without what some other camera found: its word was not there."""
     tracks: list[Track]
     solve: Solve | None
     solved_at: float = 0.0
     """When the window was solved, unix seconds by the camera's clock; 0 offline."""
+
+
+Coordinate = Annotated[float, msgspec.Meta(ge=-1e6, le=1e6)]
+
+ScoredBox = tuple[Coordinate, Coordinate, Coordinate, Coordinate, Annotated[float, msgspec.Meta(ge=0, le=1)]]
+"""Left, top, right, bottom in pixels of the camera's own picture, and how sure the detector is."""
+
+FOUND_MOST = 100
+"""Boxes that a camera tells the others of one frame at most; those that it is surest of."""
+
+
+class Found(msgspec.Struct, frozen=True, kw_only=True):
+    """What a camera found in one frame, before it follows anybody: for the other cameras."""
+
+    camera: str
+    boot: Number
+    size: tuple[Pixels, Pixels]
+    """Width and height of the camera's own picture."""
+    pulse: Pulse
+    boxes: Annotated[list[ScoredBox], msgspec.Meta(max_length=FOUND_MOST)] | None
+    """Null: nobody was looked for, so that it says nothing."""
+    ended: bool = False
+    """The recording has no frame for this pulse: nothing follows."""
 
 
 class CameraStatus(msgspec.Struct, frozen=True, kw_only=True):

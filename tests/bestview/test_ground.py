@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from bestview import checked_homography, feet, foot_spread, person_heights, to_ground
+from bestview.ground import feet_cut_off, from_ground
 
 
 def looking_along(height: float = 3.0, focal: float = 400.0) -> NDArray[np.float64]:
@@ -83,3 +84,24 @@ def test_the_recordings_homographies_are_accepted(shared_data: Path) -> None:
         ground = json.loads((shared_data / scene / "ground.json").read_text())
         for camera, matrix in ground["homography"].items():
             checked_homography(matrix, camera)
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.floats(-20, 20), st.floats(0.1, 50) | st.floats(-50, -0.1), st.sampled_from([1.0, -2.5]))
+def test_a_place_is_where_its_picture_stands_and_what_lies_behind_the_camera_is_nowhere(
+    x: float, y: float, scale: float
+) -> None:
+    homography = scale * looking_along()
+    pixel = from_ground(homography, np.array([x, y]))
+    if y > 0:
+        assert to_ground(homography, pixel) == pytest.approx([x, y], rel=1e-6, abs=1e-6)
+    else:
+        assert np.isnan(pixel).all()
+    assert np.isnan(from_ground(homography, np.array([np.nan, y]))).all()
+
+
+def test_feet_on_the_lower_edge_are_cut_off_and_boxes_that_reach_beyond_it_are_believed() -> None:
+    bottoms = np.array([100.0, 470.0, 476.0, 480.0, 484.0, 490.0, 560.0])
+    boxes = np.stack([np.zeros(7), np.zeros(7), np.full(7, 50.0), bottoms], axis=-1)
+    assert feet_cut_off(boxes, 480.0).tolist() == [False, False, True, True, True, False, False]
+    assert not feet_cut_off(boxes, float("inf")).any()

@@ -106,6 +106,36 @@ async def test_a_client_may_come_before_the_router_and_survives_its_restart(sett
     client.close()
 
 
+async def test_two_that_hear_each_other_do_so_through_the_router_until_one_listens_no_more(
+    settings: Zenoh,
+) -> None:
+    router = Bus.router(settings)
+    one, two = Bus.hearing(settings), Bus.hearing(settings)
+    heard, ended, there = Heard(), Heard(), Presence()
+    two.subscribe("found/*", heard.queue.put_nowait)
+    end = two.listen("found/one", ended.queue.put_nowait)
+    one.watch_alive("ready", there.note)
+    two.declare_alive("ready")
+    await there.until("ready")
+    one.publish("found/one", b"first")
+    assert (await ended.next()).payload == b"first"
+    end()
+    end()
+    one.publish("found/one", b"second")
+    assert [(await heard.next()).payload for _ in range(2)] == [b"first", b"second"]
+    assert ended.queue.empty()
+    for bus in (one, two, router):
+        bus.close()
+
+
+async def test_who_wants_to_hear_the_others_needs_the_router(
+    settings: Zenoh, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("server.wire.bus._OPEN_WITHIN_MS", 100)
+    with pytest.raises(UserError, match=r"zenoh\.connect: nobody is at tcp/127"):
+        Bus.hearing(settings)
+
+
 async def test_who_closes_is_seen_to_be_gone_and_who_was_there_before_is_seen_to_be_there(
     settings: Zenoh,
 ) -> None:

@@ -210,7 +210,7 @@ async def test_a_camera_whose_tracker_fails_ends_with_that_error(
     def fail(*_: object) -> None:
         raise ArithmeticError("the tracker's own mistake")
 
-    monkeypatch.setattr("server.camera.pipeline.CameraPipeline.track", fail)
+    monkeypatch.setattr("server.camera.pipeline.CameraPipeline.follow", fail)
     async with asyncio.timeout(PATIENCE):
         with pytest.raises(ArithmeticError):
             await it.camera("c0")

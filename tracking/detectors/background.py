@@ -89,6 +89,8 @@ class BackgroundDetector:
         self._filter: BoxFilter | None = None
         self._line: HeightLine | None = None
         self._band: Band | None = None
+        self.blind = True
+        """Whether the last frame could not be searched, since the background was not known."""
 
     def detect(self, image: Image, frame: int | None = None) -> Detections:  # noqa: ARG002 — Detector
         """Give the hypotheses of the next frame; none while the background is not known yet.
@@ -99,6 +101,7 @@ class BackgroundDetector:
         grid = self._grid_of(image)
         small = grid.shrunk(image)
         split = self._background.split(small)
+        self.blind = split is None
         if split is None:
             return Detections.empty(self.bins)
         mask = _cleaned(split.foreground & grid.visible)

@@ -48,6 +48,8 @@ class HogSettings:
 class HogDetector:
     """Finds upright people in single pictures; remembers nothing. Scores are `1 / (1 + exp(-margin))`."""
 
+    blind = False
+
     def __init__(
         self, settings: HogSettings | None = None, looks: Looks | None = None, ignore: Polygons = ()
     ) -> None:

@@ -60,6 +60,8 @@ class OnnxDetector:
         ImportError: onnxruntime is not installed.
     """
 
+    blind = False
+
     def __init__(self, settings: OnnxSettings, looks: Looks | None = None, ignore: Polygons = ()) -> None:
         self.settings = settings
         self._looks = looks or Looks()

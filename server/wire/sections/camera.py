@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import PositiveFloat, ValidationInfo, field_validator
+from pydantic import NonNegativeFloat, PositiveFloat, ValidationInfo, field_validator
 
-from bestview import checked_homography
+from bestview import WitnessSettings, checked_homography
 from server.wire.library import validated
 from server.wire.sections.base import Name, Polygon, Section
 from tracking import DEFAULT_SOLVER, CostSettings, WindowSettings, solver_named
@@ -52,6 +52,10 @@ class Track(Section):
     """Seconds of frames that may wait on a busy machine; a camera's older ones are left out, and said so."""
     window: Annotated[WindowSettings, validated(WindowSettings)] = WindowSettings()
     costs: Annotated[CostSettings, validated(CostSettings)] = CostSettings()
+    witness: Annotated[WitnessSettings, validated(WitnessSettings)] = WitnessSettings()
+    """How a camera goes by what others find that look at the same ground."""
+    witness_wait_s: NonNegativeFloat = 0.2
+    """Seconds that a camera's tracker waits for what the others found in a frame."""
 
     @field_validator("solver")
     @classmethod

@@ -1,0 +1,143 @@
+"""A camera among others on the bus: it tells what it found in each frame, and waits a little for them."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+from collections.abc import Callable
+
+import msgspec
+
+from server.camera.earshot import Earshot
+from server.camera.witness import Heard, Witness
+from server.wire.bus import Bus
+from server.wire.config import Config
+from server.wire.errors import UserError
+from server.wire.inbox import Message
+from server.wire.messages import Found, Keys, camera_of
+
+log = logging.getLogger(__name__)
+
+_JOINED_S = 2.0
+_AGAIN_S = 1.0
+_LISTENERS_S = 1.0
+"""How long the first word waits until all the others can hear it: all have come when pulses begin."""
+_DECODER = msgspec.json.Decoder(Found)
+
+
+class Exchange:
+    """What goes between one camera and the others that look at the same ground.
+
+    It has a session of its own, since the one that a camera has from the start hears no other camera.
+    """
+
+    def __init__(self, config: Config, camera_id: str, witness: Witness | None, most: int) -> None:
+        self._config, self._camera = config, camera_id
+        self._keys = Keys(config.site.name)
+        self._others = config.witnesses(camera_id) if witness else ()
+        self._patience = config.track.witness_wait_s
+        looks_here = witness.looks_here if witness else lambda _: False
+        self._earshot = Earshot(self._others, self._patience, most, looks_here)
+        self._listening: set[str] = set()
+        self._came = asyncio.Event()
+        self._joining: asyncio.Task[None] | None = None
+        self._opening: asyncio.Task[Bus] | None = None
+        self._bus: Bus | None = None
+        self._told = False
+        self.bad_messages = 0
+
+    async def join(self) -> None:
+        """Join the others; where the router is not there yet, that goes on meanwhile."""
+        if not self._others:
+            return
+        self._joining = asyncio.create_task(self._join(), name="join")
+        await asyncio.wait({self._joining}, timeout=_JOINED_S)
+
+    async def leave(self) -> None:
+        """Leave the others."""
+        self._bus = None
+        if self._joining is not None:
+            self._joining.cancel()
+            await asyncio.gather(self._joining, return_exceptions=True)
+        if self._opening is not None:
+            with contextlib.suppress(UserError):
+                (await self._opening).close()
+
+    async def _join(self) -> None:
+        while True:
+            self._opening = asyncio.create_task(asyncio.to_thread(Bus.hearing, self._config.zenoh))
+            try:
+                # Shielded: a session that nobody knows of could not be closed, and the process not end.
+                bus = await asyncio.shield(self._opening)
+                break
+            except UserError as problem:
+                log.info("camera %s: cannot hear the others yet: %s", self._camera, problem)
+                await asyncio.sleep(_AGAIN_S)
+        for other in self._others:
+            self._listen(bus, other)
+        bus.watch_alive(self._keys.camera("*", "hears"), self._alive)
+        # After the subscriptions: who knows this token knows them, too.
+        bus.declare_alive(self._keys.camera(self._camera, "hears"))
+        self._bus = bus
+
+    async def of(self, pulse: int, word: Found | None, *, needed: bool) -> Heard:
+        """Tell the others what was found in a frame; give what they found in it, waited for where needed."""
+        if word is None:
+            return Heard()
+        await self._tell(word)
+        self._earshot.ask(pulse, asyncio.get_running_loop().time())
+        if not needed:
+            return Heard()
+        if self._bus is not None:
+            await self._until(lambda: not self._earshot.misses(pulse), self._patience)
+        for camera in self._earshot.give_up(pulse):
+            log.info("camera %s: what %s found in frame %d came too late", self._camera, camera, pulse)
+        return self._earshot.heard(pulse)
+
+    async def end(self, word: Found | None) -> None:
+        """Tell the others that nothing follows."""
+        if word is not None:
+            await self._tell(word)
+
+    async def _tell(self, word: Found) -> None:
+        if self._bus is None:
+            return
+        if not self._told:
+            self._told = True
+            await self._until(lambda: self._listening.issuperset(self._others), _LISTENERS_S)
+        self._bus.publish(self._keys.camera(self._camera, "found"), msgspec.json.encode(word))
+
+    async def _until(self, done: Callable[[], bool], seconds: float) -> None:
+        """Wait until something holds, asked whenever anything comes; for so long at most."""
+        try:
+            async with asyncio.timeout(seconds):
+                while not done():
+                    self._came.clear()
+                    await self._came.wait()
+        except TimeoutError:
+            return
+
+    def _listen(self, bus: Bus, other: str) -> None:
+        def take(message: Message) -> None:
+            word = self._read(message)
+            if word is not None and not self._earshot.put(word, asyncio.get_running_loop().time()):
+                end()  # of a hundred cameras most look elsewhere
+            self._came.set()
+
+        end = bus.listen(self._keys.camera(other, "found"), take)
+
+    def _read(self, message: Message) -> Found | None:
+        try:
+            word = _DECODER.decode(message.payload)
+            if word.camera != camera_of(message.key):
+                raise msgspec.ValidationError("it is another camera's")
+        except (msgspec.DecodeError, UnicodeDecodeError) as problem:
+            self.bad_messages += 1
+            log.warning("camera %s: a message on %s is none: %s", self._camera, message.key, problem)
+            return None
+        return word
+
+    def _alive(self, key: str, there: bool) -> None:
+        (self._listening.add if there else self._listening.discard)(camera_of(key))
+        self._came.set()

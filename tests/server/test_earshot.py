@@ -1,0 +1,142 @@
+"""Whose word is waited for: nobody's twice in vain, and everybody's who would have been in time."""
+
+from __future__ import annotations
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from server.camera.earshot import Earshot
+from server.wire.messages import Found
+
+PATIENCE, MOST = 0.2, 50
+
+
+def word(pulse: int, camera: str = "c1", boot: int = 1, *, ended: bool = False) -> Found:
+    return Found(camera=camera, boot=boot, size=(640, 480), pulse=pulse, boxes=[], ended=ended)
+
+
+def earshot(*others: str, near: bool = True) -> Earshot:
+    return Earshot(others or ("c1",), PATIENCE, MOST, lambda _: near)
+
+
+def pulses(it: Earshot, pulse: int) -> list[tuple[str, int]]:
+    return [(said.camera, said.pulse) for said in it.heard(pulse).words]
+
+
+def test_words_that_came_before_are_there_in_the_order_of_the_configuration() -> None:
+    it = earshot("c1", "c2")
+    it.put(word(7, "c2"), 0.0)
+    it.put(word(7, "c1"), 0.0)
+    it.ask(7, 1.0)
+    assert not it.misses(7)
+    assert pulses(it, 7) == [("c1", 7), ("c2", 7)]
+    assert not it.heard(7).alone
+
+
+def test_a_camera_that_was_never_there_costs_one_wait() -> None:
+    it = earshot()
+    it.ask(0, 0.0)
+    assert it.misses(0)
+    assert it.give_up(0) == ["c1"]
+    assert it.heard(0).alone
+    for pulse in range(1, 50):
+        it.ask(pulse, pulse / 25)
+        assert not it.misses(pulse)
+        assert it.heard(pulse).alone, "it is said all the same"
+
+
+def test_a_camera_that_was_late_is_waited_for_once_it_would_have_been_in_time() -> None:
+    it = earshot()
+    it.put(word(0), 0.0)
+    it.ask(1, 0.0)
+    it.give_up(1)
+    it.put(word(1), 0.0 + PATIENCE + 0.01)
+    it.ask(2, 0.3)
+    assert not it.misses(2), "it is too slow by more than the patience"
+    it.put(word(2), 0.3 + PATIENCE / 2)
+    it.ask(3, 0.34)
+    assert it.misses(3)
+    it.put(word(3), 0.36)
+    assert not it.misses(3)
+    assert pulses(it, 3) == [("c1", 3)]
+
+
+def test_a_word_that_was_lost_is_not_waited_for_when_a_later_one_is_there() -> None:
+    it = earshot()
+    it.put(word(4), 0.0)
+    it.ask(3, 0.0)
+    assert not it.misses(3)
+    assert it.heard(3).alone
+    it.ask(4, 0.0)
+    assert pulses(it, 4) == [("c1", 4)]
+
+
+def test_a_recording_that_is_over_has_nothing_more_to_say_and_nothing_is_missing() -> None:
+    it = earshot()
+    it.put(word(4), 0.0)
+    it.put(word(5, ended=True), 0.0)
+    it.ask(4, 0.0)
+    assert pulses(it, 4) == [("c1", 4)]
+    for pulse in (5, 6):
+        it.ask(pulse, 0.0)
+        assert not it.misses(pulse)
+        assert it.heard(pulse).words == ()
+        assert not it.heard(pulse).alone
+
+
+def test_a_camera_that_was_started_again_is_waited_for_again() -> None:
+    it = earshot()
+    it.put(word(4), 0.0)
+    it.put(word(5, ended=True), 0.0)
+    it.put(word(9, boot=2), 0.0)
+    it.ask(10, 0.0)
+    assert it.misses(10)
+
+
+def test_a_camera_that_looks_elsewhere_is_never_waited_for_and_its_words_are_not_needed() -> None:
+    it = earshot(near=False)
+    assert not it.put(word(0), 0.0)
+    for pulse in range(3):
+        it.ask(pulse, 0.0)
+        assert not it.misses(pulse)
+        assert it.heard(pulse).words == ()
+        assert not it.heard(pulse).alone
+
+
+def test_no_more_words_are_kept_than_may_be_needed() -> None:
+    it = earshot()
+    for pulse in range(10 * MOST):
+        it.put(word(pulse), 0.0)
+    it.ask(MOST - 1, 0.0)
+    assert pulses(it, MOST - 1) == [("c1", MOST - 1)]
+    it.ask(MOST, 0.0)
+    assert not it.misses(MOST)
+    assert it.heard(MOST).alone
+
+
+@settings(deadline=None, max_examples=100)
+@given(st.lists(st.tuples(st.booleans(), st.integers(0, 3), st.floats(0, 0.5)), max_size=40))
+def test_two_waits_in_vain_have_a_word_in_time_between_them(steps: list[tuple[bool, int, float]]) -> None:
+    """However words and questions come: ``steps`` are a word of so many pulses later, or a question."""
+    it = earshot()
+    it.put(word(0), 0.0)
+    now, said, asked = 0.0, 0, -1
+    trusted = True
+    times: dict[int, float] = {}
+    for speaks, ahead, later in steps:
+        now += later
+        if speaks:
+            said += 1 + ahead
+            it.put(word(said), now)
+            if said > asked or now <= times.get(said, -1.0) + PATIENCE:
+                trusted = True
+        else:
+            asked += 1
+            times[asked] = now
+            it.ask(asked, now)
+            waits = it.misses(asked)
+            assert waits == (trusted and said < asked)
+            if waits:
+                now += PATIENCE
+                it.give_up(asked)
+                trusted = False
