@@ -101,11 +101,8 @@ def _pack_sound(heard: Heard, counters: Counters) -> Iterator[bytes]:
 
 def _sound_pes(heard: Heard) -> list[bytes]:
     """Give sound as PES packets, each frame behind its ADTS head."""
-    form = heard.format
-    made: list[bytes] = []
-    if form.coding != "aac":
-        return made
-    for place in range(0, len(heard.frames), _FRAMES_AT_ONCE):
+    form, made = heard.format, list[bytes]()
+    for place in range(0, len(heard.frames) if form.coding == "aac" else 0, _FRAMES_AT_ONCE):
         stamp = _stamp(round((heard.first + place) * form.samples * TIMESCALE / form.rate) % _CLOCK)
         frames = heard.frames[place : place + _FRAMES_AT_ONCE]
         content = b"".join(form.adts(len(frame)) + frame for frame in frames)

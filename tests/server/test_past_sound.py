@@ -245,6 +245,20 @@ async def test_a_site_without_sound_keeps_none(tmp_path: Path, recording: Path) 
         assert b"soun" not in await download(hall, "/objects/1/best.mp4?from=p0&to=p20")
 
 
+@settings(max_examples=100, deadline=None)
+@given(st.data())
+def test_a_damaged_file_gives_what_can_be_read_or_nothing(
+    tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
+) -> None:
+    path = tmp_path_factory.mktemp("damaged") / "sound.mp4"
+    content = bytearray(b"".join(sound_fragment(FORM, [b"abc", b"de"], 2 * number) for number in range(4)))
+    for _ in range(data.draw(st.integers(1, 5))):
+        content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))
+    path.write_bytes(content[: data.draw(st.integers(0, len(content)))])
+    found = frames_in(path, 0, data.draw(st.integers(0, len(content))), 0, 8, FORM)
+    assert found.keys() <= set(range(8))
+
+
 @settings(max_examples=60, deadline=None)
 @given(
     st.lists(st.lists(st.binary(min_size=1, max_size=40), max_size=6), min_size=1, max_size=8),

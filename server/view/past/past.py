@@ -125,7 +125,8 @@ class Past:
         if self.store is None:
             return []
         current = [] if self.store.run is None else [self.store.run]
-        return [*(run for run in tuple(self.store.earlier) if self._fits(run)), *current]
+        own = self._headers
+        return [*(run for run in tuple(self.store.earlier) if self._fits(run, own)), *current]
 
     @property
     def sounding(self) -> list[Run]:
@@ -133,8 +134,8 @@ class Past:
         own = self._headers
         return [] if own is None else [run for run in self.runs if self._headers_of(run).sound == own.sound]
 
-    def _fits(self, run: Run) -> bool:
-        own, pulse0 = self._headers, self.pulse0
+    def _fits(self, run: Run, own: Headers | None) -> bool:
+        pulse0 = self.pulse0
         if own is None or pulse0 is None or run.head.pulse0 is None:
             return False
         same = run.head.fps == self._config.site.fps and abs(run.head.pulse0 - pulse0) < _SAME_S

@@ -57,14 +57,17 @@ def _fragments(file: BufferedReader, at: int, end: int) -> Iterator[tuple[int, t
             return
         if kind == b"moof":
             moof = file.read(size - _HEAD)
-        elif kind == b"mdat" and moof:
-            yield *_told(moof), at + _HEAD
+        elif kind == b"mdat" and (told := _told(moof)) is not None:
+            yield *told, at + _HEAD
         at += size
 
 
-def _told(moof: bytes) -> tuple[int, tuple[int, ...]]:
+def _told(moof: bytes) -> tuple[int, tuple[int, ...]] | None:
     """Give what a fragment of :func:`server.view.mp4_sound.sound_fragment` says: first sample, sizes."""
-    (sample,) = struct.unpack_from(">Q", moof, moof.index(b"tfdt") + 8)
-    at = moof.index(b"trun") + 8
-    (count,) = struct.unpack_from(">I", moof, at)
-    return sample, struct.unpack_from(f">{count}I", moof, at + 8)
+    try:
+        (sample,) = struct.unpack_from(">Q", moof, moof.index(b"tfdt") + 8)
+        at = moof.index(b"trun") + 8
+        (count,) = struct.unpack_from(">I", moof, at)
+        return sample, struct.unpack_from(f">{count}I", moof, at + 8)
+    except (ValueError, struct.error):  # a file that somebody has damaged
+        return None
