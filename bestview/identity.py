@@ -130,6 +130,11 @@ class IdentityRegistry:
             self._settle(last_frame)
         return IdentityUpdate(numbers, born, returned, gone, merged, split)
 
+    @property
+    def pairs(self) -> int:
+        """How many pairs of parts of tracks and people there is anything to say of: what memory goes with."""
+        return self._tables.entries
+
     def _gate(self) -> float:
         """Distance between feet at which they are as likely one person's as two's, ground units."""
         settings = self._settings
