@@ -20,11 +20,13 @@ const SAME_PLAYBACK_S = 0.5; // a VideoFrame whose time is further off than this
  * @param {HTMLVideoElement} video
  * @param {() => boolean} wanted whether the image is
  * @param {(frame: Frame) => void} tell
+ * @param {AbortSignal} [enough] after which nothing is told
  */
-export function watchFrames(video, wanted, tell) {
-  if (!('requestVideoFrameCallback' in video)) return watchTime(video, wanted, tell);
+export function watchFrames(video, wanted, tell, enough) {
+  if (!('requestVideoFrameCallback' in video)) return watchTime(video, wanted, tell, enough);
   /** @type {VideoFrameRequestCallback} */
   const shown = (_now, { mediaTime, expectedDisplayTime }) => {
+    if (enough?.aborted) return;
     video.requestVideoFrameCallback(shown);
     const shownAt = Date.now() + expectedDisplayTime - performance.now();
     tell({ ...take(video, mediaTime, wanted()), shownAt });
@@ -57,10 +59,12 @@ export function take(video, mediaTime, wanted) {
  * @param {HTMLVideoElement} video
  * @param {() => boolean} wanted
  * @param {(frame: Frame) => void} tell
+ * @param {AbortSignal} [enough]
  */
-function watchTime(video, wanted, tell) {
+function watchTime(video, wanted, tell, enough) {
   let last = -1;
   const look = () => {
+    if (enough?.aborted) return;
     requestAnimationFrame(look);
     if (video.currentTime === last || video.readyState < HTMLMediaElement.HAVE_CURRENT_DATA) return;
     last = video.currentTime;

@@ -10,6 +10,7 @@ import { Overlay } from './overlay.js';
 import { People } from './people.js';
 import { Reason } from './reason.js';
 import { Strip } from './strip.js';
+import { Tiles } from './tiles.js';
 import { copy, pictureInPicture, saveSnapshot } from './tools.js';
 import { Viewer } from './viewer.js';
 import { Why } from './why.js';
@@ -42,7 +43,13 @@ const soundToggle = element('toggle-sound');
 const [title, text] = /** @type {HTMLElement[]} */ ([...element('status').children]);
 
 const viewer = new Viewer(video, show);
-const people = new People(element('people'), element('earlier'), (object) => viewer.choose(object));
+const people = new People(
+  element('people'),
+  element('earlier'),
+  (object) => viewer.choose(object),
+  (object) => viewer.toggleBeside(object),
+);
+const tiles = new Tiles(element('tiles'), viewer, (object) => viewer.choose(object));
 const cameras = new Cameras(element('cameras'), (camera) => viewer.hold(camera));
 const overlay = new Overlay(element('boxes'));
 const strip = new Strip(element('strip'));
@@ -67,9 +74,10 @@ function show() {
     element('live').hidden = viewer.past === null;
   }
   if (viewer.people) {
-    people.show(viewer.people, viewer.object, viewer.palette, (person) => viewer.isGone(person));
+    people.show(viewer.people, viewer.object, viewer.tiles, viewer.palette, (person) => viewer.isGone(person));
     element('nobody').hidden = viewer.people.length > 0;
   }
+  tiles.show(viewer.tiles);
   document.title = viewer.object === null ? 'MyView' : `Person ${viewer.object} · MyView`;
   readOut();
   repaint();
@@ -129,6 +137,7 @@ function repaint() {
   const frame = take(video, viewer.mediaTime, painted());
   if (frame.image) viewer.shown({ ...frame, shownAt: Date.now() });
   paint(frame.image);
+  tiles.repaint();
 }
 
 /** @type {string | null | undefined} */

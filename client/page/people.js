@@ -17,21 +17,24 @@ export class People {
    * @param {HTMLElement} here list element for those who are or were just in view
    * @param {HTMLDetailsElement} earlier holds a list element for those who have not been for a while
    * @param {(object: number) => void} choose
+   * @param {(object: number) => void} beside to be seen beside the chosen person, or no more
    */
-  constructor(here, earlier, choose) {
+  constructor(here, earlier, choose, beside) {
     this.here = here;
     this.earlier = earlier;
     this.gone = /** @type {HTMLElement} */ (earlier.querySelector('ul'));
     this.choose = choose;
+    this.beside = beside;
   }
 
   /**
    * @param {Person[]} people
    * @param {number | null} chosen
+   * @param {number[]} beside
    * @param {Palette} palette
    * @param {(person: Person) => boolean} isGone not in view for a while
    */
-  show(people, chosen, palette, isGone) {
+  show(people, chosen, beside, palette, isGone) {
     const known = new Set(people.map((person) => person.object));
     for (const [object, card] of this.#cards) {
       if (known.has(object)) continue;
@@ -40,7 +43,7 @@ export class People {
     }
     for (const person of [...people].sort((a, b) => a.object - b.object)) {
       const card = this.#card(person.object);
-      card.update(person, person.object === chosen, palette);
+      card.update(person, person.object === chosen, beside.includes(person.object), palette);
       const away = isGone(person) && person.object !== chosen;
       this.#place(card.item, away ? this.gone : this.here, person.object);
     }
@@ -51,7 +54,7 @@ export class People {
   #card(object) {
     let card = this.#cards.get(object);
     if (!card) {
-      card = new Card(object, () => this.choose(object));
+      card = new Card(object, () => this.choose(object), () => this.beside(object));
       this.#cards.set(object, card);
     }
     return card;
@@ -77,8 +80,9 @@ class Card {
   /**
    * @param {number} object
    * @param {() => void} choose
+   * @param {() => void} beside
    */
-  constructor(object, choose) {
+  constructor(object, choose, beside) {
     this.item = document.createElement('li');
     this.item.dataset.object = String(object);
     this.button = document.createElement('button');
@@ -96,15 +100,24 @@ class Card {
     picture.ariaHidden = this.seenBy.ariaHidden = 'true';
     picture.append(this.image, number);
     this.button.append(picture, this.seenBy, this.words);
-    this.item.append(this.button);
+    this.plus = document.createElement('button');
+    this.plus.type = 'button';
+    this.plus.className = 'plus';
+    this.plus.textContent = '+';
+    this.plus.addEventListener('click', beside);
+    this.item.append(this.button, this.plus);
   }
 
   /**
    * @param {Person} person
    * @param {boolean} chosen
+   * @param {boolean} beside
    * @param {Palette} palette
    */
-  update(person, chosen, palette) {
+  update(person, chosen, beside, palette) {
+    this.plus.hidden = chosen;
+    this.plus.setAttribute('aria-pressed', String(beside));
+    this.plus.ariaLabel = this.plus.title = `Person ${person.object} beside the large picture`;
     this.button.setAttribute('aria-current', String(chosen));
     this.button.classList.toggle('away', !person.visible);
     const seen = person.cameras.length ? `seen by ${person.cameras.join(', ')}` : 'not in view';

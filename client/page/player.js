@@ -56,6 +56,8 @@ export class Player {
   /** @type {Run | null} whose first picture the element is about to show */
   #landing = null;
   #pace = new Pace();
+  /** @type {number} */
+  #ticking;
   #codec = '';
   #container = 'mp4';
   /** @type {Subject | null} whose picture the element shows */
@@ -79,7 +81,7 @@ export class Player {
     video.addEventListener('play', () => {
       if (!this.#run && this.shown) this.listener.resumed();
     });
-    setInterval(() => this.#tick(), TICK_MS);
+    this.#ticking = setInterval(() => this.#tick(), TICK_MS);
   }
 
   /**
@@ -247,6 +249,14 @@ export class Player {
     const step = this.#pace.step(performance.now() / 1000, video.currentTime, ranges);
     if (step.seek !== null) this.#seek(step.seek);
     if (video.playbackRate !== step.rate) video.playbackRate = step.rate;
+  }
+
+  /** Leave the stream and the element, for good. */
+  close() {
+    this.stop();
+    clearInterval(this.#ticking);
+    this.video.removeAttribute('src');
+    this.video.load();
   }
 
   /** Leave the stream; the last frame stays. */

@@ -7,6 +7,7 @@ import { Palette } from './palette.js';
 import { Player } from './player.js';
 import { Probe } from './probe.js';
 import { describe } from './status.js';
+import { MOST_TILES } from './tiles.js';
 
 /** @import {Box, Camera, Gop, Person, Site} from './contract.js' */
 /** @import {Part} from './follow.js' */
@@ -37,6 +38,10 @@ export class Viewer {
   probe = new Probe();
   connected = false;
   supported = true;
+  container = 'mp4';
+  codec = '';
+  /** Who is seen beside the chosen person. */
+  beside = watchedInAddress().beside;
   boxesOn = true;
   followOn = false;
   /** @type {Part | null} of the frame now shown, where the person is followed; null: all of it */
@@ -64,8 +69,9 @@ export class Viewer {
       resumed: () => this.#resume(),
     });
     this.probe.object = this.object;
-    onAddress(({ object, camera }) => {
+    onAddress(({ object, camera, beside }) => {
       this.#held = camera;
+      this.beside = beside;
       if (object !== null) this.#turnTo(object, true);
     });
   }
@@ -80,8 +86,9 @@ export class Viewer {
     }
     this.site = this.probe.site = site;
     this.palette = new Palette(site.cameras);
-    const codec = site.sound ? `${site.codec},${site.sound}` : site.codec;
-    this.supported = this.player.configure(site.container ?? 'mp4', codec);
+    this.container = site.container ?? 'mp4';
+    this.codec = site.sound ? `${site.codec},${site.sound}` : site.codec;
+    this.supported = this.player.configure(this.container, this.codec);
     this.#play();
     this.changed();
   }
@@ -124,6 +131,8 @@ export class Viewer {
   /** @param {number} object as the viewer wishes */
   choose(object) {
     if (object !== this.object) this.#held = null;
+    // Who was small and becomes large changes places with who was large.
+    this.beside = this.beside.map((it) => (it === object && this.object !== null ? this.object : it));
     this.#turnTo(object, true);
     this.#write(true);
   }
@@ -183,6 +192,21 @@ export class Viewer {
     this.#write(true);
     this.#play();
     this.changed();
+  }
+
+  /** @param {number} object to be seen beside the chosen person, or no more */
+  toggleBeside(object) {
+    const { tiles } = this;
+    const others = tiles.filter((it) => it !== object);
+    this.beside = tiles.includes(object) ? others : [...others.slice(1 - MOST_TILES), object];
+    this.#write(true);
+    this.changed();
+  }
+
+  /** @returns {number[]} those of them who have a stream */
+  get tiles() {
+    const known = new Set(this.people?.map((person) => person.object));
+    return this.beside.filter((it) => it !== this.object && known.has(it)).slice(-MOST_TILES);
   }
 
   /** @param {number} by steps through those in view, around the end */
@@ -275,6 +299,7 @@ export class Viewer {
   /** Whoever was chosen by a number that is no longer theirs stays chosen by the one they have. */
   #followMerge() {
     const { object } = this;
+    this.beside = this.beside.map((it) => this.people?.find((person) => person.also?.includes(it))?.object ?? it);
     const same = this.people?.find((person) => object !== null && person.also?.includes(object));
     if (!same || this.chosen) return;
     this.say(`Person ${object} turned out to be person ${same.object}.`);
@@ -301,7 +326,7 @@ export class Viewer {
 
   /** @param {boolean} chosen by the viewer */
   #write(chosen) {
-    writeAddress({ object: this.object, camera: this.#held }, chosen);
+    writeAddress({ object: this.object, camera: this.#held, beside: this.beside }, chosen);
   }
 
   /**

@@ -1,0 +1,117 @@
+/** Others beside the chosen person: a small player each, live, with boxes on their own frames as in the large one. */
+
+import { take, watchFrames } from './frames.js';
+import { Overlay } from './overlay.js';
+import { Player } from './player.js';
+
+/** @import {Decisions} from './decisions.js' */
+/** @import {Frame} from './frames.js' */
+/** @import {Site} from './contract.js' */
+
+export const MOST_TILES = 3; // of six connections to a server events, the large player and all else need three
+
+/**
+ * What all players of the page have in common.
+ *
+ * @typedef {object} Shared
+ * @property {Site | null} site
+ * @property {string} container of all streams
+ * @property {string} codec
+ * @property {Decisions} decisions
+ * @property {boolean} boxesOn
+ */
+
+export class Tiles {
+  /** @type {Map<number, Tile>} */
+  #tiles = new Map();
+
+  /**
+   * @param {HTMLElement} place
+   * @param {Shared} shared
+   * @param {(object: number) => void} choose the person of a tile that was pressed
+   */
+  constructor(place, shared, choose) {
+    this.place = place;
+    this.shared = shared;
+    this.choose = choose;
+  }
+
+  /** @param {number[]} objects who is to be seen beside the chosen person */
+  show(objects) {
+    for (const [object, tile] of this.#tiles) {
+      if (objects.includes(object)) continue;
+      tile.close();
+      this.#tiles.delete(object);
+    }
+    for (const object of objects) {
+      if (!this.#tiles.has(object) && this.shared.site) {
+        const tile = new Tile(object, this.shared, () => this.choose(object));
+        this.#tiles.set(object, tile);
+        this.place.append(tile.element);
+      }
+      this.#tiles.get(object)?.play();
+    }
+    this.place.hidden = this.#tiles.size === 0;
+  }
+
+  repaint() {
+    for (const tile of this.#tiles.values()) tile.repaint();
+  }
+}
+
+class Tile {
+  #mediaTime = 0;
+  #enough = new AbortController();
+
+  /**
+   * @param {number} object
+   * @param {Shared} shared
+   * @param {() => void} pressed
+   */
+  constructor(object, shared, pressed) {
+    this.object = object;
+    this.shared = shared;
+    this.element = document.createElement('button');
+    this.element.type = 'button';
+    this.element.className = 'stage tile pictured';
+    this.element.title = `Person ${object}: make large`;
+    this.element.ariaLabel = this.element.title;
+    this.element.addEventListener('click', pressed);
+    this.video = document.createElement('video');
+    this.video.muted = this.video.autoplay = this.video.playsInline = true;
+    const canvas = document.createElement('canvas');
+    this.element.append(this.video, canvas);
+    this.overlay = new Overlay(canvas);
+    const [landed, resumed] = [() => this.repaint(), () => this.play()];
+    this.player = new Player(this.video, { landed, resumed, ended: () => undefined });
+    watchFrames(this.video, () => shared.boxesOn, (frame) => this.#paint(frame), this.#enough.signal);
+  }
+
+  play() {
+    const { container, codec } = this.shared;
+    if (!this.player.configure(container, codec)) return;
+    this.player.choose({ object: this.object, camera: null, past: null });
+  }
+
+  close() {
+    this.#enough.abort();
+    this.player.close();
+    this.element.remove();
+  }
+
+  repaint() {
+    if (this.player.shown) this.#paint({ ...take(this.video, this.#mediaTime, this.shared.boxesOn), shownAt: 0 });
+  }
+
+  /** @param {Frame} frame */
+  #paint({ mediaTime, image }) {
+    const { site, decisions, boxesOn } = this.shared;
+    this.#mediaTime = mediaTime;
+    if (site && boxesOn && !this.player.landing) {
+      const pulse = Math.round(mediaTime * site.fps);
+      const camera = decisions.camera(this.object, pulse);
+      this.overlay.draw(camera === null ? [] : decisions.boxes(camera, pulse), this.object, site, image, null);
+    } else this.overlay.clear();
+    image?.close();
+  }
+}
