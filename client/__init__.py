@@ -11,7 +11,8 @@ from client.http import (
     RefusedError,
 )
 from client.model import Box, Camera, Cameras, Choice, Cut, Event, Gop, Objects, SeenObject, Site, Span
-from client.player import Progress, Watched, record, watch
+from client.player import Watched, record, watch
+from client.session import Progress
 
 __all__ = [
     "AwayError",

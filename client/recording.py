@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from io import BufferedWriter
 from pathlib import Path
 
 from client.fmp4 import MAX_BOX, Mp4Box, Mp4Error, decode_time, sound_track, timescale, track_of
 from client.plain import write_plain
+from client.webm import WebmError
+from client.webm_recording import WebmRecording, write_indexed
 
 _log = logging.getLogger(__name__)
 
@@ -134,36 +136,40 @@ class Recording:
 
 
 @contextmanager
-def recording(out: Path | None, seconds: float | None) -> Iterator[Recording]:
+def recording(
+    out: Path | None, seconds: float | None, container: str = "mp4"
+) -> Iterator[Recording | WebmRecording]:
     """Record into ``out.part``, which is made into ``out`` at the end, however it ends, if it has any media.
 
     An interrupted recording is whole up to its last fragment, hence kept; an empty one leaves nothing.
-    ``out`` is a plain MP4 file; where the disk has no room for both, it is the fragments as they came.
+    ``out`` is a plain MP4 file, or a WebM with an index; where the disk has no room for both, it is the
+    fragments as they came.
 
     Raises:
         OSError: the file cannot be written.
     """
+    made = WebmRecording if container == "webm" else Recording
     if out is None:
-        yield Recording(None, seconds)
+        yield made(None, seconds)
         return
     part = out.with_name(out.name + ".part")
     kept = None
     try:
         with part.open("wb") as file:
-            kept = Recording(file, seconds)
+            kept = made(file, seconds)
             yield kept
     finally:
         if kept is not None and kept.fragments:
-            _finish(part, out)
+            _finish(part, out, write_indexed if container == "webm" else write_plain)
         else:
             part.unlink(missing_ok=True)
 
 
-def _finish(part: Path, out: Path) -> None:
+def _finish(part: Path, out: Path, write: Callable[[Path, Path], None]) -> None:
     plain = out.with_name(out.name + ".plain")
     try:
-        write_plain(part, plain)
-    except (OSError, Mp4Error) as error:
+        write(part, plain)
+    except (OSError, Mp4Error, WebmError) as error:
         _log.warning("%s: is left in fragments: %s", out, error)
         plain.unlink(missing_ok=True)
         part.replace(out)

@@ -1,0 +1,143 @@
+"""One recording over as many connections as it takes."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+from yarl import URL
+
+from client.commentary import Commentary
+from client.fmp4 import BoxReader, Mp4Error
+from client.http import AwayError, ContractError, HttpSettings, NotFoundError, RefusedError, get
+from client.recording import Recording, StreamChangedError
+from client.webm import ElementReader, WebmError
+from client.webm_recording import WebmChangedError, WebmRecording
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """How far a recording is."""
+
+    seconds: float
+    """Media seconds so far."""
+    bytes: int
+    camera: str | None
+    """Which camera is shown; None as long as it is not known."""
+    cuts: int
+    """Changes of the camera so far, as far as they are known."""
+    reconnections: int
+    """How many times the stream had to be opened again."""
+
+
+Report = Callable[[Progress], None]
+
+
+class Session:
+    """One recording over as many connections as it takes."""
+
+    def __init__(
+        self,
+        record: Recording | WebmRecording,
+        commentary: Commentary,
+        report: Report | None,
+        start: str | None,
+        end: str | None,
+    ) -> None:
+        self._start, self._end = start, end
+        self._record = record
+        self._commentary = commentary
+        self._report = report
+        self._camera: str | None = None
+        self.cuts = 0
+        self.reconnections = 0
+
+    async def run(self, address: URL, settings: HttpSettings) -> bool:
+        """Stream until full (True) or the server is gone for good (False)."""
+        failures = 0
+        while True:
+            before = self._record.fragments
+            try:
+                if await self._connection(self._asking(address), settings):
+                    return True
+                if self._end is not None and self._record.fragments:
+                    return True
+                problem = AwayError(f"{address.origin()}: the stream has ended")
+            except (StreamChangedError, WebmChangedError):
+                return False
+            except (AwayError, NotFoundError, RefusedError) as error:
+                # A server that has just been restarted does not know its objects yet, nor their past.
+                if not isinstance(error, AwayError) and not self._record.fragments:
+                    raise
+                problem = AwayError(str(error))
+            failures = 1 if self._record.fragments > before else failures + 1
+            if failures > settings.retries:
+                if self._record.fragments:
+                    return False
+                raise problem
+            await asyncio.sleep(settings.backoff(failures))
+            self.reconnections += 1
+
+    def _asking(self, address: URL) -> URL:
+        """Say where to begin and to end: after an interruption, with the frame after the last one."""
+        query = {} if self._end is None else {"to": self._end}
+        at, site = self._record.media_time, self._commentary.site
+        if at is not None and site is not None and self._start is not None:
+            return address.with_query({"from": f"p{round(at * site.fps) + 1}", **query})
+        if self._start is not None:
+            return address.with_query({"from": self._start, **query})
+        return address.with_query(query)
+
+    async def _connection(self, address: URL, settings: HttpSettings) -> bool:
+        """Stream over one connection; True when full, False when it has ended."""
+        is_webm = isinstance(self._record, WebmRecording)
+        taken = _taker(self._record)
+        self._record.reconnected()
+        async with get(address, settings, "video/webm" if is_webm else "video/mp4") as answer:
+            async for data in answer.content.iter_any():
+                try:
+                    if not self._take(taken(data)):
+                        return True
+                except (StreamChangedError, WebmChangedError):
+                    raise
+                except (Mp4Error, WebmError) as error:
+                    what = "WebM" if is_webm else "fragmented MP4"
+                    raise ContractError(f"{address} is not a {what}: {error}") from error
+        return False
+
+    def _take(self, taken: Iterator[bool]) -> bool:
+        before = noted = self._record.fragments
+        more = True
+        for more in taken:
+            if not more:
+                break
+            if self._record.fragments > noted:
+                noted = self._record.fragments
+                self._note_camera()
+        if self._record.fragments > before:
+            self._tell()
+        return more
+
+    def _note_camera(self) -> None:
+        camera = self._commentary.camera_at(self._record.media_time)
+        if camera is not None and camera != self._camera:
+            self.cuts += self._camera is not None
+            self._camera = camera
+
+    def _tell(self) -> None:
+        if self._report is not None:
+            self._report(
+                Progress(
+                    self._record.seconds, self._record.bytes, self._camera, self.cuts, self.reconnections
+                )
+            )
+
+
+def _taker(record: Recording | WebmRecording) -> Callable[[bytes], Iterator[bool]]:
+    """Give what takes a connection's bytes; it tells of each part whether there is room for more."""
+    if isinstance(record, WebmRecording):
+        elements = ElementReader()
+        return lambda data: map(record.take, elements.feed(data))
+    boxes = BoxReader()
+    return lambda data: map(record.take, boxes.feed(data))
