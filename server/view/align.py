@@ -39,13 +39,17 @@ class _Place:
 class Aligner:
     """Collects the cameras' messages by epoch. It has no clock: it is told which pulse it is.
 
-    ``grace`` is how many pulses after an epoch's end a camera that is there is waited for.
+    ``grace`` is how many pulses a camera that is there is waited for, after an epoch's end and after the first of
+    them has spoken. While none has, each of them is ``behind``: so many pulses more are waited for the first.
+    Who knew nothing of anybody could only go on with nobody.
     """
 
-    def __init__(self, cameras: Sequence[str], stride: int, grace: int) -> None:
-        self.stride, self._grace = stride, grace
+    def __init__(self, cameras: Sequence[str], stride: int, grace: int, behind: int = 0) -> None:
+        self.stride, self._grace, self._behind = stride, grace, behind
         self._places = {camera: _Place() for camera in cameras}
         self._next: int | None = None
+        self._heard: int | None = None
+        """The pulse at which somebody had spoken of the next epoch, or of a later one."""
         self.late_messages = dict.fromkeys(cameras, 0)
 
     def come(self, camera: str) -> None:
@@ -98,14 +102,14 @@ class Aligner:
         end = end_of_epoch(number, self.stride)
         missing = [name for name, place in self._places.items() if self._awaited(place, end)]
         any_word = any(place.waiting for place in self._places.values())
-        if missing and now <= end + self._grace:
-            return None
-        if not any_word and now <= end + self._grace:
+        if any_word and self._heard is None:
+            self._heard = now
+        if (missing or not any_word) and now <= self._patience(end):
             return None
         late = tuple(missing)
         for name in late:
             self._places[name].trusted = False
-        self._next = number + 1
+        self._next, self._heard = number + 1, None
         taken = {}
         for name, place in self._places.items():
             message = place.waiting.pop(number, None)
@@ -113,6 +117,13 @@ class Aligner:
                 taken[name] = message
                 place.ended |= message.ended
         return Epoch(number, end, taken, (*late, *self._skipped(end, taken)))
+
+    def _patience(self, end: int) -> int:
+        """Give the last pulse at which an epoch with this end is waited for."""
+        if self._heard is not None:
+            return max(end, self._heard) + self._grace
+        expected = any(place.there and not place.ended for place in self._places.values())
+        return end + self._grace + (self._behind if expected else 0)
 
     def _skipped(self, end: int, taken: Container[str]) -> list[str]:
         """List the cameras whose word on an epoch is lost: they were there, and have spoken of later ones."""

@@ -35,14 +35,15 @@ class BestViewService:
     def __init__(self, config: Config, out: Path | None = None) -> None:
         self.config = config
         cameras = config.camera_ids
-        grace, stride = round(config.view.late_after_s * config.site.fps), config.track.window.stride
+        fps, stride = config.site.fps, config.track.window.stride
+        grace, behind = round(config.view.late_after_s * fps), round(config.track.backlog_s * fps)
         # What is waited for must still be there when it is decided.
         frames = max(
-            round(config.view.buffer_s * config.site.fps), 4 * (config.view.lookahead + grace + stride)
+            round(config.view.buffer_s * fps), behind + 4 * (config.view.lookahead + grace + stride)
         )
         self.agreement = agreement_for(config)
         self.shelves = {camera: Shelf(config.site.fps, frames, self.agreement) for camera in cameras}
-        self.aligner = Aligner(cameras, stride, grace)
+        self.aligner = Aligner(cameras, stride, grace, behind)
         form = config.sound.format
         self.sound = None if form is None else SoundShelf(form, config.site.fps, frames / config.site.fps)
         self.splicer = Splicer(self.shelves, self.agreement, config, self.sound)

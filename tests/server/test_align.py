@@ -66,6 +66,7 @@ def test_the_epochs_are_the_same_in_whatever_order_the_cameras_messages_mix(
 def test_a_camera_that_is_late_is_left_out_once_and_not_waited_for_until_it_is_in_time_again() -> None:
     aligner = begun("c0", "c1")
     aligner.tracks(word("c0", 0))
+    assert aligner.ready(now=4) == []
     assert aligner.ready(now=4 + GRACE) == []
     assert heard(aligner.ready(now=5 + GRACE)) == [(0, ("c0",), ("c1",))]
     aligner.tracks(word("c0", 1))
@@ -121,3 +122,45 @@ def test_a_camera_whose_word_on_an_epoch_was_lost_is_not_waited_for_and_the_loss
     aligner.tracks(word("c1", 0))
     aligner.tracks(word("c1", 1))
     assert heard(aligner.ready(now=0)) == [(0, ("c1",), ("c0",)), (1, ("c0", "c1"), ())]
+
+
+BEHIND = 50
+
+
+def test_cameras_that_are_all_behind_are_waited_for_and_nobody_is_left_out() -> None:
+    """As on a machine with too much to do: everybody speaks two seconds late."""
+    aligner = Aligner(CAMERAS, STRIDE, GRACE, BEHIND)
+    for camera in CAMERAS:
+        aligner.come(camera)
+        aligner.frame(camera, 1, 0)
+    epochs = []
+    for now in range(400):
+        for place, camera in enumerate(CAMERAS):
+            epoch, rest = divmod(now - BEHIND - 3 * place + 1, STRIDE)
+            if rest == 0 and epoch > 0:
+                aligner.tracks(word(camera, epoch - 1))
+        epochs += aligner.ready(now)
+    assert heard(epochs) == [(number, CAMERAS, ()) for number in range(len(epochs))]
+    assert len(epochs) > 60
+
+
+def test_nobody_is_waited_for_longer_than_they_may_be_behind() -> None:
+    aligner = Aligner(CAMERAS, STRIDE, GRACE, BEHIND)
+    aligner.come("c0")
+    aligner.frame("c0", 1, 0)
+    assert aligner.ready(now=4 + GRACE + BEHIND) == []
+    assert heard(aligner.ready(now=5 + GRACE + BEHIND)) == [(0, (), ("c0",))]
+    aligner.gone("c0")
+    assert aligner.ready(now=9 + GRACE) == []
+    assert heard(aligner.ready(now=10 + GRACE)) == [(1, (), ())], "nobody is there to be behind"
+
+
+def test_the_others_are_waited_for_from_the_first_word_on() -> None:
+    aligner = Aligner(CAMERAS, STRIDE, GRACE, BEHIND)
+    for camera in ("c0", "c1"):
+        aligner.come(camera)
+        aligner.frame(camera, 1, 0)
+    aligner.tracks(word("c0", 0))
+    assert aligner.ready(now=40) == []
+    assert aligner.ready(now=40 + GRACE) == []
+    assert heard(aligner.ready(now=41 + GRACE)) == [(0, ("c0",), ("c1",))]
