@@ -13,6 +13,7 @@ from pathlib import Path
 import aiohttp
 import numpy as np
 import pytest
+from beeps import heard, write_beeps
 from running_site import CAMERAS, PATIENCE_S, RunningSite, bounded, configuration, running
 from spliced import FPS, pictures
 
@@ -26,7 +27,8 @@ pytestmark = [
 async def site(recording: Path, tmp_path: Path) -> AsyncIterator[RunningSite]:
     """A site that records into segments of two seconds, with people in sight."""
     record = {"folder": str(tmp_path / "kept"), "segment_s": 2.0}
-    config = configuration(tmp_path, recording, camera={"at_end": "loop"}, record=record)
+    sound = {"source": str(write_beeps(tmp_path / "beeps.wav")), "at_end": "loop"}
+    config = configuration(tmp_path, recording, camera={"at_end": "loop"}, record=record, sound=sound)
     async with running(config) as site:
         await site.until(lambda: bool(site.gops and site.gops[-1].choices), "somebody is shown")
         yield site
@@ -65,6 +67,7 @@ async def by_its_address_it_is_what_the_cameras_showed(site: RunningSite, folder
     end = site.pulse - FPS
     async with aiohttp.ClientSession(site.url) as session:
         shown = await downloaded(session, f"/objects/{number}/best.mp4?from=p{start}&to=p{end}", folder)
+        it_beeps_every_second_without_a_hole(folder / "downloaded.mp4")
         cameras = {
             camera: await downloaded(session, f"/cameras/{camera}/live.mp4?from=p{start}&to=p{end}", folder)
             for camera in CAMERAS
@@ -79,6 +82,13 @@ async def by_its_address_it_is_what_the_cameras_showed(site: RunningSite, folder
         camera = chosen.get(pulse)
         if camera is not None and pulse in cameras[camera]:
             np.testing.assert_array_equal(picture, cameras[camera][pulse], f"{pulse}: {camera}")
+
+
+def it_beeps_every_second_without_a_hole(film: Path) -> None:
+    times, beeps = heard(film)
+    assert np.diff(times) == pytest.approx(1 / 48_000, abs=1e-4)
+    assert len(beeps) >= 2
+    assert [it - round(it) for it in beeps] == pytest.approx([0] * len(beeps), abs=0.04)
 
 
 async def downloaded(session: aiohttp.ClientSession, path: str, folder: Path) -> dict[int, np.ndarray]:
