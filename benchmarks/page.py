@@ -85,7 +85,7 @@ async def _switch(page: Page, turn: int) -> list[float]:
     if not others:
         return []
     number = others[turn % len(others)]
-    card = page.locator(f"#people li[data-object='{number}'] button")
+    card = page.locator(f"#people li[data-object='{number}'] .person")
     if not await card.count():
         return []
     await card.click()

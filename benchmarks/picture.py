@@ -128,7 +128,7 @@ async def _best_picture(page: Page) -> bytes:
     for _ in range(_MOMENTS):
         rated = await page.evaluate(_RATED)
         if rated:
-            await page.click(f"#people li[data-object='{rated[0]['object']}'] button")
+            await page.click(f"#people li[data-object='{rated[0]['object']}'] .person")
         await page.mouse.move(0, 0)  # nothing is to be lit up under it
         await page.evaluate("document.activeElement.blur(), scrollTo(0, 0)")
         await asyncio.sleep(_LANDED_S)

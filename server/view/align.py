@@ -39,9 +39,9 @@ class _Place:
 class Aligner:
     """Collects the cameras' messages by epoch. It has no clock: it is told which pulse it is.
 
-    ``grace`` is how many pulses a camera that is there is waited for, after an epoch's end and after the first of
-    them has spoken. While none has, each of them is ``behind``: so many pulses more are waited for the first.
-    Who knew nothing of anybody could only go on with nobody.
+    ``grace`` is how many pulses a camera that is there is waited for, after an epoch's end and the first
+    word on it. While none has, they are all ``behind``: the first is waited for so many pulses more.
+    Without any of them it could only go on with nobody.
     """
 
     def __init__(self, cameras: Sequence[str], stride: int, grace: int, behind: int = 0) -> None:
