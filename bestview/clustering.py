@@ -9,9 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bestview.likelihood import CameraLooks, LookWeights, distance_of
+from bestview.ranges import pairs_within
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+
+_SOME = 10_000
+"""Pairs whose looks are compared at once: all those of a crowd would be hundreds of megabytes."""
 
 
 def cluster(
@@ -81,6 +85,23 @@ class _Looks:
             for at, row in enumerate(camera.rows.tolist(), first):
                 self._of[row][number] = at
 
+    def add_all(self, to: Floats) -> None:
+        """Add to (N, N) what looks say about all rows; before any of them were merged."""
+        camera = np.repeat(np.arange(len(self._camera)), [rows.size for rows in self._camera])
+        one, two = pairs_within(camera)
+        for some in (slice(start, start + _SOME) for start in range(0, one.size, _SOME)):
+            told = self._evidence(one[some], two[some])
+            a, b = self._group[one[some]], self._group[two[some]]
+            np.add.at(to, (a, b), told)
+            np.add.at(to, (b, a), told)
+
+    def _evidence(self, one: Ints, two: Ints) -> Floats:
+        """Evidence of (P,) pairs of looks, each in one camera."""
+        distance = distance_of(np.einsum("ij,ij->i", self._root[one], self._root[two]))
+        told = self._weights.told(distance, self._slope[one], self._middle[one])
+        # Who was merged away has no frames, and so no evidence.
+        return told * self._weights.known(self._count[one], self._count[two])
+
     def add_evidence(self, row: int, to: Floats) -> None:
         """Add to (N,) what looks say about a group and all others."""
         mine = self._of[row]
@@ -88,11 +109,7 @@ class _Looks:
             return
         others = np.concatenate([self._camera[number] for number in mine])
         own = np.repeat(list(mine.values()), [self._camera[number].size for number in mine])
-        distance = distance_of(np.einsum("ij,ij->i", self._root[others], self._root[own]))
-        known = self._weights.known(self._count[own], self._count[others])
-        # Who was merged away has no frames, and so no evidence.
-        told = self._weights.told(distance, self._slope[others], self._middle[others]) * known
-        to += np.bincount(self._group[others], told, to.size)
+        to += np.bincount(self._group[others], self._evidence(others, own), to.size)
 
     def merge(self, keep: int, lose: int) -> None:
         """Give one group's looks to another."""
@@ -140,8 +157,7 @@ class _Groups:
         self._looks = _Looks(looks, count, weights)
         self.label = np.arange(count)
         self._value = self._evidence.copy()
-        for camera in looks:
-            self._value[np.ix_(camera.rows, camera.rows)] += camera.every(weights)
+        self._looks.add_all(self._value)
         self._value[self._apart | ~self._linked | (self._past[:, None] & self._past)] = -np.inf
         self.best = self._value.max(axis=1, initial=-np.inf)
         self.at = self._value.argmax(axis=1) if count else np.zeros(0, dtype=np.int64)

@@ -6,9 +6,10 @@ or comes back after a while unseen, begins a new episode: who it is, is asked an
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,13 +80,13 @@ class Episode:
         """The number it was told most often, 0 before the first; of equals the lowest."""
         return max(sorted(self.told), key=self.told.__getitem__, default=0)
 
-    def sight(self, frame: int, *, crowded: bool) -> None:
-        """Count a sighting, in a crowd or not."""
-        self.frames += 1
-        self.free += not crowded
-        self.crowd = self.crowd + 1 if crowded else 0
+    def sight(self, frames: range, *, crowded: bool) -> None:
+        """Count sightings one after the other, all in a crowd or none."""
+        self.frames += len(frames)
+        self.free += 0 if crowded else len(frames)
+        self.crowd = self.crowd + len(frames) if crowded else 0
         if not self.firm:
-            self.untold.append(frame)
+            self.untold.extend(frames)
 
     def tell(self, upto: int) -> bool:
         """Count the frames up to `upto` as told by today's number; say whether any was."""
@@ -130,26 +131,22 @@ class Episodes:
             that it is settled to be, 0: it is not.
         """
         rows, firm = np.full(seen.visible.shape, -1), np.zeros(seen.visible.shape, dtype=np.int64)
-        crowds = seen.crowded(self._settings.crowd).tolist()
-        for track, (key, visible) in enumerate(zip(seen.keys, seen.visible.tolist(), strict=True)):
-            crowded = crowds[track]
-            ends = {look.last - seen.first: look for look in looks.get(key, ())}
-            episode, row, last = self._current.get(key), -1, -1
-            if episode is not None:
-                row, last = self._row.get(episode.key, -1), episode.end.frame
-            for column in (column for column, there in enumerate(visible) if there):
-                frame = seen.first + column
-                if episode is None or self._ends(episode, frame - last, crowded=crowded[column]):
-                    # Only here and at last: where it ends meanwhile nobody asks.
-                    _end_at(episode, seen, track, last)
-                    episode, row = self._begin(key, _end(seen, track, column), episode), len(self.open) - 1
-                last = frame
-                episode.sight(frame, crowded=crowded[column])
-                rows[track, column], firm[track, column] = row, episode.firm
-                look = ends.get(column)
-                if look is not None and not any(crowded[look.first - seen.first : column + 1]):
-                    episode.looks.add(key.camera, Look.of(look.histogram, look.last - look.first + 1))
-            _end_at(episode, seen, track, last)
+        crowded = seen.crowded(self._settings.crowd)
+        # Where this is 0, a run of one frame is as good as a longer one.
+        whole = min(self._settings.crowd_frames, self._settings.gap) > 0
+        for run in _runs(seen.visible, crowded, whole=whole):
+            key = seen.keys[run.track]
+            episode, frame = self._current.get(key), seen.first + run.start
+            if episode is None or self._ends(episode, frame, crowded=run.crowded):
+                episode = self._begin(key, _end(seen, run.track, run.start), episode)
+            episode.sight(range(frame, seen.first + run.stop), crowded=run.crowded)
+            episode.end = _end(seen, run.track, run.stop - 1)
+            rows[run.track, run.start : run.stop] = self._row.get(episode.key, -1)
+            firm[run.track, run.start : run.stop] = episode.firm
+            for look in looks.get(key, ()):
+                first, last = look.first - seen.first, look.last - seen.first
+                if run.start <= last < run.stop and not crowded[run.track, first : last + 1].any():
+                    episode.looks.add(key.camera, Look.of(look.histogram, last - first + 1))
         return rows, firm
 
     def _begin(self, key: TrackKey, at: End, before: Episode | None) -> Episode:
@@ -161,8 +158,8 @@ class Episodes:
         self.open.append(episode)
         return episode
 
-    def _ends(self, episode: Episode, unseen: int, *, crowded: bool) -> bool:
-        """Say whether a sighting, so many frames after the last one, begins a new episode.
+    def _ends(self, episode: Episode, frame: int, *, crowded: bool) -> bool:
+        """Say whether a sighting in `frame` begins a new episode.
 
         Where nothing is known of how somebody looks there is nothing to ask by: the tracker is believed.
         """
@@ -170,7 +167,7 @@ class Episodes:
             return False
         settings = self._settings
         out_of_crowd = not crowded and episode.crowd >= settings.crowd_frames and episode.free >= _ROOTED
-        return out_of_crowd or unseen > settings.gap
+        return out_of_crowd or frame - episode.end.frame > settings.gap
 
     def told_anew(self, lost: int, kept: int) -> None:
         """Take over that two numbers turned out to be one person's."""
@@ -221,7 +218,27 @@ def _end(seen: Sightings, track: int, column: int) -> End:
     return End(seen.first + column, seen.boxes[track, column].copy(), seen.ground[track, column].copy())
 
 
-def _end_at(episode: Episode | None, seen: Sightings, track: int, frame: int) -> None:
-    """Let an episode end with its last sighting, if that is of this update."""
-    if episode is not None and frame >= seen.first:
-        episode.end = _end(seen, track, frame - seen.first)
+class _Run(NamedTuple):
+    """Consecutive sightings of a track, from column `start` on, all in a crowd or none."""
+
+    track: int
+    start: int
+    stop: int
+    crowded: bool
+
+
+def _runs(visible: NDArray[np.bool_], crowded: NDArray[np.bool_], *, whole: bool) -> Iterator[_Run]:
+    """Part the sightings, (T, W) which and whether in a crowd: only the first of a run can begin an episode.
+
+    `whole`: runs are as long as can be; else each is one frame.
+    """
+    kind = np.where(visible, 1 + crowded, 0)
+    kind = np.pad(kind, ((0, 0), (1, 1)))
+    change = (kind[:, 1:] != kind[:, :-1]) | (not whole)
+    track, start = np.nonzero(change[:, :-1] & visible)
+    # As many end as begin, in the same order.
+    _, stop = np.nonzero(change[:, 1:] & visible)
+    for run in zip(
+        track.tolist(), start.tolist(), (stop + 1).tolist(), crowded[track, start].tolist(), strict=True
+    ):
+        yield _Run(*run)

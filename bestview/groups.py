@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +14,9 @@ from bestview.looks import Looks
 from bestview.persons import Person
 
 
-@dataclass(slots=True, eq=False)
+@dataclass(eq=False)
 class Group:
-    """One person, as far as can be told now.
+    """One person, as far as can be told now; complete before it is asked anything.
 
     Attributes:
         rows: of the tables.
@@ -44,7 +45,7 @@ class Group:
         """Frame of the last one."""
         return max([*(it.end.frame for it in self.episodes), *(it.last for it in self.past)])
 
-    @property
+    @cached_property
     def cameras(self) -> set[str]:
         """Those that see the person, or have."""
         seen = {episode.key.camera for episode in self.episodes}
@@ -52,7 +53,7 @@ class Group:
             *(it.looks.by_camera for it in self.episodes), *(it.looks.by_camera for it in self.past)
         )
 
-    @property
+    @cached_property
     def looks(self) -> Looks:
         """Of all that is in the group."""
         looks = Looks()

@@ -61,16 +61,14 @@ class Standing:
     Attributes:
         row: (L,) rising.
         camera: (L,) number of the track's camera.
-        place: (L, W, 2) ground units, NaN where it stands nowhere.
-        spread: (L, W, 3) of its covariance xx, xy, yy.
+        where: (5, L, W) place x, y and its covariance xx, xy, yy, ground units; NaN where it stands nowhere.
         rows: (S,) of each sighting.
         frames: (S,) likewise, the number of the frame.
     """
 
     row: Ints
     camera: Ints
-    place: Floats
-    spread: Floats
+    where: Floats
     rows: Ints
     frames: Ints
 
@@ -81,17 +79,16 @@ class Standing:
         track, frame = np.nonzero(known & (rows >= 0))
         code = rows[track, frame] * max(len(rows), 1) + track
         code, first, line = np.unique(code, return_index=True, return_inverse=True)
-        place = np.full((code.size, rows.shape[1], 2), np.nan)
-        spread = np.full((code.size, rows.shape[1], 3), np.nan)
-        place[line, frame] = seen.ground[track, frame]
-        spread[line, frame] = seen.spread[track, frame][:, [0, 0, 1], [0, 1, 1]]
+        where = np.full((5, code.size, rows.shape[1]), np.nan)
+        where[:2, line, frame] = seen.ground[track, frame].T
+        where[2:, line, frame] = seen.spread[track, frame][:, [0, 0, 1], [0, 1, 1]].T
         row = rows[track, frame]
-        return cls(row[first], camera[track[first]], place, spread, row, seen.first + frame)
+        return cls(row[first], camera[track[first]], where, row, seen.first + frame)
 
     def scores(self, one: Ints, two: Ints, gate: float) -> Floats:
         """Score (P,) pairs of lines in each frame: (P, W); NaN where not both stand somewhere."""
-        x, y = np.moveaxis(self.place[one] - self.place[two], -1, 0)
-        xx, xy, yy = np.moveaxis(self.spread[one] + self.spread[two], -1, 0)
+        x, y = self.where[:2, one] - self.where[:2, two]
+        xx, xy, yy = self.where[2:, one] + self.where[2:, two]
         xx, yy = xx + gate**2, yy + gate**2
         # Squared length of (x, y) in the metric of the inverse covariance, the 2x2 inverse written out.
         squared = (yy * x * x - 2.0 * xy * x * y + xx * y * y) / (xx * yy - xy * xy)
@@ -99,13 +96,13 @@ class Standing:
 
     def close(self, gate: float) -> tuple[Ints, Ints]:
         """Give the pairs of lines that might score more than the least: (P,) and (P,), the lower first."""
-        xx, xy, yy = np.moveaxis(self.spread, -1, 0)
+        xx, xy, yy = self.where[2:]
         longest = (xx + yy) / 2.0 + np.hypot((xx - yy) / 2.0, xy)
         # D^2 is at least the squared distance over gate^2 and both longest variances together.
-        reach = np.sqrt((1.0 - WORST) * (longest + gate**2 / 2.0) * _SLACK)[..., None]
-        low = np.fmin.reduce(self.place - reach, axis=1, initial=np.nan)
-        high = np.fmax.reduce(self.place + reach, axis=1, initial=np.nan)
-        return overlapping(low, high)
+        reach = np.sqrt((1.0 - WORST) * (longest + gate**2 / 2.0) * _SLACK)
+        low = np.fmin.reduce(self.where[:2] - reach, axis=-1, initial=np.nan)
+        high = np.fmax.reduce(self.where[:2] + reach, axis=-1, initial=np.nan)
+        return overlapping(low.T, high.T)
 
 
 def near(stands: Standing, gate: float, open_rows: int, met: tuple[Ints, Ints], rows: int) -> Nearness:
