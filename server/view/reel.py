@@ -12,8 +12,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import takewhile
 
-from server.view.fmp4 import Sample, still
 from server.view.footage import Footage
+from server.view.part import Part, standing_for
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,35 +38,6 @@ def plan(fps: float, gop: int, segment_s: float, window_s: float) -> Plan:
     """Plan segments of as many whole GOPs as fit, at least one, and a window of at least three of them."""
     frames = gop * max(1, int(segment_s * fps / gop + 1e-9))
     return Plan(fps, gop, frames, max(3, -(-int(window_s * fps) // frames)))
-
-
-@dataclass(frozen=True)
-class Part:
-    """One GOP of a segment. ``lead`` is what stands if nothing has been shown in the segment yet."""
-
-    segment: int
-    footage: Footage
-    lead: Footage | None
-    fps: float
-
-    @property
-    def independent(self) -> bool:
-        """Whether it can be decoded without the parts before."""
-        return self.footage.start or self.lead is not None
-
-    @property
-    def data(self) -> bytes:
-        """The part as fragments of MP4."""
-        shown = self.footage
-        if self.lead is None:
-            return shown.with_sound
-        return shown.sound + _standing(self.lead, shown.first, shown.until, self.fps)
-
-
-def _standing(lead: Footage, first: int, until: int, fps: float) -> bytes:
-    """Show the lead's last picture for some pulses: what it is decoded by passes within a few ticks."""
-    samples = [Sample(picture.sample, picture.key) for picture in lead.pictures]
-    return still(samples, first, until, fps)
 
 
 class Segment:
@@ -106,7 +77,7 @@ class Segment:
         heard = b"".join(it.sound for it in standing)
         if not standing:
             return rest
-        return heard + _standing(self._lead, self.first, standing[-1].until, self._plan.fps) + rest
+        return heard + standing_for(self._lead, self.first, standing[-1].until, self._plan.fps) + rest
 
     @property
     def parts(self) -> Sequence[Part]:
@@ -129,7 +100,8 @@ class Reel:
         self.ended = False
         self._segments: dict[int, Segment] = {}
         self._lead: Footage | None = None
-        self._grown = asyncio.Event()
+        self._grown: asyncio.Event | None = None
+        """What somebody waits for; None: nobody does."""
         self.until = 0
         """The first pulse that is not here yet."""
 
@@ -160,11 +132,14 @@ class Reel:
         self._tell()
 
     def _tell(self) -> None:
-        self._grown.set()
-        self._grown = asyncio.Event()
+        if self._grown is not None:
+            self._grown.set()
+            self._grown = None
 
     async def more(self) -> None:
         """Wait until there is more, or the end."""
+        if self._grown is None:
+            self._grown = asyncio.Event()
         await self._grown.wait()
 
     @property

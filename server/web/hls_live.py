@@ -10,7 +10,8 @@ import asyncio
 
 from aiohttp import web
 
-from server.view.reel import Part, Reel, Segment
+from server.view.part import Part
+from server.view.reel import Reel, Segment
 from server.web.api import not_now, problem
 from server.web.hls_playlist import Listed, ListedPart, part_name, playlist, playlist_answer
 

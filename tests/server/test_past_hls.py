@@ -18,7 +18,9 @@ from halls import A, B, Hall, opened
 from recorded_by_hand import PULSE0, Picture, own_pictures
 from sounds_by_hand import FRAMES as SOUNDING
 from sounds_by_hand import heard, sends, write_flashes
+from test_players import HLS_BY_ITSELF
 
+from benchmarks.browser import CHROMIUM, chromium
 from server.view.decide import GopDecision, ObjectChoice
 from server.wire.messages import GopChoices
 
@@ -232,3 +234,15 @@ async def test_ffmpeg_plays_the_past_with_its_sound_to_the_end(tmp_path: Path) -
         assert times[-1] == pytest.approx(SOUNDING / FPS, abs=0.03)
         with av.open(str(out)) as container:
             assert sum(1 for _ in container.decode(video=0)) == SOUNDING
+
+
+@pytest.mark.skipif(not CHROMIUM.exists(), reason=f"needs a Chromium at {CHROMIUM}")
+async def test_chromium_plays_the_past_to_its_end(hall: Hall) -> None:
+    shows(hall, range(20))
+    async with chromium() as browser:
+        page = await browser.new_page(bypass_csp=True)
+        await page.goto(f"http://127.0.0.1:{hall.port}/healthz")
+        seen = await page.evaluate(HLS_BY_ITSELF, "/objects/1/hls/index.m3u8?from=-2.4&to=-0.4")
+    if seen is None:
+        pytest.skip("this Chromium plays no HLS by itself")
+    assert seen == {"end": "ended", "seconds": pytest.approx(2.0, abs=0.05)}
