@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Literal
 
 from server.view.bridge import Bridge, H264Bridge
 from server.view.fmp4 import Sample, fragment, init_segment, rebased, ticks
+from server.view.picture import Picture
 from server.view.skip import UnfitError, continuing
 from server.wire.h264 import ParameterSets, nal_units, parameter_sets, sample
 from server.wire.sections import Site
@@ -47,16 +49,18 @@ class Agreement:
         elif found != self.parameters:
             raise ParameterMismatchError("its H.264 parameter sets differ from the other cameras'")
 
-    def pack(self, access_unit: bytes, pulse: int, fps: float, *, key: bool) -> bytes:
-        """Give a frame as a fragment, which fits into any stream of the site.
+    def accept(self, key: bytes) -> ParameterSets | None:
+        """Look at a camera's key frame; give the parameter sets up to the next, where they are its own.
 
         Raises:
-            ParameterMismatchError: its parameter sets are not the site's, and the camera must be refused.
+            ParameterMismatchError: it is not of the site, and the camera must be refused.
         """
-        units = nal_units(access_unit)
-        if key:
-            self.check(parameter_sets(units))
-        return fragment([Sample(sample(units), key)], pulse, fps)
+        self.check(parameter_sets(nal_units(key)))
+        return None
+
+    def pack(self, access_unit: bytes, pulse: int, fps: float, *, key: bool) -> bytes:
+        """Give a frame as a fragment, which fits into any stream of the site."""
+        return fragment([Sample(sample(nal_units(access_unit)), key)], pulse, fps)
 
     def head(
         self, site: Site, sound: SoundFormat | None = None, *, pulses: int | None = None
@@ -74,11 +78,39 @@ class Agreement:
         """Give a fragment as it is in a stream that has this pulse at time 0."""
         return rebased(fragment, -ticks(origin, fps))
 
-    def bridge(self, fps: float) -> Bridge | None:
-        """Give what bridges holes; None where it is not known how."""
+    def bridge(self, newest: Picture, fps: float) -> Bridge | None:
+        """Give what bridges holes after a picture; None where it is not known how."""
+        del newest
+        return None if self.parameters is None else bridge_by(self.parameters, fps)
+
+
+class OwnParameters(Agreement):
+    """The same, but cameras may have parameter sets of their own, which their key frames carry."""
+
+    def accept(self, key: bytes) -> ParameterSets:
+        """Take a camera's parameter sets for its own.
+
+        Raises:
+            ParameterMismatchError: it has none.
+        """
+        found = parameter_sets(nal_units(key))
+        if found is None:
+            raise ParameterMismatchError("a key frame without parameter sets")
         if self.parameters is None:
+            self.parameters = replace(found, may_change=True)
+        return found
+
+    def bridge(self, newest: Picture, fps: float) -> Bridge | None:
+        """Give what bridges holes after a picture, by that picture's own parameter sets."""
+        if newest.parameters is None:
             return None
-        try:
-            return H264Bridge(continuing(self.parameters), fps)
-        except UnfitError:
-            return None
+        bridge = bridge_by(newest.parameters, fps)
+        return None if bridge is None else replace(bridge, parameters=newest.parameters)
+
+
+def bridge_by(parameters: ParameterSets, fps: float) -> H264Bridge | None:
+    """Give what bridges holes in a stream of these parameter sets; None where it is not known how."""
+    try:
+        return H264Bridge(continuing(parameters), fps)
+    except UnfitError:
+        return None

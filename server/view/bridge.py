@@ -9,6 +9,7 @@ from typing import Protocol
 from server.view.fmp4 import Sample, fragment
 from server.view.picture import Picture
 from server.view.skip import Continuing
+from server.wire.h264 import ParameterSets
 
 Span = tuple[int, int]
 """A pulse, and for how many a picture is shown."""
@@ -41,6 +42,8 @@ class H264Bridge:
 
     how: Continuing
     fps: float
+    parameters: ParameterSets | None = None
+    """As of :class:`Picture`."""
 
     def after(self, newest: Picture, spans: Sequence[Span]) -> list[Picture]:
         """Count on from the newest picture."""
@@ -63,4 +66,6 @@ class H264Bridge:
     def _made(self, data: bytes, span: Span) -> Picture:
         pulse, lasts = span
         made = fragment([Sample(data, key=False, lasts=lasts)], pulse, self.fps)
-        return Picture(pulse, key=False, fragment=made, boot=NO_CAMERAS, lasts=lasts)
+        return Picture(
+            pulse, key=False, fragment=made, boot=NO_CAMERAS, lasts=lasts, parameters=self.parameters
+        )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from server.view.agreement import Agreement
+from server.view.agreement import Agreement, OwnParameters
 from server.view.vp8 import Vp8Agreement
 from server.wire.config import Config
 
@@ -11,4 +11,4 @@ def agreement_for(config: Config) -> Agreement:
     """Give what all streams of a site are made of, before any picture has come."""
     if config.encode.codec == "vp8":
         return Vp8Agreement(config.site.width, config.site.height)
-    return Agreement()
+    return OwnParameters() if config.encode.parameters == "own" else Agreement()

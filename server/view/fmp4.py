@@ -68,7 +68,7 @@ def init_segment(
                         box("dinf", full("dref", 0, 0, struct.pack(">I", 1) + full("url ", 0, 1, b""))),
                         box(
                             "stbl",
-                            full("stsd", 0, 0, struct.pack(">I", 1) + _avc1(parameters, width, height)),
+                            full("stsd", 0, 0, struct.pack(">I", 1) + _entry(parameters, width, height)),
                             full("stts", 0, 0, bytes(4)),
                             full("stsc", 0, 0, bytes(4)),
                             full("stsz", 0, 0, bytes(8)),
@@ -117,14 +117,14 @@ def _fragment(samples: Sequence[Sample], first: int, edges: Sequence[int]) -> by
     return box("moof", header, box("traf", track, run)) + box("mdat", *(s.data for s in samples))
 
 
-def _avc1(parameters: ParameterSets, width: int, height: int) -> bytes:
+def _entry(parameters: ParameterSets, width: int, height: int) -> bytes:
     sps, pps = parameters.sps, parameters.pps
     configuration = (
         b"\x01" + sps[1:4] + b"\xff\xe1" + struct.pack(">H", len(sps)) + sps
         + b"\x01" + struct.pack(">H", len(pps)) + pps
     )  # fmt: skip
     return box(
-        "avc1",
+        parameters.entry,
         bytes(6) + struct.pack(">H", 1) + bytes(16) + struct.pack(">2H", width, height)
         + struct.pack(">2I", 0x480000, 0x480000) + bytes(4) + struct.pack(">H", 1) + bytes(32)
         + struct.pack(">Hh", 24, -1),

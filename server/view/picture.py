@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from server.view.fmp4 import sample_of
+from server.wire.h264 import ParameterSets
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,6 +20,8 @@ class Picture:
     """Which run of the camera's process it is from; pictures of two runs do not build on each other."""
     lasts: int = 1
     """Pulses that it is shown for."""
+    parameters: ParameterSets | None = None
+    """Those that it is decoded by, if they are not the same in all streams of the site."""
 
     @property
     def until(self) -> int:

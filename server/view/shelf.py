@@ -6,6 +6,7 @@ from typing import TypeAlias
 
 from server.view.agreement import Agreement
 from server.view.picture import Picture
+from server.wire.h264 import ParameterSets
 
 Shelved: TypeAlias = Picture
 """One frame, ready to be sent to anybody."""
@@ -22,6 +23,7 @@ class Shelf:
         self._frames = frames
         self._agreement = agreement
         self._shelved: dict[int, Shelved] = {}
+        self._parameters: ParameterSets | None = None
         self.newest = -1
 
     def put(self, pulse: int, boot: int, access_unit: bytes, *, key: bool) -> Shelved:
@@ -30,8 +32,10 @@ class Shelf:
         Raises:
             ParameterMismatchError: its parameters are not the site's, and the camera must be refused.
         """
+        if key:
+            self._parameters = self._agreement.accept(access_unit)
         made = self._agreement.pack(access_unit, pulse, self._fps, key=key)
-        shelved = Shelved(pulse, key, made, boot)
+        shelved = Shelved(pulse, key, made, boot, parameters=self._parameters)
         self._shelved[pulse] = shelved
         self.newest = max(self.newest, pulse)
         while len(self._shelved) > self._frames:

@@ -8,6 +8,7 @@ ordinary stream.
 from __future__ import annotations
 
 from server.view.agreement import Agreement
+from server.view.bridge import Bridge
 from server.view.picture import Picture
 
 _LONG_S = 2
@@ -56,7 +57,7 @@ class Timeline:
 
     def fill(self, until: int) -> list[Picture]:
         """Give what repeats the last picture up to a pulse; nothing before the first picture."""
-        bridge, missing = self._agreement.bridge(self._fps), until - self._until
+        bridge, missing = self._bridge(), until - self._until
         if bridge is None or self._newest is None or not 0 < missing <= LONGEST_S * self._fps:
             return []
         each = 1 if missing <= _LONG_S * self._fps else missing
@@ -74,12 +75,12 @@ class Timeline:
             return []
         if picture.key:
             return self.fill(picture.pulse)
-        bridge = self._agreement.bridge(self._fps)
+        bridge = self._bridge()
         return [] if bridge is None else bridge.before(picture, (self._until, picture.pulse - self._until))
 
     def _lost_before(self, picture: Picture) -> bool:
         """Tell whether something is missing that a picture is decoded by."""
-        bridge, newest = self._agreement.bridge(self._fps), self._newest
+        bridge, newest = self._bridge(), self._newest
         if bridge is None or newest is None:
             return False
         if (
@@ -92,3 +93,6 @@ class Timeline:
 
     def _begins_anew(self, picture: Picture) -> bool:
         return picture.key and picture.pulse < self._until - _ANEW_S * self._fps
+
+    def _bridge(self) -> Bridge | None:
+        return None if self._newest is None else self._agreement.bridge(self._newest, self._fps)

@@ -34,14 +34,17 @@ class Vp8Agreement(Agreement):
         """The codec string that browsers know."""
         return "vp8"
 
-    def pack(self, access_unit: bytes, pulse: int, fps: float, *, key: bool) -> bytes:
-        """Give a frame as a cluster, which fits into any stream of the site.
+    def accept(self, key: bytes) -> None:
+        """Look at a key frame.
 
         Raises:
-            ParameterMismatchError: a key frame is not of VP8, or not of the site's size.
+            ParameterMismatchError: it is not of VP8, or not of the site's size.
         """
-        if key and size_of(access_unit) != self._size:
+        if size_of(key) != self._size:
             raise ParameterMismatchError("its pictures are not VP8 of the site's size")
+
+    def pack(self, access_unit: bytes, pulse: int, fps: float, *, key: bool) -> bytes:
+        """Give a frame as a cluster, which fits into any stream of the site."""
         return cluster(access_unit, pulse, fps, key=key)
 
     def head(self, site: Site, sound: SoundFormat | None = None, *, pulses: int | None = None) -> bytes:
@@ -53,8 +56,9 @@ class Vp8Agreement(Agreement):
         """Give a cluster as it is in a stream that has this pulse at time 0."""
         return rebased(fragment, -ticks(origin, fps))
 
-    def bridge(self, fps: float) -> Bridge:
-        """Give what bridges holes."""
+    def bridge(self, newest: Picture, fps: float) -> Bridge:
+        """Give what bridges holes, whatever is before them."""
+        del newest
         return Vp8Bridge(repeat(*self._size), fps)
 
 

@@ -19,15 +19,22 @@ _SPS_MIN_BYTES = 4
 
 @dataclass(frozen=True, slots=True)
 class ParameterSets:
-    """What a decoder must know before the first picture; equal in all cameras that are spliced."""
+    """What a decoder must know before the first picture."""
 
     sps: bytes
     pps: bytes
+    may_change: bool = False
+    """A stream that begins with these may go on with others, which stand in its key pictures."""
+
+    @property
+    def entry(self) -> str:
+        """The kind of sample entry in MP4: avc3 if they may change (ISO/IEC 14496-15, 5.4.2.1.2)."""
+        return "avc3" if self.may_change else "avc1"
 
     @property
     def codec(self) -> str:
         """The codec string of RFC 6381, e.g. ``avc1.42C01E``."""
-        return f"avc1.{self.sps[1:4].hex().upper()}"
+        return f"{self.entry}.{self.sps[1:4].hex().upper()}"
 
 
 def nal_units(access_unit: bytes) -> list[bytes]:

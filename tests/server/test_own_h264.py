@@ -208,6 +208,13 @@ def test_where_all_cameras_pass_their_parameter_sets_are_their_own(tmp_path: Pat
     pipeline.close()
 
 
+def test_where_each_camera_may_have_its_own_parameter_sets_any_fit(tmp_path: Path) -> None:
+    encode = {"crf": 30, "parameters": "own"}
+    pipeline = CameraPipeline(site(written(tmp_path, "mp4"), encode=encode), "c0")
+    assert pipeline.passes
+    pipeline.close()
+
+
 def test_images_do_not_fit_and_vp8_sites_have_no_such_thing(tmp_path: Path) -> None:
     pipeline = CameraPipeline(site("scene:room", "auto"), "c0")
     assert "single images" in pipeline.why_encoded

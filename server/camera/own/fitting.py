@@ -35,7 +35,8 @@ def wanted_by(config: Config) -> Wanted:
     """Say what a site wants."""
     site = config.site
     parameters = None
-    if any(camera.h264 != "pass" for camera in config.cameras):
+    encoding = any(camera.h264 != "pass" for camera in config.cameras)
+    if encoding and config.encode.parameters == "equal":
         blank = np.zeros((site.height, site.width, 3), dtype=np.uint8)
         first = Encoder(site, config.encode).encode(0, blank)
         parameters = parameter_sets(nal_units(first.data))

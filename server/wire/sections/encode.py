@@ -10,7 +10,7 @@ from server.wire.sections.base import Section
 
 
 class Encode(Section):
-    """Identical in all cameras: that is what makes cutting without re-encoding possible."""
+    """Identical in all cameras that encode: that is what makes cutting without re-encoding possible."""
 
     codec: Literal["h264", "vp8"] = "h264"
     """H.264 by x264 in MP4, or VP8 by libvpx in WebM: free of patents' and of the GPL's terms."""
@@ -21,6 +21,8 @@ class Encode(Section):
     preset: Literal["ultrafast", "superfast", "veryfast", "faster", "fast", "medium"] = "ultrafast"
     max_kbps: Annotated[int, Field(ge=16)] | None = None
     """Kilobits that a camera's pictures take in any second at most; None: as many as the quality wants."""
+    parameters: Literal["equal", "own"] = "equal"
+    """Those of H.264 (SPS, PPS): the same in all cameras; or cameras that pass theirs on have their own."""
     quantizer: Annotated[int, Field(ge=0, le=63)] = 16
     """VP8's constant quality, instead of crf: smaller is better and larger; 8 to 32 is sensible."""
     speed: Annotated[int, Field(ge=1, le=16)] = 10

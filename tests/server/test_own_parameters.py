@@ -1,0 +1,201 @@
+"""Cameras with parameter sets of their own: a cut from one to the other is right, and so is what bridges."""
+
+from __future__ import annotations
+
+import asyncio
+import io
+import shutil
+import subprocess
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import av
+import numpy as np
+import pytest
+from cameras_by_hand import FPS, GOP, HEIGHT, NO_REASON, WIDTH, small_config
+from halls import A, B, Hall, opened
+from numpy.typing import NDArray
+
+from benchmarks.browser import CHROMIUM, chromium
+from server.camera.encode import AccessUnit, Encoder
+from server.view.agreement import ParameterMismatchError
+from server.view.channel import Piece
+from server.view.codec import agreement_for
+from server.view.decide import GopDecision, ObjectChoice
+from server.view.footage import Footage
+from server.view.shelf import Shelf
+from server.view.splice import Splicer
+from server.wire.config import Config
+from server.wire.h264 import nal_units, parameter_sets
+from server.wire.sections import Encode, Site
+
+GOPS = 12
+OWN = {"encode": {"parameters": "own"}}
+MAKES: dict[str, dict[str, Any]] = {A: {"preset": "ultrafast"}, B: {"preset": "medium", "crf": 30}}
+"""CAVLC without and CABAC with the rest of profile High: as different as two makes."""
+MISSING = {(B, 3), (A, 6), (A, 7), (B, 10)}
+"""GOPs that do not come."""
+
+
+@cache
+def sent(camera: str) -> tuple[AccessUnit, ...]:
+    encoder = Encoder(Site(width=WIDTH, height=HEIGHT, fps=FPS), Encode(gop=GOP, **MAKES[camera]))
+    rng = np.random.default_rng(sum(camera.encode()))
+    coarse = rng.integers(0, 255, (GOPS * GOP, HEIGHT // 8, WIDTH // 8, 3), dtype=np.uint8)
+    return tuple(
+        encoder.encode(pulse, picture.repeat(8, axis=0).repeat(8, axis=1))
+        for pulse, picture in enumerate(coarse)
+    )
+
+
+def alone(camera: str) -> list[NDArray[np.uint8]]:
+    decoder = av.CodecContext.create("h264", "r")
+    packets = [*(av.Packet(unit.data) for unit in sent(camera)), None]
+    return [it.to_ndarray(format="yuv420p") for packet in packets for it in decoder.decode(packet)]
+
+
+def shown(gop: int) -> tuple[str, int]:
+    """Say whose picture is shown: of which camera, and of which GOP."""
+    camera = (A, B)[gop % 2]
+    return (camera, gop) if (camera, gop) not in MISSING else shown(gop - 1)
+
+
+def expected() -> list[NDArray[np.uint8]]:
+    """Give what is to be seen: where a GOP does not come, the last picture before it."""
+    own, seen = {camera: alone(camera) for camera in MAKES}, []
+    for gop in range(GOPS):
+        camera, real = shown(gop)
+        seen += [own[camera][gop * GOP + n] if real == gop else seen[-1] for n in range(GOP)]
+    return seen
+
+
+def put(shelves: dict[str, Shelf]) -> None:
+    for camera, shelf in shelves.items():
+        for unit in sent(camera):
+            if (camera, unit.pulse // GOP) not in MISSING:
+                shelf.put(unit.pulse, 1, unit.data, key=unit.key)
+
+
+def decision(gop: int) -> GopDecision:
+    choice = ObjectChoice(1, (A, B)[gop % 2], None, away=False)
+    return GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON)
+
+
+async def spliced(config: Config) -> tuple[bytes, bytes]:
+    """Give a stream that changes camera at every GOP, as MP4 and as a transport stream."""
+    agreement = agreement_for(config)
+    shelves = {camera: Shelf(FPS, GOPS * GOP, agreement) for camera in MAKES}
+    put(shelves)
+    splicer, pieces, viewer = Splicer(shelves, agreement, config), list[Piece](), None
+    for gop in range(GOPS):
+        splicer.decision(decision(gop))
+        viewer = viewer or splicer.objects[1].join()
+    splicer.close()
+    assert viewer is not None
+    pieces = [piece async for piece in viewer.pieces()]
+    head = agreement.head(config.site)
+    assert head is not None
+    ts = b"".join(piece.ts for piece in pieces if isinstance(piece, Footage))
+    return head + b"".join(piece.data for piece in pieces), ts
+
+
+def config(**changes: Any) -> Config:
+    return small_config(**OWN, http={"viewer_queue_gops": 100}, **changes)
+
+
+def test_the_cameras_do_differ() -> None:
+    one, other = (parameter_sets(nal_units(sent(camera)[0].data)) for camera in MAKES)
+    assert one is not None
+    assert other is not None
+    assert one.sps != other.sps
+    assert one.pps != other.pps
+
+
+@pytest.mark.parametrize("form", ["mp4", "mpegts"])
+async def test_every_frame_is_the_chosen_cameras_and_holes_stand_still(form: str) -> None:
+    mp4, ts = await spliced(config())
+    with av.open(io.BytesIO(mp4 if form == "mp4" else ts), format=form) as container:
+        seen = [(frame.time, frame.to_ndarray(format="yuv420p")) for frame in container.decode(video=0)]
+    assert [round(time * FPS) for time, _ in seen] == list(range(GOPS * GOP))
+    for pulse, ((_, picture), right) in enumerate(zip(seen, expected(), strict=True)):
+        np.testing.assert_array_equal(picture, right, f"pulse {pulse}")
+
+
+@pytest.mark.skipif(not shutil.which("ffmpeg"), reason="needs ffmpeg")
+async def test_ffmpeg_plays_it_without_a_warning(tmp_path: Path) -> None:
+    for name, data in zip(("own.mp4", "own.ts"), await spliced(config()), strict=True):
+        (tmp_path / name).write_bytes(data)
+        as_pictures = "-f rawvideo -pix_fmt yuv420p -fps_mode passthrough -"
+        command = f"ffmpeg -nostdin -v warning -i {tmp_path / name} {as_pictures}".split()
+        played = await asyncio.to_thread(subprocess.run, command, capture_output=True, check=True)
+        assert played.stderr == b"", name
+        pictures = np.frombuffer(played.stdout, np.uint8).reshape(-1, HEIGHT * 3 // 2, WIDTH)
+        np.testing.assert_array_equal(pictures, expected(), name)
+
+
+async def test_where_they_must_be_equal_the_second_camera_is_refused() -> None:
+    with pytest.raises(ParameterMismatchError, match="differ from the other cameras'"):
+        await spliced(small_config())
+
+
+PLAY = """async ([url, codec]) => {
+  const video = document.createElement('video');
+  const source = new MediaSource();
+  video.muted = true;
+  video.src = URL.createObjectURL(source);
+  await new Promise((done) => source.addEventListener('sourceopen', done, { once: true }));
+  const buffer = source.addSourceBuffer(`video/mp4; codecs="${codec}"`);
+  buffer.appendBuffer(await (await fetch(url)).arrayBuffer());
+  await new Promise((done) => buffer.addEventListener('updateend', done, { once: true }));
+  source.endOfStream();
+  const canvas = new OffscreenCanvas(video.videoWidth, video.videoHeight).getContext('2d');
+  const greens = [];
+  for (let pulse = 0; pulse < buffer.buffered.end(0) * 25 - 0.5; pulse += 1) {
+    const seeked = new Promise((done) => video.addEventListener('seeked', done, { once: true }));
+    video.currentTime = (pulse + 0.5) / 25;
+    await seeked;
+    canvas.drawImage(video, 0, 0);
+    const { data, width, height } = canvas.getImageData(0, 0, video.videoWidth, video.videoHeight);
+    const blocks = [];
+    for (let y = 4; y < height; y += 8) {
+      for (let x = 4; x < width; x += 8) blocks.push(data[4 * (y * width + x) + 1]);
+    }
+    greens.push(blocks);
+  }
+  return { ranges: buffer.buffered.length, greens, error: video.error?.message ?? '' };
+}"""
+
+
+@pytest.mark.skipif(not CHROMIUM.exists(), reason=f"needs a Chromium at {CHROMIUM}")
+async def test_chromium_shows_the_chosen_cameras_pictures() -> None:
+    async for hall in opened(patience=60, **OWN, http={"viewer_queue_gops": 100}):
+        seen = await _played(hall)
+    assert (seen["error"], seen["ranges"]) == ("", 1)
+    rgb = [av.VideoFrame.from_ndarray(it, format="yuv420p").to_ndarray(format="rgb24") for it in expected()]
+    right = np.array([it[4::8, 4::8, 1].ravel() for it in rgb], dtype=float)
+    found = np.array(seen["greens"], dtype=float)
+    assert len(found) == GOPS * GOP
+    # Colours are converted in two ways; pictures of other pulses or cameras differ by several times as much.
+    assert np.abs(found - right).mean(axis=1).max() < 20
+    assert np.abs(found[1:] - right[:-1]).mean(axis=1)[: 3 * GOP - 1].min() > 40
+
+
+async def _played(hall: Hall) -> dict[str, Any]:
+    splicer, agreement = hall.service.splicer, hall.service.agreement
+    put(hall.service.shelves)
+    splicer.decision(decision(0))
+    assert agreement.codec is not None
+    assert agreement.codec.startswith("avc3.")
+    async with chromium() as browser:
+        page = await browser.new_page(bypass_csp=True)
+        await page.goto(f"http://127.0.0.1:{hall.port}/healthz")
+        playing = asyncio.create_task(page.evaluate(PLAY, ["/objects/1/best.mp4", agreement.codec]))
+        while not splicer.viewers:  # noqa: ASYNC110 — the browser comes when it comes
+            await asyncio.sleep(0.01)
+        for gop in range(1, GOPS):
+            splicer.decision(decision(gop))
+            await asyncio.sleep(0.01)
+        splicer.close()
+        found: dict[str, Any] = await playing
+    return found
