@@ -6,10 +6,9 @@ or comes back after a while unseen, begins a new episode: who it is, is asked an
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 from bestview.identity_settings import IdentitySettings
 from bestview.keys import EpisodeKey, TrackKey
 from bestview.looks import Look, Looks
+from bestview.runs import runs_of
 from bestview.sightings import Glimpse, Sightings
 
 Floats = NDArray[np.float64]
@@ -134,7 +134,7 @@ class Episodes:
         crowded = seen.crowded(self._settings.crowd)
         # Where this is 0, a run of one frame is as good as a longer one.
         whole = min(self._settings.crowd_frames, self._settings.gap) > 0
-        for run in _runs(seen.visible, crowded, whole=whole):
+        for run in runs_of(seen.visible, crowded, whole=whole):
             key = seen.keys[run.track]
             episode, frame = self._current.get(key), seen.first + run.start
             if episode is None or self._ends(episode, frame, crowded=run.crowded):
@@ -216,29 +216,3 @@ class Episodes:
 def _end(seen: Sightings, track: int, column: int) -> End:
     # Copies: an end is remembered for long, and must not keep a whole update.
     return End(seen.first + column, seen.boxes[track, column].copy(), seen.ground[track, column].copy())
-
-
-class _Run(NamedTuple):
-    """Consecutive sightings of a track, from column `start` on, all in a crowd or none."""
-
-    track: int
-    start: int
-    stop: int
-    crowded: bool
-
-
-def _runs(visible: NDArray[np.bool_], crowded: NDArray[np.bool_], *, whole: bool) -> Iterator[_Run]:
-    """Part the sightings, (T, W) which and whether in a crowd: only the first of a run can begin an episode.
-
-    `whole`: runs are as long as can be; else each is one frame.
-    """
-    kind = np.where(visible, 1 + crowded, 0)
-    kind = np.pad(kind, ((0, 0), (1, 1)))
-    change = (kind[:, 1:] != kind[:, :-1]) | (not whole)
-    track, start = np.nonzero(change[:, :-1] & visible)
-    # As many end as begin, in the same order.
-    _, stop = np.nonzero(change[:, 1:] & visible)
-    for run in zip(
-        track.tolist(), start.tolist(), (stop + 1).tolist(), crowded[track, start].tolist(), strict=True
-    ):
-        yield _Run(*run)

@@ -5,10 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from bestview.ranges import distinct
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 _SHIFT = 32
+_LOW = (1 << _SHIFT) - 1
 
 
 class PairTable:
@@ -38,7 +41,7 @@ class PairTable:
     @property
     def two(self) -> Ints:
         """(P,) the higher one."""
-        return self._code & ((1 << _SHIFT) - 1)
+        return self._code & _LOW
 
     def find(self, one: Ints, two: Ints) -> Ints:
         """Give the entry of each of (P,) pairs, -1: it has none."""
@@ -68,6 +71,18 @@ class PairTable:
         if not which.all():
             self._code, self.value = self._code[which], self.value[which]
 
+    def renamed(self, one: Ints, two: Ints) -> PairTable:
+        """Give the table with other names, (P,) and (P,), and the sums of what is one pair then.
+
+        A thing has no entry with itself.
+        """
+        total = PairTable(self.value.shape[1])
+        a, b = once(one, two)
+        total.put(a, b, np.zeros((a.size, self.value.shape[1])))
+        np.add.at(total.value, total.find(one, two), self.value)
+        total.keep(total.one != total.two)
+        return total
+
     def _at(self, code: Ints) -> Ints:
         at = np.searchsorted(self._code, code)
         there = at < self._code.size
@@ -77,3 +92,9 @@ class PairTable:
 
 def _codes(one: Ints, two: Ints) -> Ints:
     return np.asarray((np.minimum(one, two) << _SHIFT) | np.maximum(one, two))
+
+
+def once(one: Ints, two: Ints) -> tuple[Ints, Ints]:
+    """Give each of (P,) pairs once, the lower name first, rising."""
+    pairs = distinct(_codes(one, two))
+    return pairs >> _SHIFT, pairs & _LOW

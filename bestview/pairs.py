@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from bestview.identity_settings import IdentitySettings
 from bestview.keys import EpisodeKey
 from bestview.meeting import WORST
-from bestview.pair_table import PairTable
+from bestview.pair_table import PairTable, once
 from bestview.presence import Presence
-from bestview.ranges import distinct, written_out
+from bestview.ranges import written_out
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -86,7 +86,7 @@ class PairTables:
         """Note (P,) pairs of rows that were seen at once in one camera."""
         one, two = self._names_of(one, two)
         new = self._apart.find(one, two) < 0
-        one, two = _once(one[new], two[new])
+        one, two = once(one[new], two[new])
         self._apart.put(one, two, np.ones((one.size, 1)))
 
     def apart(self, one: Ints, two: Ints) -> NDArray[np.bool_]:
@@ -168,7 +168,7 @@ class PairTables:
         self._absorb_near(into)
         self._presence.absorb(kept, lost)
         self._apart, self._alike = (
-            _renamed(table, *(self._name[into[self._rows_of(side)]] for side in (table.one, table.two)))
+            table.renamed(*(self._name[into[self._rows_of(side)]] for side in (table.one, table.two)))
             for table in (self._apart, self._alike)
         )
 
@@ -180,7 +180,7 @@ class PairTables:
         size = end - begin
         one, two = into[self._rows_of(self._near.one)], into[self._rows_of(self._near.two)]
         touched = (size[one] > 1) | (size[two] > 1)
-        one, two = _once(one[touched], two[touched])
+        one, two = once(one[touched], two[touched])
         different = one != two
         one, two = one[different], two[different]
         # Whoever of one side has no entry with somebody of the other was elsewhere.
@@ -215,19 +215,3 @@ class PairTables:
     def _rows_of(self, names: Ints) -> Ints:
         order = np.argsort(self._name)
         return order[np.searchsorted(self._name, names, sorter=order)]
-
-
-def _once(one: Ints, two: Ints) -> tuple[Ints, Ints]:
-    """Give each of (P,) pairs once, the lower one first."""
-    pairs = distinct((np.minimum(one, two) << 32) | np.maximum(one, two))
-    return pairs >> 32, pairs & 0xFFFFFFFF
-
-
-def _renamed(table: PairTable, one: Ints, two: Ints) -> PairTable:
-    """Give entries other names, (P,) and (P,), and sum up those of one pair; a thing has none with itself."""
-    total = PairTable()
-    a, b = _once(one, two)
-    total.put(a, b, np.zeros((a.size, 1)))
-    np.add.at(total.value, total.find(one, two), table.value)
-    total.keep(total.one != total.two)
-    return total

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bestview.ranges import distinct, pairs_within, written_out
+from bestview.runs import runs_of
 from bestview.sweep import overlapping
 
 
@@ -48,3 +51,20 @@ def test_counts_are_written_out_one_after_the_other(counts: list[int]) -> None:
     expected = [(i, k) for i, count in enumerate(counts) for k in range(count)]
     assert list(zip(owner.tolist(), which.tolist(), strict=True)) == expected
     assert distinct(np.array(counts, dtype=np.int64)).tolist() == sorted(set(counts))
+
+
+@settings(deadline=None, max_examples=100)
+@given(st.integers(0, 4), st.integers(0, 6), st.integers(0, 2**32), st.booleans())
+def test_runs_are_all_sightings_in_order_parted_where_something_changes(
+    tracks: int, frames: int, seed: int, whole: bool
+) -> None:
+    rng = np.random.default_rng(seed)
+    visible, crowded = rng.random((tracks, frames)) < 0.7, rng.random((tracks, frames)) < 0.4
+    runs = list(runs_of(visible, crowded, whole=whole))
+    sightings = [(run.track, column) for run in runs for column in range(run.start, run.stop)]
+    assert sightings == [(int(i), int(k)) for i, k in np.argwhere(visible)]
+    assert all((crowded[run.track, run.start : run.stop] == run.crowded).all() for run in runs)
+    for one, two in pairwise(runs):
+        goes_on = (one.track, one.stop, one.crowded) == (two.track, two.start, two.crowded)
+        assert not (whole and goes_on)
+    assert whole or all(run.stop == run.start + 1 for run in runs)
