@@ -9,8 +9,9 @@ from functools import partial
 from aiohttp import web
 
 from server.view.past.hearing import Hearing
+from server.view.past.kept import kept_from
 from server.view.past.moment import MomentError
-from server.view.past.play import Source, known, sounds
+from server.view.past.play import Source, sounds
 from server.view.past.rewound import Rewound
 from server.view.past.stream import Wish
 from server.view.reel import Reel, Segment
@@ -34,7 +35,7 @@ class Stream:
     @property
     def exists(self) -> bool:
         """Whether there is or was such a stream."""
-        return self.reel is not None or bool(known(self.source))
+        return self.reel is not None or kept_from(self.source, 0) is not None
 
 
 def playlist_of_the_past(request: web.Request, stream: Stream) -> web.Response:

@@ -9,8 +9,9 @@ from aiohttp import web
 
 from server.view.channel import Channel
 from server.view.past.hearing import Hearing
+from server.view.past.kept import kept_from, known
 from server.view.past.moment import MomentError, moment_of, pulse_at
-from server.view.past.play import CameraPast, ObjectPast, Source, known, sounds
+from server.view.past.play import CameraPast, ObjectPast, Source, sounds
 from server.view.past.stream import PastStream, Wish
 from server.view.past.told import told
 from server.view.service import BestViewService
@@ -39,7 +40,7 @@ async def best_of_the_past(request: web.Request, form: Form) -> web.StreamRespon
     def live() -> Channel | None:
         return service.splicer.objects.get(service.board.resolve(number))
 
-    if live() is None and not known(source):
+    if live() is None and kept_from(source, 0) is None:
         return problem(404, f"there is no object {number}")
     return await _stream(request, form, source, f"object {number}", live)
 
@@ -119,9 +120,10 @@ def wish_of(request: web.Request, service: BestViewService, now: int) -> Wish:
 
 def nothing_kept(source: Source, wish: Wish, what: str) -> web.Response | None:
     """Say that nothing is kept of the time that somebody wants to see, and what is; None: something is."""
-    there = known(source)
-    if any(it.end > wish.start and (wish.end is None or it.first < wish.end) for it in there):
+    first = kept_from(source, wish.start)
+    if first is not None and (wish.end is None or first < wish.end):
         return None
+    there = known(source)
     kept = ", ".join(f"p{it.first} to p{it.end - 1}" for it in there) or "nothing"
     return problem(416, f"of {what} nothing is kept from p{wish.start} on; there is {kept}")
 

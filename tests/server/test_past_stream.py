@@ -33,9 +33,10 @@ from server.view.agreement import Agreement
 from server.view.channel import Channel
 from server.view.footage import Footage
 from server.view.past import stream as past_stream
+from server.view.past.kept import kept_from, kept_until, known
 from server.view.past.media import pulse_of
 from server.view.past.moment import MomentError, pulse_at
-from server.view.past.play import Recorded, known
+from server.view.past.play import CameraPast, ObjectPast, Recorded
 from server.view.past.store import Store
 from server.view.past.stream import PastStream, Wish
 from server.view.past.stretch import Span
@@ -145,6 +146,10 @@ async def test_an_end_that_is_yet_to_come_is_waited_for(recorded: Hall) -> None:
 
 
 async def test_without_a_recording_the_memory_is_the_past(busy: Hall) -> None:
+    for source in (ObjectPast(busy.service.past, (1,)), CameraPast(busy.service.past, A)):
+        (span,) = known(source)
+        assert (kept_from(source, 0), kept_until(source)) == (span.first, span.end)
+        assert kept_from(source, span.end) is None
     assert [pulse for pulse, _ in await read(busy, "/objects/1/best.mp4?from=p0&to=p9")] == list(range(9))
 
 
@@ -267,6 +272,9 @@ async def test_any_part_of_any_past_is_played_without_a_hole(
     stream = PastStream(source, Timeline(agreement, FPS, GOP), FPS, lambda: None)
     data = b"".join([it.data async for it in stream.send(Wish(start, start + frames))])
     store.close()
+    there = known(source)
+    assert kept_from(source, start) == next((max(it.first, start) for it in there if it.end > start), None)
+    assert kept_until(source) == (there[-1].end if there else 0)
     kept = [gop for gop, camera in enumerate(shown) if camera is not None]
     wanted = [gop for gop in kept if (gop + 1) * GOP > start and gop * GOP < start + frames]
     if not wanted:

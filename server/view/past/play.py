@@ -12,7 +12,7 @@ from typing import Protocol
 from server.view.past.media import Gop, gops
 from server.view.past.past import Past
 from server.view.past.run import Run
-from server.view.past.stretch import Span, Stretch, Tape, spans
+from server.view.past.stretch import Stretch, Tape
 
 _AT_ONCE = 8
 """GOPs read from the disk in one go."""
@@ -107,16 +107,6 @@ class CameraPast:
 def sounds(past: Past) -> Sequence[Recorded]:
     """Say what there is of the site's sound on the disk."""
     return [Recorded(run, run.sound.tape) for run in past.sounding]
-
-
-def known(source: Source) -> list[Span]:
-    """Say what there is, on the disk and in memory."""
-    found: list[Stretch | Span] = [it for one in source.recorded for it in one.tape.all]
-    gop = source.recall(0)
-    while gop is not None:
-        found.append(Span(gop.first, gop.end))
-        gop = source.recall(gop.end)
-    return spans(found)
 
 
 async def play(source: Source, start: int) -> AsyncGenerator[Gop, None]:

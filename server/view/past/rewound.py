@@ -11,8 +11,9 @@ from dataclasses import dataclass, replace
 
 from server.view.footage import Footage
 from server.view.past.hearing import Hearing
+from server.view.past.kept import kept_from, kept_until
 from server.view.past.media import Gop, is_key
-from server.view.past.play import Source, known, last_before, play
+from server.view.past.play import Source, last_before, play
 from server.view.picture import Picture
 from server.view.reel import Plan, Segment
 from server.view.timeline import Timeline
@@ -47,9 +48,8 @@ class Rewound:
     ) -> None:
         self._source, self._plan, self._gop = source, plan, gop
         self._timeline, self._hearing = timeline, hearing
-        self._kept = known(source)
         self._over = over
-        self.end = min(decided, self._kept[-1].end) if over and self._kept else decided
+        self.end = min(decided, kept_until(source)) if over else decided
         """The pulse after the last that there is, or will ever be where it is over."""
 
     def entries(self, start: int, end: int | None) -> Sequence[Entry]:
@@ -59,17 +59,15 @@ class Rewound:
         nothing was shown: no number is left out.
         """
         frames = self._plan.frames
-        begin = next((max(it.first, start) for it in self._kept if it.end > start), None)
-        if begin is None:
+        begin, earliest = kept_from(self._source, start), kept_from(self._source, 0)
+        if begin is None or earliest is None:
             return []
         last = -(-self.end // frames) if self._over else self.end // frames
         last = last if end is None else min(last, -(-end // frames))
-        return [self._entry(number) for number in range(begin // frames, last)]
-
-    def _entry(self, number: int) -> Entry:
-        frames = self._plan.frames
-        first, until = number * frames, (number + 1) * frames
-        return Entry(number, max(self._kept[0].first, first), min(until, self.end) if self._over else until)
+        return [
+            Entry(number, max(earliest, number * frames), min((number + 1) * frames, self.end))
+            for number in range(begin // frames, last)
+        ]
 
     async def segment(self, number: int) -> Segment | None:
         """Put a segment together; None where it is not whole yet, or nothing is kept of it or before it."""
