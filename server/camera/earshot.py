@@ -10,7 +10,7 @@ from server.camera.witness import Heard
 from server.wire.messages import Found
 
 _ASKED = 256
-"""Pulses for which it is remembered when their words were asked for."""
+"""Pulses for which it is remembered until when their words counted."""
 
 
 @dataclass(slots=True)
@@ -36,16 +36,13 @@ class Earshot:
 
     Args:
         others: the cameras that may say something.
-        patience: seconds after a frame was asked about for which its words are waited for.
         most: words of one camera that are kept; more of them would be of frames far ahead.
         looks_here: tells by a camera's first word whether it sees the same ground.
     """
 
-    def __init__(
-        self, others: Sequence[str], patience: float, most: int, looks_here: Callable[[Found], bool]
-    ) -> None:
+    def __init__(self, others: Sequence[str], most: int, looks_here: Callable[[Found], bool]) -> None:
         self._others = {camera: _Other() for camera in others}
-        self._patience, self._most, self._looks_here = patience, most, looks_here
+        self._most, self._looks_here = most, looks_here
         self._asked: deque[tuple[int, float]] = deque(maxlen=_ASKED)
 
     def put(self, word: Found, now: float) -> bool:
@@ -57,18 +54,21 @@ class Earshot:
             other.words.clear()
         if other.near is None:
             other.near = self._looks_here(word)
-        asked = next((at for pulse, at in reversed(self._asked) if pulse == word.pulse), None)
+        until = next((until for pulse, until in reversed(self._asked) if pulse == word.pulse), None)
         current = self._asked[-1][0] if self._asked else -1
-        other.trusted |= word.pulse > current or (asked is not None and now <= asked + self._patience)
+        other.trusted |= word.pulse > current or (until is not None and now <= until)
         other.newest = max(other.newest, word.pulse)
         other.ended |= word.ended
         if other.near and not word.ended and word.pulse >= current and len(other.words) < self._most:
             other.words[word.pulse] = word
         return other.near
 
-    def ask(self, pulse: int, now: float) -> None:
-        """Ask for the words about a frame; pulses must grow. What was said of earlier ones is forgotten."""
-        self._asked.append((pulse, now))
+    def ask(self, pulse: int, until: float) -> None:
+        """Ask for the words about a frame, which count until then; those about earlier ones are forgotten.
+
+        Pulses must grow.
+        """
+        self._asked.append((pulse, until))
         for other in self._others.values():
             for old in [it for it in other.words if it < pulse]:
                 del other.words[old]

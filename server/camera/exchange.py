@@ -38,7 +38,7 @@ class Exchange:
         self._others = config.witnesses(camera_id) if witness else ()
         self._patience = config.track.witness_wait_s
         looks_here = witness.looks_here if witness else lambda _: False
-        self._earshot = Earshot(self._others, self._patience, most, looks_here)
+        self._earshot = Earshot(self._others, most, looks_here)
         self._listening: set[str] = set()
         self._came = asyncio.Event()
         self._joining: asyncio.Task[None] | None = None
@@ -81,16 +81,21 @@ class Exchange:
         bus.declare_alive(self._keys.camera(self._camera, "hears"))
         self._bus = bus
 
-    async def of(self, pulse: int, word: Found | None, *, needed: bool) -> Heard:
-        """Tell the others what was found in a frame; give what they found in it, waited for where needed."""
+    async def of(self, pulse: int, word: Found | None, taken: float, *, needed: bool) -> Heard:
+        """Tell the others what was found in a frame; give what they found in it, waited for where needed.
+
+        ``taken`` is when the frame was taken, by the loop's clock. From then on patience is counted, and not
+        from when it was searched: a camera that falls behind takes no other with it.
+        """
         if word is None:
             return Heard()
         await self._tell(word)
-        self._earshot.ask(pulse, asyncio.get_running_loop().time())
+        until = taken + self._patience
+        self._earshot.ask(pulse, until)
         if not needed:
             return Heard()
         if self._bus is not None:
-            await self._until(lambda: not self._earshot.misses(pulse), self._patience)
+            await self._until(lambda: not self._earshot.misses(pulse), until)
         for camera in self._earshot.give_up(pulse):
             log.info("camera %s: what %s found in frame %d came too late", self._camera, camera, pulse)
         return self._earshot.heard(pulse)
@@ -105,13 +110,14 @@ class Exchange:
             return
         if not self._told:
             self._told = True
-            await self._until(lambda: self._listening.issuperset(self._others), _LISTENERS_S)
+            until = asyncio.get_running_loop().time() + _LISTENERS_S
+            await self._until(lambda: self._listening.issuperset(self._others), until)
         self._bus.publish(self._keys.camera(self._camera, "found"), msgspec.json.encode(word))
 
-    async def _until(self, done: Callable[[], bool], seconds: float) -> None:
-        """Wait until something holds, asked whenever anything comes; for so long at most."""
+    async def _until(self, done: Callable[[], bool], until: float) -> None:
+        """Wait until something holds, asked whenever anything comes; no longer than until then."""
         try:
-            async with asyncio.timeout(seconds):
+            async with asyncio.timeout_at(until):
                 while not done():
                     self._came.clear()
                     await self._came.wait()

@@ -54,7 +54,7 @@ class CameraProcess:
         self._tracking = ThreadPoolExecutor(1, "tracking")
         fps = config.site.fps
         self._backlog_pictures = max(1, round(config.track.backlog_s * fps))
-        self._backlog: asyncio.Queue[tuple[int, Image | None] | None] = asyncio.Queue(
+        self._backlog: asyncio.Queue[tuple[int, Image | None, float] | None] = asyncio.Queue(
             maxsize=_MARKS_PER_PICTURE * self._backlog_pictures
         )
         self._exchange = Exchange(config, camera_id, self._pipeline.witness, self._backlog.maxsize)
@@ -165,15 +165,16 @@ class CameraProcess:
         if shed:
             self._meter.shed()
         if not self._backlog.full():
-            self._backlog.put_nowait((pulse, None if shed else image))
+            now = asyncio.get_running_loop().time()
+            self._backlog.put_nowait((pulse, None if shed else image, now))
 
     async def _track(self) -> None:
         """Follow everybody, frame by frame, behind the video."""
         thumbs_every = round(self._config.site.fps)
         while (item := await self._backlog.get()) is not None:
-            pulse, image = item
+            pulse, image, taken = item
             searched = await self._in(self._tracking, partial(self._pipeline.search, pulse, image))
-            heard = await self._exchange.of(searched.pulse, searched.word, needed=searched.asks)
+            heard = await self._exchange.of(pulse, searched.word, taken, needed=searched.asks)
             tracks = await self._in(self._tracking, partial(self._pipeline.follow, searched, heard))
             if tracks is None:
                 continue

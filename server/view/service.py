@@ -38,9 +38,7 @@ class BestViewService:
         fps, stride = config.site.fps, config.track.window.stride
         grace, behind = round(config.view.late_after_s * fps), round(config.track.backlog_s * fps)
         # What is waited for must still be there when it is decided.
-        frames = max(
-            round(config.view.buffer_s * fps), behind + 4 * (config.view.lookahead + grace + stride)
-        )
+        frames = max(round(config.view.buffer_s * fps), behind + 4 * (config.view.lookahead + grace + stride))
         self.agreement = agreement_for(config)
         self.shelves = {camera: Shelf(config.site.fps, frames, self.agreement) for camera in cameras}
         self.aligner = Aligner(cameras, stride, grace, behind)

@@ -16,7 +16,7 @@ def word(pulse: int, camera: str = "c1", boot: int = 1, *, ended: bool = False) 
 
 
 def earshot(*others: str, near: bool = True) -> Earshot:
-    return Earshot(others or ("c1",), PATIENCE, MOST, lambda _: near)
+    return Earshot(others or ("c1",), MOST, lambda _: near)
 
 
 def pulses(it: Earshot, pulse: int) -> list[tuple[str, int]]:
@@ -48,13 +48,13 @@ def test_a_camera_that_was_never_there_costs_one_wait() -> None:
 def test_a_camera_that_was_late_is_waited_for_once_it_would_have_been_in_time() -> None:
     it = earshot()
     it.put(word(0), 0.0)
-    it.ask(1, 0.0)
+    it.ask(1, PATIENCE)
     it.give_up(1)
-    it.put(word(1), 0.0 + PATIENCE + 0.01)
-    it.ask(2, 0.3)
+    it.put(word(1), PATIENCE + 0.01)
+    it.ask(2, 0.3 + PATIENCE)
     assert not it.misses(2), "it is too slow by more than the patience"
     it.put(word(2), 0.3 + PATIENCE / 2)
-    it.ask(3, 0.34)
+    it.ask(3, 0.34 + PATIENCE)
     assert it.misses(3)
     it.put(word(3), 0.36)
     assert not it.misses(3)
@@ -133,7 +133,7 @@ def test_two_waits_in_vain_have_a_word_in_time_between_them(steps: list[tuple[bo
         else:
             asked += 1
             times[asked] = now
-            it.ask(asked, now)
+            it.ask(asked, now + PATIENCE)
             waits = it.misses(asked)
             assert waits == (trusted and said < asked)
             if waits:

@@ -30,6 +30,7 @@ from tracking import Detections
 
 PATIENCE = 40.0  # seconds until a test that awaits something has failed
 FRAMES = 60
+WAIT = 2.0  # seconds that two cameras wait for each other, and for a third one that never comes
 
 
 @pytest.fixture(scope="module")
@@ -138,7 +139,7 @@ async def test_a_camera_that_never_comes_is_told_and_does_not_hold_up_the_others
 @pytest.fixture
 async def pair(recording: Path) -> AsyncIterator[tuple[Bus, Exchange, Exchange]]:
     """The router, and two of the three cameras on the bus."""
-    config = config_of(recording, wait=0.2)
+    config = config_of(recording, wait=WAIT)
     router = Bus.router(config.zenoh)
     exchanges = [
         Exchange(config, camera, Witness(config, camera, (192, 108), 1), 100) for camera in ("c0", "c1")
@@ -151,40 +152,48 @@ async def pair(recording: Path) -> AsyncIterator[tuple[Bus, Exchange, Exchange]]
     router.close()
 
 
+def now() -> float:
+    return asyncio.get_running_loop().time()
+
+
 def word(camera: str, pulse: int) -> Found:
     return Found(camera=camera, boot=1, size=(192, 108), pulse=pulse, boxes=[(1.5, 2.0, 20.25, 60.0, 0.5)])
+
+
+async def both(one: Exchange, two: Exchange, pulse: int = 0, *, needed: bool = True) -> list[Heard]:
+    """Let both say what they found in a frame, and hear the other."""
+    pair = (("c0", one), ("c1", two))
+    return await asyncio.gather(*(it.of(pulse, word(name, pulse), now(), needed=needed) for name, it in pair))
 
 
 async def test_words_go_both_ways_from_the_first_one_on(pair: tuple[Bus, Exchange, Exchange]) -> None:
     _, one, two = pair
     for pulse in range(5):
-        first, second = await asyncio.gather(
-            one.of(pulse, word("c0", pulse), needed=True), two.of(pulse, word("c1", pulse), needed=True)
-        )
+        first, second = await both(one, two, pulse)
         assert first.words == (word("c1", pulse),)
         assert second.words == (word("c0", pulse),)
 
 
 async def test_a_camera_that_is_gone_is_waited_for_once(pair: tuple[Bus, Exchange, Exchange]) -> None:
     _, one, two = pair
-    await asyncio.gather(*(it.of(0, word(name, 0), needed=True) for name, it in (("c0", one), ("c1", two))))
+    await both(one, two, needed=True)
     await two.leave()
     began = asyncio.get_running_loop().time()
     for pulse in range(1, 100):
-        assert (await one.of(pulse, word("c0", pulse), needed=True)).alone
-    assert asyncio.get_running_loop().time() - began < 50 * 0.2
+        assert (await one.of(pulse, word("c0", pulse), now(), needed=True)).alone
+    assert asyncio.get_running_loop().time() - began < 50 * WAIT
 
 
 async def test_what_is_no_word_is_counted_and_left(pair: tuple[Bus, Exchange, Exchange]) -> None:
     _, one, two = pair
-    await asyncio.gather(*(it.of(0, word(name, 0), needed=False) for name, it in (("c0", one), ("c1", two))))
+    await both(one, two, needed=False)
     key = Keys("hall").camera("c1", "found")
     assert two._bus is not None
     far = msgspec.json.encode(word("c0", 1))
     for nonsense in (b"", b"{", b"[1]", b'{"camera": "c1"}', far, b"\xff\xfe"):
         two._bus.publish(key, nonsense)
-    await two.of(1, word("c1", 1), needed=False)
-    assert (await one.of(1, word("c0", 1), needed=True)).words == (word("c1", 1),)
+    await two.of(1, word("c1", 1), now(), needed=False)
+    assert (await one.of(1, word("c0", 1), now(), needed=True)).words == (word("c1", 1),)
     assert one.bad_messages == 6
 
 

@@ -54,8 +54,8 @@ class Track(Section):
     costs: Annotated[CostSettings, validated(CostSettings)] = CostSettings()
     witness: Annotated[WitnessSettings, validated(WitnessSettings)] = WitnessSettings()
     """How a camera goes by what others find that look at the same ground."""
-    witness_wait_s: NonNegativeFloat = 0.2
-    """Seconds that a camera's tracker waits for what the others found in a frame."""
+    witness_wait_s: NonNegativeFloat = 0.3
+    """Seconds after a frame was taken until which it waits for what the others found in it."""
 
     @field_validator("solver")
     @classmethod
