@@ -17,9 +17,10 @@ from sounds_by_hand import EVERY, FPS, beeps, write_flashes
 
 from server.camera.sound import Frame, LiveSound
 from server.camera.sources.stream import Stream
+from server.view.mp4_sound import sound_fragment, sound_init_segment
 from server.wire.aac import SAMPLES as FRAME
 from server.wire.sections import Sound
-from server.wire.sound import SoundFormat
+from server.wire.sound import Coding, SoundFormat
 
 FRAMES = 3 * EVERY
 PATIENCE_S = 20.0  # until a test that awaits something has failed
@@ -81,11 +82,11 @@ def test_a_camera_is_heard_beside_its_pictures(camera: str) -> None:
     assert [frame.number for frame in frames] == sorted({frame.number for frame in frames})
 
 
-def moments(frames: list[Frame]) -> list[float]:
+def moments(frames: list[Frame], form: SoundFormat = FORM) -> list[float]:
     """Give when beeps begin, seconds after pulse 0."""
     found = {frame.number: frame.data for frame in frames}
-    data = [found.get(number, FORM.silence) for number in range(max(found) + 1)]
-    return beeps(b"".join(FORM.adts(len(it)) + it for it in data), "aac")
+    data = [found.get(number, form.silence) for number in range(max(found) + 1)]
+    return beeps(sound_init_segment(form) + sound_fragment(form, data, 0))
 
 
 def handed_over(path: Path, sound: LiveSound, first: int) -> list[Frame]:
@@ -106,16 +107,23 @@ def handed_over(path: Path, sound: LiveSound, first: int) -> list[Frame]:
     return frames
 
 
-def test_a_beep_is_where_the_flash_is_shown_also_after_the_camera_has_begun_anew(tmp_path: Path) -> None:
-    path = write_flashes(tmp_path / "own.mp4", FRAMES)
-    sound = LiveSound(Sound(source="c0"), FPS)
+@pytest.mark.parametrize(
+    ("codec", "sends"), [("aac", "aac"), ("aac", "libopus"), ("opus", "libopus"), ("opus", "aac")]
+)
+def test_a_beep_is_where_the_flash_is_shown_also_after_the_camera_has_begun_anew(
+    tmp_path: Path, codec: Coding, sends: str
+) -> None:
+    path = write_flashes(tmp_path / "own.mp4", FRAMES, codec=sends)
+    settings = Sound(source="c0", codec=codec)
+    sound = LiveSound(settings, FPS)
     one, two = handed_over(path, sound, 50), handed_over(path, sound, 50 + 2 * FRAMES)
     numbers = [frame.number for frame in one + two]
     assert numbers == sorted(set(numbers)), "each once, in order"
     assert len(two) > 0.9 * len(one)
     starts = (50, 50 + 2 * FRAMES)
     expected = [(start + number) / FPS for start in starts for number in range(EVERY, FRAMES, EVERY)]
-    assert moments(one + two) == pytest.approx(expected, abs=0.04)
+    assert settings.format is not None
+    assert moments(one + two, settings.format) == pytest.approx(expected, abs=0.04)
 
 
 def test_a_camera_without_sound_is_no_mistake(tmp_path: Path) -> None:

@@ -211,6 +211,7 @@ async def test_ffprobe_has_nothing_to_say(hall: Hall, recording: Path, tmp_path:
     assert {it[0] for it in probed(tmp_path / "live.ts", "codec_name,nb_read_frames")} == {"h264"}
 
 
+@needs_ffprobe
 async def test_what_somebody_keeps_has_it_too(hall: Hall, recording: Path, tmp_path: Path) -> None:
     sends(hall.service, recording)
     decide(hall, range(GOPS))
@@ -219,6 +220,7 @@ async def test_what_somebody_keeps_has_it_too(hall: Hall, recording: Path, tmp_p
     data = out.read_bytes()
     assert flashes(data) == pytest.approx(BEEPS, abs=0.001)
     assert beeps(data) == pytest.approx(BEEPS, abs=STEP)
+    assert [it[0] for it in probed(out, "codec_name,nb_read_frames")] == ["h264", "opus"]
 
 
 PLAY = """async ([url, codecs]) => {
