@@ -16,6 +16,7 @@ from av.video.frame import VideoFrame
 from server.camera.encode import Encoder
 from server.draw.boxes import Image, draw_boxes
 from server.draw.unpack import frames
+from server.draw.unpack_webm import webm_frames
 from server.wire.drawing import Canvas, Draw, Drawn, Jpeg, Unit, belongs
 
 log = logging.getLogger(__name__)
@@ -49,7 +50,7 @@ class Studio:
 
     def __init__(self, canvas: Canvas) -> None:
         self._canvas = canvas
-        self._decoder = _decoder()
+        self._decoder = _decoder(canvas.codec)
         self._whole = False
         """What comes can be decoded: nothing has been damaged since the last key frame."""
         self._encoder: Encoder | None = None
@@ -80,7 +81,8 @@ class Studio:
         return self._jpeg(self._last.pulse, image)
 
     def _paintings(self, request: Draw) -> Iterator[Painting]:
-        for unit in frames(request.fragments, self._canvas.fps):
+        unpack = webm_frames if self._canvas.codec == "vp8" else frames
+        for unit in unpack(request.fragments, self._canvas.fps):
             self._whole = (self._whole or unit.key) and bool(unit.data)  # nothing would mean the end
             if not self._whole:
                 continue
@@ -90,7 +92,7 @@ class Studio:
                 pictures = self._decoder.decode(packet)
             except av.FFmpegError as error:
                 log.warning("frame %d cannot be decoded: %s", unit.pulse, error)
-                self._decoder, self._whole = _decoder(), False
+                self._decoder, self._whole = _decoder(self._canvas.codec), False
                 continue
             for frame in pictures:
                 pulse = unit.pulse if frame.pts is None else frame.pts
@@ -110,8 +112,8 @@ class Studio:
         return Jpeg(pulse, np.asarray(jpeg).tobytes())
 
 
-def _decoder() -> VideoCodecContext:
-    decoder = av.CodecContext.create("h264", "r")
-    assert isinstance(decoder, VideoCodecContext)  # noqa: S101 — tells mypy what h264 is
+def _decoder(codec: str) -> VideoCodecContext:
+    decoder = av.CodecContext.create(codec, "r")
+    assert isinstance(decoder, VideoCodecContext)  # noqa: S101 — tells mypy what it is
     decoder.thread_count = 1  # or frames are held back
     return decoder

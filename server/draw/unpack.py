@@ -21,7 +21,7 @@ _START_CODE = b"\x00\x00\x00\x01"
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """One access unit, Annex B."""
+    """One access unit, Annex B, or a frame of VP8."""
 
     pulse: int
     key: bool

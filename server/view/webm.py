@@ -13,12 +13,14 @@ TICKS = 1000
 
 _UNKNOWN = b"\x01" + b"\xff" * 7
 """A size that is not known (RFC 8794, 6.2): a live stream has no end."""
-_SEGMENT, _CLUSTER = b"\x18\x53\x80\x67", b"\x1f\x43\xb6\x75"
+CLUSTER = b"\x1f\x43\xb6\x75"
+"""What each frame begins with."""
+_SEGMENT = b"\x18\x53\x80\x67"
 _TIMESTAMP, _SIMPLE_BLOCK, _BLOCK_GROUP, _BLOCK = b"\xe7", b"\xa3", b"\xa0", b"\xa1"
 _BLOCK_DURATION, _REFERENCE = b"\x9b", b"\xfb"
 _TRACK = b"\x81"
 _KEY = 0x80
-_TIME_AT = len(_CLUSTER) + 4 + len(_TIMESTAMP) + 1
+_TIME_AT = len(CLUSTER) + 4 + len(_TIMESTAMP) + 1
 """Where the time stands: behind the heads of the cluster and of the time itself."""
 
 
@@ -67,7 +69,13 @@ def cluster(frame: bytes, pulse: int, fps: float, *, key: bool, lasts: int = 1) 
         if not key:
             inside += _element(_REFERENCE, struct.pack(">b", -1))  # the frame before, whenever that was
         block = _element(_BLOCK_GROUP, inside)
-    return _CLUSTER + _size(8 + 2 + len(block)) + _TIMESTAMP + b"\x88" + struct.pack(">Q", time) + block
+    return CLUSTER + _size(8 + 2 + len(block)) + _TIMESTAMP + b"\x88" + struct.pack(">Q", time) + block
+
+
+def pulse_of(frame: bytes, fps: float) -> int:
+    """Give the pulse of a cluster of :func:`cluster`."""
+    (time,) = struct.unpack_from(">Q", frame, _TIME_AT)
+    return round(int(time) * fps / TICKS)
 
 
 def rebased(frame: bytes, by: int) -> bytes:

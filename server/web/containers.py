@@ -22,8 +22,10 @@ async def refuse_other_containers(
     """Answer 404 where a stream is asked for that only sites of another codec have."""
     if _STREAM.fullmatch(request.path):
         container, is_webm = request.app[SERVICE].agreement.container, request.path.endswith(".webm")
-        if container == "webm" and not is_webm:
-            return problem(404, "these streams are VP8 (encode.codec): there is best.webm and live.webm")
+        if container == "webm" and not request.path.endswith((".webm", ".mjpeg", ".jpg")):
+            return problem(
+                404, "these streams are VP8 (encode.codec): there is best.webm, live.webm and JPEG"
+            )
         if container == "mp4" and is_webm:
             return problem(404, "these streams are H.264 (encode.codec): there is best.mp4 and live.mp4")
     return await handler(request)

@@ -22,6 +22,8 @@ LENGTH_BYTES = 4
 class Canvas(msgspec.Struct, frozen=True, kw_only=True):
     """What all pictures of a site share; all that shapes the parameter sets of H.264 is the cameras' own."""
 
+    codec: Literal["h264", "vp8"] = "h264"
+    """Of the frames to decode; what is encoded is H.264."""
     width: int
     height: int
     fps: float
@@ -37,7 +39,7 @@ class Draw(msgspec.Struct, frozen=True, kw_only=True):
     """Frames to decode, and what is wanted of them."""
 
     fragments: bytes = b""
-    """MP4 fragments of consecutive frames; of the first request, they begin with a key frame."""
+    """Fragments (or clusters) of consecutive frames; of the first request, they begin with a key frame."""
     first: int = 0
     """The pulse that ``boxes`` begin with."""
     boxes: Boxes = []

@@ -16,8 +16,10 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from server.camera.encode import AccessUnit, Encoder
+from server.draw.unpack_webm import webm_frames
 from server.view.agreement import ParameterMismatchError
 from server.view.picture import Picture
+from server.view.pictures.decided import first_pulse
 from server.view.shelf import Shelf
 from server.view.timeline import Timeline
 from server.view.vp8 import Vp8Agreement, size_of
@@ -151,6 +153,26 @@ def test_a_cluster_is_moved_by_its_time_alone(pulse: int, by: int, fps: float) -
     time = round(pulse * 1000 / fps) + max(0, by)
     assert moved[10:18] == time.to_bytes(8, "big")
     assert moved[:10] + moved[18:] == (whole := cluster(b"frame", pulse, fps, key=True))[:10] + whole[18:]
+
+
+@given(
+    st.lists(st.tuples(st.binary(min_size=1, max_size=40), st.booleans(), st.integers(1, 200)), min_size=1),
+    st.integers(0, 2**40),
+    st.data(),
+)
+def test_frames_come_out_of_clusters_as_they_went_in_and_damage_ends_them(
+    frames: list[tuple[bytes, bool, int]], first: int, data: st.DataObject
+) -> None:
+    pulse, clusters, expected = first, b"", []
+    for content, begins, lasts in frames:
+        key = begins and lasts == 1
+        clusters += cluster(content, pulse, FPS, key=key, lasts=lasts)
+        expected.append((pulse, key, content, lasts))
+        pulse += lasts
+    assert [(it.pulse, it.key, it.data, it.lasts) for it in webm_frames(clusters, FPS)] == expected
+    assert first_pulse(clusters, FPS) == first
+    list(webm_frames(clusters[: data.draw(st.integers(0, len(clusters)))], FPS))
+    list(webm_frames(data.draw(st.binary(max_size=100)), FPS))
 
 
 @pytest.mark.skipif(not shutil.which("ffprobe"), reason="needs ffprobe")

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from server.view.fmp4 import TIMESCALE
+from server.view.webm import CLUSTER, pulse_of
 from server.wire.drawing import Boxes
 from server.wire.messages import GopChoices
 
@@ -27,7 +28,9 @@ NOTHING = Told(0, [])
 
 
 def first_pulse(fragments: bytes, fps: float) -> int:
-    """Give the pulse that fragments begin with."""
+    """Give the pulse that fragments, or clusters of WebM, begin with."""
+    if fragments.startswith(CLUSTER):
+        return pulse_of(fragments, fps)
     at = fragments.index(_TFDT) + len(_TFDT) + 4  # behind version and flags
     (ticks,) = struct.unpack_from(">Q", fragments, at)
     return round(int(ticks) * fps / TIMESCALE)

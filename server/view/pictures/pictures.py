@@ -66,6 +66,7 @@ class Pictures:
         self._queue = config.http.viewer_queue_gops
         self._most = config.http.pictures_max
         self._canvas = Canvas(
+            codec=config.encode.codec,
             width=config.site.width,
             height=config.site.height,
             fps=config.site.fps,
