@@ -15,6 +15,9 @@ from itertools import takewhile
 from server.view.footage import Footage
 from server.view.part import Part, standing_for
 
+_LEAST_PART_S = 0.1
+"""Players ask twice for every part."""
+
 
 @dataclass(frozen=True, slots=True)
 class Plan:
@@ -27,6 +30,11 @@ class Plan:
     """Pulses in a segment: whole GOPs."""
     listed: int
     """Segments in a playlist."""
+
+    @property
+    def has_parts(self) -> bool:
+        """Whether a GOP is worth a question of its own."""
+        return self.gop / self.fps >= _LEAST_PART_S
 
     @property
     def target_s(self) -> int:
@@ -81,7 +89,9 @@ class Segment:
 
     @property
     def parts(self) -> Sequence[Part]:
-        """The parts that there are by now; none where it is not made of whole GOPs."""
+        """The parts that there are by now; none where it is not of whole GOPs, or they are too short."""
+        if not self._plan.has_parts:
+            return ()
         gop, fps, began = self._plan.gop, self._plan.fps, False
         parts: list[Part] = []
         for it in self._footage:

@@ -52,11 +52,13 @@ def _newest(reel: Reel, pulse0: float | None) -> str:
         parts = _parts(growing, oldest)
         listed.append(Listed(growing.number, growing.first, growing.until, parts, whole=False))
     length = plan.gop / plan.fps
-    extra = [
-        f"#EXT-X-SERVER-CONTROL:CAN-BLOCK-RELOAD=YES,PART-HOLD-BACK={_HELD_BACK * length:.5f}",
-        f"#EXT-X-PART-INF:PART-TARGET={length:.5f}",
-    ]
-    hint = None if reel.ended else part_name(*_next(reel))
+    extra = ["#EXT-X-SERVER-CONTROL:CAN-BLOCK-RELOAD=YES"]
+    if plan.has_parts:
+        extra = [
+            f"#EXT-X-SERVER-CONTROL:CAN-BLOCK-RELOAD=YES,PART-HOLD-BACK={_HELD_BACK * length:.5f}",
+            f"#EXT-X-PART-INF:PART-TARGET={length:.5f}",
+        ]
+    hint = part_name(*_next(reel)) if plan.has_parts and not reel.ended else None
     return playlist(listed, plan, pulse0, extra, ended=reel.ended, hint=hint)
 
 
@@ -73,7 +75,7 @@ def _next(reel: Reel) -> tuple[int, int]:
 
 
 def _is_next(reel: Reel, number: int, index: int) -> bool:
-    return not reel.ended and (number, index) == _next(reel)
+    return reel.plan.has_parts and not reel.ended and (number, index) == _next(reel)
 
 
 def _wanted(request: web.Request, reel: Reel) -> tuple[int, int | None] | web.Response | None:

@@ -253,6 +253,28 @@ async def test_ffmpeg_which_does_not_know_parts_plays_on_without_a_word(hall: Ha
     assert sum(not line.startswith("#") for line in done.stdout.splitlines()) == 8 * PARTS * GOP
 
 
+async def test_gops_that_are_too_short_are_no_parts_but_segments_can_be_waited_for() -> None:
+    async for hall in opened(http=HTTP, encode={"gop": 2}, view={"lookahead": 10}):
+        hall.service.come(*CAMERAS)
+        gops = 40
+        for camera in CAMERAS:
+            for unit in encoded(0, 100, gop=2)[: 2 * gops]:
+                hall.service.intake.video(video(camera, unit))
+        choice = ObjectChoice(1, A, None, away=False)
+        decisions = [GopDecision(2 * gop, 2, (choice,), {}, {}, (), NO_REASON) for gop in range(gops)]
+        for decision in decisions[: gops // 2]:
+            hall.service.splicer.decision(decision)
+        waiting = asyncio.create_task(text_of(hall, "?_HLS_msn=3"))
+        now = await text_of(hall)
+        assert "CAN-BLOCK-RELOAD=YES\n" in now
+        assert "PART" not in now
+        assert "3.m4s" not in now
+        for decision in decisions[gops // 2 :]:
+            hall.service.splicer.decision(decision)
+        assert "3.m4s" in await waiting
+        assert (await hall.get(STREAM + "5.0.m4s"))[0] == 404
+
+
 async def test_a_camera_has_parts_too(hall: Hall) -> None:
     shows(hall, range(2 * PARTS + 1))
     async with hall.session.get(f"/cameras/{A}/hls/index.m3u8") as answer:
