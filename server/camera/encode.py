@@ -23,6 +23,8 @@ class AccessUnit:
     pulse: int
     key: bool
     data: bytes
+    after: int | None = None
+    """The pulse of the one before it, which it is decoded by; None: it is not known."""
 
 
 class Encoder:
@@ -49,5 +51,5 @@ class Encoder:
         frame.time_base = CLOCK
         frame.pict_type = PictureType.I if key else PictureType.NONE
         data = b"".join(bytes(packet) for packet in self._context.encode(frame))
-        self._last = pulse
-        return AccessUnit(pulse, key, data)
+        before, self._last = self._last, pulse
+        return AccessUnit(pulse, key, data, before)

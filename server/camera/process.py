@@ -140,6 +140,7 @@ class CameraProcess:
             pulse=pulse.number,
             key=unit.key,
             boot=self._boot,
+            after=unit.after,
             due=pulse.due,
             taken=taken,
             encoded=time.time(),

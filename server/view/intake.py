@@ -113,7 +113,8 @@ class Intake:
             head = self._frame_head.decode(message.attachment)
             if state.refused:
                 return
-            frame = self._shelves[camera].put(head.pulse, head.boot, message.payload, key=head.key)
+            shelf = self._shelves[camera]
+            frame = shelf.put(head.pulse, head.boot, message.payload, key=head.key, after=head.after)
         except msgspec.DecodeError:
             state.bad_messages += 1
         except ParameterMismatchError as error:

@@ -20,6 +20,8 @@ class Picture:
     """Which run of the camera's process it is from; pictures of two runs do not build on each other."""
     lasts: int = 1
     """Pulses that it is shown for."""
+    after: int | None = None
+    """The pulse of the one that it is decoded by; None: it is not known, or none."""
     parameters: ParameterSets | None = None
     """Those that it is decoded by, if they are not the same in all streams of the site."""
 

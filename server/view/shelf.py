@@ -26,8 +26,10 @@ class Shelf:
         self._parameters: ParameterSets | None = None
         self.newest = -1
 
-    def put(self, pulse: int, boot: int, access_unit: bytes, *, key: bool) -> Shelved:
-        """Shelve an access unit.
+    def put(
+        self, pulse: int, boot: int, access_unit: bytes, *, key: bool, after: int | None = None
+    ) -> Shelved:
+        """Shelve an access unit; ``after`` is the pulse of the one that it is decoded by, if that is known.
 
         Raises:
             ParameterMismatchError: its parameters are not the site's, and the camera must be refused.
@@ -35,7 +37,7 @@ class Shelf:
         if key:
             self._parameters = self._agreement.accept(access_unit)
         made = self._agreement.pack(access_unit, pulse, self._fps, key=key)
-        shelved = Shelved(pulse, key, made, boot, parameters=self._parameters)
+        shelved = Shelved(pulse, key, made, boot, parameters=self._parameters, after=after)
         self._shelved[pulse] = shelved
         self.newest = max(self.newest, pulse)
         while len(self._shelved) > self._frames:

@@ -80,9 +80,8 @@ class Vp8Bridge:
         return [self._made(span)]
 
     def is_lost_between(self, newest: Picture, picture: Picture, missing: int) -> bool:
-        """Take every missing picture for lost: VP8 does not number its frames."""
-        del newest, picture
-        return missing > 0
+        """Tell it by what the camera says: VP8 does not number its frames."""
+        return missing > 0 and picture.after != newest.pulse
 
     def _made(self, span: Span) -> Picture:
         pulse, lasts = span

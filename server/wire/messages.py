@@ -51,6 +51,8 @@ class FrameHead(msgspec.Struct, frozen=True, kw_only=True):
     """It begins a GOP: SPS, PPS and an IDR picture are inside."""
     boot: Number
     """Which run of the camera process: a restarted camera has another one."""
+    after: Pulse | None = None
+    """The pulse of the access unit before it, which it is decoded by; null where it is not known."""
     due: float
     """When the pulse was due."""
     taken: float

@@ -33,11 +33,12 @@ sides = st.integers(8, 60).map(lambda half: 2 * half)
 
 
 @cache
-def encoded(width: int, height: int, seed: int = 0) -> tuple[AccessUnit, ...]:
-    """Encode pictures that move, so that frames build on the ones before them."""
+def encoded(width: int, height: int, missed: frozenset[int] = frozenset()) -> tuple[AccessUnit, ...]:
+    """Encode pictures that move, so that frames build on the ones before them, but for those missed."""
     encoder = Encoder(Site(width=width, height=height, fps=FPS), Encode(codec="vp8", gop=GOP))
-    noise = np.random.default_rng(seed).integers(0, 255, (height, width, 3), dtype=np.uint8)
-    return tuple(encoder.encode(pulse, np.roll(noise, 3 * pulse, axis=1)) for pulse in range(FRAMES))
+    noise = np.random.default_rng(0).integers(0, 255, (height, width, 3), dtype=np.uint8)
+    taken = (pulse for pulse in range(FRAMES) if pulse not in missed)
+    return tuple(encoder.encode(pulse, np.roll(noise, 3 * pulse, axis=1)) for pulse in taken)
 
 
 def decoded(frames: list[bytes], decoder: str) -> list[Pixels]:
@@ -97,39 +98,42 @@ def read(data: bytes) -> list[tuple[float, Pixels]]:
 
 
 @settings(max_examples=60, deadline=None)
-@given(st.sets(st.integers(0, FRAMES - 1)), st.integers(0, 10**6))
-def test_a_stream_has_a_picture_for_every_pulse_whatever_does_not_come(lost: set[int], start: int) -> None:
-    """What is shown is the camera's own picture, or stands still up to the next key picture."""
-    start -= start % GOP
-    units, plain = encoded(64, 48), decoded([unit.data for unit in encoded(64, 48)], "vp8")
+@given(
+    st.sets(st.integers(0, FRAMES - 1), max_size=6),
+    st.sets(st.integers(0, FRAMES - 1), max_size=6),
+    st.integers(0, 10**6),
+)
+def test_a_stream_has_a_picture_for_every_pulse_whatever_does_not_come(
+    missed: set[int], lost: set[int], first: int
+) -> None:
+    """What was not taken costs itself; after what was lost the stream stands up to the next key picture."""
+    first -= first % GOP
+    units = {unit.pulse: unit for unit in encoded(64, 48, missed=frozenset(missed))}
+    plain = dict(zip(units, decoded([unit.data for unit in units.values()], "vp8"), strict=True))
     agreement = Vp8Agreement(64, 48)
     time, on = Timeline(agreement, FPS, GOP), Shelf(FPS, FRAMES, agreement)
     shown: list[Picture] = []
-    expected: list[int] = []
-    standing = -1
-    for unit in units:
-        if unit.key:
-            standing = -1
-        if unit.pulse in lost:
-            standing = standing if standing >= 0 or not expected else expected[-1]
-            if expected:
-                expected.append(standing)
-            elif unit.key:
-                standing = -2  # nothing can be shown before the next key picture
-            continue
-        picture = on.put(start + unit.pulse, 1, unit.data, key=unit.key)
-        shown += time.take(picture)
-        if not expected and not unit.key:
-            continue
-        expected.append(unit.pulse if standing == -1 else standing)
-    shown += time.fill(start + FRAMES)
-    if not expected:
+    seen: list[int] = []
+    """The pulse of the picture that is to be seen at each pulse."""
+    for pulse in range(FRAMES):
+        unit = None if pulse in lost else units.get(pulse)
+        if unit is not None:
+            after = None if unit.after is None else first + unit.after
+            shown += time.take(on.put(first + pulse, 1, unit.data, key=unit.key, after=after))
+        if unit is not None and (unit.key or unit.after in seen):
+            seen.append(pulse)
+        elif seen:
+            seen.append(seen[-1])
+    shown += time.fill(first + FRAMES)
+    if not seen:
         assert not shown
         return
     found = read(header(64, 48, FPS) + b"".join(picture.fragment for picture in shown))
-    first = FRAMES - len(expected)
-    assert [round(pulse, 3) for pulse, _ in found] == list(range(start + first, start + FRAMES))
-    np.testing.assert_array_equal([picture for _, picture in found], [plain[n] for n in expected])
+    pulses = [pulse for picture in shown for pulse in range(picture.pulse, picture.until)]
+    assert pulses == list(range(first + FRAMES - len(seen), first + FRAMES))
+    assert [round(pulse, 3) for pulse, _ in found] == [picture.pulse for picture in shown]
+    begun = dict(zip(pulses, seen, strict=True))
+    np.testing.assert_array_equal([picture for _, picture in found], [plain[begun[it.pulse]] for it in shown])
 
 
 def test_a_long_hole_is_one_picture_that_lasts() -> None:
