@@ -11,6 +11,8 @@ the number of the person it is at, and the same with short gaps bridged; *own tr
 with the number of the person it is mostly at; *again*: all as MyView numbered it at last, known at once, and
 nobody ever away. The mean of *own tracks, not joined* is what each camera's tracker is worth by itself.
 
+*Looks alone* are those of sites whose cameras have no floor in common, told without travel times.
+
 *No evidence* is without what the cameras tell each other about each frame. *Calibrated* has the homographies
 that `myview calibrate` makes of the cameras' own tracks. *Largest* chooses frame by frame the camera with the
 largest box. *Nearest feet* joins whole tracks of our cameras, each by itself (or of ByteTrack, on the same
@@ -27,7 +29,7 @@ from pathlib import Path
 import cv2
 
 from benchmarks.bestview_calibrate import CannotCalibrateError, calibrated
-from benchmarks.bestview_cases import Case, auditorium, room, terrace
+from benchmarks.bestview_cases import Case, auditorium, gallery, room, terrace
 from benchmarks.bestview_join import own_tracks
 from benchmarks.bestview_plot import plot_sweeps, plot_ways
 from benchmarks.bestview_sweep import Swept, sweep, sweep_tables
@@ -38,10 +40,12 @@ from benchmarks.peer_environment import PeerEnvironment, PeersAwayError, default
 from benchmarks.report import Report
 from benchmarks.surroundings import CannotRunError, parser
 
-SCENES = ("terrace", "auditorium", "room")
+SCENES = ("terrace", "auditorium", "room", "gallery")
 ROOMS = ((2, 3, 40.0), (4, 8, 40.0), (8, 20, 30.0))
 """Cameras, people, seconds."""
 QUICK_ROOMS = ((2, 3, 12.0),)
+GALLERY, QUICK_GALLERY = (6, 240.0), (3, 30.0)
+"""People, seconds."""
 COLUMNS = ["", "joint", "mean", "Agree", "Regret", "Visible", "Chosen", "Cuts", "Best", "Shot"]
 
 WHY = ["", "Visible", "choice", "number", "missed"]
@@ -59,6 +63,8 @@ def cases(options: argparse.Namespace, folder: Path, report: Report) -> Iterator
     if "room" in wanted:
         for cameras, people, seconds in QUICK_ROOMS if options.quick else ROOMS:
             yield room(folder, cameras, people, seconds)
+    if "gallery" in wanted:
+        yield gallery(folder, *(QUICK_GALLERY if options.quick else GALLERY))
 
 
 def row_of(it: Outcome) -> list[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ from tracking.motchallenge import read_rows
 _AUDITORIUM = ("HC3", "HC4", "IP2", "IP5")
 _AUDITORIUM_SIZE, _AUDITORIUM_FPS = (1920, 1080), 30.0
 _ROOM_SIZE, _ROOM_FPS, _ROOM_SEED = (640, 360), 25.0, 1
+_GALLERY_SIZE = (384, 216)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,6 +34,7 @@ class Case:
         gt: the ground truth of each camera.
         least_shown: the share of a person that has to show for a view to show them.
         detections: files to track by; None: the pictures are searched.
+        apart: its cameras have no floor in common.
     """
 
     name: str
@@ -41,6 +43,7 @@ class Case:
     gt: Rows
     least_shown: float
     detections: Mapping[str, Path] | None = None
+    apart: bool = False
 
     def config(self, *, ground: bool = True, **changes: Mapping[str, Any]) -> Config:
         """Give the configuration, with some settings changed, and with or without homographies."""
@@ -112,13 +115,22 @@ def auditorium(data: Path) -> Case:
 
 
 def room(folder: Path, cameras: int, people: int, seconds: float) -> Case:
-    """Draw the synthetic scene into a new folder."""
-    scene = Scene("room", cameras, people, _ROOM_SEED, *_ROOM_SIZE, _ROOM_FPS)
-    name = f"room-{cameras}-{people}"
+    """Draw the synthetic room into a new folder."""
+    return _drawn(folder, Scene("room", cameras, people, _ROOM_SEED, *_ROOM_SIZE, _ROOM_FPS), seconds)
+
+
+def gallery(folder: Path, people: int, seconds: float) -> Case:
+    """Draw the synthetic gallery, whose three cameras have no floor in common, into a new folder."""
+    scene = Scene("gallery", 3, people, _ROOM_SEED, *_GALLERY_SIZE, _ROOM_FPS)
+    return replace(_drawn(folder, scene, seconds), apart=True)
+
+
+def _drawn(folder: Path, scene: Scene, seconds: float) -> Case:
+    name = f"{scene.name}-{scene.cameras}-{scene.objects}"
     write_recording(scene, folder / name, seconds)
     views = find_views(folder, name)
     gt = {video.stem: read_rows(folder / name / "gt" / f"{video.stem}.txt") for video in views.videos}
-    about = f"synthetic, {cameras} cameras, {people} people, {seconds:g} s"
+    about = f"synthetic, {scene.cameras} cameras, {scene.objects} people, {seconds:g} s"
     return Case(name, about, _content(views), gt, 0.25)
 
 

@@ -31,6 +31,7 @@ from tracking.motchallenge import MotRow, format_rows
 LEAST_IOU = 0.5
 BRIDGE = 20
 """Frames that somebody may be hidden for and still count as shown."""
+LOOKS_ALONE = {"identity": {"travel_cap": 0.0}}
 TRUE, TRUE_LARGEST = "true boxes", "true boxes, largest"
 OURS, CALIBRATED, WITHOUT = "MyView", "MyView, calibrated", "no homographies"
 PEER = "ByteTrack"
@@ -94,6 +95,8 @@ def ways(
     apart = followed(uncalibrated, seen.frames)
     bare = decide(uncalibrated, apart)
     yield Way(WITHOUT, bare)
+    if case.apart:
+        yield Way("  looks alone", decide(case.config(ground=False, view=LOOKS_ALONE), apart))
     if not case.calibrated:
         yield Way(f"{WITHOUT}, largest", simple(bare.tracks))
     for name, scene in ((OURS, case if case.calibrated else None), (CALIBRATED, walked)):
@@ -103,6 +106,8 @@ def ways(
         ours = decide(scene.config(), said)
         yield Way(name, ours)
         yield Way(f"{name}, no evidence", decide(scene.config(), apart))
+        if case.apart:
+            yield Way(f"{name}, looks alone", decide(scene.config(view=LOOKS_ALONE), said))
         yield Way(f"{name}, again", chosen(ours.tracks))
         yield Way(f"{name}, largest", simple(ours.tracks))
         ground = {camera: it for camera, it in homographies(scene.config()).items() if it is not None}

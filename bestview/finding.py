@@ -25,6 +25,7 @@ def find_again(
     lost: Sequence[Looks],
     possible: NDArray[np.bool_],
     gate: float,
+    in_time: Floats | float = 1.0,
 ) -> list[int]:
     """Say who of those who are `lost` each newly `found` person is: their index, or -1.
 
@@ -36,10 +37,11 @@ def find_again(
         lost: L of them.
         possible: (N, L); where False the two are surely not one.
         gate: distance below which two looks are likely one person's.
+        in_time: (N, L) what distances are multiplied by, for what else is known.
     """
     if not found or not lost:
         return [-1] * len(found)
-    apart = np.where(possible, unlike(appearances, found, lost), np.nan)
+    apart = np.where(possible, unlike(appearances, found, lost) * in_time, np.nan)
     good = clearly_least(apart, _RATIO) & (apart <= gate)
     row, column = linear_sum_assignment(np.where(good, apart, _NEVER))
     answer = [-1] * len(found)

@@ -80,7 +80,7 @@ class IdentityRegistry:
         calibrated = {camera: matrix is not None for camera, matrix in self._homographies.items()}
         self._between = LooksBetween(settings, calibrated)
         self._episodes = Episodes(settings)
-        self._people = People(settings)
+        self._people = People(settings, len(self._homographies))
         self._doubt = Doubt(self._homographies)
         self._pictures: Mapping[str, tuple[int, int]] = {}
         self._tables = PairTables(settings)
@@ -112,7 +112,9 @@ class IdentityRegistry:
         self._scale.learn(seen.heights)
         rows, firm = self._episodes.take(seen, {track.key: track.looks for track in tracks})
         self._here = np.unique(firm[firm > 0])
-        self._people.see(self._here.tolist(), last_frame)
+        tracks_of, _ = np.nonzero(firm)
+        by = (seen.keys[track].camera for track in tracks_of.tolist())
+        self._people.see(dict.fromkeys(zip(firm[firm > 0].tolist(), by, strict=True)), last_frame)
         self._gather(seen, rows, firm, last_frame)
         episodes = self._episodes.open
         born: tuple[int, ...] = ()

@@ -83,6 +83,12 @@ class IdentitySettings:
     merge_after: int = 50
     # Frames after which someone whom no camera sees is said to be gone (250: ten seconds at 25/s).
     gone_after: int = 250
+    # Frames within which the way from camera to camera says who has come (4500: three minutes at 25/s).
+    travel_frames: int = 4500
+    # Ways out of a camera that must be known for their times to weigh half.
+    travel_known: float = 5.0
+    # The most evidence that they give, for or against; 0: looks alone.
+    travel_cap: float = 4.0
     # Frames for which who is gone is compared like everybody; later only a clear likeness brings them back.
     recent: int = 750
     # Frames after which someone gone is forgotten (15000: ten minutes at 25/s).

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 
-import numpy as np
-
 from bestview.between import LooksBetween
 from bestview.corrections import Merge
 from bestview.episodes import Episode
-from bestview.finding import find_again
 from bestview.groups import Group
 from bestview.identity_settings import IdentitySettings
-from bestview.looks import Looks
 from bestview.naming import named
+from bestview.newcomers import Lost, Newcomers
 from bestview.pairs import PairTables
 from bestview.persons import Person
 
@@ -21,8 +18,9 @@ from bestview.persons import Person
 class People:
     """The persons by number."""
 
-    def __init__(self, settings: IdentitySettings) -> None:
+    def __init__(self, settings: IdentitySettings, cameras: int) -> None:
         self._settings = settings
+        self._newcomers = Newcomers(settings, cameras)
         self._persons: dict[int, Person] = {}
         self._next_number = 1
 
@@ -56,7 +54,11 @@ class People:
                 episode.number = group.number
             if group.number:
                 person = self._persons[group.number]
-                person.last = max(person.last, group.last)
+                for episode in group.episodes:
+                    person.see(episode.key.camera, episode.end.frame)
+                for before in group.past:
+                    person.see(before.camera, before.last)
+        self._newcomers.see_at_once((it for it in groups if it.number), frame)
         return born, self._merge(groups, frame)
 
     def _number_new(
@@ -72,20 +74,15 @@ class People:
         new.sort(key=lambda it: (it.first, it.rows[0]))
         here = {it.number: it for it in groups if it.number}
         lost = [
-            person
+            Lost(person, here.get(number))
             for number, person in sorted(self._persons.items())
             if number not in here or here[number].last < frame - self._settings.gap
         ]
-        before = [here.get(person.number) for person in lost]
-        looks = [_looks(person, group) for person, group in zip(lost, before, strict=True)]
-        asked = [(it, *who) for it in new for who in zip(lost, before, strict=True)]
-        possible = np.array([self._may_be(*one, tables, between, frame) for one in asked], dtype=np.bool_)
-        possible = possible.reshape(len(new), len(lost))
-        found = find_again(between.appearances, [it.looks for it in new], looks, possible, between.gate)
+        found = self._newcomers.match(new, lost, tables, between, frame)
         born = []
         for group, match in zip(new, found, strict=True):
             if match >= 0:
-                group.number = lost[match].number
+                group.number = lost[match].person.number
                 continue
             group.number = self._next_number
             self._persons[group.number] = Person(group.number)
@@ -100,23 +97,6 @@ class People:
             return False
         doubted = max(0, silent(new) - len(new.cameras) + 1) if settings.doubt else 0
         return new.frames >= settings.confirm * (1.0 + settings.doubt * doubted)
-
-    def _may_be(
-        self,
-        new: Group,
-        person: Person,
-        before: Group | None,
-        tables: PairTables,
-        between: LooksBetween,
-        frame: int,
-    ) -> bool:
-        """Say whether looks alone may tell that somebody is one of the lost."""
-        if before is None:
-            # Who has no group though they are compared with everybody is in somebody else's.
-            return person.last < frame - self._settings.recent
-        # Where there was something to compare by, grouping has had its say.
-        compared = bool(new.cameras & before.cameras) or between.share_ground(new.cameras, before.cameras)
-        return not compared and not tables.any_apart(new.rows, before.rows)
 
     def _merge(self, groups: Sequence[Group], frame: int) -> tuple[Merge, ...]:
         """Merge numbers that have been nobody's for long: whoever had them is in somebody else's group."""
@@ -141,11 +121,11 @@ class People:
                 person.looks.add_all(episode.looks)
                 person.settled += episode.told[person.number]
 
-    def see(self, numbers: Iterable[int], frame: int) -> None:
-        """Note that people are seen whose tracks are settled though they go on."""
-        for number in numbers:
+    def see(self, seen: Iterable[tuple[int, str]], frame: int) -> None:
+        """Note whom cameras see whose tracks are settled though they go on."""
+        for number, camera in seen:
             if number in self._persons:
-                self._persons[number].last = max(self._persons[number].last, frame)
+                self._persons[number].see(camera, frame)
 
     def comings_and_goings(
         self, episodes: Iterable[Episode], frame: int
@@ -154,7 +134,7 @@ class People:
         for episode in episodes:
             person = self._persons.get(episode.number)
             if person is not None:
-                person.last = max(person.last, episode.end.frame)
+                person.see(episode.key.camera, episode.end.frame)
         returned: list[int] = []
         gone: list[int] = []
         for number, person in sorted(self._persons.items()):
@@ -186,8 +166,3 @@ def _whose_now(groups: Sequence[Group]) -> dict[int, int]:
                 most[number] = (frames, group.number)
     here = {group.number for group in groups}
     return {number: other for number, (_, other) in most.items() if number not in here}
-
-
-def _looks(person: Person, group: Group | None) -> Looks:
-    """How somebody looks who is lost: with what is not settled yet."""
-    return person.looks if group is None else group.looks

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from bestview.looks import Looks
+from bestview.travel import Sight
 
 
 @dataclass(slots=True, eq=False)
@@ -14,6 +15,7 @@ class Person:
     Attributes:
         number: from 1, never used for anybody else.
         last: frame of the last sighting.
+        camera: in which that was; of several the first by name.
         gone: said to be gone, and not back yet.
         looks: of the settled episodes.
         settled: their frames that were told to be this person's.
@@ -22,13 +24,24 @@ class Person:
 
     number: int
     last: int = -1
+    camera: str = ""
     gone: bool = False
     looks: Looks = field(default_factory=Looks)
     settled: int = 0
     nobody_since: int = -1
 
+    @property
+    def sight(self) -> Sight:
+        """Where they were seen last."""
+        return Sight(self.camera, self.last)
+
+    def see(self, camera: str, frame: int) -> None:
+        """Note a sighting."""
+        if frame > self.last or (frame == self.last and camera < self.camera):
+            self.last, self.camera = frame, camera
+
     def absorb(self, other: Person) -> None:
         """Take over what is known of `other`: the two are one."""
         self.looks.add_all(other.looks)
-        self.last = max(self.last, other.last)
+        self.see(other.camera, other.last)
         self.settled += other.settled

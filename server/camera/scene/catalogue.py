@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from server.camera.scene.gallery import GALLERY
 from server.camera.scene.room import ROOM, Room
 
-_ROOMS = {"room": ROOM}
+_ROOMS = {"room": ROOM, "gallery": GALLERY}
 
 
 def scene_names() -> tuple[str, ...]:

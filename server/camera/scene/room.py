@@ -91,7 +91,8 @@ _OAK = (0.40, 0.29, 0.20)
 _LEAF = ((0.20, 0.33, 0.20), (0.24, 0.40, 0.23), (0.17, 0.29, 0.19))
 
 
-def _bench(x: float, y: float) -> Furniture:
+def bench(x: float, y: float) -> Furniture:
+    """Give a bench along the southern wall, by its south-western corner."""
     legs = (0.10, 1.32)
     return Furniture(
         "bench",
@@ -105,7 +106,8 @@ def _bench(x: float, y: float) -> Furniture:
     )
 
 
-def _plant(x: float, y: float) -> Furniture:
+def plant(x: float, y: float) -> Furniture:
+    """Give a plant in a pot, by its middle."""
     balls = ((0, 0, 1.0, 0.30), (0.17, 0.06, 0.82, 0.22), (-0.16, 0.1, 0.86, 0.23), (0.02, -0.17, 0.8, 0.22))
     leaves = tuple(
         Block(
@@ -161,13 +163,13 @@ ROOM = Room(
     # Along the walls and beneath the cameras, where nobody wants to go; only the pillar stands in the room.
     furniture=(
         _pillar(5.6, 6.0, 3.4),
-        _bench(4.75, 0.45),
+        bench(4.75, 0.45),
         _sofa(0.08, 2.95),
         _sideboard(10.54, 2.3),
-        _plant(0.6, 0.6),
-        _plant(10.4, 0.6),
-        _plant(0.6, 7.4),
-        _plant(10.4, 7.4),
+        plant(0.6, 0.6),
+        plant(10.4, 0.6),
+        plant(0.6, 7.4),
+        plant(10.4, 7.4),
     ),
     rug=(3.7, 2.35, 7.3, 4.75),
     # Corners first: with two or three cameras the doorways are far from all of them, and before two.

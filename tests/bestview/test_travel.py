@@ -1,0 +1,96 @@
+"""Times from camera to camera say who has come: learned from who surely went there, and nothing before."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+from math import log
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bestview import IdentitySettings
+from bestview.travel import Sight, TravelTimes, time_bins
+
+CAMERAS = ("c0", "c1", "c2")
+SETTINGS = IdentitySettings(travel_frames=1000, travel_known=5.0, travel_cap=4.0)
+WAY = st.tuples(st.sampled_from(CAMERAS), st.sampled_from(CAMERAS), st.integers(-50, 1500))
+
+
+def plain(ways: list[tuple[str, str, int]], lost: str, found: str, frames: int) -> float:
+    """The rule, read plainly: from the list of all ways."""
+    edges = time_bins(SETTINGS.travel_frames).tolist()
+
+    def bin_of(time: int) -> int:
+        return next((i for i, (low, high) in enumerate(pairwise(edges)) if low <= time < high), -1)
+
+    out = [(b, bin_of(time)) for a, b, time in ways if a == lost and bin_of(time) >= 0]
+    mine, last = bin_of(frames), len(edges) - 2
+    if mine < 0 or not out:
+        return 0.0
+    into = [place for b, place in out if b == found]
+    here = sum(
+        share
+        for place in into
+        for beside, share in ((-1, 0.25), (0, 0.5), (1, 0.25))
+        if min(max(place + beside, 0), last) == mine
+    )
+    share_of_camera = (len(into) + 1 / len(CAMERAS)) / (len(out) + 1)
+    share_of_time = (edges[mine + 1] - edges[mine]) / (edges[-1] - edges[0])
+    density = (here / share_of_time + 1) / (len(into) + 1)
+    said = min(max(log(len(CAMERAS) * share_of_camera * density), -4.0), 4.0)
+    return len(out) / (len(out) + 5.0) * said
+
+
+@settings(deadline=None, max_examples=200)
+@given(st.lists(WAY, max_size=30), WAY)
+def test_evidence_is_that_of_all_ways_read_plainly(
+    ways: list[tuple[str, str, int]], asked: tuple[str, str, int]
+) -> None:
+    travel = TravelTimes(SETTINGS, len(CAMERAS))
+    for lost, found, frames in ways:
+        travel.learn(Sight(lost, 100), Sight(found, 100 + frames))
+    lost, found, frames = asked
+    said = travel.evidence([Sight(found, 70 + frames)], [Sight(lost, 70)])
+    assert said.shape == (1, 1)
+    assert said[0, 0] == pytest.approx(plain(ways, lost, found, frames))
+
+
+def test_the_usual_time_speaks_for_somebody_and_another_camera_or_time_against() -> None:
+    travel = TravelTimes(SETTINGS, len(CAMERAS))
+    for i in range(20):
+        travel.learn(Sight("c0", 0), Sight("c1", 150 + i))
+    found = [Sight("c1", 160), Sight("c1", 5), Sight("c1", 900), Sight("c2", 160), Sight("c1", 5000)]
+    usual, soon, late, elsewhere, ages = travel.evidence(found, [Sight("c0", 0)])[:, 0].tolist()
+    assert usual > 1.0
+    assert max(soon, late, elsewhere) < -1.0
+    assert ages == 0.0, "who has been away for longer than a way takes"
+    assert not travel.evidence(found, [Sight("c2", 0)]).any(), "nobody has come from there yet"
+
+
+def test_old_ways_fade_and_memory_is_bounded() -> None:
+    travel = TravelTimes(SETTINGS, len(CAMERAS))
+    for i in range(300):
+        travel.learn(Sight("c0", i), Sight("c1", i + 30))
+    for i in range(150):
+        travel.learn(Sight("c0", i), Sight("c1", i + 700))
+    then, now = travel.evidence([Sight("c1", 30), Sight("c1", 700)], [Sight("c0", 0)])[:, 0]
+    assert now > then
+    assert sum(times.sum() for times in travel._exits["c0"].into.values()) <= 64
+
+
+@given(st.integers(0, 10_000))
+def test_bins_cover_all_times_without_holes(longest: int) -> None:
+    edges = time_bins(longest)
+    assert edges[0] == 1.0
+    assert edges[-1] == longest + 1 or longest < 1
+    assert (np.diff(edges) > 0).all() or longest < 1
+
+
+def test_any_settings_may_be_at_their_least() -> None:
+    travel = TravelTimes(replace(SETTINGS, travel_frames=0, travel_known=0.0, travel_cap=0.0), 0)
+    travel.learn(Sight("c0", 0), Sight("c1", 1))
+    assert travel.evidence([Sight("c1", 1)], [Sight("c0", 0)]).tolist() == [[0.0]]
+    assert travel.evidence([], []).shape == (0, 0)
