@@ -44,6 +44,10 @@ class Searched:
         return self.word is not None and len(self.detections) > 0
 
 
+_WAITS_S = 2.0
+"""How long nothing may come of a camera that passes through before it counts as away."""
+
+
 class CameraPipeline:
     """Source, encoder, detector and tracker of one camera, without a clock and without a network.
 
@@ -76,6 +80,9 @@ class CameraPipeline:
         self.begins = camera.offset if self.source.recorded else 0
         """The pulse at which the pictures begin."""
         self._last: int | None = None
+        self._without = 0
+        """Pulses since the last picture."""
+        self._patience = round(_WAITS_S * site.fps) + config.encode.gop
 
     def take(self, pulse: int) -> Image | None:
         """Give the site-sized picture of a pulse, None where the source has none yet.
@@ -84,7 +91,16 @@ class CameraPipeline:
             SourceEnded: the recording is over.
         """
         own = self.source.take(pulse)
-        return None if own is None else self._fit.image(own)
+        if own is None:
+            self._without += 1
+            return None
+        self._without = 0
+        return self._fit.image(own)
+
+    @property
+    def away(self) -> bool:
+        """Whether a camera gives no pictures; one that passes through may only wait for a GOP to begin."""
+        return not self.source.recorded and self._without > (self._patience if self.passes else 0)
 
     def encode(self, pulse: int, image: Image) -> AccessUnit:
         """Encode the picture of a pulse, the last one that was taken."""

@@ -128,7 +128,7 @@ class CameraProcess:
         await self._send_sound(pulse.number)
         image = await self._in(self._video, lambda: self._pipeline.take(pulse.number))
         if image is None:
-            if not self._pipeline.source.recorded:
+            if self._pipeline.away:
                 self._state = "away"
             self._meter.missed(pulse.number, 1 + pulse.missed)
             self._queue_for_tracking(pulse.number, None)

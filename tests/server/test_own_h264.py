@@ -299,9 +299,10 @@ class NetworkCamera:
 
     def close(self) -> None:
         self._stop.set()
-        self._server.shutdown()
-        self._thread.join()
-        self._server.server_close()
+        if self._thread.is_alive():
+            self._server.shutdown()
+            self._thread.join()
+            self._server.server_close()
 
 
 @pytest.fixture
@@ -321,7 +322,9 @@ def test_a_network_camera_passes_too_in_whole_gops_at_the_sites_pulses(network: 
     pipeline = CameraPipeline(site(network.url, camera=camera), "c0")
     assert pipeline.passes
     sent: list[AccessUnit] = []
-    end, pulse = time.monotonic() + 20, 0
+    assert pipeline.take(1) is None
+    assert not pipeline.away, "it waits for a GOP to begin"
+    end, pulse = time.monotonic() + 20, 2
     while len(sent) < 40:
         assert time.monotonic() < end, f"{len(sent)} units within 20 s"
         time.sleep(0.001)
@@ -329,6 +332,15 @@ def test_a_network_camera_passes_too_in_whole_gops_at_the_sites_pulses(network: 
         if image is not None:
             sent.append(pipeline.encode(pulse, image))
         pulse += 1
+    assert not pipeline.away
+    network.close()
+    gone = range(pulse, pulse + 4 * FPS)
+    while not pipeline.away and time.monotonic() < end:
+        time.sleep(0.001)
+        assert pulse in gone, "its last units have gone, and it is not away"
+        pipeline.take(pulse)
+        pulse += 1
+    assert pipeline.away
     pipeline.close()
     own = {tuple(nals(unit.data)): unit.pulse for unit in encoded(0, 1000)}
     numbers = [own[tuple(nals(unit.data))] for unit in sent]
