@@ -119,18 +119,24 @@ async def test_a_camera_has_the_sound_at_once_or_silence_a_little_later(loud: Ha
     check_counters(taken_apart(ts))
 
 
-async def test_segments_have_the_sound_of_their_pictures(loud: Hall, recording: Path) -> None:
+@pytest.mark.parametrize("parts", [0, 5])
+async def test_segments_and_their_parts_have_the_sound_of_their_pictures(
+    loud: Hall, recording: Path, parts: int
+) -> None:
     sends(loud.service, recording)
     await watched(loud, recording, [])
-    init = await (await loud.session.get("/objects/1/hls/init.mp4")).read()
     listed = await (await loud.session.get("/objects/1/hls/index.m3u8")).text()
-    names = [line for line in listed.splitlines() if line.endswith(".m4s")]
-    parts = [await (await loud.session.get(f"/objects/1/hls/{name}")).read() for name in names]
-    data = init + b"".join(parts)
+    numbers = [line.removesuffix(".m4s") for line in listed.splitlines() if line.endswith(".m4s")]
+    names = [f"{it}.{part}.m4s" for it in numbers for part in range(parts)] or [f"{it}.m4s" for it in numbers]
+    fetched = [
+        await (await loud.session.get(f"/objects/1/hls/{name}")).read() for name in ("init.mp4", *names)
+    ]
+    data = b"".join(fetched)
     times, _ = heard(data)
     assert np.diff(times) == pytest.approx(1 / 48_000, abs=1e-4)
-    began = int(names[0].split(".")[0]) * 25 / FPS
+    began = int(numbers[0]) * 25 / FPS
     assert times[0] == pytest.approx(began, abs=0.022)
+    assert flashes(data) == pytest.approx([it for it in BEEPS if it > began], abs=0.001)
     assert beeps(data) == pytest.approx([it for it in BEEPS if it > began], abs=STEP)
 
 
