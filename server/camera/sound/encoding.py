@@ -19,6 +19,8 @@ log = logging.getLogger(__name__)
 
 _LONG_S = 10
 """A longer silence is not encoded: its frames are left out."""
+_AHEAD = {"aac": 0, "opus": 312}
+"""Samples that a decoder is behind the encoder, beyond whole frames (libopus: 6.5 ms at 48 kHz)."""
 _OFF_S = 0.02
 """Sound that is this far away from its place is moved there."""
 
@@ -27,7 +29,7 @@ class Encoding:
     """Decodes, resamples and encodes. Where nothing comes there is silence; what comes twice is left out."""
 
     def __init__(self, form: SoundFormat, kbps: int) -> None:
-        self._rate, self._each = form.rate, form.samples
+        self._rate, self._each, self._ahead = form.rate, form.samples, _AHEAD[form.coding]
         self._layout = "mono" if form.channels == 1 else "stereo"
         self._format = "fltp" if form.coding == "aac" else "flt"
         self._resampler = self._new_resampler()
@@ -51,7 +53,7 @@ class Encoding:
             return []
         for frame in heard:
             if frame.pts is not None and frame.time_base is not None:
-                self._place(round((frame.pts * frame.time_base + shift) * self._rate))
+                self._place(round((frame.pts * frame.time_base + shift) * self._rate) - self._ahead)
             self._append(frame)
         return self._encoded()
 
