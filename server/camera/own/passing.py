@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Protocol
 
 from server.camera.encode import AccessUnit
@@ -17,6 +18,8 @@ class Unit:
     key: bool
     data: bytes
     image: Image
+    time: Fraction | None = None
+    """When it was taken, seconds by the camera's clock; None: it does not say."""
 
 
 class OwnSource(Source, Protocol):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Mapping
+from fractions import Fraction
 
 import av
 from av.video.stream import VideoStream
@@ -36,6 +37,7 @@ class OwnStream(Stream):
         _check(url, options, wanted)
         self._waiting = Waiting(wanted.gop)
         self._waiting_lock = threading.Lock()
+        self._frame_s = 1 / Fraction(wanted.fps).limit_denominator(1001)
         self._unbroken = False
         """Nothing has been lost since the last key unit."""
         self.taken: Unit | None = None
@@ -44,8 +46,13 @@ class OwnStream(Stream):
     def take(self, pulse: int) -> Image | None:
         """Give the picture of the access unit that goes with a pulse; None where none can."""
         with self._waiting_lock:
-            self.taken = self._waiting.take(pulse)
-        return None if self.taken is None else self.taken.image
+            self.taken = taken = self._waiting.take(pulse)
+        if taken is None:
+            return None
+        if self._listener is not None and taken.time is not None:
+            # What is shown has waited. Sound is asked for at the next pulse, before its picture is taken.
+            self._listener.picture(taken.time + self._frame_s)
+        return taken.image
 
     def _read(self, opened: Opened) -> bool:
         at_once(opened)
@@ -62,9 +69,11 @@ class OwnStream(Stream):
         key, image = is_key(data), decoded(packet)
         self._unbroken = image is not None and bool(data) and (self._unbroken or key)
         if image is not None and self._unbroken:
-            self._told_of(packet)
+            time = None
+            if packet.pts is not None and packet.time_base is not None:
+                time = packet.pts * packet.time_base
             with self._waiting_lock:
-                self._waiting.put(Unit(key, data, image))
+                self._waiting.put(Unit(key, data, image, time))
         return image is not None
 
 

@@ -33,6 +33,7 @@ class Waiting:
         self._units.append(unit)
         if len(self._units) > _MOST_GOPS * self._gop + _CUSHION:
             self._units.popleft()
+            self._whole = False
 
     def take(self, pulse: int) -> Unit | None:
         """Give what goes with a pulse; pulses must grow. None: nothing can."""

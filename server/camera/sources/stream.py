@@ -102,10 +102,7 @@ class Stream:
         if pictures:
             with self._lock:
                 self._newest, self._newest_at = pictures[-1], time.monotonic()
-            self._told_of(pictures[-1])
+            newest = pictures[-1]
+            if self._listener is not None and newest.pts is not None and newest.time_base is not None:
+                self._listener.picture(newest.pts * newest.time_base)
         return bool(pictures)
-
-    def _told_of(self, newest: VideoFrame | av.Packet[VideoStream]) -> None:
-        """Tell who listens when the newest picture was."""
-        if self._listener is not None and newest.pts is not None and newest.time_base is not None:
-            self._listener.picture(newest.pts * newest.time_base)
