@@ -6,10 +6,10 @@ from dataclasses import replace
 from typing import Literal
 
 from server.view.bridge import Bridge, H264Bridge
-from server.view.fmp4 import Sample, fragment, init_segment, rebased, ticks
+from server.view.fmp4 import Sample, fragment, init_segment, rebased, sample_of, ticks
 from server.view.picture import Picture
 from server.view.skip import UnfitError, continuing
-from server.wire.h264 import ParameterSets, nal_units, parameter_sets, sample
+from server.wire.h264 import ParameterSets, nal_units, parameter_sets, sample, units_of
 from server.wire.sections import Site
 from server.wire.sound import SoundFormat
 
@@ -78,6 +78,11 @@ class Agreement:
         """Give a fragment as it is in a stream that has this pulse at time 0."""
         return rebased(fragment, -ticks(origin, fps))
 
+    def told_by(self, key: bytes) -> ParameterSets | None:
+        """Give the parameter sets of the pictures from a key fragment on, where they may be its own."""
+        del key
+        return None
+
     def bridge(self, newest: Picture, fps: float) -> Bridge | None:
         """Give what bridges holes after a picture; None where it is not known how."""
         del newest
@@ -99,6 +104,10 @@ class OwnParameters(Agreement):
         if self.parameters is None:
             self.parameters = replace(found, may_change=True)
         return found
+
+    def told_by(self, key: bytes) -> ParameterSets | None:
+        """Find them in the picture, where they always are."""
+        return parameter_sets(units_of(sample_of(key)))
 
     def bridge(self, newest: Picture, fps: float) -> Bridge | None:
         """Give what bridges holes after a picture, by that picture's own parameter sets."""

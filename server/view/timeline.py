@@ -26,7 +26,7 @@ class Timeline:
     """
 
     def __init__(self, agreement: Agreement, fps: float, gop: int) -> None:
-        self._agreement, self._fps, self._gop = agreement, fps, gop
+        self.agreement, self._fps, self._gop = agreement, fps, gop
         self._newest: Picture | None = None
         """The picture that the next one is decoded by."""
         self._until = 0
@@ -95,4 +95,4 @@ class Timeline:
         return picture.key and picture.pulse < self._until - _ANEW_S * self._fps
 
     def _bridge(self) -> Bridge | None:
-        return None if self._newest is None else self._agreement.bridge(self._newest, self._fps)
+        return None if self._newest is None else self.agreement.bridge(self._newest, self._fps)

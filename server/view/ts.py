@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from server.view.fmp4 import TIMESCALE, ticks
 from server.view.picture import Picture
 from server.view.sound import Heard
+from server.wire.h264 import units_of
 
 PACKET_BYTES = 188
 COUNTERS = 16
@@ -136,12 +137,9 @@ def _stamp(time: int) -> bytes:
 
 
 def _annex_b(sample: bytes) -> Iterator[bytes]:
-    at = 0
-    while at < len(sample):
-        end = at + 4 + int.from_bytes(sample[at : at + 4], "big")
+    for unit in units_of(sample):
         yield _START_CODE
-        yield sample[at + 4 : end]
-        at = end
+        yield unit
 
 
 def _reference(time: int, *, key: bool = False) -> bytes:

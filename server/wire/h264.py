@@ -51,6 +51,17 @@ def nal_units(access_unit: bytes) -> list[bytes]:
     return [unit for unit in units if unit]
 
 
+def units_of(sample: bytes) -> list[bytes]:
+    """Split an MP4 sample into its NAL units; what is no whole one is left out."""
+    units, at = [], 0
+    while at + 4 <= len(sample):
+        end = at + 4 + int.from_bytes(sample[at : at + 4], "big")
+        if at + 4 < end <= len(sample):
+            units.append(sample[at + 4 : end])
+        at = end
+    return units
+
+
 def nal_type(unit: bytes) -> int:
     """Give nal_unit_type (7.3.1)."""
     return unit[0] & 0x1F

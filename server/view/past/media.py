@@ -9,7 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
+from server.view.agreement import Agreement
 from server.view.fmp4 import TIMESCALE
+from server.view.picture import Picture
 
 _HEAD = 8
 """Bytes of a box's size and kind."""
@@ -35,6 +37,15 @@ class Gop:
     def data(self) -> bytes:
         """Its bytes."""
         return b"".join(self.fragments)
+
+
+def pictures_of(gop: Gop, agreement: Agreement) -> list[Picture]:
+    """Give a GOP's pictures as the site's streams have them."""
+    told = agreement.told_by(gop.fragments[0])
+    return [
+        Picture(gop.first + place, is_key(fragment), fragment, boot=0, parameters=told)
+        for place, fragment in enumerate(gop.fragments)
+    ]
 
 
 class CameraFile:

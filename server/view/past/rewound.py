@@ -9,10 +9,11 @@ from collections.abc import Callable, Sequence
 from contextlib import aclosing
 from dataclasses import dataclass, replace
 
+from server.view.agreement import Agreement
 from server.view.footage import Footage
 from server.view.past.hearing import Hearing
 from server.view.past.kept import kept_from, kept_until
-from server.view.past.media import Gop, is_key
+from server.view.past.media import pictures_of
 from server.view.past.play import Source, last_before, play
 from server.view.picture import Picture
 from server.view.reel import Plan, Segment
@@ -77,10 +78,11 @@ class Rewound:
             return None
         lead = await last_before(self._source, first)
         timeline, hearing = self._timeline(), self._hearing()
-        led = [] if lead is None else _pictures(lead)
+        agreement = timeline.agreement
+        led = [] if lead is None else pictures_of(lead, agreement)
         if led:  # as if it had been shown just now: what repeats it does not say how old it is
             timeline.pass_by(replace(led[-1], pulse=first - 1))
-        came = await self._came(first, until)
+        came = await self._came(first, until, agreement)
         footage: list[Footage] = []
         for begin in range(first, until, self._gop):
             end = min(begin + self._gop, until)
@@ -97,19 +99,12 @@ class Rewound:
             segment.add(it)
         return segment
 
-    async def _came(self, first: int, until: int) -> list[Picture]:
+    async def _came(self, first: int, until: int, agreement: Agreement) -> list[Picture]:
         """Give the pictures that there are of some pulses."""
         came: list[Picture] = []
         async with aclosing(play(self._source, first)) as gops:
             async for gop in gops:
                 if gop.first >= until:
                     break
-                came += _pictures(gop)
+                came += pictures_of(gop, agreement)
         return came
-
-
-def _pictures(gop: Gop) -> list[Picture]:
-    return [
-        Picture(gop.first + place, is_key(fragment), fragment, boot=0)
-        for place, fragment in enumerate(gop.fragments)
-    ]

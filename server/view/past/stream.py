@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from server.view.channel import Channel
 from server.view.footage import Footage
 from server.view.past.hearing import Hearing
-from server.view.past.media import is_key
+from server.view.past.media import pictures_of
 from server.view.past.play import Source, play
 from server.view.picture import Picture
 from server.view.tally import Tally
@@ -58,11 +58,8 @@ class PastStream:
             async for gop in gops:
                 if wish.end is not None and gop.first >= wish.end:
                     return
-                pictures = [
-                    Picture(gop.first + number, is_key(fragment), fragment, boot=0)
-                    for number, fragment in enumerate(gop.fragments)
-                    if wish.end is None or gop.first + number < wish.end
-                ]
+                came = pictures_of(gop, self._timeline.agreement)
+                pictures = [it for it in came if wish.end is None or it.pulse < wish.end]
                 for shown in self._shown(pictures):
                     footage = await self._recalled(shown)
                     if wish.end is None:
