@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from server.camera.encode import AccessUnit, Encoder
 from server.view.fmp4 import Sample, fragment, init_segment, rebased, ticks
-from server.wire.h264 import nal_type, nal_units, parameter_sets, sample
+from server.wire.h264 import NAL_AUD, nal_type, nal_units, parameter_sets, sample, units_of
 from server.wire.sections import Encode, Site
 
 SITE = Site(width=64, height=48, fps=25)
@@ -119,3 +119,14 @@ def test_any_bytes_are_split_without_an_error(data: bytes) -> None:
 @given(st.floats(1, 120), st.integers(0, 10**9))
 def test_ticks_rise_with_every_pulse(fps: float, pulse: int) -> None:
     assert ticks(pulse + 1, fps) > ticks(pulse, fps)
+
+
+UNITS = st.binary(min_size=1, max_size=9).filter(lambda it: nal_type(it) != NAL_AUD)
+
+
+@given(st.lists(UNITS), st.binary(max_size=9))
+def test_a_sample_is_taken_apart_as_it_was_put_together_and_junk_is_left_out(
+    units: list[bytes], junk: bytes
+) -> None:
+    assert units_of(sample(units)) == units
+    assert units_of(sample(units) + junk)[: len(units)] == units
