@@ -139,7 +139,7 @@ async def test_where_they_must_be_equal_the_second_camera_is_refused() -> None:
         await spliced(small_config())
 
 
-PLAY = """async ([url, codec]) => {
+PLAY = """async ([url, codec, width, height]) => {
   const video = document.createElement('video');
   const source = new MediaSource();
   video.muted = true;
@@ -149,14 +149,19 @@ PLAY = """async ([url, codec]) => {
   buffer.appendBuffer(await (await fetch(url)).arrayBuffer());
   await new Promise((done) => buffer.addEventListener('updateend', done, { once: true }));
   source.endOfStream();
-  const canvas = new OffscreenCanvas(video.videoWidth, video.videoHeight).getContext('2d');
+  const canvas = new OffscreenCanvas(width, height).getContext('2d');
   const greens = [];
   for (let pulse = 0; pulse < buffer.buffered.end(0) * 25 - 0.5; pulse += 3) {
-    const seeked = new Promise((done) => video.addEventListener('seeked', done, { once: true }));
     video.currentTime = (pulse + 0.5) / 25;
-    await seeked;
-    canvas.drawImage(video, 0, 0);
-    const { data, width, height } = canvas.getImageData(0, 0, video.videoWidth, video.videoHeight);
+    for (let is = -1; is !== pulse;) {  // a picture says when it is shown; that it was sought says less
+      await new Promise(requestAnimationFrame);
+      if (video.seeking || video.readyState < video.HAVE_CURRENT_DATA) continue;
+      const image = new VideoFrame(video);
+      is = Math.round(image.timestamp * 25 / 1e6);
+      canvas.drawImage(image, 0, 0);
+      image.close();
+    }
+    const { data } = canvas.getImageData(0, 0, width, height);
     const blocks = [];
     for (let y = 4; y < height; y += 8) {
       for (let x = 4; x < width; x += 8) blocks.push(data[4 * (y * width + x) + 1]);
@@ -190,7 +195,9 @@ async def _played(hall: Hall) -> dict[str, Any]:
     async with chromium() as browser:
         page = await browser.new_page(bypass_csp=True)
         await page.goto(f"http://127.0.0.1:{hall.port}/healthz")
-        playing = asyncio.create_task(page.evaluate(PLAY, ["/objects/1/best.mp4", agreement.codec]))
+        playing = asyncio.create_task(
+            page.evaluate(PLAY, ["/objects/1/best.mp4", agreement.codec, WIDTH, HEIGHT])
+        )
         while not splicer.viewers:  # noqa: ASYNC110 — the browser comes when it comes
             await asyncio.sleep(0.01)
         for gop in range(1, GOPS):
