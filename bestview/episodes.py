@@ -161,9 +161,10 @@ class Episodes:
     def _ends(self, episode: Episode, frame: int, *, crowded: bool) -> bool:
         """Say whether a sighting in `frame` begins a new episode.
 
-        Where nothing is known of how somebody looks there is nothing to ask by: the tracker is believed.
+        Where it is neither known how somebody looks nor where they stand, there is nothing to ask by: the
+        tracker is believed.
         """
-        if not episode.looks.by_camera:
+        if not episode.looks.by_camera and np.isnan(episode.end.ground).any():
             return False
         settings = self._settings
         out_of_crowd = not crowded and episode.crowd >= settings.crowd_frames and episode.free >= _ROOTED
