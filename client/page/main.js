@@ -99,7 +99,7 @@ function readOut() {
   const live = viewer.past === null;
   strip.draw({ pulse: probe.pulse, live, fps: site.fps, object: viewer.object, decisions, palette });
   if (whyOn && !stripElement.matches(':hover')) explain(probe.pulse);
-  if (viewer.held === null) void reason.about(viewer.object, probe.camera);
+  if (viewer.held === null) void reason.about(viewer.object, probe.camera, live ? null : probe.pulse);
   else reason.put(`Held by hand. ${best(decisions.camera(viewer.object, probe.pulse), viewer.held)}`);
 }
 
@@ -191,6 +191,7 @@ async function copyLink() {
 }
 
 let whyOn = false;
+let explained = viewer.decisions;
 
 function toggleWhy() {
   whyOn = !whyOn;
@@ -201,10 +202,12 @@ function toggleWhy() {
 
 /** @param {number | null} pulse */
 function explain(pulse) {
-  const { site, object, probe } = viewer;
+  const { site, object, probe, decisions } = viewer;
+  if (decisions !== explained) why.forget(); // the pulses began anew
+  explained = decisions;
   if (!site || object === null || pulse === null || probe.pulse === null) return why.hide();
   const ago = (probe.pulse - pulse) / site.fps;
-  void why.show(object, pulse, site.gop, ago < site.gop / site.fps ? 'Now' : `${ago.toFixed(1)} s before`);
+  why.show(object, pulse, site.gop, ago < site.gop / site.fps ? 'Now' : `${ago.toFixed(1)} s before`);
 }
 
 /** @param {number} number from 1, of a camera in the site's order */

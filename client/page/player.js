@@ -62,6 +62,8 @@ export class Player {
   #container = 'mp4';
   /** @type {Subject | null} whose picture the element shows */
   shown = null;
+  /** @type {Subject | null} whose stream was left because the picture was paused for long */
+  #left = null;
 
   /**
    * @param {HTMLVideoElement} video
@@ -102,6 +104,8 @@ export class Player {
   /** @param {Subject} subject whom to show from now on */
   choose(subject) {
     if (this.#run && same(this.#run.subject, subject)) return;
+    if (this.#left && same(this.#left, subject) && this.video.paused) return;
+    this.#left = null;
     this.#run?.leave.abort();
     this.#run = begin(subject);
     void this.#follow(this.#run);
@@ -239,7 +243,10 @@ export class Player {
     if (!run.landed) return;
     const { ranges } = buffer;
     if (video.paused) {
-      if ((ranges.at(-1)?.[1] ?? 0) - video.currentTime > PAUSED_S) this.stop();
+      if ((ranges.at(-1)?.[1] ?? 0) - video.currentTime > PAUSED_S) {
+        this.stop();
+        this.#left = run.subject;
+      }
       return;
     }
     if (run.subject.past) {
@@ -262,7 +269,7 @@ export class Player {
   /** Leave the stream; the last frame stays. */
   stop() {
     this.#run?.leave.abort();
-    this.#run = null;
+    this.#run = this.#left = null;
   }
 }
 

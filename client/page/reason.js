@@ -1,4 +1,4 @@
-/** Why this view: the server's one plain sentence about the present choice. */
+/** Why this view: the server's one plain sentence about the present choice, or about that of a moment of the past. */
 
 import { getJson } from './http.js';
 
@@ -20,15 +20,17 @@ export class Reason {
    *
    * @param {number} object
    * @param {string | null} camera now shown
+   * @param {number | null} pulse now shown, of the past; null: it is live
    */
-  async about(object, camera) {
-    const about = `${object} ${camera}`;
+  async about(object, camera, pulse) {
+    const about = `${object} ${camera} ${pulse === null}`;
     const now = performance.now();
     if (about === this.#about && now - this.#asked < EVERY_MS) return;
     this.#about = about;
     this.#asked = now;
+    const query = pulse === null ? '' : `?at=p${pulse}`;
     try {
-      const choice = /** @type {Choice} */ (await getJson(`api/objects/${object}/choice`));
+      const choice = /** @type {Choice} */ (await getJson(`api/objects/${object}/choice${query}`));
       // The choice runs ahead of the picture by the look-ahead: it may already be about the next view.
       this.#say(about, choice.camera === camera ? choice.reason : '');
     } catch {

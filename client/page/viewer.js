@@ -52,6 +52,7 @@ export class Viewer {
   #follow = new Follow();
   #followed = ''; // whom, in which camera
   #asked = this.object !== null; // by the viewer, not by default
+  #asleep = false; // paused by a browser that nobody looks at, not by hand
   #frameAt = -Infinity;
   #chosenAt = -Infinity;
   #notice = '';
@@ -66,13 +67,16 @@ export class Viewer {
     this.player = new Player(video, {
       landed: changed,
       ended: () => this.#losePast(),
-      resumed: () => this.#resume(),
+      resumed: () => (this.#asleep ? this.live() : this.#resume()),
     });
+    video.addEventListener('pause', () => (this.#asleep = document.hidden));
     this.probe.object = this.object;
     onAddress(({ object, camera, beside }) => {
+      if (camera !== this.#held) this.#moveOn();
       this.#held = camera;
       this.beside = beside;
       if (object !== null) this.#turnTo(object, true);
+      this.changed();
     });
   }
 
@@ -138,12 +142,17 @@ export class Viewer {
   }
 
   /**
-   * @param {number} pulse to see again, from there on
+   * @param {number} wanted pulse to see again, from there on
    */
-  watchFrom(pulse) {
+  watchFrom(wanted) {
     if (!this.site || this.object === null || this.probe.pulse === null) return;
     const { fps } = this.site;
+    const pulse = Math.max(0, wanted);
     if (pulse >= this.decisions.end - LIVE_S * fps) return this.live();
+    if (this.container === 'webm') {
+      this.say('Of WebM nothing is kept to be seen again: this is live.');
+      return this.live();
+    }
     this.past = { pulse, time: pulse / fps };
     this.player.video.play().catch(() => undefined);
     this.#play();
@@ -153,9 +162,9 @@ export class Viewer {
   /** From now on what happens now. */
   live() {
     this.past = null;
+    this.player.video.play().catch(() => undefined);
     this.#play();
     this.changed();
-    this.player.video.play().catch(() => undefined);
   }
 
   /** @param {number} seconds to go on, or back, from the frame now shown */
@@ -175,6 +184,14 @@ export class Viewer {
     else this.watchFrom(this.probe.pulse);
   }
 
+  /** Whoever is watched next, or by which camera, is watched from the moment of the past that is now shown. */
+  #moveOn() {
+    const { shown, video } = this.player;
+    if (!this.site || !this.past || shown?.past !== this.past) return;
+    const pulse = Math.floor(video.currentTime * this.site.fps);
+    this.past = { pulse, time: pulse / this.site.fps };
+  }
+
   #losePast() {
     this.say('That is not kept any more: this is live.');
     this.live();
@@ -188,6 +205,7 @@ export class Viewer {
   /** @param {string | null} camera to stay with; once more, or null: the best is shown again */
   hold(camera) {
     if (this.object === null) return;
+    this.#moveOn();
     this.#held = camera === this.#held ? null : camera;
     this.#write(true);
     this.#play();
@@ -299,7 +317,8 @@ export class Viewer {
   /** Whoever was chosen by a number that is no longer theirs stays chosen by the one they have. */
   #followMerge() {
     const { object } = this;
-    this.beside = this.beside.map((it) => this.people?.find((person) => person.also?.includes(it))?.object ?? it);
+    const now = this.beside.map((it) => this.people?.find((person) => person.also?.includes(it))?.object ?? it);
+    this.beside = [...new Set(now)];
     const same = this.people?.find((person) => object !== null && person.also?.includes(object));
     if (!same || this.chosen) return;
     this.say(`Person ${object} turned out to be person ${same.object}.`);
@@ -339,6 +358,7 @@ export class Viewer {
       this.#play();
       return;
     }
+    this.#moveOn();
     this.object = object;
     this.#chosenAt = performance.now();
     this.probe.choose(object);

@@ -4,6 +4,8 @@ import { getJson } from './http.js';
 
 /** @import {Choice} from './contract.js' */
 
+/** @typedef {{key: string, object: number, pulse: number, when: string}} Wish */
+
 const KEPT = 200; // answers: a minute of GOPs, and some
 const NUMBERS = new Intl.NumberFormat('en', { minimumFractionDigits: 2, maximumFractionDigits: 2 });
 const FRAMES = new Intl.NumberFormat('en', { maximumFractionDigits: 1 });
@@ -11,7 +13,8 @@ const FRAMES = new Intl.NumberFormat('en', { maximumFractionDigits: 1 });
 export class Why {
   /** @type {Map<string, Choice>} by person and first pulse of the GOP */
   #known = new Map();
-  #wanted = '';
+  /** @type {Wish | null} null: nothing is to be shown */
+  #wanted = null;
   #asking = false;
 
   /** @param {HTMLElement} place */
@@ -20,8 +23,13 @@ export class Why {
   }
 
   hide() {
-    this.#wanted = '';
+    this.#wanted = null;
     this.place.hidden = true;
+  }
+
+  /** Pulses began anew: their numbers mean other moments. */
+  forget() {
+    this.#known.clear();
   }
 
   /**
@@ -32,23 +40,30 @@ export class Why {
    * @param {number} gop frames
    * @param {string} when in words
    */
-  async show(object, pulse, gop, when) {
+  show(object, pulse, gop, when) {
     const key = `${object} ${pulse - (pulse % gop)}`;
-    this.#wanted = key;
+    this.#wanted = { key, object, pulse, when };
     const known = this.#known.get(key);
-    if (known) return this.#draw(known, when);
-    if (this.#asking) return;
+    if (known) this.#draw(known, when);
+    else if (!this.#asking) void this.#ask(this.#wanted);
+  }
+
+  /** @param {Wish} wish */
+  async #ask({ key, object, pulse }) {
     this.#asking = true;
     try {
       const choice = /** @type {Choice} */ (await getJson(`api/objects/${object}/choice?at=p${pulse}`));
       this.#known.set(key, choice);
       if (this.#known.size > KEPT) this.#known.delete(/** @type {string} */ (this.#known.keys().next().value));
-      if (this.#wanted === key) this.#draw(choice, when);
+      if (this.#wanted?.key === key) this.#draw(choice, this.#wanted.when);
     } catch {
-      if (this.#wanted === key) this.#say(`${when}: not known. Reasons are kept from when a person is first watched.`);
-    } finally {
-      this.#asking = false;
+      if (this.#wanted?.key === key) {
+        this.#say(`${this.#wanted.when}: not known. Reasons are kept from when a person is first watched.`);
+      }
     }
+    this.#asking = false;
+    const next = this.#wanted; // somebody may have gone on meanwhile, and rest there
+    if (next && next.key !== key && !this.#known.has(next.key)) void this.#ask(next);
   }
 
   /** @param {string} text */

@@ -67,6 +67,43 @@ async def test_who_pauses_goes_on_where_they_stopped(browser: Browser) -> None:
         await visit.until(LIVE)
 
 
+async def left_for_long(visit: Visit) -> int:
+    """Let the stream of a paused picture run on until the page leaves it; give the pulse that is shown."""
+    await visit.until("video.paused")
+    stopped = int(await visit.get("myview.pulse"))
+    visit.server.site.pulse0 -= 40
+    await visit.until("video.buffered.end(video.buffered.length - 1) > video.currentTime + 30")
+    await visit.page.wait_for_timeout(300)
+    visit.server.site.people[3] = False  # of whom the page is told
+    await expect(visit.page.locator(".cards li")).to_have_count(3)
+    await visit.page.wait_for_timeout(300)
+    assert await visit.get("video.paused && myview.pulse") == stopped
+    assert visit.server.site.opened == [1], "nobody looks at what comes"
+    return stopped
+
+
+async def test_however_long_a_picture_is_paused_it_stays_so(browser: Browser) -> None:
+    async with visiting(browser) as visit:
+        await visit.playing(1)
+        await visit.page.keyboard.press("Space")
+        stopped = await left_for_long(visit)
+        await visit.page.keyboard.press("Space")
+        await visit.until(f"!video.paused && myview.pulse > {stopped}")
+        assert await visit.get("myview.pulse") < stopped + 2 * FPS
+
+
+async def test_what_a_browser_paused_unseen_is_live_when_somebody_looks(browser: Browser) -> None:
+    async with visiting(browser) as visit:
+        await visit.playing(1)
+        asked: list[str] = []
+        visit.page.on("request", lambda request: asked.append(request.url))
+        await visit.get("Object.defineProperty(document, 'hidden', { value: true }) && video.pause()")
+        stopped = await left_for_long(visit)
+        await visit.get("video.play()")  # as the browser does
+        await visit.until(f"myview.pulse > {stopped + 30 * FPS}")
+        assert not any("from=" in address for address in asked)
+
+
 async def test_what_is_not_kept_any_more_is_said_and_live_goes_on(browser: Browser) -> None:
     async with visiting(browser, FakeSite(kept_from=STARTS_AT + 10_000)) as visit:
         await visit.playing(1)
@@ -83,8 +120,12 @@ async def test_another_person_is_watched_at_the_same_moment_of_the_past(browser:
         await seconds_of_playing(visit, 6)
         await visit.page.keyboard.press(",")
         await visit.until("myview.delays.at(-1).delayMs > 4000")
+        back = await visit.get("myview.pulse")
+        async with visit.page.expect_request(lambda request: "choice?at=p" in request.url):
+            await visit.until(f"myview.pulse > {back + 2 * FPS}")
         await visit.page.keyboard.press("ArrowRight")
         await visit.playing(2)
+        assert await visit.get("myview.pulse") > back + FPS, "goes on from the moment shown"
         await visit.until("myview.delays.at(-1).delayMs > 4000 && myview.camera === 'c2'")
         await visit.page.keyboard.press("1")
         await visit.until("myview.delays.at(-1).delayMs > 4000 && myview.camera === 'c0'")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import AsyncIterator
 
 import pytest
@@ -9,7 +10,7 @@ import pytest_asyncio
 from page_browser import needs_chromium, visiting
 from page_pattern import FPS
 from page_site import STARTS_AT, FakeSite
-from playwright.async_api import Browser, expect
+from playwright.async_api import Browser, Route, expect
 
 from benchmarks.browser import chromium
 
@@ -52,6 +53,24 @@ async def test_a_moment_under_the_mouse_is_explained(browser: Browser) -> None:
         assert 2 < float(words.split(maxsplit=1)[0]) < 5
         await visit.page.mouse.move(5, 5)
         await expect(why).to_be_hidden()
+
+
+async def test_where_the_mouse_comes_to_rest_is_explained_though_answers_are_slow(browser: Browser) -> None:
+    async with visiting(browser) as visit:
+        await visit.playing(1)
+
+        async def late(route: Route) -> None:
+            await asyncio.sleep(0.4)
+            await route.continue_()
+
+        await visit.page.route("**/choice?at=*", late)
+        box = await visit.page.locator("#strip").bounding_box()
+        assert box is not None
+        for seconds in (10, 30):
+            await visit.page.mouse.move(box["x"] + box["width"] * (60 - seconds) / 62, box["y"] + 5)
+        words = visit.page.locator("#why p").first
+        await expect(words).to_contain_text("s before: c")
+        assert 28 < float((await words.text_content() or "").split(maxsplit=1)[0]) < 32
 
 
 async def test_a_moment_whose_reasons_are_not_kept_is_said(browser: Browser) -> None:

@@ -205,6 +205,9 @@ async def test_the_page_plays_across_cuts_and_from_one_person_to_another(free: H
         assert await page.evaluate("document.querySelector('video').dataset.same") == "yes", "one player"
         await page.goto(f"http://127.0.0.1:{free.port}/?object=1&camera=c1")
         await page.wait_for_function("myview.state === 'playing' && myview.camera === 'c1'")
+        await page.keyboard.press(",")
+        said = await page.locator("#notice").text_content()
+        assert said == "Of WebM nothing is kept to be seen again: this is live."
         going_on.cancel()
     assert errors == []
 
