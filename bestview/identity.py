@@ -112,9 +112,11 @@ class IdentityRegistry:
         self._scale.learn(seen.heights)
         rows, firm = self._episodes.take(seen, {track.key: track.looks for track in tracks})
         self._here = np.unique(firm[firm > 0])
-        tracks_of, _ = np.nonzero(firm)
-        by = (seen.keys[track].camera for track in tracks_of.tolist())
-        self._people.see(dict.fromkeys(zip(firm[firm > 0].tolist(), by, strict=True)), last_frame)
+        # Each track and number once: there are as many sightings of them as frames.
+        most = int(firm.max(initial=0)) + 1
+        track, number = np.divmod(np.unique((np.arange(len(firm))[:, None] * most + firm)[firm > 0]), most)
+        by = [seen.keys[it].camera for it in track.tolist()]
+        self._people.see(zip(number.tolist(), by, strict=True), last_frame)
         self._gather(seen, rows, firm, last_frame)
         episodes = self._episodes.open
         born: tuple[int, ...] = ()
