@@ -46,7 +46,10 @@ $(STAMP): pyproject.toml requirements/lock.txt
 
 # What checks the page's JavaScript: the page itself needs nothing of it.
 $(NODE_STAMP): $(STAMP) package.json package-lock.json
-	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/npm ci --silent
+	@echo "npm ci  (typescript and axe-core, to check the page)"
+	@PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/npm ci --silent \
+		|| { echo "npm could not fetch what checks the page; to see why: PATH=$(BIN):\$$PATH npm ci." \
+			"All else without it: $(BIN)/pytest -m 'not slow'"; exit 1; }
 	@touch $@
 
 clean:
