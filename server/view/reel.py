@@ -127,6 +127,7 @@ class Reel:
             self._segments.clear()  # began anew, or nothing came for long: no number is left out
         self.until = footage.until
         if long:
+            self._tell()
             return
         if number not in self._segments:
             self._segments[number] = Segment(number, self.plan, self._lead)

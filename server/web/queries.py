@@ -51,7 +51,7 @@ def _complaint(request: web.Request, path: str) -> str | None:
     if overlay == "1" and path not in OVERLAY:
         return "overlay: boxes are burnt into a person's best.mp4, and into .mjpeg and .jpg; not into this"
     if "camera" in request.query and (path not in HELD or request.query.keys() & {"overlay", "from", "to"}):
-        return "camera: a person's live best.mp4 and best.ts can be held to one, and nothing else"
+        return "camera: a person's live best.mp4, best.ts or best.webm can be held to one, and nothing else"
     for name in ("from", "to"):
         if name in request.query and path not in PAST:
             return f"{name}: only .mp4, .ts and HLS can begin in the past"

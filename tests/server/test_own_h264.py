@@ -23,7 +23,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from videos_by_hand import write_video
 
-from server.camera.encode import AccessUnit
+from server.camera.encode import AccessUnit, Encoder
 from server.camera.own.fitting import wanted_by
 from server.camera.own.passing import Unit
 from server.camera.own.stream import OwnStream
@@ -385,3 +385,28 @@ def test_sound_beside_it_waits_as_long_as_the_pictures(network: NetworkCamera) -
     source.close()
     assert in_a_row == 4 * GOP
     assert float(listener._shift or 0) == pytest.approx(waited / FPS, abs=0.02), "to within half a frame"
+
+
+def test_a_network_camera_that_comes_back_with_other_pictures_is_away(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    config = site("rtsp://camera", encode={"parameters": "own"})
+    larger = config.site.model_copy(update={"width": 2 * WIDTH, "height": 2 * HEIGHT})
+    encoder = Encoder(larger, config.encode)
+    blank = np.zeros((2 * HEIGHT, 2 * WIDTH, 3), dtype=np.uint8)
+    own = written(tmp_path, "h264").read_bytes()
+    other = b"".join(encoder.encode(pulse, blank).data for pulse in range(FRAMES))
+    path = tmp_path / "own.h264"
+    path.write_bytes(own + other)  # it changes while it is read, and is changed when it is opened again
+    source = OwnStream(str(path), {}, None, wanted_by(config))
+    (tmp_path / "other.h264").write_bytes(other)
+    (tmp_path / "other.h264").replace(path)
+    end = time.monotonic() + PATIENCE_S
+    while "does not fit any more" not in caplog.text:
+        assert time.monotonic() < end
+        time.sleep(0.02)
+    source.close()
+    assert f"its pictures are {2 * WIDTH}x{2 * HEIGHT}, the site's {WIDTH}x{HEIGHT}" in caplog.text
+    waiting = source._waiting._units
+    assert waiting
+    assert {unit.image.shape for unit in waiting} == {(HEIGHT, WIDTH, 3)}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 from collections.abc import Mapping
 from fractions import Fraction
@@ -19,6 +20,8 @@ from server.camera.sources.base import Image
 from server.camera.sources.opening import Opened, open_video
 from server.camera.sources.stream import OPEN_S, READ_S, Stream
 
+log = logging.getLogger(__name__)
+
 _LOOKED_AT_GOPS = 2
 """GOPs that a camera sends before it is known to fit."""
 
@@ -35,6 +38,7 @@ class OwnStream(Stream):
         self, url: str, options: Mapping[str, str], listener: LiveSound | None, wanted: Wanted
     ) -> None:
         _check(url, options, wanted)
+        self._wanted = wanted
         self._waiting = Waiting(wanted.gop)
         self._waiting_lock = threading.Lock()
         self._frame_s = 1 / Fraction(wanted.fps).limit_denominator(1001)
@@ -55,7 +59,14 @@ class OwnStream(Stream):
         return taken.image
 
     def _read(self, opened: Opened) -> bool:
+        try:
+            Fitting(self._wanted).opened(opened)
+        except MisfitError as misfit:
+            log.warning("%s: what it sends does not fit any more: %s", self._url, misfit)
+            opened.container.close()
+            return False
         at_once(opened)
+        self._unbroken = False
         return super()._read(opened)
 
     def _decode(self, packet: av.Packet[VideoStream]) -> bool:
@@ -67,6 +78,8 @@ class OwnStream(Stream):
         except ValueError:
             data = b""
         key, image = is_key(data), decoded(packet)
+        if image is not None and image.shape[1::-1] != self._wanted.size:
+            image = None  # it has changed since the connection began, which it may not
         self._unbroken = image is not None and bool(data) and (self._unbroken or key)
         if image is not None and self._unbroken:
             time = None
