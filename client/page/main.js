@@ -196,6 +196,7 @@ let explained = viewer.decisions;
 function toggleWhy() {
   whyOn = !whyOn;
   element('toggle-why').setAttribute('aria-pressed', String(whyOn));
+  element('why').classList.toggle('stays', whyOn);
   if (whyOn) explain(viewer.probe.pulse);
   else why.hide();
 }

@@ -149,10 +149,7 @@ export class Viewer {
     const { fps } = this.site;
     const pulse = Math.max(0, wanted);
     if (pulse >= this.decisions.end - LIVE_S * fps) return this.live();
-    if (this.container === 'webm') {
-      this.say('Of WebM nothing is kept to be seen again: this is live.');
-      return this.live();
-    }
+    if (this.container === 'webm') return this.#losePast(); // of such a site nothing is
     this.past = { pulse, time: pulse / fps };
     this.player.video.play().catch(() => undefined);
     this.#play();
@@ -193,7 +190,7 @@ export class Viewer {
   }
 
   #losePast() {
-    this.say('That is not kept any more: this is live.');
+    this.say('Nothing is kept of that: this is live.');
     this.live();
   }
 

@@ -34,6 +34,11 @@ async def test_the_present_view_is_explained_camera_by_camera(browser: Browser) 
         await expect(why.locator("tbody tr").nth(1)).to_contain_text("0.500.501.00")
         await expect(why).to_contain_text("A cut costs as much as 7.5 frames of not seeing the person.")
         await expect(why).to_contain_text("Over 10 frames: staying with c2 0, c0 9.3 with its cut.")
+        table = await why.bounding_box()
+        legend = await visit.page.locator(".legend").bounding_box()
+        assert table is not None
+        assert legend is not None
+        assert table["y"] + table["height"] <= legend["y"], "it lies over nothing that can be pressed"
         await visit.page.get_by_role("button", name="Why").click()
         await expect(why).to_be_hidden()
 
