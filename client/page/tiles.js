@@ -38,16 +38,19 @@ export class Tiles {
 
   /** @param {number[]} objects who is to be seen beside the chosen person */
   show(objects) {
+    let focused = false;
     for (const [object, tile] of this.#tiles) {
       if (objects.includes(object)) continue;
+      focused ||= tile.element === document.activeElement;
       tile.close();
       this.#tiles.delete(object);
     }
-    for (const object of objects) {
+    for (const [at, object] of objects.entries()) {
       if (!this.#tiles.has(object) && this.shared.site) {
         const tile = new Tile(object, this.shared, () => this.choose(object));
         this.#tiles.set(object, tile);
-        this.place.append(tile.element);
+        this.place.insertBefore(tile.element, this.place.children[at] ?? null);
+        if (focused) tile.element.focus(); // it has the place of the one that was pressed
       }
       this.#tiles.get(object)?.play();
     }
@@ -80,7 +83,10 @@ class Tile {
     this.video = document.createElement('video');
     this.video.muted = this.video.autoplay = this.video.playsInline = true;
     const canvas = document.createElement('canvas');
-    this.element.append(this.video, canvas);
+    const number = document.createElement('span');
+    number.className = 'number';
+    number.textContent = String(object);
+    this.element.append(this.video, canvas, number);
     this.overlay = new Overlay(canvas);
     const [landed, resumed] = [() => this.repaint(), () => this.play()];
     this.player = new Player(this.video, { landed, resumed, ended: () => undefined });

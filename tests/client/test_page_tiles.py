@@ -45,6 +45,7 @@ async def test_somebody_is_seen_beside_and_exchanged_by_a_press(browser: Browser
         await visit.page.get_by_role("button", name="Person 2: make large").click()
         await visit.playing(2)
         assert visit.page.url.endswith("?object=2&beside=1")
+        await expect(visit.page.get_by_role("button", name="Person 1: make large")).to_be_focused()
         await small_ones_play(visit, 1)
         await visit.page.get_by_role("button", name="Person 1 beside").click()
         await expect(visit.page.locator("#tiles")).to_be_hidden()
@@ -55,6 +56,8 @@ async def test_three_at_most_are_seen_beside_by_a_link_too(browser: Browser) -> 
     async with visiting(browser, FakeSite(people=FIVE), "?object=1&beside=2,3,4,9") as visit:
         await visit.playing(1)
         await small_ones_play(visit, 3)
+        await visit.page.get_by_role("button", name="Person 3: make large").click()
+        await expect(visit.page.locator(".tile")).to_have_text(["2", "1", "4"])
         await visit.page.get_by_role("button", name="Person 5 beside").click()
         await expect(visit.page.get_by_role("button", name="make large")).to_have_count(3)
         await expect(visit.page.get_by_role("button", name="Person 5: make large")).to_be_visible()
