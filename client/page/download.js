@@ -16,9 +16,11 @@ const SILENCE_MS = 6000; // a live stream that says nothing for this long is dea
 export async function* download(address, signal) {
   const silence = new AbortController();
   let timer = setTimeout(() => silence.abort(), SILENCE_MS);
-  const either = AbortSignal.any([signal, silence.signal]);
+  const leave = () => silence.abort(); // AbortSignal.any is younger than the oldest iPhones that can play this
+  signal.addEventListener('abort', leave);
+  if (signal.aborted) leave();
   try {
-    const response = await fetch(address, { cache: 'no-store', signal: either });
+    const response = await fetch(address, { cache: 'no-store', signal: silence.signal });
     if (!response.ok || !response.body) throw new Error(`${address}: ${response.status}`);
     const reader = response.body.getReader();
     const splitter = address.split('?')[0].endsWith('.webm') ? new ClusterSplitter() : new SegmentSplitter();
@@ -32,6 +34,7 @@ export async function* download(address, signal) {
     }
   } finally {
     clearTimeout(timer);
+    signal.removeEventListener('abort', leave);
     silence.abort(); // whoever leaves early leaves no connection open
   }
 }

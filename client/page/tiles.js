@@ -97,6 +97,8 @@ class Tile {
     const { container, codec } = this.shared;
     if (!this.player.configure(container, codec)) return;
     this.player.choose({ object: this.object, camera: null, past: null });
+    // Nobody pauses it by hand: a browser did, unseen.
+    if (this.player.shown && this.video.paused && !document.hidden) this.video.play().catch(() => undefined);
   }
 
   close() {

@@ -70,6 +70,9 @@ export class Viewer {
       resumed: () => (this.#asleep ? this.live() : this.#resume()),
     });
     video.addEventListener('pause', () => (this.#asleep = document.hidden));
+    document.addEventListener('visibilitychange', () => {
+      if (!document.hidden && this.#asleep && video.paused) this.live();
+    });
     this.probe.object = this.object;
     onAddress(({ object, camera, beside }) => {
       if (camera !== this.#held) this.#moveOn();

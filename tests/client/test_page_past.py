@@ -16,6 +16,7 @@ from benchmarks.browser import chromium
 
 pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="module")]
 
+HIDDEN = "Object.defineProperty(document, 'hidden', {{ value: {}, configurable: true }})"
 LIVE = "myview.delays.at(-1).delayMs < 2000"
 
 
@@ -92,14 +93,18 @@ async def test_however_long_a_picture_is_paused_it_stays_so(browser: Browser) ->
         assert await visit.get("myview.pulse") < stopped + 2 * FPS
 
 
-async def test_what_a_browser_paused_unseen_is_live_when_somebody_looks(browser: Browser) -> None:
+@pytest.mark.parametrize(
+    "awake",
+    ["video.play()", f"{HIDDEN.format('false')} && document.dispatchEvent(new Event('visibilitychange'))"],
+)
+async def test_what_a_browser_paused_unseen_is_live_when_somebody_looks(browser: Browser, awake: str) -> None:
     async with visiting(browser) as visit:
         await visit.playing(1)
         asked: list[str] = []
         visit.page.on("request", lambda request: asked.append(request.url))
-        await visit.get("Object.defineProperty(document, 'hidden', { value: true }) && video.pause()")
+        await visit.get(f"{HIDDEN.format('true')} && video.pause()")
         stopped = await left_for_long(visit)
-        await visit.get("video.play()")  # as the browser does
+        await visit.get(awake)
         await visit.until(f"myview.pulse > {stopped + 30 * FPS}")
         assert not any("from=" in address for address in asked)
 
