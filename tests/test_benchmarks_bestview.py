@@ -172,6 +172,7 @@ def test_settings_are_swept_and_knowing_all_costs_nothing_but_the_gop(passing: C
     assert all(it.score.regret >= 0.0 for it in found.values())
 
 
+@pytest.mark.slow
 def test_the_benchmark_prints_a_row_for_every_way(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(bestview, "QUICK_ROOMS", ((2, 1, 1.0),))
     out = tmp_path / "out"

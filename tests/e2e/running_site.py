@@ -38,7 +38,9 @@ def configuration(folder: Path, recording: Path, **sections: Any) -> Path:
     }
     for camera in content["cameras"]:
         camera.update(sections.get("camera", {}))
-    content.update({name: value for name, value in sections.items() if name != "camera"})
+    for name, value in sections.items():
+        if name != "camera":
+            content[name] = {**content.get(name, {}), **value} if isinstance(value, dict) else value
     path = folder / "site.yaml"
     path.write_text(yaml.safe_dump(content), encoding="utf-8")
     return path
