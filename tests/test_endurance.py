@@ -68,6 +68,7 @@ def test_the_memory_of_this_process_is_read() -> None:
         assert resident_megabytes() - held > 16.0
 
 
+@pytest.mark.slow
 def test_a_run_is_described_by_its_spans(capsys: pytest.CaptureFixture[str]) -> None:
     run = run_tracker(1500)  # the fewest that have six samples
     describe(Report(), run)

@@ -7,6 +7,10 @@ const KEPT_SECONDS = 75;
 export class Decisions {
   /** @type {Gop[]} sorted by first pulse */
   #gops = [];
+  /** @type {Map<number, number>} by a number that somebody once had: the one they have now */
+  #now = new Map();
+  /** @type {Map<number, number[]>} the other way */
+  #once = new Map();
 
   /** @param {number} fps */
   constructor(fps) {
@@ -25,6 +29,22 @@ export class Decisions {
 
   clear() {
     this.#gops = [];
+  }
+
+  /** @param {{object: number, also?: number[]}[]} people with the numbers that they once had: what was said of those is theirs */
+  rename(people) {
+    this.#once = new Map(people.map(({ object, also }) => [object, also ?? []]));
+    this.#now = new Map(people.flatMap(({ object, also }) => (also ?? []).map((it) => [it, object])));
+  }
+
+  /**
+   * @param {Gop | undefined} gop
+   * @param {number} object
+   * @returns {string | null}
+   */
+  #choice(gop, object) {
+    const known = [object, ...(this.#once.get(object) ?? [])].find((it) => gop?.choices[it]);
+    return known === undefined ? null : gop?.choices[known] ?? null;
   }
 
   /** The first pulse that nothing is decided for yet; 0 when nothing is known. */
@@ -52,7 +72,7 @@ export class Decisions {
    * @returns {string | null} the camera
    */
   camera(object, pulse) {
-    return this.at(pulse)?.choices[object] ?? null;
+    return this.#choice(this.at(pulse), object);
   }
 
   /**
@@ -62,7 +82,8 @@ export class Decisions {
    */
   boxes(camera, pulse) {
     const gop = this.at(pulse);
-    return gop?.boxes[camera]?.[pulse - gop.first] ?? [];
+    const boxes = gop?.boxes[camera]?.[pulse - gop.first] ?? [];
+    return boxes.map(([number, ...sides]) => [this.#now.get(number) ?? number, ...sides]);
   }
 
   /**
@@ -77,7 +98,7 @@ export class Decisions {
     const runs = [];
     for (const gop of this.#gops) {
       const end = gop.first + gop.frames;
-      const camera = gop.choices[object];
+      const camera = this.#choice(gop, object);
       if (end <= from || !camera) continue;
       const last = runs.at(-1);
       if (last && last.camera === camera && last.end === gop.first) last.end = end;

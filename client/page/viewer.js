@@ -89,6 +89,7 @@ export class Viewer {
     const anew = !old || old.fps !== site.fps || Math.abs((old.pulse0 ?? 0) - (site.pulse0 ?? 0)) > RESTART_S;
     if (anew) {
       this.decisions = new Decisions(site.fps);
+      this.decisions.rename(this.people ?? []);
       this.past = null;
     }
     this.site = this.probe.site = site;
@@ -103,6 +104,7 @@ export class Viewer {
   /** @param {Person[]} people */
   setPeople(people) {
     this.people = people;
+    this.decisions.rename(people);
     this.#followMerge();
     const lost = this.object !== null && !this.chosen;
     if (this.object === null || (lost && !this.#asked)) this.#chooseDefault();

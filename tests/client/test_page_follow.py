@@ -42,7 +42,7 @@ async def bright_share_now(visit: Visit) -> float:
     return float((await visit.screenshot() > BRIGHT).all(axis=2).mean())
 
 
-@pytest.mark.parametrize("boxes", [True, False])
+@pytest.mark.parametrize("boxes", [True, pytest.param(False, marks=pytest.mark.slow)])
 async def test_who_is_followed_is_large_and_inside_the_picture(browser: Browser, boxes: bool) -> None:
     async with visiting(browser, FakeSite(people={1: True})) as visit:
         await visit.playing(1)

@@ -55,6 +55,7 @@ async def test_a_held_camera_stays_until_automatic_is_pressed(browser: Browser) 
         assert await visit.get("video === window.before[0] && video.currentSrc === window.before[1]")
 
 
+@pytest.mark.slow
 async def test_a_link_and_keys_hold_too_and_another_person_is_automatic(browser: Browser) -> None:
     async with visiting(browser, query="?object=1&camera=c0") as visit:
         await visit.playing(1)

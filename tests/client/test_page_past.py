@@ -78,7 +78,8 @@ async def left_for_long(visit: Visit) -> int:
     visit.server.site.people[3] = False  # of whom the page is told
     await expect(visit.page.locator(".cards li")).to_have_count(3)
     await visit.page.wait_for_timeout(300)
-    assert await visit.get("video.paused && myview.pulse") == stopped
+    # A frame may be told of that was on its way to the screen when the picture was stopped.
+    assert await visit.get("video.paused && myview.pulse") - stopped in {0, 1}
     assert visit.server.site.opened == [1], "nobody looks at what comes"
     return stopped
 

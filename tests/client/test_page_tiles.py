@@ -52,6 +52,7 @@ async def test_somebody_is_seen_beside_and_exchanged_by_a_press(browser: Browser
         assert visit.page.url.endswith("?object=2")
 
 
+@pytest.mark.slow
 async def test_three_at_most_are_seen_beside_by_a_link_too(browser: Browser) -> None:
     async with visiting(browser, FakeSite(people=FIVE), "?object=1&beside=2,3,4,9") as visit:
         await visit.playing(1)
@@ -64,6 +65,7 @@ async def test_three_at_most_are_seen_beside_by_a_link_too(browser: Browser) -> 
         await small_ones_play(visit, 3)
 
 
+@pytest.mark.slow
 async def test_the_boxes_of_the_small_pictures_are_switched_with_the_others(browser: Browser) -> None:
     painted = """[...document.querySelectorAll('#tiles canvas')].every((it) => it.width > 0
         && it.getContext('2d').getImageData(0, 0, it.width, it.height).data.some((value) => value > 0))"""

@@ -162,6 +162,7 @@ async def test_a_killed_camera_is_replaced_within_a_second_and_comes_back(
     assert not gaps, f"the viewer's stream has holes: {gaps}"
 
 
+@pytest.mark.slow
 async def test_when_all_cameras_die_streams_stand_still_and_go_on(site: RunningSite, tmp_path: Path) -> None:
     await site.until(lambda: any(site.gops[-1].choices.values()), "somebody is shown")
     number = next(number for number, camera in site.gops[-1].choices.items() if camera)

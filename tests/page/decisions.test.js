@@ -24,3 +24,15 @@ test('decisions are kept for a minute, in order and once', () => {
     { camera: 'b', first: 5950, end: 6000 },
   ]);
 });
+
+test('what was said of a number before it was merged is said of whom it was', () => {
+  const decisions = new Decisions(25);
+  const boxes = { a: [[[4, 1, 2, 3, 4], [2, 0, 0, 1, 1]]] };
+  decisions.add({ first: 0, frames: 1, choices: { 4: 'a' }, boxes: /** @type {any} */ (boxes), cuts: [] });
+  decisions.add({ first: 1, frames: 1, choices: { 1: 'b' }, boxes: {}, cuts: [] });
+  assert.equal(decisions.camera(1, 0), null);
+  decisions.rename([{ object: 1, also: [4, 7] }, { object: 2 }]);
+  assert.equal(decisions.camera(1, 0), 'a');
+  assert.deepEqual(decisions.boxes('a', 0), [[1, 1, 2, 3, 4], [2, 0, 0, 1, 1]]);
+  assert.deepEqual(decisions.runs(1, 0).map((it) => it.camera), ['a', 'b']);
+});

@@ -90,6 +90,7 @@ async def live(config: Config, out: Path, running: list[Running]) -> dict[str, b
     return in_folder(out)
 
 
+@pytest.mark.slow
 async def test_live_equals_offline_whichever_way_words_go(
     recording: Path, tmp_path: Path, running: list[Running]
 ) -> None:

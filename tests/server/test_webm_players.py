@@ -188,6 +188,7 @@ async def go_on(hall: Hall) -> None:
 
 
 @pytest.mark.skipif(not CHROMIUM.exists(), reason=f"needs a Chromium at {CHROMIUM}")
+@pytest.mark.slow
 async def test_the_page_plays_across_cuts_and_from_one_person_to_another(free: Hall) -> None:
     errors: list[str] = []
     async with chromium() as browser:
