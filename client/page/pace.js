@@ -9,13 +9,14 @@
 
 const RECENT_S = 15; // in which the edge was furthest behind at some time: a network's rough moments recur
 const CALM_S = 4; // before hurrying, so long at least: the next gap may be seconds away
+const HALF = 0.5; // of the time since the beginning counts at most: beginnings are rough, and soon over
 const SLACK_S = 0.08; // aimed at: two frames at 25 per second
 const MOST_SLACK_S = 1;
 const STALLED_S = 0.06; // more slack for each time the picture stood
 const CALM_PER_S = 0.01; // how fast the aim comes back after the network was rough
 const FASTER_AT_S = 0.03; // above the aim
 const FASTER_UNTIL_S = 0.005; // above the aim
-const FASTER_PER_S = 0.5; // faster for each second above the aim: to hurry a little is not seen
+const FASTER_PER_S = 1; // faster for each second above the aim: to hurry a little is not seen
 const FASTER = 1.25; // at most
 const SLOWER_AT = 0.35; // of the aim
 const SLOWER_UNTIL = 0.8; // of the aim
@@ -32,6 +33,7 @@ const EDGE_S = 0.06; // closer to the end of a range than this, the picture stan
 export class Pace {
   /** @type {{now: number, edge: number}[]} where the stream ended, less the clock */
   #edges = [];
+  #begun = NaN;
   #aim = SLACK_S;
   #rate = 1;
   #last = 0;
@@ -39,6 +41,7 @@ export class Pace {
   /** After a jump or a switch what was before says nothing. */
   reset() {
     this.#edges = [];
+    this.#begun = NaN;
     this.#rate = 1;
   }
 
@@ -71,13 +74,15 @@ export class Pace {
    * @param {number} time
    */
   #choose(now, time) {
-    const old = this.#edges.findIndex((sample) => sample.now >= now - RECENT_S);
+    if (Number.isNaN(this.#begun)) this.#begun = now;
+    const recent = Math.min(Math.max(HALF * (now - this.#begun), CALM_S), RECENT_S);
+    const old = this.#edges.findIndex((sample) => sample.now >= now - recent);
     this.#edges.splice(0, old);
     const slack = Math.min(...this.#edges.map((sample) => sample.edge)) + now - time;
     const over = slack - this.#aim;
     if (slack < SLOWER_AT * this.#aim) return SLOWER;
     if (this.#rate < 1 && slack < SLOWER_UNTIL * this.#aim) return SLOWER;
-    const calm = now - this.#edges[0].now >= CALM_S; // before, the lowest point may be to come
+    const calm = now - this.#begun >= CALM_S; // before, the lowest point may be to come
     if (!calm || over < (this.#rate > 1 ? FASTER_UNTIL_S : FASTER_AT_S)) return 1;
     return Math.min(1 + FASTER_PER_S * over, FASTER);
   }

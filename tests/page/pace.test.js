@@ -64,6 +64,13 @@ test('a network that is late now and then is kept further away from', () => {
   assert.ok(Math.max(...settled.map((it) => it.now - it.time)) < 0.5, 'and is no further behind than that');
 });
 
+test('a rough beginning is soon forgotten', () => {
+  const late = (/** @type {number} */ gop) => (gop < 8 ? 1.2 : 0);
+  const log = played({ behind: 0.4, burst: 0.4, seconds: 20, late });
+  const settled = log.filter((it) => it.now > 14);
+  assert.ok(Math.max(...settled.map((it) => it.now - it.time)) < 0.35, `${settled[0].now - settled[0].time}`);
+});
+
 test('it is never slower or faster than anybody would bear', () => {
   let seed = 1;
   const random = () => (seed = (seed * 48271) % 2147483647) / 2147483647;
