@@ -36,6 +36,11 @@ def problem(status: int, error: str) -> web.Response:
     return answer(Problem(error), status)
 
 
+def no_camera(service: BestViewService, camera: str) -> web.Response:
+    """Say that there is no camera of this name, and which there are."""
+    return problem(404, f"there is no camera {camera!r}; there are {', '.join(service.shelves)}")
+
+
 def not_now(error: str) -> web.Response:
     """Say why not, and when to try again."""
     response = problem(503, error)

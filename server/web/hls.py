@@ -5,7 +5,7 @@ from __future__ import annotations
 from aiohttp import web
 
 from server.view.past.play import CameraPast
-from server.web.api import not_now, problem
+from server.web.api import no_camera, not_now, problem
 from server.web.forms import mp4_head
 from server.web.hls_live import coming_part, newest
 from server.web.hls_past import Stream, playlist_of_the_past, segment_of_the_past
@@ -93,6 +93,5 @@ def _stream(request: web.Request) -> Stream | None:
 
 def _nobody(request: web.Request) -> web.Response:
     if "camera" in request.match_info:
-        cameras = ", ".join(request.app[SERVICE].shelves)
-        return problem(404, f"there is no camera {request.match_info['camera']!r}; there are {cameras}")
+        return no_camera(request.app[SERVICE], request.match_info["camera"])
     return problem(404, f"there is no object {request.match_info['object']}")

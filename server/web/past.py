@@ -16,7 +16,7 @@ from server.view.past.stream import PastStream, Wish
 from server.view.past.told import told
 from server.view.service import BestViewService
 from server.view.timeline import Timeline
-from server.web.api import answer, not_now, problem
+from server.web.api import answer, no_camera, not_now, problem
 from server.web.forms import Form
 from server.web.keys import SERVICE
 from server.web.limits import no_place
@@ -50,7 +50,7 @@ async def camera_of_the_past(request: web.Request, form: Form) -> web.StreamResp
     service = request.app[SERVICE]
     camera = request.match_info["camera"]
     if camera not in service.shelves:
-        return problem(404, f"there is no camera {camera!r}; there are {', '.join(service.shelves)}")
+        return no_camera(service, camera)
     source = CameraPast(service.past, camera)
     what = f"camera {camera}"
     return await _stream(request, form, source, what, lambda: service.splicer.cameras.get(camera))
@@ -73,7 +73,7 @@ async def get_camera_past(request: web.Request) -> web.Response:
     service = request.app[SERVICE]
     camera = request.match_info["camera"]
     if camera not in service.shelves:
-        return problem(404, f"there is no camera {camera!r}; there are {', '.join(service.shelves)}")
+        return no_camera(service, camera)
     return answer(_past(service, CameraPast(service.past, camera)))
 
 

@@ -17,7 +17,7 @@ from server.view.pictures import (
     Subject,
 )
 from server.view.pictures.multipart import BEGIN, CONTENT_TYPE, PULSE, part
-from server.web.api import not_now, problem
+from server.web.api import no_camera, not_now, problem
 from server.web.forms import MP4
 from server.web.keys import PICTURES, SERVICE
 from server.web.limits import no_place
@@ -141,9 +141,7 @@ def _person(request: web.Request) -> Subject:
 def _camera(request: web.Request) -> Subject:
     service, camera = request.app[SERVICE], request.match_info["camera"]
     if camera not in service.shelves:
-        raise _RefusedError(
-            problem(404, f"there is no camera {camera!r}; there are {', '.join(service.shelves)}")
-        )
+        raise _RefusedError(no_camera(service, camera))
     return CameraView(camera, decided=wants_boxes(request))
 
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from aiohttp import web
 
 from server.view.channel import Channel
-from server.view.service import BestViewService
-from server.web.api import not_now, problem
+from server.web.api import no_camera, not_now, problem
 from server.web.forms import MP4, TS, WEBM, Form
 from server.web.keys import SERVICE
 from server.web.limits import no_place
@@ -67,7 +66,7 @@ async def _best(request: web.Request, form: Form) -> web.StreamResponse:
     if held is not None:
         channel = service.splicer.decided.get(held)
         if channel is None:
-            return problem(404, no_camera(service, held))
+            return no_camera(service, held)
     return await _send(request, channel, form)
 
 
@@ -78,13 +77,8 @@ async def _live(request: web.Request, form: Form) -> web.StreamResponse:
     camera = request.match_info["camera"]
     channel = service.splicer.cameras.get(camera)
     if channel is None:
-        return problem(404, no_camera(service, camera))
+        return no_camera(service, camera)
     return await _send(request, channel, form)
-
-
-def no_camera(service: BestViewService, camera: str) -> str:
-    """Say that there is none of this name, and which there are."""
-    return f"there is no camera {camera!r}; there are {', '.join(service.shelves)}"
 
 
 async def _send(request: web.Request, channel: Channel, form: Form) -> web.StreamResponse:

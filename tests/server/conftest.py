@@ -7,8 +7,9 @@ import os
 import pytest
 from command_line import myview
 from halls import busy, hall
+from vp8_by_hand import free
 
-__all__ = ["busy", "hall", "myview"]
+__all__ = ["busy", "free", "hall", "myview"]
 
 
 @pytest.fixture(autouse=True)

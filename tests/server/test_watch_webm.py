@@ -5,45 +5,21 @@ from __future__ import annotations
 import asyncio
 import shutil
 import subprocess
-from collections.abc import AsyncIterator
 from pathlib import Path
 
 import av
 import numpy as np
 import pytest
-from cameras_by_hand import CAMERAS, FPS, GOP, HEIGHT, LARGE, SMALL, STRIDE, WIDTH, encoded
-from halls import A, B, Hall, opened
+from cameras_by_hand import FPS, GOP, HEIGHT, STRIDE, WIDTH, encoded
+from halls import Hall
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
+from vp8_by_hand import EPOCHS, feed, own
 
 import client
 from client.webm import ElementReader, WebmError
 from client.webm_recording import WebmChangedError, WebmRecording, write_indexed
 from server.view.webm import cluster, header
-
-EPOCHS = 8
-
-
-@pytest.fixture
-async def free() -> AsyncIterator[Hall]:
-    """A site of VP8, a few GOPs old."""
-    async for hall in opened(patience=60, encode={"codec": "vp8"}, http={"viewer_queue_gops": 100}):
-        hall.service.come(*CAMERAS)
-        for epoch in range(3):
-            feed(hall, epoch)
-        yield hall
-
-
-def feed(hall: Hall, epoch: int) -> None:
-    sizes = (SMALL, LARGE) if epoch % 4 < 2 else (LARGE, SMALL)
-    hall.service.feed(epoch, {camera: {1: size} for camera, size in zip((A, B), sizes, strict=True)})
-
-
-def own(camera: int) -> list[NDArray[np.uint8]]:
-    decoder = av.CodecContext.create("vp8", "r")
-    units = encoded(camera, codec="vp8")
-    return [it.to_ndarray(format="yuv420p") for unit in units for it in decoder.decode(av.Packet(unit.data))]
 
 
 async def test_a_film_is_recorded_over_cuts_with_the_boxes_beside_it(free: Hall, tmp_path: Path) -> None:

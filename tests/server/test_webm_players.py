@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import shutil
-from collections.abc import AsyncIterator
 
 import av
 import cv2
@@ -25,41 +24,17 @@ from cameras_by_hand import (
     video,
     word,
 )
-from halls import A, B, Hall, opened
-from numpy.typing import NDArray
+from halls import A, B, Hall
+from vp8_by_hand import EPOCHS, feed, own
 
 from benchmarks.browser import CHROMIUM, chromium
 from server.view.decide import GopDecision, ObjectChoice
 from server.wire.epochs import end_of_epoch
 
-EPOCHS = 8
-"""As many as a camera by hand has pictures of."""
 PATHS = ("/objects/1/best.webm", "/cameras/c1/live.webm")
 
 needs_ffmpeg = pytest.mark.skipif(not shutil.which("ffmpeg"), reason="needs ffmpeg")
 needs_mpv = pytest.mark.skipif(not shutil.which("mpv"), reason="needs mpv")
-
-
-@pytest.fixture
-async def free() -> AsyncIterator[Hall]:
-    """A site of VP8; its person is larger in the other camera every GOP, so there are cuts."""
-    changes = {"codec": "vp8"}
-    async for hall in opened(patience=60, encode=changes, http={"viewer_queue_gops": 100}):
-        hall.service.come(*CAMERAS)
-        for epoch in range(3):
-            feed(hall, epoch)
-        yield hall
-
-
-def feed(hall: Hall, epoch: int) -> None:
-    sizes = (SMALL, LARGE) if epoch % 4 < 2 else (LARGE, SMALL)
-    hall.service.feed(epoch, {camera: {1: size} for camera, size in zip((A, B), sizes, strict=True)})
-
-
-def own(camera: int) -> list[NDArray[np.uint8]]:
-    decoder = av.CodecContext.create("vp8", "r")
-    units = encoded(camera, codec="vp8")
-    return [it.to_ndarray(format="yuv420p") for unit in units for it in decoder.decode(av.Packet(unit.data))]
 
 
 async def played(hall: Hall, command: str) -> list[tuple[int | None, bytes, str]]:
