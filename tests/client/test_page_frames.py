@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 import pytest_asyncio
-from page_browser import Visit, needs_chromium, visiting
+from page_browser import needs_chromium, visiting
 from page_pattern import CAMERAS, FPS, GROUNDS, HEIGHT, SQUARE, WIDTH
 from page_site import HOLD, LOOKAHEAD, FakeSite
 from playwright.async_api import Browser
@@ -31,6 +31,8 @@ GROUNDS_SEEN = f"""
     }};
     requestAnimationFrame(look);
 """
+BEHIND_AT_MOST = 5.0  # seconds: three are lived with before a jump, and the look-ahead and a GOP come on top
+MISSED = 25  # seconds
 BUSY = "setInterval(() => { const t = performance.now() + 25; while (performance.now() < t); }, 40)"
 
 
@@ -111,27 +113,29 @@ async def test_boxes_can_be_hidden_and_shown_again(browser: Browser) -> None:
         assert off_by(await visit.screenshot()) is not None
 
 
-async def settled_delay(visit: Visit, frames: int) -> tuple[float, float]:
-    """Give the median and the largest delay, in seconds, of the last second after some frames."""
-    await visit.playing(1)
-    await visit.until(f"myview.delays.length > {frames}")
-    delays = await visit.get(f"myview.delays.slice(-{FPS}).map((d) => d.delayMs / 1000)")
-    return float(np.median(delays)), max(delays)
-
-
 @pytest.mark.parametrize("bursts", [False, True], ids=["frames", "GOPs"])
-async def test_the_delay_is_measured_and_stays_near_the_look_ahead(browser: Browser, *, bursts: bool) -> None:
+async def test_the_delay_is_measured_and_neither_less_than_the_look_ahead_nor_without_end(
+    browser: Browser, *, bursts: bool
+) -> None:
     async with visiting(browser, FakeSite(bursts=bursts)) as visit:
-        middle_delay, largest = await settled_delay(visit, 5 * FPS)
-        served = LOOKAHEAD / FPS  # when the server lets a frame go; a GOP at a time, its first frames later
-        assert served < middle_delay < served + 0.75
-        assert largest < middle_delay + 0.3
+        await visit.playing(1)
+        await visit.until(f"myview.delays.length > {4 * FPS}")
+        delays = await visit.get(f"myview.delays.slice(-{FPS}).map((it) => it.delayMs / 1000)")
+        # The server lets no frame go before; its clock is known to half of a question's way there and back.
+        assert min(delays) > LOOKAHEAD / FPS / 2
+        # How close it comes on an idle machine is told with a clock of its own, in tests/page/pace.test.js.
+        await visit.until(f"myview.delays.slice(-{FPS}).every((it) => it.delayMs < {1000 * BEHIND_AT_MOST})")
 
 
 async def test_far_behind_it_jumps_back_to_live(browser: Browser) -> None:
     async with visiting(browser) as visit:
-        before, _ = await settled_delay(visit, FPS)
+        await visit.playing(1)
         await visit.get("video.pause()")
-        await visit.page.wait_for_timeout(4000)  # the time that is to be caught up with
+        await visit.until("video.paused")
+        stopped = await visit.get("myview.pulse")
+        visit.server.site.pulse0 -= MISSED
+        await visit.until(f"video.buffered.end(video.buffered.length - 1) > video.currentTime + {MISSED}")
         await visit.get("video.play()")
-        await visit.until(f"myview.delays.at(-1).delayMs < {1000 * before + 400}")
+        await visit.until(f"myview.pulse > {stopped + MISSED * FPS}")
+        steps = np.diff(await visit.get("myview.delays.map((it) => it.pulse)"))
+        assert steps.max() > (MISSED - 5) * FPS, "not played through in a hurry"
