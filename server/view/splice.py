@@ -8,6 +8,7 @@ from server.view.agreement import Agreement
 from server.view.channel import Channel
 from server.view.decide import GopDecision
 from server.view.picture import Picture
+from server.view.prefer import Preferring
 from server.view.reel import Reel, plan
 from server.view.shelf import Shelf
 from server.view.sound import SoundShelf
@@ -41,6 +42,7 @@ class Splicer:
         self._people: dict[int, DecidedStream] = {}
         self._gone: dict[int, DecidedStream] = {}
         """Those whose stream has ended a moment ago: players still fetch its end."""
+        self.preferring = Preferring(self._stream)
         self._gops = 0
         self.objects: dict[int, Channel] = {}
         self.cameras = {camera: stream.channel for camera, stream in self._live.items()}
@@ -67,6 +69,7 @@ class Splicer:
                 self._people[lost].show(cameras[kept], gop)
         for camera, decided in self._decided.items():
             decided.show(camera, gop)
+        self.preferring.show(decision, gop)
         for live in self._live.values():
             live.fill(decision.first - round(_SILENT_S * fps))
         self._forget_gone(decision.first)
@@ -77,6 +80,7 @@ class Splicer:
             del self.objects[number]
             self._gone[number] = self._people.pop(number)
             self._gone[number].close()
+        self.preferring.forget(known)
 
     def reel(self, number: int) -> Reel | None:
         """Give the newest segments of an object's stream, for a while even when it has ended."""
@@ -106,11 +110,12 @@ class Splicer:
     def viewers(self) -> int:
         """How many streams are being watched."""
         channels = [*self.objects.values(), *self.cameras.values(), *self.decided.values()]
-        return sum(channel.viewers for channel in channels)
+        return sum(channel.viewers for channel in channels) + self.preferring.viewers
 
     def close(self) -> None:
         """End all streams."""
         for stream in [*self._people.values(), *self._decided.values()]:
             stream.close()
+        self.preferring.close()
         for channel in self.cameras.values():
             channel.close()

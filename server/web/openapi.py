@@ -66,6 +66,7 @@ _SCHEMAS: dict[str, Any] = {
     "to": {**_MOMENT, "description": "Ends there, likewise."},
     "at": {**_MOMENT, "description": "Of the last minute; what was before the first question is not kept."},
     "held": {"type": "string", "description": "Shows this camera, not the best: held by hand."},
+    "prefer": {"type": "string", "description": "Shows this camera while it sees the person, else the best."},
     "fps": {"type": "number", "exclusiveMinimum": 0, "description": "Pictures a second; the site's at most."},
 }
 
@@ -107,7 +108,8 @@ def _operation(path: str, summary: str) -> dict[str, Any]:
     if path in _UNAVAILABLE:
         responses["503"] = {"description": "Not now; try again later."}
     parameters = [{"name": name, "in": "path", "required": True, "schema": _SCHEMAS[name]} for name in names]
-    queries = ["overlay"] * (path in OVERLAY) + ["fps"] * path.endswith(".mjpeg")
+    queries = ["prefer"] * (path in HELD)
+    queries += ["overlay"] * (path in OVERLAY) + ["fps"] * path.endswith(".mjpeg")
     queries += ["from", "to"] * (path in PAST) + ["at"] * path.endswith("/choice")
     queries += ["_HLS_msn", "_HLS_part"] * path.endswith(".m3u8")
     if path in HELD:

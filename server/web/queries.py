@@ -27,7 +27,7 @@ PAST = {
 }
 """What can begin in the past."""
 HELD = {"/objects/{object}/best.mp4", "/objects/{object}/best.webm", "/objects/{object}/best.ts"}
-"""What can be held to one camera."""
+"""What can be held to one camera, or prefer one."""
 _STREAMS = ("/objects/", "/cameras/")
 
 
@@ -50,8 +50,10 @@ def _complaint(request: web.Request, path: str) -> str | None:
         return f"overlay={overlay}: must be 0 or 1"
     if overlay == "1" and path not in OVERLAY:
         return "overlay: boxes are burnt into a person's best.mp4, and into .mjpeg and .jpg; not into this"
-    if "camera" in request.query and (path not in HELD or request.query.keys() & {"overlay", "from", "to"}):
-        return "camera: a person's live best.mp4, best.ts or best.webm can be held to one, and nothing else"
+    for name, done in (("camera", "be held to one"), ("prefer", "prefer a camera")):
+        others = {"overlay", "from", "to", "camera", "prefer"} - {name}
+        if name in request.query and (path not in HELD or request.query.keys() & others):
+            return f"{name}: a person's live best.mp4, best.ts or best.webm can {done}, and nothing else"
     for name in ("from", "to"):
         if name in request.query and path not in PAST:
             return f"{name}: only .mp4, .ts and HLS can begin in the past"

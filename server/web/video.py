@@ -59,14 +59,18 @@ async def _best(request: web.Request, form: Form) -> web.StreamResponse:
         return await best_of_the_past(request, form)
     service = request.app[SERVICE]
     number = int(request.match_info["object"])
-    channel = service.splicer.objects.get(service.board.resolve(number))
+    person = service.board.resolve(number)
+    channel = service.splicer.objects.get(person)
     if channel is None:
         return problem(404, f"there is no object {number}")
-    held = request.query.get("camera")
+    held, preferred = request.query.get("camera"), request.query.get("prefer")
+    for camera in (held, preferred):
+        if camera is not None and camera not in service.shelves:
+            return no_camera(service, camera)
     if held is not None:
-        channel = service.splicer.decided.get(held)
-        if channel is None:
-            return no_camera(service, held)
+        channel = service.splicer.decided[held]
+    elif preferred is not None:
+        channel = service.splicer.preferring.channel(person, preferred)
     return await _send(request, channel, form)
 
 

@@ -47,9 +47,12 @@ async def test_the_best_view_is_playable_from_its_first_byte_at_the_pulses_times
         )
 
 
-async def test_a_stream_that_is_held_to_a_camera_shows_that_one_whichever_is_best(busy: Hall) -> None:
+@pytest.mark.parametrize("how", ["camera", "prefer"])
+async def test_a_stream_shows_the_camera_that_is_held_or_preferred_whichever_is_best(
+    busy: Hall, how: str
+) -> None:
     assert (await busy.get_json("/api/objects/1/choice"))["camera"] == B
-    async with busy.session.get(f"/objects/1/best.mp4?camera={A}") as answer:
+    async with busy.session.get(f"/objects/1/best.mp4?{how}={A}") as answer:
         data = await read_stream(answer, GOP)
     decoder = av.VideoCodecContext.create("h264", "r")
     own = [picture for unit in encoded(0) for picture in decoder.decode(av.Packet(unit.data))]
@@ -72,9 +75,13 @@ async def test_a_stream_that_is_held_to_a_camera_shows_that_one_whichever_is_bes
         ("/objects/1/best.mp4?camera=c0&overlay=1", 400),
         ("/objects/1/best.ts?camera=c0&from=-1", 400),
         ("/cameras/c0/live.mp4?camera=c1", 400),
+        ("/objects/1/best.mp4?prefer=c7", 404),
+        ("/objects/1/best.jpg?prefer=c0", 400),
+        ("/objects/1/best.mp4?prefer=c0&camera=c1", 400),
+        ("/objects/1/best.ts?prefer=c0&from=-1", 400),
     ],
 )
-async def test_what_cannot_be_held_to_a_camera_is_said(busy: Hall, path: str, status: int) -> None:
+async def test_what_cannot_be_held_or_preferred_is_said(busy: Hall, path: str, status: int) -> None:
     code, content = await busy.get(path)
     assert code == status
     assert "camera" in content["error"] or "object 7" in content["error"]
