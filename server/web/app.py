@@ -11,13 +11,14 @@ from aiohttp import web
 
 from server.view.pictures import Pictures
 from server.view.service import BestViewService
-from server.web import api, hls, openapi, page, past, pictures, video
+from server.web import api, hls, openapi, operator_session, page, past, pictures, video
 from server.web.api import problem
 from server.web.containers import refuse_other_containers
 from server.web.cors import preflight
 from server.web.events import Events
 from server.web.keys import EVENTS, METRICS, PICTURES, SERVICE
 from server.web.metrics import registry
+from server.web.operator_permission import PERMISSION, Permission, operators_only
 from server.web.queries import refuse_what_is_not_there
 from server.web.share import to_the_right_service
 from server.wire.errors import UserError
@@ -58,6 +59,7 @@ def make_app(service: BestViewService) -> web.Application:
     app = web.Application(
         middlewares=[
             one_line_errors,
+            operators_only,
             preflight,
             refuse_what_is_not_there,
             refuse_other_containers,
@@ -66,7 +68,8 @@ def make_app(service: BestViewService) -> web.Application:
     )
     app[SERVICE], app[EVENTS], app[PICTURES] = service, Events(service), Pictures(service)
     app[METRICS] = registry(service, app[PICTURES])
-    for module in (api, video, past, hls, pictures, openapi, page):
+    app[PERMISSION] = Permission(service.config.http.operator_token)
+    for module in (api, video, past, hls, pictures, openapi, page, operator_session):
         app.add_routes(module.routes)
     app.cleanup_ctx.append(_telling)
     app.on_shutdown.append(_end_streams)

@@ -11,18 +11,20 @@ from typing import Any
 import msgspec
 from aiohttp import web
 
+from server.web.operator_schema import OPERATOR
 from server.web.queries import HELD, OVERLAY, PAST
 from server.web.schema import Cameras, Choice, Objects, Past, Problem, SiteInfo
 
 routes = web.RouteTableDef()
 
-_JSON = {
+_JSON: dict[str, type[msgspec.Struct]] = {
     "/api/site": SiteInfo,
     "/api/objects": Objects,
     "/api/cameras": Cameras,
     "/api/objects/{object}/choice": Choice,
     "/api/objects/{object}/past": Past,
     "/api/cameras/{camera}/past": Past,
+    **OPERATOR,
 }
 _OTHER = {
     "/objects/{object}/best.mp4": "video/mp4",
@@ -76,13 +78,14 @@ def describe(app: web.Application) -> dict[str, Any]:
     _, components = msgspec.json.schema_components(
         [*_JSON.values(), Problem], ref_template="#/components/schemas/{name}"
     )
-    paths = {}
+    paths: dict[str, dict[str, Any]] = {}
     for route in app.router.routes():
-        if route.method != "GET" or route.resource is None:
+        if route.method == "HEAD" or route.resource is None:
             continue
         path = route.resource.canonical
         if path in _JSON or path in _OTHER:
-            paths[path] = {"get": _operation(path, inspect.getdoc(route.handler) or "")}
+            operation = _operation(path, inspect.getdoc(route.handler) or "")
+            paths.setdefault(path, {})[route.method.lower()] = operation
     return {
         "openapi": "3.1.0",
         "info": {"title": "MyView", "version": version("myview")},
@@ -103,6 +106,8 @@ def _operation(path: str, summary: str) -> dict[str, Any]:
         responses["404"] = {"description": "There is none of this name.", "content": error}
     if path in OVERLAY | PAST | HELD or path.endswith("/choice"):
         responses["400"] = {"description": "The query asks for what there is not.", "content": error}
+    if path in OPERATOR:
+        responses["403"] = {"description": "Only the operator may.", "content": error}
     if path in PAST - {"/api/past"}:
         responses["416"] = {"description": "Nothing is kept of that time.", "content": error}
     if path in _UNAVAILABLE:

@@ -19,11 +19,16 @@ _HEADERS = {
 }
 
 
+def page_file(name: str) -> web.FileResponse:
+    """Give one of the page's files, which is there."""
+    return web.FileResponse(_FOLDER / name, headers=_HEADERS)
+
+
 @routes.get("/")
 async def get_index(request: web.Request) -> web.StreamResponse:
     """Give the page."""
     del request
-    return web.FileResponse(_FOLDER / "index.html", headers=_HEADERS)
+    return page_file("index.html")
 
 
 @routes.get("/page/{file:.+}")

@@ -28,6 +28,8 @@ class Http(Section):
     pictures_max: PositiveInt = 8
     """People and cameras whose pictures are decoded at once: JPEG, and boxes burnt in. One more gets 503."""
     jpeg_quality: Annotated[int, Field(ge=1, le=100)] = 80
+    operator_token: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")] | None = None
+    """SHA-256 of the token that lets somebody operate the site; none: only from the server's own machine."""
 
 
 class Record(Section):
