@@ -93,7 +93,7 @@ def hls_of_nginx(site: StreamSite, number: int, seconds: float, folder: Path) ->
     connection = http.client.HTTPConnection("127.0.0.1", site.http)
     listed = _get(connection, f"/objects/{number}/hls/index.m3u8")
     (folder / "index.m3u8").write_bytes(listed)
-    newest = listed.decode().splitlines()[-1]
+    newest = _newest(listed)
     (folder / newest).write_bytes(_get(connection, f"/objects/{number}/hls/{newest}"))
     connection.close()
     port = free_port()
@@ -131,11 +131,16 @@ def _fetch(port: int, folder: str, seconds: float) -> tuple[int, int]:
     connection = http.client.HTTPConnection("127.0.0.1", port)
     pairs, size, until = 0, 0, time.monotonic() + seconds
     while time.monotonic() < until:
-        newest = _get(connection, f"{folder}index.m3u8").decode().splitlines()[-1]
+        newest = _newest(_get(connection, f"{folder}index.m3u8"))
         size = len(_get(connection, f"{folder}{newest}"))
         pairs += 1
     connection.close()
     return pairs, size
+
+
+def _newest(playlist: bytes) -> str:
+    """Give the newest whole segment: what is listed of the growing one comes behind it, in tags."""
+    return next(line for line in reversed(playlist.decode().splitlines()) if not line.startswith("#"))
 
 
 def _get(connection: http.client.HTTPConnection, path: str) -> bytes:
