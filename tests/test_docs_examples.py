@@ -30,7 +30,7 @@ DOCS = sorted((ROOT / "docs").glob("*.md"))
 INTERFACES = (ROOT / "docs" / "interfaces.md").read_text(encoding="utf-8")
 OPERATING = (ROOT / "docs" / "operating.md").read_text(encoding="utf-8")
 URL = "http://localhost:8080"
-PATIENCE = 30.0  # seconds that an example may take
+PATIENCE = 90.0  # seconds that an example may take
 _BLOCK = re.compile(
     r"^```python runnable\n(.*?)^```\n(?:\n```text output\n(.*?)^```\n)?", re.DOTALL | re.MULTILINE
 )

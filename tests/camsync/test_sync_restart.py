@@ -6,11 +6,13 @@ import asyncio
 from collections.abc import Callable
 
 import pytest
-from pulses_by_hand import PATIENCE, Connect
+from pulses_by_hand import BUSY, PATIENCE, Connect
 
 from camsync import AxisLostError, ClientSettings, Pulse, PulseClient, PulseServer, ServerLimits
 
 FPS = 200.0
+AWAY = round(1.5 * BUSY * FPS)
+"""Pulses that are counted without a server: a new one that began with them anew would be seen to."""
 QUICK = ClientSettings(backoff_first=0.01, backoff_most=0.05)
 
 
@@ -37,8 +39,8 @@ async def test_while_the_server_is_away_the_client_counts_on_at_the_same_rate() 
     assert own[-1].own
     assert [pulse.number for pulse in own] == list(range(before.number + 1, own[-1].number + 1))
     for pulse in own:
-        assert pulse.due == pytest.approx(before.due + (pulse.number - before.number) / FPS, abs=0.02)
-        assert pulse.received > pulse.due - 0.02
+        assert pulse.due == pytest.approx(before.due + (pulse.number - before.number) / FPS, abs=BUSY)
+        assert pulse.received > pulse.due - BUSY
     assert client.status().own >= sum(pulse.own for pulse in own) > 0
     assert client.missed == 0
     await client.close()
@@ -51,7 +53,7 @@ async def test_a_restarted_server_goes_on_where_the_clients_have_got_to(expect: 
         clients = [PulseClient("127.0.0.1", port, name, settings=QUICK) for name in ("c0", "c1")]
         await asyncio.gather(*(until(client, lambda pulse: pulse.number >= 40) for client in clients))
         epoch = server.epoch
-    away = await asyncio.gather(*(until(client, lambda pulse: pulse.number >= 70) for client in clients))
+    away = await asyncio.gather(*(until(client, lambda pulse: pulse.number >= AWAY) for client in clients))
     async with PulseServer(FPS, port=port, expect=expect, start_timeout=1000.0) as again:
         back = await asyncio.gather(*(until(client, in_step) for client in clients))
         for client, first, then in zip(clients, away, back, strict=True):
@@ -60,12 +62,14 @@ async def test_a_restarted_server_goes_on_where_the_clients_have_got_to(expect: 
             assert client.status().connections == 2
         # The axis is the old one, up to what it takes to say so.
         assert epoch is not None
-        assert again.epoch == pytest.approx(epoch, abs=0.1)
-        both = await asyncio.gather(*(until(client, lambda pulse: pulse.number >= 200) for client in clients))
+        assert again.epoch == pytest.approx(epoch, abs=BUSY)
+        both = await asyncio.gather(
+            *(until(client, lambda pulse: pulse.number >= 2 * AWAY) for client in clients)
+        )
         dues = [{pulse.number: pulse.due for pulse in pulses} for pulses in both]
         shared = dues[0].keys() & dues[1].keys()
         assert len(shared) > 30
-        assert all(abs(dues[0][number] - dues[1][number]) < 0.02 for number in shared)
+        assert all(abs(dues[0][number] - dues[1][number]) < BUSY for number in shared)
     for client in clients:
         await client.close()
 
@@ -75,31 +79,31 @@ async def test_a_new_camera_joins_the_continued_axis(by_hand: Connect) -> None:
         (await by_hand(server.port)).say(b"HELLO 1 c0 last=5000 ago=1.0\n")
         new = await by_hand(server.port)
         new.say(b"HELLO 1 c1\n")
-        assert (await new.beat()).number == pytest.approx(5000 + FPS, abs=FPS / 4)
+        assert (await new.beat()).number == pytest.approx(5000 + FPS, abs=20 * BUSY * FPS)
 
 
 async def test_the_furthest_count_moves_a_server_that_has_just_begun_forward(by_hand: Connect) -> None:
     async with PulseServer(FPS) as server:
         listener = await by_hand(server.port)
         await listener.beat()
-        (await by_hand(server.port)).say(b"HELLO 1 c0 last=1000 ago=0\n")
+        (await by_hand(server.port)).say(b"HELLO 1 c0 last=10000 ago=0\n")
         numbers = [(await listener.beat()).number for _ in range(20)]
-        while numbers[-1] < 1000:
+        while numbers[-1] < 10_000:
             numbers.append((await listener.beat()).number)
-        (await by_hand(server.port)).say(b"HELLO 1 c1 last=500 ago=0\n")
-        (await by_hand(server.port)).say(b"HELLO 1 c2 last=2000 ago=0\n")
-        while numbers[-1] < 2000:
+        (await by_hand(server.port)).say(b"HELLO 1 c1 last=5000 ago=0\n")
+        (await by_hand(server.port)).say(b"HELLO 1 c2 last=20000 ago=0\n")
+        while numbers[-1] < 20_000:
             numbers.append((await listener.beat()).number)
         assert numbers == sorted(set(numbers))
-        assert len(numbers) < 500
-        assert server.skipped > 1500
+        assert len(numbers) < 5000
+        assert server.skipped > 15_000
 
 
 async def test_who_is_not_expected_cannot_move_the_axis(by_hand: Connect) -> None:
     async with PulseServer(FPS, expect={"c0"}, start_timeout=0.0) as server:
         stranger = await by_hand(server.port)
         stranger.say(b"HELLO 1 stranger last=1000000 ago=0\n")
-        assert [(await stranger.beat()).number < 1000 for _ in range(20)]
+        assert all([(await stranger.beat()).number < 1_000_000 for _ in range(20)])
         assert server.skipped == 0
 
 
@@ -122,9 +126,9 @@ async def test_a_client_slightly_ahead_waits_for_the_server() -> None:
         client = PulseClient("127.0.0.1", port, "c0", settings=QUICK)
         await until(client, lambda pulse: pulse.number >= 50)
     async with PulseServer(FPS, port=port, limits=ServerLimits(adopt_for=-1.0)) as again:
-        pulses = await until(client, in_step)
+        pulses = await until(client, lambda pulse: in_step(pulse) and again.pulse is not None)
         numbers = [pulse.number for pulse in pulses]
         assert numbers == sorted(set(numbers))
         assert again.pulse is not None
-        assert again.pulse - pulses[-1].number < FPS / 4
+        assert again.pulse - pulses[-1].number < 20 * BUSY * FPS
     await client.close()

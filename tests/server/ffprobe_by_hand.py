@@ -18,7 +18,7 @@ def probed(path: Path | str, entries: str) -> list[list[str]]:
          "-of", "csv=p=0", str(path)],
         capture_output=True,
         text=True,
-        timeout=30,
+        timeout=60,
         check=True,
     )  # fmt: skip
     assert done.stderr == ""

@@ -13,7 +13,7 @@ from cameras_by_hand import CAMERAS, LARGE, SMALL, FedService, TrackNumbers, sma
 from server.web.app import make_app, serving
 from server.wire.sections import Http
 
-PATIENCE = 10.0  # seconds until a test that awaits something has failed
+PATIENCE = 60.0  # seconds until a test that awaits something has failed
 A, B = CAMERAS
 
 

@@ -17,7 +17,7 @@ from server.wire.errors import UserError
 from server.wire.inbox import Inbox, Message
 from server.wire.sections import Zenoh
 
-PATIENCE = 20.0  # seconds until a test that awaits something has failed
+PATIENCE = 60.0  # seconds until a test that awaits something has failed
 
 
 @pytest.fixture

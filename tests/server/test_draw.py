@@ -165,6 +165,6 @@ def test_the_process_itself_ends_when_nobody_is_left_to_ask() -> None:
     process = subprocess.Popen(
         [sys.executable, "-m", "server.draw"], stdin=subprocess.PIPE, stdout=subprocess.PIPE
     )
-    out, _ = process.communicate(framed(CANVAS) + framed(Draw(fragments=fragments(0, 1))), timeout=20)
+    out, _ = process.communicate(framed(CANVAS) + framed(Draw(fragments=fragments(0, 1))), timeout=60)
     assert msgspec.msgpack.decode(out[4:], type=Drawn).newest == 0
     assert process.returncode == 0

@@ -13,7 +13,7 @@ import pytest
 
 from server.run.ending import ending_later
 
-PATIENCE = 10.0
+PATIENCE = 60.0  # seconds until a test that awaits something has failed
 
 
 @pytest.fixture(params=[signal.SIGTERM, signal.SIGINT])

@@ -28,7 +28,7 @@ from server.wire.loading import build_config
 from server.wire.messages import FOUND_MOST, Found, Keys
 from tracking import Detections
 
-PATIENCE = 40.0  # seconds until a test that awaits something has failed
+PATIENCE = 60.0  # seconds until a test that awaits something has failed
 FRAMES = 60
 WAIT = 1.0  # seconds that two cameras wait for each other, and for a third one that never comes
 

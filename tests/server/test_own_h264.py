@@ -40,7 +40,7 @@ from server.wire.errors import UserError
 from server.wire.h264 import NAL_AUD, nal_type, nal_units
 
 FRAMES = 20
-PATIENCE_S = 20.0
+PATIENCE_S = 60.0  # until a test that awaits something has failed
 
 
 def site(source: Path | str, h264: str = "pass", **changes: Any) -> Config:

@@ -40,6 +40,7 @@ from server.wire.messages import GopChoices
 from server.wire.sound import SoundFormat
 
 FORM = SoundFormat(48_000, 2)
+PATIENT = {"viewer_queue_gops": 100}  # with who reads slowly
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +53,9 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
 async def hall(recording: Path, tmp_path: Path) -> AsyncIterator[Hall]:
     """A site with that sound, which records into segments of two GOPs."""
     record = {"folder": str(tmp_path / "kept"), "segment_s": 0.4}
-    async for hall in opened(sound={"source": str(recording)}, record=record):
+    async for hall in opened(
+        sound={"source": str(recording)}, record=record, http={"viewer_queue_gops": 100}
+    ):
         hall.service.past.open()
         hall.service.come(*CAMERAS)
         yield hall
@@ -180,7 +183,9 @@ async def test_what_retention_took_away_or_nobody_kept_is_silent(hall: Hall, rec
 async def test_the_sound_of_an_earlier_run_is_heard_after_a_restart(recording: Path, tmp_path: Path) -> None:
     record = {"folder": str(tmp_path / "kept"), "segment_s": 0.4}
     for gops in (range(GOPS - 1), range(GOPS - 1, GOPS)):
-        async for hall in opened(sound={"source": str(recording)}, record=record):
+        async for hall in opened(
+            sound={"source": str(recording)}, record=record, http={"viewer_queue_gops": 100}
+        ):
             hall.service.pulse0 = PULSE0
             hall.service.past.open()
             hall.service.come(*CAMERAS)

@@ -14,7 +14,7 @@ from server.view.past.store import Piece
 from server.view.past.writer import Writer
 from server.wire.errors import UserError
 
-PATIENCE = 10.0  # seconds until a test that awaits something has failed
+PATIENCE = 60.0  # seconds until a test that awaits something has failed
 
 
 class Disk:

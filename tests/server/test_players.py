@@ -144,7 +144,7 @@ async def test_chromium_plays_hls_by_itself_up_to_the_end(live: Hall) -> None:
         page = await browser.new_page(bypass_csp=True)
         await page.goto(f"http://127.0.0.1:{live.port}/healthz")
         playing = asyncio.create_task(page.evaluate(HLS_BY_ITSELF, "/objects/1/hls/index.m3u8"))
-        async with asyncio.timeout(30):
+        async with asyncio.timeout(60):
             for epoch in range(20, EPOCHS):
                 await asyncio.sleep(STRIDE / FPS / 5)
                 feed(live, epoch)

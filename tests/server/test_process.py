@@ -25,7 +25,7 @@ from server.wire.config import Config
 from server.wire.loading import build_config
 from server.wire.messages import CameraStatus, CameraTracks, FrameHead, GopChoices, pulse_client
 
-PATIENCE = 40.0  # seconds until a test that awaits something has failed
+PATIENCE = 60.0  # seconds until a test that awaits something has failed
 FPS = 50
 FRAMES = 60
 

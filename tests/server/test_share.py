@@ -36,7 +36,7 @@ from server.wire.errors import UserError
 from server.wire.messages import Box, Keys
 from server.wire.sections import Http, Share
 
-PATIENCE_S = 20.0
+PATIENCE_S = 60.0  # until a test that awaits something has failed
 
 
 def shared(index: int, of: int = 2, **more: Any) -> dict[str, Any]:

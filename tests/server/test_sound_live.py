@@ -23,7 +23,7 @@ from server.wire.sections import Sound
 from server.wire.sound import Coding, SoundFormat
 
 FRAMES = 3 * EVERY
-PATIENCE_S = 20.0  # until a test that awaits something has failed
+PATIENCE_S = 60.0  # until a test that awaits something has failed
 FORM = SoundFormat(48_000, 2)
 
 

@@ -150,7 +150,7 @@ async def hall(recording: Path, tmp_path: Path) -> AsyncIterator[Hall]:
     """A site that has that recording's sound, whose first GOP is decided."""
     record = {"folder": str(tmp_path / "kept"), "segment_s": 0.4}
     sound = {"source": str(recording), "codec": "opus"}
-    async for hall in opened(sound=sound, record=record):
+    async for hall in opened(sound=sound, record=record, http={"viewer_queue_gops": 100}):
         hall.service.past.open()
         hall.service.come(*CAMERAS)
         for camera in CAMERAS:
@@ -172,7 +172,7 @@ async def watched(hall: Hall, *ways: str) -> list[bytes]:
     answers = [await hall.session.get(way) for way in ways]
     for gop in range(1, GOPS):
         decide(hall, range(gop, gop + 1))
-        await asyncio.sleep(0.005)  # the viewer is not to fall behind
+        await asyncio.sleep(0.005)
     hall.service.splicer.close()
     return [await answer.read() for answer in answers]
 

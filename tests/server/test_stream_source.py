@@ -17,7 +17,7 @@ from server.camera.sources.stream import Stream
 from server.wire.errors import UserError
 from server.wire.sections import Camera, Site
 
-PATIENCE = 20.0  # seconds until a test that awaits something has failed
+PATIENCE = 60.0  # seconds until a test that awaits something has failed
 
 
 class MotionJpeg:

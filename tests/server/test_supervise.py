@@ -14,7 +14,7 @@ from server.run import supervise
 from server.run.supervise import Supervisor
 from server.wire.errors import UserError
 
-PATIENCE = 10.0  # seconds until a test that awaits something has failed
+PATIENCE = 60.0  # seconds until a test that awaits something has failed
 
 
 class Process:

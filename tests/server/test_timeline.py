@@ -66,7 +66,7 @@ def shown(splicer_head: bytes, pieces: list[bytes]) -> list[Shown]:
 
 async def received(viewer: Viewer) -> list[bytes]:
     viewer.close()
-    async with asyncio.timeout(5):
+    async with asyncio.timeout(60):
         return [data async for data in viewer]
 
 

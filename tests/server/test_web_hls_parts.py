@@ -242,7 +242,7 @@ async def test_ffmpeg_which_does_not_know_parts_plays_on_without_a_word(hall: Ha
     url = f"http://127.0.0.1:{hall.port}{STREAM}index.m3u8"
     command = ["ffmpeg", "-v", "error", "-live_start_index", "0", "-i", url, "-f", "framecrc", "-"]
     playing = asyncio.create_task(
-        asyncio.to_thread(subprocess.run, command, capture_output=True, text=True, timeout=30, check=False)
+        asyncio.to_thread(subprocess.run, command, capture_output=True, text=True, timeout=60, check=False)
     )
     for gop in range(4 * PARTS + 1, 8 * PARTS):
         shows(hall, range(gop, gop + 1))

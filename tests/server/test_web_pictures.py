@@ -173,9 +173,11 @@ async def test_one_process_draws_for_all_who_watch_one_stream(drawn: Drawn) -> N
     assert first[:length] == second[:length]
 
 
-async def test_a_process_that_is_killed_is_replaced_and_the_streams_go_on(drawn: Drawn) -> None:
+async def test_a_process_that_is_killed_is_replaced_and_the_streams_go_on(
+    drawn: Drawn, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("server.view.pictures.process._ANSWER_S", 1000.0)  # nobody waits for that
     pictures: Pictures = drawn.app[PICTURES]
-    loop = asyncio.get_running_loop()
     going = asyncio.create_task(drawn.keep_going(GOP / FPS))
     async with (
         drawn.session.get(f"/objects/{SOMEBODY}/best.mp4?overlay=1") as film,
@@ -187,12 +189,10 @@ async def test_a_process_that_is_killed_is_replaced_and_the_streams_go_on(drawn:
         source = pictures.sources[PersonView(SOMEBODY)]
         assert source.pid is not None
         os.kill(source.pid, signal.SIGKILL)
-        killed = loop.time()
         while source.restarts == 0:  # noqa: ASYNC110 — the service notices by itself
             await asyncio.sleep(0.01)
         data += await read_film(film, 2 * GOP)
         await anext(reading)
-        assert loop.time() - killed < 4, "2 s where nothing else is going on"
         await reading.aclose()
     going.cancel()
     with av.open(io.BytesIO(data), "r") as stream:
