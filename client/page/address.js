@@ -3,7 +3,8 @@
 /**
  * @typedef {object} Watched
  * @property {number | null} object
- * @property {string | null} camera held by hand; null: whichever sees them best
+ * @property {string | null} camera held by hand; null: none is
+ * @property {string | null} prefer the camera that is preferred; null: none is
  * @property {number[]} beside who else is seen
  */
 
@@ -17,6 +18,7 @@ export function watchedInAddress() {
   return {
     object: NUMBER.test(text) ? Number(text) : null,
     camera: query.get('camera'),
+    prefer: query.get('prefer'),
     beside: [...new Set(beside.map(Number))],
   };
 }
@@ -25,15 +27,15 @@ export function watchedInAddress() {
  * @param {Watched} watched
  * @param {boolean} chosen by the viewer (a step to go back from) or by default
  */
-export function writeAddress({ object, camera, beside }, chosen) {
-  const old = watchedInAddress();
-  if (old.object === object && old.camera === camera && old.beside.join() === beside.join()) return;
+export function writeAddress(watched, chosen) {
+  const { object, camera, prefer, beside } = watched;
+  if (JSON.stringify(watchedInAddress()) === JSON.stringify({ object, camera, prefer, beside })) return;
   const address = new URL(location.href);
   address.searchParams.set('object', String(object));
-  if (camera === null) address.searchParams.delete('camera');
-  else address.searchParams.set('camera', camera);
-  if (beside.length) address.searchParams.set('beside', beside.join());
-  else address.searchParams.delete('beside');
+  for (const [name, value] of Object.entries({ camera, prefer, beside: beside.join() || null })) {
+    if (value === null) address.searchParams.delete(name);
+    else address.searchParams.set(name, value);
+  }
   if (chosen) history.pushState(null, '', address);
   else history.replaceState(null, '', address);
 }

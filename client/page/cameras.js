@@ -1,6 +1,7 @@
 /** The site's cameras: the key to the strip's colours, which one is live or held, and which are not well. */
 
 /** @import {Camera} from './contract.js' */
+/** @import {Override} from './override.js' */
 /** @import {Palette} from './palette.js' */
 
 /** @type {Record<Camera['state'], string>} */
@@ -45,13 +46,14 @@ export class Cameras {
 
   /**
    * @param {string | null} live
-   * @param {string | null} held
+   * @param {Override} override
    */
-  mark(live, held) {
+  mark(live, { camera: wished, prefers }) {
     for (const [camera, item] of this.#items) {
       if (camera === live) item.setAttribute('aria-current', 'true');
       else item.removeAttribute('aria-current');
-      item.firstElementChild?.setAttribute('aria-pressed', String(camera === held));
+      item.firstElementChild?.setAttribute('aria-pressed', String(camera === wished));
+      item.classList.toggle('preferred', camera === wished && prefers);
     }
   }
 

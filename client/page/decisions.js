@@ -76,6 +76,33 @@ export class Decisions {
   }
 
   /**
+   * Which camera a stream shows that prefers one: as the server does it, by what is told of this GOP and of the
+   * one before. It is that camera where it sees the person in more than half of the frames of both.
+   *
+   * @param {number} object
+   * @param {string} camera
+   * @param {number} pulse
+   * @returns {string | null}
+   */
+  preferring(object, camera, pulse) {
+    const gop = this.at(pulse);
+    const before = gop && this.at(gop.first - 1);
+    if (gop && [gop, before ?? gop].every((it) => this.#sees(it, camera, object))) return camera;
+    return this.#choice(gop, object);
+  }
+
+  /**
+   * @param {Gop} gop
+   * @param {string} camera
+   * @param {number} object
+   */
+  #sees(gop, camera, object) {
+    const frames = gop.boxes[camera] ?? [];
+    const seen = frames.filter((boxes) => boxes.some(([number]) => (this.#now.get(number) ?? number) === object));
+    return 2 * seen.length > frames.length;
+  }
+
+  /**
    * @param {string} camera
    * @param {number} pulse
    * @returns {Box[]}

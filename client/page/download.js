@@ -1,5 +1,6 @@
 /** A live stream as whole segments, in bunches as they arrive. */
 
+import { Refused } from './http.js';
 import { SegmentSplitter } from './mp4.js';
 import { ClusterSplitter } from './webm.js';
 
@@ -21,7 +22,7 @@ export async function* download(address, signal) {
   if (signal.aborted) leave();
   try {
     const response = await fetch(address, { cache: 'no-store', signal: silence.signal });
-    if (!response.ok || !response.body) throw new Error(`${address}: ${response.status}`);
+    if (!response.ok || !response.body) throw new Refused(address, response.status);
     const reader = response.body.getReader();
     const splitter = address.split('?')[0].endsWith('.webm') ? new ClusterSplitter() : new SegmentSplitter();
     for (;;) {

@@ -10,8 +10,25 @@ const PATIENCE_MS = 4000;
  */
 export async function getJson(path, patience = PATIENCE_MS) {
   const response = await fetch(path, { cache: 'no-store', signal: AbortSignal.timeout(patience) });
-  if (!response.ok) throw new Error(`${path}: ${response.status}`);
+  if (!response.ok) throw new Refused(path, response.status);
   return response.json();
+}
+
+/** An answer that is an error. */
+export class Refused extends Error {
+  /**
+   * @param {string} path
+   * @param {number} status
+   */
+  constructor(path, status) {
+    super(`${path}: ${status}`);
+    this.status = status;
+  }
+
+  /** @returns {boolean} whether to ask again would not help: what was asked for is not there */
+  get forGood() {
+    return this.status >= 400 && this.status < 500;
+  }
 }
 
 /**

@@ -5,14 +5,14 @@
  * stream's init segment in the same SourceBuffer, over the same moments.
  */
 
-import { Backoff } from './backoff.js';
 import { MediaBuffer } from './buffer.js';
-import { download } from './download.js';
-import { pause } from './http.js';
 import { join } from './mp4.js';
 import { Pace } from './pace.js';
+import { Run } from './run.js';
+import { same } from './subject.js';
 
 /** @import {Segment} from './mp4.js' */
+/** @import {Subject} from './subject.js' */
 
 const TICK_MS = 100;
 const RESTARTED_S = 10; // a stream that begins this far back is of a site whose pulses began anew
@@ -20,31 +20,15 @@ const LANDING_MS = 300; // how long a new stream may take to reach the moment no
 const PAUSED_S = 30; // of video that waits behind a paused picture; then the download stops
 const INSIDE_S = 0.001; // a seek to the very start of a range may round to just before it
 
-/**
- * @typedef {object} Subject
- * @property {number} object who is to be seen
- * @property {string | null} camera by which; null: by whichever sees them best
- * @property {Moment | null} past where to begin; null: live
- *
- * @typedef {object} Moment
- * @property {number} pulse
- * @property {number} time of that pulse: media time, seconds
- */
-
-/**
- * One download of one person's stream.
- *
- * @typedef {object} Run
- * @property {Subject} subject
- * @property {AbortController} leave
- * @property {number} start media time of its first frame; NaN before that came
- * @property {number} since performance.now() of when its first frame was in the buffer; NaN before
- * @property {boolean} landed whether the picture now comes from it
- * @property {Segment[]} early sound that has come before the first picture
- */
-
 /** @type {typeof MediaSource | undefined} iPhones have only the managed kind */
-const Source = /** @type {any} */ (globalThis).ManagedMediaSource ?? globalThis.MediaSource;
+export const Source = /** @type {any} */ (globalThis).ManagedMediaSource ?? globalThis.MediaSource;
+
+/**
+ * @typedef {object} Listener
+ * @property {() => void} landed the picture is now of who was chosen last
+ * @property {(refused: boolean) => void} ended there is nothing more of this past, or nothing is kept of it at all
+ * @property {() => void} resumed a picture that had stopped goes on, and not because the page said so
+ */
 
 export class Player {
   /** @type {Run | null} */
@@ -60,17 +44,17 @@ export class Player {
   #ticking;
   #codec = '';
   #container = 'mp4';
+  #asked = false; // the page said that the picture is to go on
   /** @type {Subject | null} whose picture the element shows */
   shown = null;
   /** @type {Subject | null} whose stream was left because the picture was paused for long */
   #left = null;
+  /** Seconds from an element's time to the site's media time. */
+  offset = 0;
 
   /**
    * @param {HTMLVideoElement} video
-   * @param {object} listener
-   * @param {() => void} listener.landed the picture is now of who was chosen last
-   * @param {() => void} listener.ended there is nothing more of this past
-   * @param {() => void} listener.resumed the picture is to go on where it stopped, and its stream has been left
+   * @param {Listener} listener
    */
   constructor(video, listener) {
     this.video = video;
@@ -81,7 +65,9 @@ export class Player {
     });
     video.addEventListener('error', () => this.#reopen());
     video.addEventListener('play', () => {
-      if (!this.#run && this.shown) this.listener.resumed();
+      const asked = this.#asked;
+      this.#asked = false;
+      if (!asked && this.shown && (!this.#run || this.#run.landed)) this.listener.resumed();
     });
     this.#ticking = setInterval(() => this.#tick(), TICK_MS);
   }
@@ -106,14 +92,25 @@ export class Player {
     if (this.#run && same(this.#run.subject, subject)) return;
     if (this.#left && same(this.#left, subject) && this.video.paused) return;
     this.#left = null;
-    this.#run?.leave.abort();
-    this.#run = begin(subject);
-    void this.#follow(this.#run);
+    this.#run?.leave();
+    this.#run = new Run(subject);
+    void this.#run.follow(this.#container, {
+      take: (run, segments) => this.#take(run, segments),
+      ended: (refused) => this.listener.ended(refused),
+      reached: () => this.#opened?.ranges.at(-1)?.[1] ?? 0,
+    });
+  }
+
+  /** Let the picture go on, wherever it is. */
+  play() {
+    if (!this.video.paused) return;
+    this.#asked = true;
+    this.video.play().catch(() => undefined); // the page says that it is paused, and how to go on
   }
 
   #reopen() {
     const subject = this.#run?.subject;
-    this.#run?.leave.abort();
+    this.#run?.leave();
     this.#run = this.#landing = null;
     this.#opened = null;
     this.#buffer = this.#open();
@@ -128,31 +125,8 @@ export class Player {
     await new Promise((resolve) => source.addEventListener('sourceopen', resolve, { once: true }));
     URL.revokeObjectURL(address);
     this.#opened = new MediaBuffer(source.addSourceBuffer(mime(this.#container, this.#codec)));
-    this.video.play().catch(() => undefined); // the page says that it is paused, and how to go on
+    this.play();
     return this.#opened;
-  }
-
-  /** @param {Run} run */
-  async #follow(run) {
-    const { signal } = run.leave;
-    const backoff = new Backoff();
-    while (!signal.aborted) {
-      try {
-        for await (const segments of download(address(run.subject, this.#container), signal)) {
-          await this.#take(run, segments);
-          if (signal.aborted) return;
-          backoff.reset();
-        }
-      } catch (error) {
-        // Whatever it was (the server away, the person not known yet), the answer is to try again.
-        if (!signal.aborted) console.info(`the stream of ${run.subject.object}: ${error}`);
-      }
-      if (signal.aborted) return;
-      if (run.subject.past) return this.listener.ended();
-      run.start = run.since = NaN;
-      run.early = [];
-      await pause(backoff.next(), signal);
-    }
   }
 
   /**
@@ -161,19 +135,22 @@ export class Player {
    */
   async #take(run, segments) {
     const buffer = await /** @type {Promise<MediaBuffer>} */ (this.#buffer);
-    if (run.leave.signal.aborted) return;
+    if (run.left) return;
     const first = segments.find((segment) => segment.kind === 'media');
     if (!first && Number.isNaN(run.start) && segments.some((segment) => segment.kind === 'sound')) {
       run.early.push(...segments); // when the first picture tells where it begins, the old stream is cut off there
       return;
     }
     if (first && Number.isNaN(run.start)) {
+      const again = first.start < this.video.currentTime - RESTARTED_S;
+      if (again && run.landed && this.video.paused) return this.#leaveFor(run); // the old picture stays
       run.start = first.start;
       // Nothing of the old stream may be met again behind the edge of the new one.
-      const anew = run.subject.past !== null || run.start < this.video.currentTime - RESTARTED_S;
+      const anew = again || (run.subject.past !== null && !run.begun);
       if (anew) run.landed = false;
+      run.begun = true;
       await buffer.remove(anew ? 0 : run.start, Infinity);
-      if (run.leave.signal.aborted) return;
+      if (run.left) return;
     }
     const all = [...run.early.splice(0), ...segments];
     await buffer.append(join(all.map((segment) => segment.bytes)), this.video.currentTime);
@@ -212,7 +189,7 @@ export class Player {
     this.#landing = run;
     this.video.addEventListener('seeked', () => this.#showing(run), { once: true });
     this.#seek(time);
-    if (this.video.paused) this.video.play().catch(() => undefined);
+    this.play();
   }
 
   /** @returns {boolean} whether it is open just now if the picture is still of who was shown before */
@@ -243,10 +220,7 @@ export class Player {
     if (!run.landed) return;
     const { ranges } = buffer;
     if (video.paused) {
-      if ((ranges.at(-1)?.[1] ?? 0) - video.currentTime > PAUSED_S) {
-        this.stop();
-        this.#left = run.subject;
-      }
+      if ((ranges.at(-1)?.[1] ?? 0) - video.currentTime > PAUSED_S) this.#leaveFor(run);
       return;
     }
     if (run.subject.past) {
@@ -268,36 +242,15 @@ export class Player {
 
   /** Leave the stream; the last frame stays. */
   stop() {
-    this.#run?.leave.abort();
+    this.#run?.leave();
     this.#run = this.#left = null;
   }
-}
 
-/**
- * @param {Subject} subject
- * @param {string} container
- */
-function address({ object, camera, past }, container) {
-  const name = encodeURIComponent(camera ?? '');
-  if (past && camera !== null) return `cameras/${name}/live.${container}?from=p${past.pulse}`;
-  const query = past ? `?from=p${past.pulse}` : camera === null ? '' : `?camera=${name}`;
-  return `objects/${object}/best.${container}${query}`;
-}
-
-/**
- * @param {Subject} one
- * @param {Subject} other
- */
-function same(one, other) {
-  return one.object === other.object && one.camera === other.camera && one.past?.pulse === other.past?.pulse;
-}
-
-/**
- * @param {Subject} subject
- * @returns {Run}
- */
-function begin(subject) {
-  return { subject, leave: new AbortController(), start: NaN, since: NaN, landed: false, early: [] };
+  /** @param {Run} run whose stream is left until the picture, which is paused, goes on */
+  #leaveFor(run) {
+    this.stop();
+    this.#left = run.subject;
+  }
 }
 
 /**

@@ -8,8 +8,6 @@ import { Player } from './player.js';
 /** @import {Frame} from './frames.js' */
 /** @import {Site} from './contract.js' */
 
-export const MOST_TILES = 3; // of six connections to a server events, the large player and all else need three
-
 /**
  * What all players of the page have in common.
  *
@@ -96,7 +94,7 @@ class Tile {
   play() {
     const { container, codec } = this.shared;
     if (!this.player.configure(container, codec)) return;
-    this.player.choose({ object: this.object, camera: null, past: null });
+    this.player.choose({ object: this.object, camera: null, prefer: null, past: null });
     // Nobody pauses it by hand: a browser did, unseen.
     if (this.player.shown && this.video.paused && !document.hidden) this.video.play().catch(() => undefined);
   }

@@ -1,23 +1,25 @@
 /** What the page knows and what follows from it: the one place where the parts meet. */
 
 import { onAddress, watchedInAddress, writeAddress } from './address.js';
+import { Beside } from './beside.js';
 import { Decisions } from './decisions.js';
-import { Follow } from './follow.js';
+import { Framing } from './framing.js';
+import { Notice } from './notice.js';
+import { Override } from './override.js';
 import { Palette } from './palette.js';
+import { Past } from './past.js';
 import { Player } from './player.js';
 import { Probe } from './probe.js';
 import { describe } from './status.js';
-import { MOST_TILES } from './tiles.js';
 
 /** @import {Box, Camera, Gop, Person, Site} from './contract.js' */
 /** @import {Part} from './follow.js' */
 /** @import {Frame} from './frames.js' */
-/** @import {Moment} from './player.js' */
+/** @import {Subject} from './subject.js' */
 /** @import {Status} from './status.js' */
 
 const STANDING_MS = 1500; // without a new frame the picture counts as standing
 const RECENT_S = 10; // after this out of view a person belongs to the earlier ones
-const NOTICE_MS = 10_000; // for which it is said that a number was corrected
 const LIVE_S = 2; // who is less behind the newest decision than this is live
 const RESTART_S = 1; // pulse 0 moved by more than this: the pulses began anew
 
@@ -30,9 +32,11 @@ export class Viewer {
   cameras = [];
   /** @type {number | null} */
   object = watchedInAddress().object;
-  #held = watchedInAddress().camera;
-  /** @type {Moment | null} where the past that is watched began; null: it is live */
-  past = null;
+  override = new Override(watchedInAddress());
+  beside = new Beside(watchedInAddress().beside);
+  past = new Past();
+  framing = new Framing();
+  notice = new Notice();
   palette = new Palette([]);
   decisions = new Decisions(1);
   probe = new Probe();
@@ -40,23 +44,17 @@ export class Viewer {
   supported = true;
   container = 'mp4';
   codec = '';
-  /** Who is seen beside the chosen person. */
-  beside = watchedInAddress().beside;
   boxesOn = true;
-  followOn = false;
   /** @type {Part | null} of the frame now shown, where the person is followed; null: all of it */
   part = null;
   mediaTime = 0; // seconds, of the frame now shown
   /** @type {Box[]} of the frame now shown */
   boxes = [];
-  #follow = new Follow();
-  #followed = ''; // whom, in which camera
   #asked = this.object !== null; // by the viewer, not by default
   #asleep = false; // paused by a browser that nobody looks at, not by hand
   #frameAt = -Infinity;
   #chosenAt = -Infinity;
-  #notice = '';
-  #noticeAt = -Infinity;
+  #stale = false; // the picture is of pulses that have begun anew since
 
   /**
    * @param {HTMLVideoElement} video
@@ -66,7 +64,7 @@ export class Viewer {
     this.changed = changed;
     this.player = new Player(video, {
       landed: changed,
-      ended: () => this.#losePast(),
+      ended: (refused) => (refused ? this.#losePast() : this.live()),
       resumed: () => (this.#asleep ? this.live() : this.#resume()),
     });
     video.addEventListener('pause', () => (this.#asleep = document.hidden));
@@ -74,11 +72,10 @@ export class Viewer {
       if (!document.hidden && this.#asleep && video.paused) this.live();
     });
     this.probe.object = this.object;
-    onAddress(({ object, camera, beside }) => {
-      if (camera !== this.#held) this.#moveOn();
-      this.#held = camera;
-      this.beside = beside;
-      if (object !== null) this.#turnTo(object, true);
+    onAddress((watched) => {
+      if (this.override.take(watched)) this.#moveOn();
+      this.beside.numbers = watched.beside;
+      if (watched.object !== null) this.#turnTo(watched.object, true);
       this.changed();
     });
   }
@@ -90,8 +87,10 @@ export class Viewer {
     if (anew) {
       this.decisions = new Decisions(site.fps);
       this.decisions.rename(this.people ?? []);
-      this.past = null;
+      this.past.leave();
+      this.#stale = this.probe.pulse !== null;
     }
+    this.override.configure(site.cameras);
     this.site = this.probe.site = site;
     this.palette = new Palette(site.cameras);
     this.container = site.container ?? 'mp4';
@@ -139,32 +138,32 @@ export class Viewer {
 
   /** @param {number} object as the viewer wishes */
   choose(object) {
-    if (object !== this.object) this.#held = null;
-    // Who was small and becomes large changes places with who was large.
-    this.beside = this.beside.map((it) => (it === object && this.object !== null ? this.object : it));
+    if (object !== this.object) this.override.hold(null);
+    this.beside.swap(object, this.object);
     this.#turnTo(object, true);
     this.#write(true);
   }
 
   /**
    * @param {number} wanted pulse to see again, from there on
+   * @param {boolean} resumed it is where the picture was paused
    */
-  watchFrom(wanted) {
+  watchFrom(wanted, resumed = false) {
     if (!this.site || this.object === null || this.probe.pulse === null) return;
     const { fps } = this.site;
     const pulse = Math.max(0, wanted);
-    if (pulse >= this.decisions.end - LIVE_S * fps) return this.live();
+    if (this.#stale || pulse >= this.decisions.end - LIVE_S * fps) return this.live();
     if (this.container === 'webm') return this.#losePast(); // of such a site nothing is
-    this.past = { pulse, time: pulse / fps };
-    this.player.video.play().catch(() => undefined);
+    this.past.begin(pulse, fps, resumed);
+    this.player.play();
     this.#play();
     this.changed();
   }
 
   /** From now on what happens now. */
   live() {
-    this.past = null;
-    this.player.video.play().catch(() => undefined);
+    this.past.leave();
+    this.player.play();
     this.#play();
     this.changed();
   }
@@ -182,33 +181,39 @@ export class Viewer {
   }
 
   #resume() {
-    if (this.probe.pulse === null) this.player.video.play().catch(() => undefined);
-    else this.watchFrom(this.probe.pulse);
+    if (this.probe.pulse === null) this.player.play();
+    else this.watchFrom(this.probe.pulse, true);
   }
 
   /** Whoever is watched next, or by which camera, is watched from the moment of the past that is now shown. */
   #moveOn() {
     const { shown, video } = this.player;
-    if (!this.site || !this.past || shown?.past !== this.past) return;
-    const pulse = Math.floor(video.currentTime * this.site.fps);
-    this.past = { pulse, time: pulse / this.site.fps };
+    if (!this.site || shown?.past !== this.past.moment) return;
+    this.past.moveOn(Math.floor(video.currentTime * this.site.fps), this.site.fps);
   }
 
   #losePast() {
-    this.say('Nothing is kept of that: this is live.');
+    // Who was paused after somebody had left has lost nothing: there is no picture of them since.
+    const left = this.past.resumed && !this.chosen?.visible;
+    if (!left) this.notice.say('Nothing is kept of that: this is live.');
     this.live();
-  }
-
-  /** @returns {string | null} the camera that is held by hand; null: the best is shown */
-  get held() {
-    return this.#held !== null && this.site?.cameras.includes(this.#held) ? this.#held : null;
   }
 
   /** @param {string | null} camera to stay with; once more, or null: the best is shown again */
   hold(camera) {
+    this.#change(() => this.override.hold(camera));
+  }
+
+  /** Prefer the camera that was held, or hold the one that was preferred. */
+  prefer() {
+    if (this.override.camera !== null) this.#change(() => this.override.toggle());
+  }
+
+  /** @param {() => void} change by which camera the chosen person is seen */
+  #change(change) {
     if (this.object === null) return;
     this.#moveOn();
-    this.#held = camera === this.#held ? null : camera;
+    change();
     this.#write(true);
     this.#play();
     this.changed();
@@ -216,17 +221,14 @@ export class Viewer {
 
   /** @param {number} object to be seen beside the chosen person, or no more */
   toggleBeside(object) {
-    const { tiles } = this;
-    const others = tiles.filter((it) => it !== object);
-    this.beside = tiles.includes(object) ? others : [...others.slice(1 - MOST_TILES), object];
+    this.beside.toggle(object, this.tiles);
     this.#write(true);
     this.changed();
   }
 
   /** @returns {number[]} those of them who have a stream */
   get tiles() {
-    const known = new Set(this.people?.map((person) => person.object));
-    return this.beside.filter((it) => it !== this.object && known.has(it)).slice(-MOST_TILES);
+    return this.beside.shown(this.people, this.object);
   }
 
   /** @param {number} by steps through those in view, around the end */
@@ -252,27 +254,25 @@ export class Viewer {
     // The same moment may be shown again, of somebody else.
     if (pulse !== this.probe.pulse) {
       this.#frameAt = performance.now();
+      this.#stale = false;
       this.probe.frame({ pulse, shownAt, delayMs: this.#delay(pulse, shownAt) });
     }
-    if (this.player.shown) {
-      const { object, camera: held } = this.player.shown;
-      const camera = held ?? this.decisions.camera(object, pulse);
-      this.probe.view(object, camera, shownAt);
-      this.boxes = camera === null ? [] : this.decisions.boxes(camera, pulse);
-      this.part = this.#frame(`${object} ${camera}`, object, passed);
-    }
+    if (!this.site || !this.player.shown) return;
+    const { object } = this.player.shown;
+    const camera = this.#camera(this.player.shown, pulse);
+    this.probe.view(object, camera, shownAt);
+    this.boxes = camera === null ? [] : this.decisions.boxes(camera, pulse);
+    const box = this.boxes.find(([number]) => number === object);
+    this.part = this.framing.step(`${object} ${camera}`, box, this.site, passed);
   }
 
   /**
-   * @param {string} whom in which camera: where that changes, there is nothing to move from
-   * @param {number} object
-   * @param {number} passed seconds
+   * @param {Subject} subject
+   * @param {number} pulse
    */
-  #frame(whom, object, passed) {
-    if (whom !== this.#followed || !this.followOn) this.#follow.reset();
-    this.#followed = whom;
-    if (!this.followOn || !this.site) return null;
-    return this.#follow.step(this.boxes.find(([number]) => number === object), this.site, passed);
+  #camera({ object, camera, prefer }, pulse) {
+    if (camera !== null) return camera;
+    return prefer === null ? this.decisions.camera(object, pulse) : this.decisions.preferring(object, prefer, pulse);
   }
 
   /** @returns {boolean} whether new frames are being shown */
@@ -298,11 +298,6 @@ export class Viewer {
     return status;
   }
 
-  /** @returns {string} what has just turned out about the chosen person's number; empty: nothing */
-  get notice() {
-    return performance.now() - this.#noticeAt < NOTICE_MS ? this.#notice : '';
-  }
-
   /** @type {number | null} milliseconds that the server's clock is ahead; set from outside */
   clockOffset = null;
 
@@ -319,8 +314,7 @@ export class Viewer {
   /** Whoever was chosen by a number that is no longer theirs stays chosen by the one they have. */
   #followMerge() {
     const { object } = this;
-    const now = this.beside.map((it) => this.people?.find((person) => person.also?.includes(it))?.object ?? it);
-    this.beside = [...new Set(now)];
+    this.beside.rename(this.people);
     const same = this.people?.find((person) => object !== null && person.also?.includes(object));
     if (!same || this.chosen) return;
     this.say(`Person ${object} turned out to be person ${same.object}.`);
@@ -330,8 +324,7 @@ export class Viewer {
 
   /** @param {string} text that is worth a moment's notice */
   say(text) {
-    this.#notice = text;
-    this.#noticeAt = performance.now();
+    this.notice.say(text);
     this.changed();
   }
 
@@ -347,7 +340,7 @@ export class Viewer {
 
   /** @param {boolean} chosen by the viewer */
   #write(chosen) {
-    writeAddress({ object: this.object, camera: this.#held, beside: this.beside }, chosen);
+    writeAddress({ object: this.object, ...this.override.written, beside: this.beside.numbers }, chosen);
   }
 
   /**
@@ -370,7 +363,9 @@ export class Viewer {
 
   #play() {
     if (!this.site || !this.supported || !this.people) return;
-    if (this.object !== null && this.chosen) this.player.choose({ object: this.object, camera: this.held, past: this.past });
-    else this.player.stop();
+    if (this.object === null || !this.chosen) return this.player.stop();
+    const past = this.past.moment;
+    const { held, preferred } = this.override;
+    this.player.choose({ object: this.object, camera: held, prefer: past ? null : preferred, past });
   }
 }

@@ -39,6 +39,8 @@ class FakeSite:
         skipped: Pulses whose frames are missing from every stream.
         opened: Whose stream was asked for, in order.
         kept_from: The first pulse that can be seen again.
+        ahead: Seconds that the streams run ahead of the clock: minutes pass in no time.
+        blind: Pulses, from GOP to GOP, at which the first camera finds nobody.
         pulse0: Unix seconds at which pulse 0 was due.
     """
 
@@ -50,6 +52,8 @@ class FakeSite:
     skipped: range = range(0)
     opened: list[int] = field(default_factory=list)
     kept_from: int = 0
+    ahead: float = 0.0
+    blind: range = range(0)
     pulse0: float = field(init=False)
 
     def __post_init__(self) -> None:
@@ -58,10 +62,19 @@ class FakeSite:
     @property
     def edge(self) -> int:
         """Give the newest pulse that is decided and served."""
-        return int((time.time() - self.pulse0) * FPS) - LOOKAHEAD
+        return int((time.time() + self.ahead - self.pulse0) * FPS) - LOOKAHEAD
 
     def camera(self, person: int, pulse: int) -> int:
         return (pulse // HOLD) % len(CAMERAS) if person == 1 else 2
+
+    def shown(self, person: int, pulse: int, held: str | None, preferred: str | None) -> int:
+        """Give the camera of a pulse in a stream that may be held to one, or prefer one."""
+        if held is not None:
+            return CAMERAS.index(held)
+        if preferred is not None:
+            seen = [CAMERAS.index(preferred) or it not in self.blind for it in (pulse, pulse - GOP)]
+            return CAMERAS.index(preferred) if all(seen) else self.camera(person, pulse)
+        return self.camera(person, pulse)
 
     def site(self) -> dict[str, Any]:
         return {
@@ -123,7 +136,7 @@ class FakeSite:
         return [
             [k, left, top, left + SQUARE, top + SQUARE]
             for k, (left, top) in corners.items()
-            if self.people.get(k)
+            if self.people.get(k) and (camera or pulse not in self.blind)
         ]
 
     def choice(self, person: int, first: int) -> dict[str, Any]:
@@ -155,7 +168,8 @@ class FakeSite:
         pulse = first
         while True:
             until = pulse - pulse % GOP + GOP - 1 if self.bursts else pulse
-            await asyncio.sleep(max(0.0, self.pulse0 + (until + LOOKAHEAD) / FPS - time.time()))
+            due = self.pulse0 - self.ahead + (until + LOOKAHEAD) / FPS
+            await asyncio.sleep(max(0.0, due - time.time()))
             yield pulse
             pulse += 1
 
@@ -257,7 +271,7 @@ class SiteServer:
             await response.write(pattern(0).init)
             async for pulse in site.released(first):
                 if pulse not in site.skipped:
-                    shown = site.camera(k, pulse) if held is None else CAMERAS.index(held)
+                    shown = site.shown(k, pulse, held, request.query.get("prefer"))
                     await response.write(pattern(shown).fragment(pulse))
         return response
 

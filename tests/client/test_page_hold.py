@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import pytest_asyncio
 from page_browser import Visit, needs_chromium, visiting
-from page_pattern import CAMERAS, GROUNDS
+from page_pattern import CAMERAS, GOP, GROUNDS
 from page_site import HOLD
 from playwright.async_api import Browser, expect
 
@@ -67,6 +67,30 @@ async def test_a_link_and_keys_hold_too_and_another_person_is_automatic(browser:
         assert visit.page.url.endswith("?object=2")
         await visit.page.go_back()
         await visit.until("myview.object === 1 && myview.camera === 'c2'")
+
+
+async def test_a_preferred_camera_gives_way_where_it_does_not_see_the_person(browser: Browser) -> None:
+    async with visiting(browser, query="?object=2&camera=c0") as visit:
+        await visit.playing(2)
+        await visit.page.get_by_role("button", name="Prefer").click()
+        assert visit.page.url.endswith("?object=2&prefer=c0")
+        await visit.until("myview.camera === 'c0' && myview.delays.length")
+        assert await camera_on_the_stage(visit) == "c0"
+        await expect(visit.page.locator("#reason")).to_have_text("Preferred. The best view just now is c2.")
+        site = visit.server.site
+        first = site.edge - site.edge % GOP + 3 * GOP
+        site.blind = range(first, first + 5 * GOP)
+        await visit.until(f"myview.pulse > {first + GOP}")
+        assert await visit.get("myview.camera") == "c2"
+        assert await camera_on_the_stage(visit) == "c2"
+        await expect(visit.page.locator("#reason")).to_contain_text("does not see this person")
+        await visit.until(f"myview.pulse > {site.blind.stop + GOP}")
+        cuts = await visit.get("myview.cuts.slice(-2)")
+        assert [(it["pulse"], it["to"]) for it in cuts] == [(first, "c2"), (site.blind.stop + GOP, "c0")]
+        await visit.page.get_by_role("button", name="Prefer").click()
+        await visit.until("new URL(location).searchParams.get('camera') === 'c0'")
+        await visit.page.keyboard.press("0")
+        await visit.until("myview.camera === 'c2'")
 
 
 async def test_a_camera_that_is_not_there_is_held_by_nobody(browser: Browser) -> None:

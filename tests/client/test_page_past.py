@@ -72,7 +72,7 @@ async def left_for_long(visit: Visit) -> int:
     """Let the stream of a paused picture run on until the page leaves it; give the pulse that is shown."""
     await visit.until("video.paused")
     stopped = int(await visit.get("myview.pulse"))
-    visit.server.site.pulse0 -= 40
+    visit.server.site.ahead = 40
     await visit.until("video.buffered.end(video.buffered.length - 1) > video.currentTime + 30")
     await visit.page.wait_for_timeout(300)
     visit.server.site.people[3] = False  # of whom the page is told
@@ -108,6 +108,59 @@ async def test_what_a_browser_paused_unseen_is_live_when_somebody_looks(browser:
         await visit.get(awake)
         await visit.until(f"myview.pulse > {stopped + 30 * FPS}")
         assert not any("from=" in address for address in asked)
+
+
+async def test_who_was_paused_while_the_site_began_anew_is_live(browser: Browser) -> None:
+    async with visiting(browser) as visit:
+        await visit.playing(1)
+        await visit.page.keyboard.press("Space")
+        await visit.until("video.paused")
+        stopped = await visit.get("myview.pulse")
+        await visit.server.restart_as(FakeSite(first_pulse=500))
+        await visit.until("myview.state === 'paused' && Math.abs(myview.site.pulse0 - Date.now() / 1000) < 40")
+        await visit.page.wait_for_timeout(1000)
+        assert await visit.get("video.paused && myview.pulse") - stopped in {0, 1}, "the picture stays as it was"
+        await visit.page.keyboard.press("Space")
+        await visit.until(f"!video.paused && myview.pulse < 2000 && {LIVE}")
+        await expect(visit.page.locator("#notice")).to_be_empty()
+
+
+async def test_who_plays_on_in_a_window_of_its_own_is_where_they_stopped(browser: Browser) -> None:
+    async with visiting(browser) as visit:
+        await visit.playing(1)
+        await visit.get("video.pause()")
+        stopped = await visit.get("myview.pulse")
+        visit.server.site.ahead = 20
+        await visit.until("video.buffered.end(video.buffered.length - 1) > video.currentTime + 15")
+        await visit.get("video.play()")
+        await visit.until(f"!video.paused && myview.pulse > {stopped + FPS}")
+        assert await visit.get("myview.pulse") < stopped + 5 * FPS
+        await expect(visit.page.get_by_role("button", name="Live", exact=True)).to_be_visible()
+
+
+async def test_the_past_goes_on_where_its_stream_broke(browser: Browser) -> None:
+    async with visiting(browser) as visit:
+        await visit.playing(1)
+        await seconds_of_playing(visit, 6)
+        await visit.page.keyboard.press(",")
+        await visit.until("myview.delays.at(-1).delayMs > 4000")
+        back = await visit.get("myview.pulse")
+        await visit.server.break_streams()
+        await visit.until(f"myview.pulse > {back + 6 * FPS}")
+        assert await visit.get("myview.delays.at(-1).delayMs") > 4000
+        await expect(visit.page.locator("#notice")).to_be_empty()
+
+
+async def test_who_was_paused_after_somebody_had_left_has_lost_nothing(browser: Browser) -> None:
+    async with visiting(browser) as visit:
+        await visit.playing(1)
+        await visit.page.keyboard.press("Space")
+        visit.server.site.people = {1: False, 2: True}
+        visit.server.site.kept_from = STARTS_AT + 100_000
+        await left_for_long(visit)
+        await visit.page.keyboard.press("Space")
+        await visit.until(f"!video.paused && {LIVE}")
+        await expect(visit.page.locator("#notice")).to_be_empty()
 
 
 async def test_what_is_not_kept_is_said_and_live_goes_on(browser: Browser) -> None:

@@ -1,0 +1,123 @@
+/** What buttons, keys and presses do. */
+
+import { element } from './element.js';
+import { listenToKeys } from './keys.js';
+import { copy, pictureInPicture, saveSnapshot } from './tools.js';
+
+/** @import {Explaining} from './explaining.js' */
+/** @import {Overlay} from './overlay.js' */
+/** @import {Painter} from './painter.js' */
+/** @import {Strip} from './strip.js' */
+/** @import {Viewer} from './viewer.js' */
+
+const SKIP_S = 5;
+
+/**
+ * @param {object} parts
+ * @param {HTMLVideoElement} parts.video
+ * @param {Viewer} parts.viewer
+ * @param {Painter} parts.painter
+ * @param {Overlay} parts.overlay
+ * @param {Strip} parts.strip
+ * @param {Explaining} parts.explaining
+ */
+export function listenToControls({ video, viewer, painter, overlay, strip, explaining }) {
+  const stage = element('stage');
+  const more = /** @type {HTMLDetailsElement} */ (element('more'));
+
+  /** @type {[string, string, () => void][]} element, key, what both do */
+  const controls = [
+    ['toggle-boxes', 'b', () => toggle('toggle-boxes', (viewer.boxesOn = !viewer.boxesOn))],
+    ['toggle-follow', 'z', () => toggle('toggle-follow', (viewer.framing.on = !viewer.framing.on))],
+    ['toggle-why', 'w', toggleWhy],
+    ['toggle-sound', 'm', toggleSound],
+    ['prefer', 'p', () => viewer.prefer()],
+    ['automatic', '0', () => viewer.hold(null)],
+    ['pause', ' ', () => viewer.pause()],
+    ['live', 'End', () => viewer.live()],
+    ['full-screen', 'f', fullScreen],
+    ['snapshot', 's', snapshot],
+    ['copy-link', 'l', copyLink],
+  ];
+  for (const [id, , action] of controls) element(id).addEventListener('click', action);
+
+  listenToKeys({
+    ...Object.fromEntries(controls.map(([, key, action]) => [key, action])),
+    ...Object.fromEntries([1, 2, 3, 4, 5, 6, 7, 8, 9].map((number) => [number, () => holdNumber(number)])),
+    ArrowRight: () => viewer.step(1),
+    ArrowLeft: () => viewer.step(-1),
+    ',': () => viewer.skip(-SKIP_S),
+    '.': () => viewer.skip(SKIP_S),
+    Escape: () => (more.open = false),
+  });
+
+  /**
+   * @param {string} id
+   * @param {boolean} on
+   */
+  function toggle(id, on) {
+    element(id).setAttribute('aria-pressed', String(on));
+    painter.repaint();
+  }
+
+  function toggleWhy() {
+    explaining.toggle();
+    toggle('toggle-why', explaining.on);
+  }
+
+  /** Muted at first, or no browser would play by itself. */
+  function toggleSound() {
+    if (!viewer.site?.sound) return;
+    video.muted = !video.muted;
+    toggle('toggle-sound', !video.muted);
+  }
+
+  function fullScreen() {
+    if (document.fullscreenElement) void document.exitFullscreen();
+    else void stage.requestFullscreen?.();
+  }
+
+  function snapshot() {
+    const { site, object, probe } = viewer;
+    if (!site || probe.pulse === null || !video.videoWidth) return;
+    void saveSnapshot(video, `${site.name}-person-${object}-${probe.camera ?? 'camera'}-p${probe.pulse}`);
+  }
+
+  async function copyLink() {
+    const done = await copy(location.href);
+    viewer.say(done ? 'The link to this person is copied.' : `The link to this person: ${location.href}`);
+  }
+
+  /** @param {number} number from 1, of a camera in the site's order */
+  function holdNumber(number) {
+    const camera = viewer.site?.cameras[number - 1];
+    if (camera) viewer.hold(camera);
+  }
+
+  /** @param {MouseEvent} event */
+  function personAt(event) {
+    return viewer.site ? overlay.hit(viewer.boxes, viewer.site, event) : null;
+  }
+
+  strip.surface.canvas.addEventListener('click', ({ offsetX }) => {
+    const pulse = strip.pulseAt(offsetX);
+    if (pulse === null) viewer.live();
+    else viewer.watchFrom(pulse);
+  });
+  for (const name of ['play', 'pause']) {
+    video.addEventListener(name, () => {
+      element('pause').textContent = video.paused ? 'Play' : 'Pause';
+    });
+  }
+  element('in-picture').addEventListener('click', () => void pictureInPicture(video).catch(() => undefined));
+  element('in-picture').hidden = !document.pictureInPictureEnabled;
+  document.addEventListener('click', ({ target }) => {
+    if (target instanceof Element && target.closest('summary')?.parentElement !== more) more.open = false;
+  });
+  stage.addEventListener('mousemove', (event) => stage.classList.toggle('over-person', personAt(event) !== null));
+  stage.addEventListener('click', (event) => {
+    const object = personAt(event);
+    if (object !== null) viewer.choose(object);
+    else if (video.paused) viewer.pause();
+  });
+}

@@ -1,0 +1,41 @@
+/** Asks the server for its clock, well at every connection and now and then after it. */
+
+import { ServerClock } from './clock.js';
+import { getJson, pause } from './http.js';
+
+/** @import {Viewer} from './viewer.js' */
+
+const EVERY_MS = 10_000;
+const SAMPLES = 4; // one after the other, at every connection
+const BETWEEN_MS = 250;
+
+export class Timekeeper {
+  #clock = new ServerClock();
+
+  /** @param {Viewer} viewer */
+  constructor(viewer) {
+    this.viewer = viewer;
+    setInterval(() => this.#ask(), EVERY_MS);
+  }
+
+  /** Another server may have another clock. */
+  async begin() {
+    this.#clock.clear();
+    for (let i = 0; i < SAMPLES; i += 1) {
+      await this.#ask();
+      await pause(BETWEEN_MS);
+    }
+  }
+
+  async #ask() {
+    try {
+      const sent = Date.now();
+      const site = await getJson('api/site');
+      this.#clock.add(sent, Date.now(), site.now);
+      this.viewer.clockOffset = this.#clock.offset;
+      this.viewer.setSite(site);
+    } catch {
+      // The events say when the server is away, and when it is back.
+    }
+  }
+}
