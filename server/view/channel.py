@@ -56,18 +56,24 @@ class Viewer:
         self._begun |= piece.start
         if not self._begun:
             return
-        if piece.start or piece.fills:
-            waiting = sum(queued.start or queued.fills for queued in self._queue)
-            if waiting >= self._starts_max:
-                self._queue.clear()
-                self.lost += waiting
-                self._begun = piece.start
-                if not self._begun:
-                    return
-        if self.at_once is not None and not self._queue and self.at_once(piece):
-            return
+        if not self._queue:
+            if self.at_once is not None and self.at_once(piece):
+                return
+        elif (piece.start or piece.fills) and self._is_far_behind():
+            self._begun = piece.start
+            if not self._begun:
+                return
         self._queue.append(piece)
         self._wake.set()
+
+    def _is_far_behind(self) -> bool:
+        """Whether as much waits as may; then all that waits is lost."""
+        waiting = sum(queued.start or queued.fills for queued in self._queue)
+        if waiting < self._starts_max:
+            return False
+        self._queue.clear()
+        self.lost += waiting
+        return True
 
     def put_first(self, piece: Piece) -> None:
         """Put a piece before all that waits."""

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import socket
 from collections.abc import AsyncIterable, Callable, Mapping
-from functools import lru_cache, partial
+from functools import lru_cache
 
 from aiohttp import web
 
@@ -48,8 +49,9 @@ async def send_viewer(
     """Send ``head`` and what a viewer is given, from a place that the caller took and will give up."""
 
     def ready(response: web.StreamResponse) -> None:
-        chunked = response.headers.get("Transfer-Encoding") == "chunked"
-        viewer.at_once = partial(_write_at_once, request, form, chunked)
+        if request.transport is not None:
+            chunked = response.headers.get("Transfer-Encoding") == "chunked"
+            viewer.at_once = _at_once(request.transport, form, chunked=chunked)
 
     pieces = (form(piece) async for piece in viewer.pieces())
     try:
@@ -58,14 +60,20 @@ async def send_viewer(
         viewer.at_once = None
 
 
-def _write_at_once(request: web.Request, form: Form, chunked: bool, piece: Piece) -> bool:
-    """Write a piece if nothing of the one before waits; what the system does not take follows by itself."""
-    transport = request.transport
-    if transport is None or transport.is_closing() or transport.get_write_buffer_size():
-        return False
-    data = form(piece)
-    transport.write(_chunk(data) if chunked else data)
-    return True
+def _at_once(transport: asyncio.Transport, form: Form, *, chunked: bool) -> Callable[[Piece], bool]:
+    """Give what writes a piece where nothing of the one before waits; what the system leaves follows.
+
+    It is called for every viewer of every GOP: what it would look up, the last of them waits for.
+    """
+    is_closing, waiting, write = transport.is_closing, transport.get_write_buffer_size, transport.write
+
+    def take(piece: Piece) -> bool:
+        if waiting() or is_closing():
+            return False
+        write(_chunk(form(piece)) if chunked else form(piece))
+        return True
+
+    return take
 
 
 @lru_cache(maxsize=8)
