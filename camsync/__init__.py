@@ -1,7 +1,9 @@
 """Frame pulses over TCP: every camera takes frame n when pulse n comes."""
 
+from camsync.asking import clients_of
 from camsync.client import PulseClient
 from camsync.limits import ServerLimits
+from camsync.messages import Listener
 from camsync.peer import ClientInfo
 from camsync.protocol import VERSION
 from camsync.pulse import (
@@ -20,6 +22,7 @@ __all__ = [
     "AxisLostError",
     "ClientInfo",
     "ClientSettings",
+    "Listener",
     "Pulse",
     "PulseClient",
     "PulseServer",
@@ -28,4 +31,5 @@ __all__ = [
     "SyncError",
     "SyncStatus",
     "VersionError",
+    "clients_of",
 ]

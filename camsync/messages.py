@@ -32,6 +32,11 @@ class Ping:
 
 
 @dataclass(frozen=True, slots=True)
+class Who:
+    """A client asks who else is there."""
+
+
+@dataclass(frozen=True, slots=True)
 class Greeting:
     """The server's first line; ``pulse`` is the last pulse sent, None before the first."""
 
@@ -65,6 +70,21 @@ class Pong:
 
 
 @dataclass(frozen=True, slots=True)
+class Listener:
+    """A client of the server: ``name`` is None where it only listens; ``behind`` pulses it has just lost."""
+
+    name: str | None
+    behind: int
+
+
+@dataclass(frozen=True, slots=True)
+class Clients:
+    """The answer to Who: everybody but who asks, in the order of joining."""
+
+    clients: tuple[Listener, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Refusal:
     """The server's ERROR line: ``code`` for programs, ``text`` for people."""
 
@@ -72,5 +92,5 @@ class Refusal:
     text: str
 
 
-ClientLine = Hello | Ping
-ServerLine = Greeting | Wait | Beat | Pong | Refusal
+ClientLine = Hello | Ping | Who
+ServerLine = Greeting | Wait | Beat | Pong | Clients | Refusal

@@ -11,7 +11,7 @@ from typing import Protocol, cast
 from camsync.clock import Clock
 from camsync.limits import ServerLimits
 from camsync.lines import LineBuffer, OverlongLineError, RateLimit
-from camsync.messages import Hello, Ping, Pong, Refusal
+from camsync.messages import Clients, Hello, Listener, Ping, Pong, Refusal, Who
 from camsync.protocol import MAX_LINE, ProtocolError, encode, parse_client_line
 
 _log = logging.getLogger(__name__)
@@ -47,6 +47,9 @@ class PeerHub(Protocol):
 
     def left(self, peer: Peer) -> None:
         """Forget a connection: it has ended."""
+
+    def clients(self) -> tuple[ClientInfo, ...]:
+        """Give all clients in the order in which they joined."""
 
     def hello(self, peer: Peer, hello: Hello) -> None:
         """Take a client's name; ProtocolError if it may not have it."""
@@ -157,11 +160,20 @@ class Peer(asyncio.Protocol):
             match parse_client_line(line):
                 case Ping(sent):
                     self.say(encode(Pong(sent, self._clock())))
+                case Who():
+                    self._tell_who()
                 case Hello() as hello:
                     self._hub.hello(self, hello)
         except ProtocolError as error:
             self._errors += 1
             self.say(encode(Refusal(error.code, str(error))))
+
+    def _tell_who(self) -> None:
+        """Say who else is there: a long line, and so only to who has read all that was said."""
+        others = [it for it in self._hub.clients() if it.address != self._address]
+        line = encode(Clients(tuple(Listener(it.name, it.behind) for it in others)))
+        if self._transport is not None and not self._transport.get_write_buffer_size():
+            self._transport.write(line)
 
 
 def _tune(connection: socket.socket, cut_off: float) -> None:

@@ -11,6 +11,7 @@ A client may say, and the server answers::
     HELLO 1 c0                                             ready for pulse 0, under this name
     HELLO 1 c0 last=123 ago=0.52                           has counted to pulse 123, due 0.52 seconds ago
     PING 1732159201.5      PONG 1732159201.500000 1732159201.502000      its own text, the server clock
+    WHO                    CLIENTS c0:0,-:7       who else is there, and how many pulses behind
     anything else          ERROR malformed ...                           a code, then a sentence
 
 All times are unix seconds. ``ago`` is a span, not a time, so that it means the same on a server whose clock
@@ -22,17 +23,32 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 
-from camsync.messages import Beat, ClientLine, Greeting, Hello, Known, Ping, Pong, Refusal, ServerLine, Wait
+from camsync.messages import (
+    Beat,
+    ClientLine,
+    Clients,
+    Greeting,
+    Hello,
+    Known,
+    Listener,
+    Ping,
+    Pong,
+    Refusal,
+    ServerLine,
+    Wait,
+    Who,
+)
 
 VERSION = 1
 MAX_LINE = 256  # bytes, without the line end
-MAX_SERVER_LINE = 16384  # bytes: WAIT names every camera of a site
+MAX_SERVER_LINE = 32768  # bytes: WAIT and CLIENTS name every camera of a site
 _GREETING = "MYVIEW-SYNC"
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
 _NUMBER = re.compile(r"\d{1,13}")  # pulses: enough for centuries at any rate
 _TIME = re.compile(r"-?\d{1,12}(\.\d{1,20})?")  # seconds
 _CODE = re.compile(r"[a-z]{1,20}")
 _FPS = re.compile(r"\d{1,6}(\.\d{1,20})?")  # pulses per second; no exponent: people read it
+_UNNAMED = "-"  # stands for a client without a name, which no name can be
 _SHOWN = 40  # characters of a wrong word that an error repeats
 
 
@@ -61,6 +77,8 @@ def _text(message: ClientLine | ServerLine) -> str:  # noqa: PLR0911 — one ret
             return f"HELLO {VERSION} {name}{counted}"
         case Ping(sent):
             return f"PING {sent:.6f}"
+        case Who():
+            return "WHO"
         case Greeting(version, fps, now, pulse):
             last = "-" if pulse is None else pulse
             return f"{_GREETING} {version} fps={_plain(fps)} now={now:.6f} pulse={last}"
@@ -70,6 +88,8 @@ def _text(message: ClientLine | ServerLine) -> str:  # noqa: PLR0911 — one ret
             return f"PULSE {number} {due:.6f}"
         case Pong(sent, now):
             return f"PONG {sent:.6f} {now:.6f}"
+        case Clients(clients):
+            return " ".join(["CLIENTS", ",".join(f"{it.name or _UNNAMED}:{it.behind}" for it in clients)])
         case Refusal(code, text):
             return f"ERROR {code} {text}"
 
@@ -78,7 +98,7 @@ def parse_client_line(line: bytes) -> ClientLine:
     """Read a line that a client sent, without its line end.
 
     Raises:
-        ProtocolError: the line is neither HELLO nor PING, or its words are wrong.
+        ProtocolError: the line is none of HELLO, PING and WHO, or its words are wrong.
     """
     match _words(line):
         case ["HELLO", version, name, *rest]:
@@ -89,8 +109,12 @@ def parse_client_line(line: bytes) -> ClientLine:
             return Hello(_match(_NAME, name, "name"), known)
         case ["PING", sent]:
             return Ping(_time(sent))
+        case ["WHO"]:
+            return Who()
         case _:
-            raise ProtocolError("malformed", "say HELLO 1 <name> [last=<pulse> ago=<seconds>] or PING <time>")
+            raise ProtocolError(
+                "malformed", "say HELLO 1 <name> [last=<pulse> ago=<seconds>], PING <time> or WHO"
+            )
 
 
 def parse_server_line(line: bytes) -> ServerLine | None:
@@ -136,6 +160,15 @@ def _pong(words: list[str]) -> Pong:
     return Pong(_time(sent), _time(now))
 
 
+def _clients(words: list[str]) -> Clients:
+    return Clients(tuple(_listener(it) for it in "".join(words).split(",") if it))
+
+
+def _listener(text: str) -> Listener:
+    name, _, behind = text.partition(":")
+    return Listener(None if name == _UNNAMED else _match(_NAME, name, "name"), _number(behind))
+
+
 def _refusal(words: list[str]) -> Refusal:
     code, *text = words
     return Refusal(_match(_CODE, code, "code"), " ".join(text))
@@ -146,6 +179,7 @@ _SERVER_WORDS: dict[str, Callable[[list[str]], ServerLine]] = {
     "WAIT": _wait,
     "PULSE": _beat,
     "PONG": _pong,
+    "CLIENTS": _clients,
     "ERROR": _refusal,
 }
 

@@ -1,43 +1,76 @@
 /** Puts the operator's page together: who may see it, and which of its sections is open. */
 
 import { getJson } from './http.js';
+import { CameraTiles } from './operator_cameras.js';
 import { ask, Refused } from './operator_http.js';
+import { element } from './operator_parts.js';
+import { Palette } from './palette.js';
+
+/** @import {Site} from './contract.js' */
+/** @import {Section} from './operator_parts.js' */
 
 const SIGN_IN_CODES = [401, 429];
-
-/**
- * @template {HTMLElement} T
- * @param {string} id
- * @returns {T}
- */
-function element(id) {
-  return /** @type {T} */ (document.getElementById(id));
-}
 
 /** @type {HTMLFormElement} */
 const form = element('sign-in');
 /** @type {HTMLInputElement} */
 const token = element('token');
+/** @type {Map<string, Section>} */
+const sections = new Map();
+/** @type {string | null} */
+let opened = null;
 
 /** @param {unknown} error what went wrong; null: nothing */
 function tell(error) {
   const line = error instanceof Error ? error.message : '';
   const trouble = element('trouble');
   if (trouble.textContent !== line) trouble.textContent = line; // or it is read out again
-  if (error instanceof Refused && error.status === 401) form.hidden = false;
+  if (error instanceof Refused && error.status === 401) askForToken();
 }
 
-async function open() {
+function askForToken() {
+  form.hidden = false;
+  show(null);
+  token.focus();
+}
+
+async function enter() {
   try {
     const session = await ask('session');
+    const site = await getJson('api/site');
     form.hidden = true;
     element('sign-out').hidden = !session.by_token;
     tell(null);
+    if (!sections.size) build(site);
+    show(location.hash.slice(1));
   } catch (error) {
-    form.hidden = !(error instanceof Refused && SIGN_IN_CODES.includes(error.status));
-    tell(form.hidden ? error : null); // the form says it already
-    if (!form.hidden) token.focus();
+    if (error instanceof Refused && SIGN_IN_CODES.includes(error.status)) askForToken();
+    else tell(error);
   }
+}
+
+/** @param {Site} site */
+function build(site) {
+  const palette = new Palette(site.cameras);
+  element('site').textContent = site.name;
+  document.documentElement.style.setProperty('--picture', String(site.width / site.height));
+  sections.set('cameras', new CameraTiles(palette, tell));
+}
+
+/** @param {string | null} wanted section; null: none, since nobody may see them */
+function show(wanted) {
+  const [first] = sections.keys();
+  const next = wanted === null ? null : sections.has(wanted) ? wanted : first;
+  element('sections').hidden = next === null;
+  if (opened !== null && opened !== next) sections.get(opened)?.close();
+  for (const name of sections.keys()) {
+    element(name).hidden = name !== next;
+    const link = document.querySelector(`#sections a[href="#${name}"]`);
+    if (name === next) link?.setAttribute('aria-current', 'page');
+    else link?.removeAttribute('aria-current');
+  }
+  if (next !== null && next !== opened) sections.get(next)?.open();
+  opened = next;
 }
 
 form.addEventListener('submit', async (event) => {
@@ -45,7 +78,7 @@ form.addEventListener('submit', async (event) => {
   try {
     await ask('session', 'POST', { token: token.value });
     token.value = '';
-    await open();
+    await enter();
   } catch (error) {
     tell(error);
     token.select();
@@ -57,5 +90,7 @@ element('sign-out').addEventListener('click', async () => {
   location.reload(); // nothing that was shown stays
 });
 
-void getJson('api/site').then((site) => (element('site').textContent = site.name), tell);
-void open();
+addEventListener('hashchange', () => {
+  if (opened !== null) show(location.hash.slice(1));
+});
+void enter();

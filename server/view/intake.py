@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import msgspec
 
 from server.view.agreement import ParameterMismatchError
 from server.view.align import Aligner
+from server.view.gauge import Gauge
 from server.view.sense import makes_sense
 from server.view.shelf import Shelf, Shelved
 from server.view.sound import SoundShelf
@@ -30,6 +31,8 @@ class CameraState:
     ended: bool = False
     bad_messages: int = 0
     frames: int = 0
+    gauge: Gauge = field(default_factory=Gauge)
+    """What is measured of it, for the operator."""
 
     @property
     def word(self) -> str:
@@ -55,6 +58,11 @@ class CameraState:
         if self.alive and self.away:
             return "its source gives no pictures; it is tried again"
         return ""
+
+    def bad(self, why: Exception | str) -> None:
+        """Count a message that cannot be used."""
+        self.bad_messages += 1
+        self.gauge.trouble(f"a message that cannot be used: {why}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,10 +104,12 @@ class Intake:
             return
         state.alive = there
         state.status = None  # what was said before is of another time
+        state.gauge.begin()
         if there:
             state.refused, state.ended = "", False
             self._aligner.come(camera)
         else:
+            state.gauge.trouble("its process was gone")
             self._aligner.gone(camera)
             self._drop_thumbnails(camera)
         log.info("camera %s %s", camera, "is there" if there else "is gone")
@@ -115,13 +125,15 @@ class Intake:
                 return
             shelf = self._shelves[camera]
             frame = shelf.put(head.pulse, head.boot, message.payload, key=head.key, after=head.after)
-        except msgspec.DecodeError:
-            state.bad_messages += 1
+        except msgspec.DecodeError as error:
+            state.bad(error)
         except ParameterMismatchError as error:
             state.refused = f"{error}; are all cameras of this site run with the same configuration?"
+            state.gauge.trouble(state.refused)
             log.error("camera %s is refused: %s", camera, state.refused)  # noqa: TRY400 — says all there is
         else:
             state.frames += 1
+            state.gauge.frame(head)
             self._aligner.frame(camera, head.boot, head.pulse)
             self._on_frame(camera, frame)
 
@@ -141,12 +153,13 @@ class Intake:
             return
         try:
             tracks = self._tracks.decode(message.payload)
-        except msgspec.DecodeError:
-            state.bad_messages += 1
+        except msgspec.DecodeError as error:
+            state.bad(error)
             return
         if tracks.camera != camera or not makes_sense(tracks, self._aligner.stride):
-            state.bad_messages += 1
+            state.bad("its tracks make no sense; is it run with this configuration?")
             return
+        state.gauge.window(tracks)
         state.ended = tracks.ended
         self._aligner.tracks(tracks)
 
@@ -156,9 +169,13 @@ class Intake:
         if state is None:
             return
         try:
-            state.status = self._status.decode(message.payload)
-        except msgspec.DecodeError:
-            state.bad_messages += 1
+            status = self._status.decode(message.payload)
+        except msgspec.DecodeError as error:
+            state.bad(error)
+        else:
+            was_away, state.status = state.away, status
+            if state.away and not was_away:
+                state.gauge.trouble(state.message)
 
     def thumbnail(self, message: Message) -> None:
         """Keep the newest small picture of a track."""
@@ -167,8 +184,8 @@ class Intake:
             return
         try:
             head = self._thumb_head.decode(message.attachment)
-        except msgspec.DecodeError:
-            state.bad_messages += 1
+        except msgspec.DecodeError as error:
+            state.bad(error)
             return
         self.thumbnails[camera, head.boot, head.track] = Thumbnail(message.payload, head.pulse)
 

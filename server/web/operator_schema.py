@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import msgspec
 
+from server.view.gauge import Spread, Trouble
+
 
 class OperatorSession(msgspec.Struct, frozen=True):
     """That somebody may operate."""
@@ -12,7 +14,78 @@ class OperatorSession(msgspec.Struct, frozen=True):
     """By a token; else because they are at the server's own machine."""
 
 
+class OwnPicture(msgspec.Struct, frozen=True):
+    """A camera's own picture, and how it lies in the site's: site = own · scale + (left, top), in pixels."""
+
+    width: int
+    height: int
+    scale: float
+    left: float
+    top: float
+
+
+class OperatorCamera(msgspec.Struct, frozen=True):
+    """How one camera is, in all that is measured of it."""
+
+    camera: str
+    state: str
+    """As in /api/cameras, as message, pulse, fps, missed, shed, late and in_step."""
+    message: str
+    pulse: int
+    fps: float
+    missed: int
+    shed: int
+    late: int
+    in_step: bool
+    bad_messages: int
+    clock_offset: float | None
+    """Seconds, pulse server's clock minus the camera's; null: not known."""
+    sync_error: Spread | None
+    """Seconds from the moment a frame was due to the moment it was taken, of the last ten seconds or so."""
+    tracking_delay: Spread | None
+    """Seconds from the moment a window's last frame was due to the moment the window was solved."""
+    certified: float | None
+    """Share of the windows whose answer is proven to be the optimum."""
+    windows: int
+    """How many windows that is about."""
+    last_trouble: Trouble | None
+    """What last went wrong, and when; it stays when the camera is well again."""
+    picture: OwnPicture | None
+    """Null: it has not said."""
+
+
+class OperatorCameras(msgspec.Struct, frozen=True):
+    """All cameras of the site."""
+
+    cameras: list[OperatorCamera]
+
+
+class PulseListener(msgspec.Struct, frozen=True):
+    """A client of the pulse server."""
+
+    name: str | None
+    """Null: it only listens."""
+    expected: bool
+    """The configuration names it."""
+    behind: int
+    """Pulses that it has just lost because it did not read."""
+
+
+class Pulses(msgspec.Struct, frozen=True):
+    """The pulse server's clients."""
+
+    server: str
+    """Its host and port."""
+    error: str
+    """Why nothing is known; empty: it has answered."""
+    clients: list[PulseListener]
+    missing: list[str]
+    """Who is named in the configuration and not there."""
+
+
 OPERATOR: dict[str, type[msgspec.Struct]] = {
     "/api/operator/session": OperatorSession,
+    "/api/operator/cameras": OperatorCameras,
+    "/api/operator/pulses": Pulses,
 }
 """What GET of each address answers; what changes something answers with the same, as it is then."""

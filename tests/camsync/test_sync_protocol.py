@@ -9,7 +9,21 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from camsync.lines import LineBuffer, OverlongLineError, RateLimit
-from camsync.messages import Beat, ClientLine, Greeting, Hello, Known, Ping, Pong, Refusal, ServerLine, Wait
+from camsync.messages import (
+    Beat,
+    ClientLine,
+    Clients,
+    Greeting,
+    Hello,
+    Known,
+    Listener,
+    Ping,
+    Pong,
+    Refusal,
+    ServerLine,
+    Wait,
+    Who,
+)
 from camsync.protocol import MAX_LINE, ProtocolError, encode, is_name, parse_client_line, parse_server_line
 
 names = st.from_regex(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}", fullmatch=True)
@@ -19,13 +33,19 @@ times = st.integers(-(10**15), 10**15).map(lambda micro: micro / 1e6)
 spans = st.integers(0, 10**12).map(lambda micro: micro / 1e6)
 rates = st.floats(0.01, 10_000).map(lambda fps: float(f"{fps:.12f}"))
 client_lines = st.one_of(
-    st.builds(Hello, names, st.none() | st.builds(Known, numbers, spans)), st.builds(Ping, times)
+    st.builds(Hello, names, st.none() | st.builds(Known, numbers, spans)),
+    st.builds(Ping, times),
+    st.just(Who()),
 )
 server_lines = st.one_of(
     st.builds(Greeting, st.just(1), rates, times, st.none() | numbers),
     st.builds(Wait, st.lists(names, min_size=1, max_size=5).map(tuple)),
     st.builds(Beat, numbers, times),
     st.builds(Pong, times, times),
+    st.builds(
+        Clients,
+        st.lists(st.builds(Listener, st.none() | names, st.integers(0, 10**6)), max_size=5).map(tuple),
+    ),
     st.builds(Refusal, st.just("malformed"), st.just("two words")),
 )
 
@@ -49,7 +69,7 @@ def test_what_the_server_says_is_heard_as_said(message: ServerLine) -> None:
 
 
 words = st.sampled_from(
-    [b"HELLO", b"PING", b"PULSE", b"MYVIEW-SYNC", b"WAIT", b"PONG", b"ERROR", b"1", b"-1"]
+    [b"HELLO", b"PING", b"WHO", b"PULSE", b"MYVIEW-SYNC", b"WAIT", b"PONG", b"CLIENTS", b"ERROR", b"1", b"-1"]
 )
 tails = st.sampled_from([b"last=3", b"ago=-1", b"fps=0", b"fps=25", b"now=nan", b"pulse=-", b"1e400", b"inf"])
 nearly = st.lists(words | tails | st.binary(max_size=8), max_size=6).map(b" ".join)

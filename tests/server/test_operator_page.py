@@ -4,16 +4,22 @@ from __future__ import annotations
 
 from collections.abc import AsyncIterator
 from contextlib import aclosing, asynccontextmanager
+from pathlib import Path
 from typing import Any
 
 import pytest
 import pytest_asyncio
-from halls import Hall, opened
+from cameras_by_hand import CAMERAS, LARGE, SMALL, status
+from halls import A, B, Hall, opened
 from playwright.async_api import Browser, Page, expect
 
 from benchmarks.browser import CHROMIUM, chromium
 from server.web.operator_permission import digest_of
+from server.wire.messages import Keys
 
+PAGE = Path(__file__).parents[2] / "client" / "page"
+AXE = PAGE.parents[1] / "node_modules/axe-core/axe.min.js"
+SECTIONS = ["cameras"]
 TOKEN = "a token of theirs"  # noqa: S105 — of a test
 
 pytestmark = [
@@ -30,13 +36,14 @@ async def browser() -> AsyncIterator[Browser]:
 
 @asynccontextmanager
 async def operating(
-    browser: Browser, place: str = "", width: int = 1000, **changes: Any
+    browser: Browser, place: str = "", axe: str = "", **changes: Any
 ) -> AsyncIterator[tuple[Hall, Page]]:
     """Open the operator's page of a site; an exception or a refused resource in the page fails the test."""
     complaints: list[str] = []
     async with aclosing(opened(patience=60, **changes)) as halls:
         hall = await anext(halls)
-        page = await browser.new_page(viewport={"width": width, "height": 800})
+        page = await browser.new_page(viewport={"width": 1000, "height": 800})
+        await page.add_init_script(axe)  # where the site's policy does not hold
         page.set_default_timeout(15_000)
         page.on("pageerror", lambda error: complaints.append(str(error)))
         page.on(
@@ -47,6 +54,13 @@ async def operating(
         yield hall, page
         await page.close()
     assert complaints == []
+
+
+def see(hall: Hall) -> None:
+    """Let person 1 be in both cameras, larger in c1, and person 2 in c0 alone."""
+    hall.service.come(*CAMERAS)
+    for epoch in range(3):
+        hall.service.feed(epoch, {A: {1: SMALL, 2: SMALL}, B: {1: LARGE}})
 
 
 async def test_who_has_the_token_signs_in_and_out(browser: Browser) -> None:
@@ -70,3 +84,68 @@ async def test_without_a_token_there_is_nothing_to_sign_in_to(browser: Browser) 
         await expect(page.locator("#site")).to_have_text(hall.service.config.site.name)
         await expect(page.get_by_label("The operator's token")).to_be_hidden()
         await expect(page.get_by_role("button", name="Sign out")).to_be_hidden()
+
+
+async def test_every_camera_has_a_tile_that_says_how_it_is(browser: Browser) -> None:
+    async with operating(browser, "#cameras") as (hall, page):
+        await expect(page.locator(".camera-tile .state")).to_have_text(["Starting", "Starting"])
+        see(hall)
+        await expect(page.locator(".camera-tile .state")).to_have_text(["Live", "Live"])
+        picture = await page.get_by_alt_text(f"What {A} sees now").element_handle()
+        await page.wait_for_function("(it) => it.naturalWidth > 0", arg=picture)
+        tile = page.locator(".camera-tile").first
+        assert (
+            await tile.locator("dt").all_text_contents()
+            == await page.locator(".camera-tile >> nth=1 >> dt").all_text_contents()
+        )
+        hall.service.intake.status(status(A, missed=3, clock_offset=-0.25))
+        await expect(tile.get_by_text("-250 ms")).to_be_visible()
+        hall.service.intake.alive(Keys("hall").camera(A, "alive"), there=False)
+        await expect(tile.locator(".state")).to_have_text("Gone")
+        await expect(tile.locator(".last-trouble")).to_contain_text("its process was gone")
+        await expect(page.locator("#pulses")).to_contain_text("there is no pulse server at")
+
+
+async def test_at_every_width_nothing_overflows_and_axe_finds_no_serious_fault(browser: Browser) -> None:
+    axe = AXE.read_text(encoding="utf-8") if AXE.exists() else ""
+    async with operating(browser, axe=axe) as (hall, page):
+        see(hall)
+        for width in (360, 800, 1600):
+            await page.set_viewport_size({"width": width, "height": 800})
+            for section in SECTIONS:
+                await page.evaluate("(it) => { location.hash = it; }", section)
+                await expect(page.locator(f"#{section}")).to_be_visible()
+                assert await page.evaluate("document.documentElement.scrollWidth") <= width, section
+                if width == 360:
+                    await large_enough_for_a_thumb(page)
+                if width == 800 and axe:
+                    assert await serious_faults(page) == []
+    if not axe:
+        pytest.skip("axe-core is not there: make node_modules/.installed")
+
+
+async def large_enough_for_a_thumb(page: Page) -> None:
+    for button in await page.locator("button:visible, select:visible, nav a").all():
+        box = await button.bounding_box()
+        assert box is not None
+        assert min(box["width"], box["height"]) >= 44, await button.text_content()
+
+
+async def serious_faults(page: Page) -> list[Any]:
+    found = await page.evaluate("axe.run()")
+    return [
+        (it["id"], [node["html"] for node in it["nodes"]])
+        for it in found["violations"]
+        if it["impact"] in {"serious", "critical"}
+    ]
+
+
+async def test_sections_are_reached_by_keyboard_and_kept_in_the_address(browser: Browser) -> None:
+    async with operating(browser) as (_, page):
+        await expect(page.locator("#cameras")).to_be_visible()
+        for section in SECTIONS[1:]:
+            await page.locator(f'nav a[href="#{section}"]').focus()
+            await page.keyboard.press("Enter")
+            await expect(page.locator(f"#{section}")).to_be_visible()
+            await expect(page.locator("main > section:visible")).to_have_count(1)
+            assert page.url.endswith(f"#{section}")

@@ -1,0 +1,39 @@
+/**
+ * What the operator's addresses answer, as types. No code.
+ *
+ * @typedef {{median: number, worst: number}} Spread seconds
+ *
+ * @typedef {object} OwnPicture site = own · scale + (left, top), in pixels
+ * @property {number} width pixels of the camera's own picture
+ * @property {number} height
+ * @property {number} scale
+ * @property {number} left
+ * @property {number} top
+ *
+ * @typedef {object} OperatorCamera an entry of /api/operator/cameras
+ * @property {string} camera
+ * @property {'live' | 'gone' | 'ended' | 'starting' | 'refused'} state
+ * @property {string} message
+ * @property {number} pulse
+ * @property {number} fps
+ * @property {number} missed
+ * @property {number} shed
+ * @property {number} late
+ * @property {boolean} in_step
+ * @property {number} bad_messages
+ * @property {number | null} clock_offset seconds
+ * @property {Spread | null} sync_error
+ * @property {Spread | null} tracking_delay
+ * @property {number | null} certified share of the windows
+ * @property {number} windows
+ * @property {{text: string, at: number} | null} last_trouble
+ * @property {OwnPicture | null} picture
+ *
+ * @typedef {object} Pulses /api/operator/pulses
+ * @property {string} server
+ * @property {string} error
+ * @property {{name: string | null, expected: boolean, behind: number}[]} clients
+ * @property {string[]} missing
+ */
+
+export {};

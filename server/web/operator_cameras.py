@@ -1,0 +1,70 @@
+"""The cameras as the operator sees them, and who listens to the pulses."""
+
+from __future__ import annotations
+
+import numpy as np
+from aiohttp import web
+
+from camsync import SyncError, clients_of
+from server.view.intake import CameraState
+from server.view.service import BestViewService
+from server.web.api import answer
+from server.web.keys import SERVICE
+from server.web.operator_permission import PREFIX
+from server.web.operator_schema import OperatorCamera, OperatorCameras, OwnPicture, PulseListener, Pulses
+from server.wire.fit import Fit
+from server.wire.messages import pulse_client
+
+routes = web.RouteTableDef()
+
+
+@routes.get(f"{PREFIX}/cameras")
+async def get_cameras(request: web.Request) -> web.Response:
+    """Say how every camera is: state, rate, how far from the pulse, how late its tracks, what went wrong."""
+    service = request.app[SERVICE]
+    return answer(OperatorCameras([_camera(service, *it) for it in service.intake.states.items()]))
+
+
+@routes.get(f"{PREFIX}/pulses")
+async def get_pulses(request: web.Request) -> web.Response:
+    """Ask the pulse server who its clients are."""
+    config = request.app[SERVICE].config
+    expected = [*config.camera_ids, *(pulse_client(index) for index in range(config.view.share.of))]
+    where = f"{config.sync.host}:{config.sync.port}"
+    try:
+        clients = await clients_of(config.sync.host, config.sync.port)
+    except SyncError as error:
+        return answer(Pulses(where, str(error), [], []))
+    listeners = [PulseListener(it.name, it.name in expected, it.behind) for it in clients]
+    there = {it.name for it in clients}
+    return answer(Pulses(where, "", listeners, [it for it in expected if it not in there]))
+
+
+def _camera(service: BestViewService, camera: str, state: CameraState) -> OperatorCamera:
+    status, gauge = state.status, state.gauge
+    return OperatorCamera(
+        camera=camera,
+        state=state.word,
+        message=state.message,
+        pulse=service.shelves[camera].newest,
+        fps=status.fps if status else 0.0,
+        missed=status.missed if status else 0,
+        shed=status.shed if status else 0,
+        late=service.aligner.late_messages[camera],
+        in_step=status.in_step if status else False,
+        bad_messages=state.bad_messages,
+        clock_offset=status.clock_offset if status else None,
+        sync_error=gauge.sync_error,
+        tracking_delay=gauge.tracking_delay,
+        certified=gauge.certified,
+        windows=gauge.windows,
+        last_trouble=gauge.last_trouble,
+        picture=None if gauge.size is None else _picture(service, gauge.size),
+    )
+
+
+def _picture(service: BestViewService, own: tuple[int, int]) -> OwnPicture:
+    site = service.config.site
+    fit = Fit(own, (site.width, site.height))
+    left, top = fit.to_site(np.zeros(2)).tolist()
+    return OwnPicture(width=own[0], height=own[1], scale=fit.scale, left=left, top=top)

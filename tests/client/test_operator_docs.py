@@ -1,0 +1,17 @@
+"""docs/operator.md names every section and every button of the operator's page."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PAGE = (ROOT / "client/page/operator.html").read_text(encoding="utf-8")
+DOCS = (ROOT / "docs/operator.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("words", re.findall(r"<(?:button|a) [^>]*>([^<]+)<", PAGE))
+def test_every_section_and_button_is_described(words: str) -> None:
+    assert f"**{words}**" in DOCS
