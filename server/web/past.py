@@ -9,7 +9,7 @@ from aiohttp import web
 
 from server.view.channel import Channel
 from server.view.past.hearing import Hearing
-from server.view.past.kept import kept_from, known
+from server.view.past.kept import kept_from, known, shown
 from server.view.past.moment import MomentError, moment_of, pulse_at
 from server.view.past.play import CameraPast, ObjectPast, Source, sounds
 from server.view.past.stream import PastStream, Wish
@@ -20,7 +20,7 @@ from server.web.api import answer, no_camera, not_now, problem
 from server.web.forms import Form
 from server.web.keys import SERVICE
 from server.web.limits import no_place
-from server.web.schema import Past, PastSpan
+from server.web.schema import Past, PastSpan, PastView
 from server.web.streams import send_bytes
 
 routes = web.RouteTableDef()
@@ -165,8 +165,8 @@ async def _stream(
     stream = PastStream(source, new_timeline(service), fps, joined, hearing)
     past.viewers += 1
     try:
-        async with aclosing(stream.send(wish)) as shown:
-            data = (form.packed(piece) async for piece in shown)
+        async with aclosing(stream.send(wish)) as pieces:
+            data = (form.packed(piece) async for piece in pieces)
             return await send_bytes(request, data, head, {"Content-Type": form.content_type})
     finally:
         past.viewers -= counted
@@ -180,5 +180,6 @@ def _past(service: BestViewService, source: Source) -> Past:
                 it.first, it.end - it.first, moment_of(it.first, fps, pulse0), moment_of(it.end, fps, pulse0)
             )
             for it in known(source)
-        ]
+        ],
+        [PastView(it.camera, it.first, it.end - it.first) for it in shown(source)],
     )

@@ -133,10 +133,21 @@ class PastSpan(msgspec.Struct, frozen=True):
     ends: str | None
 
 
+class PastView(msgspec.Struct, frozen=True):
+    """Frames of one camera."""
+
+    camera: str
+    first: int
+    """Pulse."""
+    frames: int
+
+
 class Past(msgspec.Struct, frozen=True):
     """What can be seen again."""
 
     spans: list[PastSpan]
+    views: list[PastView]
+    """By which camera, in order."""
 
 
 class Problem(msgspec.Struct, frozen=True):

@@ -193,8 +193,20 @@ async def test_it_is_said_what_there_is(recorded: Hall) -> None:
         "first": 0,
         "frames": 30,
     }
-    assert await recorded.get_json("/api/objects/1/past") == {"spans": [span]}
+    assert (await recorded.get_json("/api/objects/1/past"))["spans"] == [span]
     assert (await recorded.get_json("/api/cameras/c1/past"))["spans"][0]["frames"] == 35
+
+
+async def test_it_is_said_by_which_cameras(recorded: Hall) -> None:
+    async with recorded.session.get("/api/past?from=p0") as answer:
+        told = [json.loads(line) async for line in answer.content]
+    chosen = {it["first"] + n: it["choices"]["1"] for it in told for n in range(it["frames"])}
+    views = (await recorded.get_json("/api/objects/1/past"))["views"]
+    assert {it["first"] + n: it["camera"] for it in views for n in range(it["frames"])} == chosen
+    assert [it["camera"] for it in views] == [A, B]
+    assert (await recorded.get_json("/api/cameras/c1/past"))["views"] == [
+        {"camera": B, "first": 0, "frames": 35}
+    ]
 
 
 async def test_it_is_told_again_who_was_where(recorded: Hall) -> None:

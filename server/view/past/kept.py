@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 
 from server.view.past.play import Source
-from server.view.past.stretch import Span, Stretch, spans
+from server.view.past.stretch import Span, Stretch, View, spans, views
 
 
 def known(source: Source) -> list[Span]:
@@ -16,6 +16,12 @@ def known(source: Source) -> list[Span]:
         found.append(Span(gop.first, gop.end))
         gop = source.recall(gop.end)
     return spans(found)
+
+
+def shown(source: Source) -> list[View]:
+    """Say which cameras' frames they are, as far as they are known: on the disk, and after it in memory."""
+    recorded = [it for one in source.recorded for it in one.tape.all]
+    return views([*recorded, *source.remembered])
 
 
 def kept_from(source: Source, pulse: int) -> int | None:

@@ -12,7 +12,7 @@ from typing import Protocol
 from server.view.past.media import Gop, gops
 from server.view.past.past import Past
 from server.view.past.run import Run
-from server.view.past.stretch import Stretch, Tape
+from server.view.past.stretch import Stretch, Tape, View
 
 _AT_ONCE = 8
 """GOPs read from the disk in one go."""
@@ -38,6 +38,10 @@ class Source(Protocol):
 
     def recall_before(self, pulse: int) -> Gop | None:
         """Give the last GOP in memory that ends before a pulse; None where there is none."""
+
+    @property
+    def remembered(self) -> Sequence[View]:
+        """What it shows in memory, by camera."""
 
     @property
     def end(self) -> int:
@@ -72,6 +76,16 @@ class ObjectPast:
         return max(found, key=lambda gop: gop.first, default=None)
 
     @property
+    def remembered(self) -> Sequence[View]:
+        """What was chosen for them, as far as it is remembered."""
+        return [
+            View(it.choices[number], it.first, it.first + it.frames)
+            for it in self.past.recent.choices(0)
+            for number in self.numbers
+            if number in it.choices
+        ]
+
+    @property
     def end(self) -> int:
         """The pulse after the newest decided frame."""
         return self.past.recent.end
@@ -97,6 +111,16 @@ class CameraPast:
     def recall_before(self, pulse: int) -> Gop | None:
         """Give its last GOP in memory that ends before a pulse."""
         return self.past.recent.of_camera_before(self.camera, pulse)
+
+    @property
+    def remembered(self) -> Sequence[View]:
+        """What it delivered, as far as it is in memory."""
+        found = []
+        gop = self.recall(0)
+        while gop is not None:
+            found.append(View(self.camera, gop.first, gop.end))
+            gop = self.recall(gop.end)
+        return found
 
     @property
     def end(self) -> int:

@@ -44,6 +44,15 @@ class Span:
     end: int
 
 
+@dataclass(frozen=True, slots=True)
+class View:
+    """Frames of one camera that a stream has shown: ``first … end - 1``."""
+
+    camera: str
+    first: int
+    end: int
+
+
 class Tape:
     """The stretches of one stream by pulse. One thread adds to it and takes away, others look."""
 
@@ -94,6 +103,21 @@ class Tape:
         """All stretches in order."""
         with self._lock:
             return tuple(self._stretches)
+
+
+def views(found: Iterable[Stretch | View]) -> list[View]:
+    """Join what one camera shows on and on; in order, and of no frame two."""
+    joined: list[View] = []
+    for it in sorted(found, key=lambda it: it.first):
+        last = joined[-1] if joined else None
+        first = it.first if last is None else max(it.first, last.end)
+        if first >= it.end:
+            continue
+        if last is not None and (last.camera, last.end) == (it.camera, first):
+            joined[-1] = View(it.camera, last.first, it.end)
+        else:
+            joined.append(View(it.camera, first, it.end))
+    return joined
 
 
 def spans(stretches: Iterable[Stretch | Span]) -> list[Span]:
