@@ -53,6 +53,11 @@ export class Decisions {
     return last ? last.first + last.frames : 0;
   }
 
+  /** The first pulse that something is known of; Infinity when nothing is. */
+  get begin() {
+    return this.#gops[0]?.first ?? Infinity;
+  }
+
   /**
    * @param {number} pulse
    * @returns {Gop | undefined}

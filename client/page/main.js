@@ -9,6 +9,7 @@ import { Overlay } from './overlay.js';
 import { Painter } from './painter.js';
 import { People } from './people.js';
 import { Reason } from './reason.js';
+import { Span } from './span.js';
 import { Strip } from './strip.js';
 import { Tiles } from './tiles.js';
 import { Timekeeper } from './timekeeper.js';
@@ -35,6 +36,7 @@ const tiles = new Tiles(element('tiles'), viewer, (object) => viewer.choose(obje
 const cameras = new Cameras(element('cameras'), (camera) => viewer.hold(camera));
 const overlay = new Overlay(element('boxes'));
 const strip = new Strip(element('strip'));
+const span = new Span(element('span'), element('strip'), readOut);
 const reason = new Reason(element('reason'));
 const explaining = new Explaining(viewer, strip, new Why(element('why')));
 const timekeeper = new Timekeeper(viewer);
@@ -80,9 +82,13 @@ function readOut() {
   element('delay').textContent = viewer.flowing && delay > 0 ? `${(delay / 1000).toFixed(1)} s` : MISSING;
   if (!site || probe.pulse === null || viewer.object === null) return strip.clear();
   const live = viewer.past.moment === null;
-  strip.draw({ pulse: probe.pulse, live, fps: site.fps, object: viewer.object, decisions, palette });
+  const views = (/** @type {number} */ from) => viewer.views(from);
+  void viewer.kept.about(viewer.object);
+  const seconds = span.offer((decisions.end - viewer.kept.first) / site.fps);
+  strip.draw({ pulse: probe.pulse, live, fps: site.fps, seconds, decided: decisions.end, views, palette });
   explaining.follow();
-  const words = override.words(decisions.camera(viewer.object, probe.pulse), probe.camera, live);
+  const best = viewer.said(probe.pulse).camera(viewer.object, probe.pulse);
+  const words = override.words(best, probe.camera, live);
   if (words === null) void reason.about(viewer.object, probe.camera, live ? null : probe.pulse);
   else reason.put(words);
 }

@@ -1,13 +1,13 @@
-/** The last minute as a band coloured by camera, and a little of what is already decided beyond. */
+/** The last minute or more as a band coloured by camera, and a little of what is already decided beyond. */
 
 import { Surface } from './surface.js';
 
-/** @import {Decisions} from './decisions.js' */
+/** @import {View} from './kept.js' */
 /** @import {Palette} from './palette.js' */
 
-const PAST_S = 60;
-const AHEAD_S = 2;
+const AHEAD = 1 / 30; // of the past that is shown
 const GAP = 1; // CSS pixels cut out of the band at every cut
+const LEAST = 0.5; // of a band: an hour's shortest shots are seen too
 const LETTERS = '600 11px system-ui, sans-serif';
 const DECIDED_ALPHA = 0.45; // decided, not yet shown
 
@@ -16,13 +16,14 @@ const DECIDED_ALPHA = 0.45; // decided, not yet shown
  * @property {number} pulse now shown
  * @property {boolean} live whether it is the newest
  * @property {number} fps
- * @property {number} object
- * @property {Decisions} decisions
+ * @property {number} seconds of the past
+ * @property {number} decided the first pulse that nothing is decided for yet
+ * @property {(from: number) => View[]} views that were shown from a pulse on, in order
  * @property {Palette} palette
  */
 
 export class Strip {
-  /** @type {{end: number, fps: number} | null} of what was drawn last */
+  /** @type {{end: number, frames: number} | null} of what was drawn last: where the past ends, and its length */
   #moment = null;
 
   /** @param {HTMLCanvasElement} canvas */
@@ -41,24 +42,26 @@ export class Strip {
    */
   pulseAt(x) {
     if (!this.#moment) return null;
-    const { end, fps } = this.#moment;
-    const pulse = Math.round(end - PAST_S * fps + (x / this.surface.width) * (PAST_S + AHEAD_S) * fps);
+    const { end, frames } = this.#moment;
+    const pulse = Math.round(end - frames + (x / this.surface.width) * (1 + AHEAD) * frames);
     return pulse < end ? pulse : null;
   }
 
   /** @param {Moment} moment */
-  draw({ pulse, live, fps, object, decisions, palette }) {
+  draw({ pulse, live, fps, seconds, decided, views, palette }) {
     const context = this.surface.clear();
     const { width, height } = this.surface;
     // The band stands at the newest; what is watched of the past is a mark on it.
-    const end = live ? pulse : Math.max(pulse, decisions.end);
-    this.#moment = { end, fps };
-    const from = end - PAST_S * fps;
-    const perFrame = width / ((PAST_S + AHEAD_S) * fps);
+    const end = live ? pulse : Math.max(pulse, decided);
+    const frames = seconds * fps;
+    this.#moment = { end, frames };
+    const from = end - frames;
+    const perFrame = width / ((1 + AHEAD) * frames);
     /** @param {number} at */
     const x = (at) => (at - from) * perFrame;
-    for (const run of decisions.runs(object, from)) {
-      const [left, right] = [x(run.first), Math.min(x(run.end), width) - GAP];
+    for (const run of views(from)) {
+      const left = x(run.first);
+      const right = Math.max(Math.min(x(run.end), width) - GAP, left + LEAST);
       context.fillStyle = palette.colour(run.camera);
       context.fillRect(left, 0, right - left, height);
       writeName(context, run.camera, left, right, height);

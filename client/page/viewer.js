@@ -4,17 +4,20 @@ import { onAddress, watchedInAddress, writeAddress } from './address.js';
 import { Beside } from './beside.js';
 import { Decisions } from './decisions.js';
 import { Framing } from './framing.js';
+import { Kept } from './kept.js';
 import { Notice } from './notice.js';
 import { Override } from './override.js';
 import { Palette } from './palette.js';
 import { Past } from './past.js';
 import { Player } from './player.js';
 import { Probe } from './probe.js';
+import { Recall } from './recall.js';
 import { describe } from './status.js';
 
 /** @import {Box, Camera, Gop, Person, Site} from './contract.js' */
 /** @import {Part} from './follow.js' */
 /** @import {Frame} from './frames.js' */
+/** @import {View} from './kept.js' */
 /** @import {Subject} from './subject.js' */
 /** @import {Status} from './status.js' */
 
@@ -39,6 +42,7 @@ export class Viewer {
   notice = new Notice();
   palette = new Palette([]);
   decisions = new Decisions(1);
+  kept = new Kept();
   probe = new Probe();
   connected = false;
   supported = true;
@@ -62,6 +66,7 @@ export class Viewer {
    */
   constructor(video, changed) {
     this.changed = changed;
+    this.recall = new Recall(1, changed);
     this.player = new Player(video, {
       landed: changed,
       ended: (refused) => (refused ? this.#losePast() : this.live()),
@@ -86,7 +91,9 @@ export class Viewer {
     const anew = !old || old.fps !== site.fps || Math.abs((old.pulse0 ?? 0) - (site.pulse0 ?? 0)) > RESTART_S;
     if (anew) {
       this.decisions = new Decisions(site.fps);
-      this.decisions.rename(this.people ?? []);
+      this.recall = new Recall(site.fps, this.changed);
+      this.kept.forget();
+      this.#rename();
       this.past.leave();
       this.#stale = this.probe.pulse !== null;
     }
@@ -103,12 +110,16 @@ export class Viewer {
   /** @param {Person[]} people */
   setPeople(people) {
     this.people = people;
-    this.decisions.rename(people);
+    this.#rename();
     this.#followMerge();
     const lost = this.object !== null && !this.chosen;
     if (this.object === null || (lost && !this.#asked)) this.#chooseDefault();
     this.#play();
     this.changed();
+  }
+
+  #rename() {
+    for (const said of [this.decisions, this.recall.decisions]) said.rename(this.people ?? []);
   }
 
   /** @param {Camera[]} cameras */
@@ -259,20 +270,41 @@ export class Viewer {
     }
     if (!this.site || !this.player.shown) return;
     const { object } = this.player.shown;
-    const camera = this.#camera(this.player.shown, pulse);
+    if (this.player.shown.past) this.recall.want(pulse, this.decisions.begin);
+    const said = this.said(pulse);
+    const camera = this.#camera(this.player.shown, said, pulse);
     this.probe.view(object, camera, shownAt);
-    this.boxes = camera === null ? [] : this.decisions.boxes(camera, pulse);
+    this.boxes = camera === null ? [] : said.boxes(camera, pulse);
     const box = this.boxes.find(([number]) => number === object);
     this.part = this.framing.step(`${object} ${camera}`, box, this.site, passed);
   }
 
   /**
    * @param {Subject} subject
+   * @param {Decisions} said
    * @param {number} pulse
    */
-  #camera({ object, camera, prefer }, pulse) {
+  #camera({ object, camera, prefer }, said, pulse) {
     if (camera !== null) return camera;
-    return prefer === null ? this.decisions.camera(object, pulse) : this.decisions.preferring(object, prefer, pulse);
+    return prefer === null ? said.camera(object, pulse) : said.preferring(object, prefer, pulse);
+  }
+
+  /**
+   * @param {number} pulse
+   * @returns {Decisions} what is known of that moment, lately decided or asked for again
+   */
+  said(pulse) {
+    return pulse < this.decisions.begin ? this.recall.decisions : this.decisions;
+  }
+
+  /**
+   * @param {number} from pulse
+   * @returns {View[]} what has been shown of the chosen person, and is decided
+   */
+  views(from) {
+    const { object, decisions } = this;
+    if (object === null) return [];
+    return [...this.kept.between(from, decisions.begin), ...decisions.runs(object, from)];
   }
 
   /** @returns {boolean} whether new frames are being shown */

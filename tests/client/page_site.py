@@ -39,6 +39,7 @@ class FakeSite:
         skipped: Pulses whose frames are missing from every stream.
         opened: Whose stream was asked for, in order.
         kept_from: The first pulse that can be seen again.
+        recorded: Seconds of the past that are recorded.
         ahead: Seconds that the streams run ahead of the clock: minutes pass in no time.
         blind: Pulses, from GOP to GOP, at which the first camera finds nobody.
         pulse0: Unix seconds at which pulse 0 was due.
@@ -52,6 +53,7 @@ class FakeSite:
     skipped: range = range(0)
     opened: list[int] = field(default_factory=list)
     kept_from: int = 0
+    recorded: int = 0
     ahead: float = 0.0
     blind: range = range(0)
     pulse0: float = field(init=False)
@@ -163,6 +165,15 @@ class FakeSite:
             "reason": REASON,
         }
 
+    def past(self, person: int) -> dict[str, Any]:
+        """Give what can be seen again of a person, by camera."""
+        first = (self.edge - self.recorded * FPS) // HOLD * HOLD
+        views = [
+            {"camera": CAMERAS[self.camera(person, pulse)], "first": pulse, "frames": HOLD}
+            for pulse in range(first, self.edge - HOLD, HOLD)
+        ]
+        return {"spans": [], "views": views}
+
     async def released(self, first: int) -> AsyncIterator[int]:
         """Yield the pulses from `first` on, each when it may be sent."""
         pulse = first
@@ -214,6 +225,8 @@ class SiteServer:
         app.router.add_get("/api/site", self._site)
         app.router.add_get("/api/events", self._events)
         app.router.add_get("/api/objects/{k}/choice", self._choice)
+        app.router.add_get("/api/objects/{k}/past", self._past)
+        app.router.add_get("/api/past", self._told)
         app.router.add_get("/objects/{k}/best.mp4", self._best)
         app.router.add_get("/cameras/{camera}/live.mp4", self._best)
         app.router.add_get("/objects/{k}/thumb.jpg", self._thumbnail)
@@ -248,6 +261,16 @@ class SiteServer:
         if pulse < self.site.kept_from:
             return web.json_response({"error": "nothing is kept of that"}, status=404)
         return web.json_response(self.site.choice(k, pulse - pulse % GOP))
+
+    async def _past(self, request: web.Request) -> web.Response:
+        if not self.site.recorded:
+            return web.json_response({"error": "nothing is kept"}, status=404)
+        return web.json_response(self.site.past(int(request.match_info["k"])))
+
+    async def _told(self, request: web.Request) -> web.Response:
+        first, end = (int(request.query[name][1:]) for name in ("from", "to"))
+        gops = range(first - first % GOP, min(end, self.site.edge), GOP)
+        return web.Response(text="".join(json.dumps(self.site.gop(it)) + "\n" for it in gops))
 
     async def _thumbnail(self, request: web.Request) -> web.Response:
         return web.Response(body=thumbnail(int(request.match_info["k"])), content_type="image/jpeg")

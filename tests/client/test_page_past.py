@@ -8,7 +8,7 @@ from itertools import pairwise
 import pytest
 import pytest_asyncio
 from page_browser import Visit, needs_chromium, visiting
-from page_pattern import FPS, GOP
+from page_pattern import CAMERAS, FPS, GOP
 from page_site import STARTS_AT, FakeSite
 from playwright.async_api import Browser, expect
 
@@ -110,6 +110,31 @@ async def test_what_a_browser_paused_unseen_is_live_when_somebody_looks(browser:
         assert not any("from=" in address for address in asked)
 
 
+async def test_the_band_reaches_back_over_all_that_is_recorded(browser: Browser) -> None:
+    async with visiting(browser, FakeSite(recorded=1800)) as visit:
+        await visit.playing(1)
+        span = visit.page.get_by_label("How much of the past the band shows")
+        await expect(span.locator("option")).to_have_text(["Last minute", "Last 10 minutes", "Last hour"])
+        await span.select_option("Last 10 minutes")
+        strip = visit.page.locator("#strip")
+        box = await strip.bounding_box()
+        assert box is not None
+        newest = await visit.get("myview.pulse")
+        await strip.click(position={"x": box["width"] * (600 - 300) / 620, "y": 5})
+        await visit.until(
+            f"Math.abs(myview.pulse - {newest - 300 * FPS}) < {5 * FPS} && myview.camera !== null"
+        )
+        await visit.until(
+            f"new Set(myview.cuts.slice(-2).map((cut) => cut.to)).size > 1 && myview.pulse < {newest}"
+        )
+        site = visit.server.site
+        for cut in await visit.get("myview.cuts.slice(-2)"):
+            assert cut["to"] == CAMERAS[site.camera(1, cut["pulse"])]
+        await span.select_option("Last minute")
+        await visit.page.get_by_role("button", name="Live", exact=True).click()
+        await visit.until(LIVE)
+
+
 async def test_who_was_paused_while_the_site_began_anew_is_live(browser: Browser) -> None:
     async with visiting(browser) as visit:
         await visit.playing(1)
@@ -117,9 +142,10 @@ async def test_who_was_paused_while_the_site_began_anew_is_live(browser: Browser
         await visit.until("video.paused")
         stopped = await visit.get("myview.pulse")
         await visit.server.restart_as(FakeSite(first_pulse=500))
-        await visit.until("myview.state === 'paused' && Math.abs(myview.site.pulse0 - Date.now() / 1000) < 40")
+        began_anew = "Math.abs(myview.site.pulse0 - Date.now() / 1000) < 40"
+        await visit.until(f"myview.state === 'paused' && {began_anew}")
         await visit.page.wait_for_timeout(1000)
-        assert await visit.get("video.paused && myview.pulse") - stopped in {0, 1}, "the picture stays as it was"
+        assert await visit.get("video.paused && myview.pulse") - stopped in {0, 1}, "the picture stays"
         await visit.page.keyboard.press("Space")
         await visit.until(f"!video.paused && myview.pulse < 2000 && {LIVE}")
         await expect(visit.page.locator("#notice")).to_be_empty()
@@ -138,6 +164,7 @@ async def test_who_plays_on_in_a_window_of_its_own_is_where_they_stopped(browser
         await expect(visit.page.get_by_role("button", name="Live", exact=True)).to_be_visible()
 
 
+@pytest.mark.slow
 async def test_the_past_goes_on_where_its_stream_broke(browser: Browser) -> None:
     async with visiting(browser) as visit:
         await visit.playing(1)
