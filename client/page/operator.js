@@ -1,7 +1,9 @@
 /** Puts the operator's page together: who may see it, and which of its sections is open. */
 
+import { ServerEvents } from './events.js';
 import { getJson } from './http.js';
 import { CameraTiles } from './operator_cameras.js';
+import { FloorPlan } from './operator_floor.js';
 import { ask, Refused } from './operator_http.js';
 import { element } from './operator_parts.js';
 import { Palette } from './palette.js';
@@ -54,7 +56,15 @@ function build(site) {
   const palette = new Palette(site.cameras);
   element('site').textContent = site.name;
   document.documentElement.style.setProperty('--picture', String(site.width / site.height));
-  sections.set('cameras', new CameraTiles(palette, tell));
+  const floor = new FloorPlan(site, palette, tell);
+  sections.set('cameras', new CameraTiles(palette, tell)).set('floor', floor);
+  new ServerEvents({
+    opened: () => tell(null),
+    lost: () => tell(new Error('The connection is lost; it is tried again.')),
+    heard: (name, data) => {
+      if (name === 'gop') floor.add(data);
+    },
+  });
 }
 
 /** @param {string | null} wanted section; null: none, since nobody may see them */

@@ -34,6 +34,15 @@
  * @property {string} error
  * @property {{name: string | null, expected: boolean, behind: number}[]} clients
  * @property {string[]} missing
+ *
+ * @typedef {object} FloorCamera
+ * @property {string} camera
+ * @property {number[][]} homography 3x3, from pixels of the site's picture to the floor
+ * @property {[number, number][]} outline corners on the floor
+ *
+ * @typedef {object} Floor /api/operator/floor
+ * @property {FloorCamera[]} cameras
+ * @property {string[]} uncalibrated
  */
 
 export {};

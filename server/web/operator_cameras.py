@@ -6,12 +6,21 @@ import numpy as np
 from aiohttp import web
 
 from camsync import SyncError, clients_of
+from server.view.floor import covered
 from server.view.intake import CameraState
 from server.view.service import BestViewService
 from server.web.api import answer
 from server.web.keys import SERVICE
 from server.web.operator_permission import PREFIX
-from server.web.operator_schema import OperatorCamera, OperatorCameras, OwnPicture, PulseListener, Pulses
+from server.web.operator_schema import (
+    Floor,
+    FloorCamera,
+    OperatorCamera,
+    OperatorCameras,
+    OwnPicture,
+    PulseListener,
+    Pulses,
+)
 from server.wire.fit import Fit
 from server.wire.messages import pulse_client
 
@@ -38,6 +47,20 @@ async def get_pulses(request: web.Request) -> web.Response:
     listeners = [PulseListener(it.name, it.name in expected, it.behind) for it in clients]
     there = {it.name for it in clients}
     return answer(Pulses(where, "", listeners, [it for it in expected if it not in there]))
+
+
+@routes.get(f"{PREFIX}/floor")
+async def get_floor(request: web.Request) -> web.Response:
+    """Say what the cameras cover of the floor that they share."""
+    service = request.app[SERVICE]
+    site = service.config.site
+    cameras = []
+    for camera in service.config.cameras:
+        own = service.intake.states[camera.id].gauge.size
+        if camera.ground is not None and own is not None:
+            part = covered(np.array(camera.ground, dtype=np.float64), own, (site.width, site.height))
+            cameras.append(FloorCamera(camera.id, part.homography.tolist(), part.outline.tolist()))
+    return answer(Floor(cameras, [it.id for it in service.config.cameras if it.ground is None]))
 
 
 def _camera(service: BestViewService, camera: str, state: CameraState) -> OperatorCamera:

@@ -83,9 +83,28 @@ class Pulses(msgspec.Struct, frozen=True):
     """Who is named in the configuration and not there."""
 
 
+class FloorCamera(msgspec.Struct, frozen=True):
+    """What one camera covers of the floor that all share."""
+
+    camera: str
+    homography: list[list[float]]
+    """3x3, from pixels of the site's picture to the floor; below 0 in the third: above the horizon."""
+    outline: list[list[float]]
+    """Corners, x and y on the floor; empty: it sees none of it."""
+
+
+class Floor(msgspec.Struct, frozen=True):
+    """The floor plan."""
+
+    cameras: list[FloorCamera]
+    """Those that are calibrated and have said how large their own picture is."""
+    uncalibrated: list[str]
+
+
 OPERATOR: dict[str, type[msgspec.Struct]] = {
     "/api/operator/session": OperatorSession,
     "/api/operator/cameras": OperatorCameras,
     "/api/operator/pulses": Pulses,
+    "/api/operator/floor": Floor,
 }
 """What GET of each address answers; what changes something answers with the same, as it is then."""

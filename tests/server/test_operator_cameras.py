@@ -5,7 +5,7 @@ from __future__ import annotations
 from contextlib import aclosing
 
 import pytest
-from cameras_by_hand import status
+from cameras_by_hand import CAMERAS, status
 from halls import A, B, Hall, opened
 
 from camsync import PulseClient, PulseServer
@@ -41,6 +41,21 @@ async def test_what_went_wrong_last_is_told_until_something_else_does(busy: Hall
     assert await trouble() == "its source gives no pictures; it is tried again"
     intake.alive(Keys("hall").camera(A, "alive"), there=False)
     assert await trouble() == "its process was gone"
+
+
+async def test_the_floor_has_the_calibrated_cameras_that_have_spoken() -> None:
+    plan = [[0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 1.0]]
+    cameras = [{"id": A, "source": "scene:room", "ground": plan}, B]
+    async with aclosing(opened(cameras=cameras)) as halls:
+        hall = await anext(halls)
+        assert await hall.get_json("/api/operator/floor") == {"cameras": [], "uncalibrated": [B]}
+        hall.service.come(*CAMERAS)
+        hall.service.feed(0, {A: {}, B: {}})
+        (camera,) = (await hall.get_json("/api/operator/floor"))["cameras"]
+    assert camera["camera"] == A
+    assert camera["homography"] == plan
+    corners = [round(side, 6) for corner in camera["outline"] for side in corner]
+    assert corners == [0.0, 4.8, 6.4, 4.8, 6.4, 0.0, 0.0, 0.0]
 
 
 async def test_the_pulse_servers_clients_are_told_and_who_is_missing() -> None:

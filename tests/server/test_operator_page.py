@@ -19,7 +19,9 @@ from server.wire.messages import Keys
 
 PAGE = Path(__file__).parents[2] / "client" / "page"
 AXE = PAGE.parents[1] / "node_modules/axe-core/axe.min.js"
-SECTIONS = ["cameras"]
+SECTIONS = ["cameras", "floor"]
+PLAN = [[0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 1.0]]
+"""Of a camera that looks straight down: ten pixels are one unit of the floor."""
 TOKEN = "a token of theirs"  # noqa: S105 — of a test
 
 pytestmark = [
@@ -104,6 +106,29 @@ async def test_every_camera_has_a_tile_that_says_how_it_is(browser: Browser) -> 
         await expect(tile.locator(".state")).to_have_text("Gone")
         await expect(tile.locator(".last-trouble")).to_contain_text("its process was gone")
         await expect(page.locator("#pulses")).to_contain_text("there is no pulse server at")
+
+
+async def test_the_floor_plan_has_cameras_and_people_where_they_stand(browser: Browser) -> None:
+    cameras = [{"id": it, "source": "scene:room", "ground": PLAN} for it in CAMERAS]
+    async with operating(browser, "#floor", cameras=cameras) as (hall, page):
+        await expect(page.locator("#floor-words")).to_have_text("No camera has said yet what it sees.")
+        see(hall)
+        await page.reload()
+        await expect(page.locator("#plan polygon")).to_have_count(2)
+        hall.service.feed(3, {A: {1: SMALL, 2: SMALL}, B: {1: SMALL}})
+        hall.service.feed(4, {A: {2: SMALL}, B: {1: SMALL}})
+        left, _, right, bottom = SMALL
+        stands = f"{(left + right) / 20:.2f}, {bottom / 10:.2f}"
+        await expect(page.locator("#places li").nth(1)).to_have_text(f"2 at {stands}, seen by {A}")
+        await expect(page.locator("#plan .walker")).to_have_count(2)
+        assert await page.locator("#plan .way").nth(1).get_attribute("points") is not None
+
+
+async def test_a_site_that_is_not_calibrated_says_what_to_do(browser: Browser) -> None:
+    async with operating(browser, "#floor") as (hall, page):
+        see(hall)
+        await expect(page.locator("#floor-words")).to_contain_text("No camera is calibrated")
+        await expect(page.locator("#plan")).to_be_hidden()
 
 
 async def test_at_every_width_nothing_overflows_and_axe_finds_no_serious_fault(browser: Browser) -> None:
