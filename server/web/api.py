@@ -41,6 +41,11 @@ def no_camera(service: BestViewService, camera: str) -> web.Response:
     return problem(404, f"there is no camera {camera!r}; there are {', '.join(service.shelves)}")
 
 
+def no_object(number: int) -> web.Response:
+    """Say that nobody has this number, or not any more."""
+    return problem(404, f"there is no object {number}")
+
+
 def not_now(error: str) -> web.Response:
     """Say why not, and when to try again."""
     response = problem(503, error)
@@ -76,7 +81,7 @@ async def get_choice(request: web.Request) -> web.Response:
     service, number = _service(request), int(request.match_info["object"])
     if "at" not in request.query:
         choice = choice_info(service, number)
-        return problem(404, f"there is no object {number}") if choice is None else answer(choice)
+        return no_object(number) if choice is None else answer(choice)
     try:
         pulse = pulse_at(
             request.query["at"],

@@ -16,10 +16,11 @@ from server.web.api import problem
 from server.web.containers import refuse_other_containers
 from server.web.cors import preflight
 from server.web.events import Events
-from server.web.keys import EVENTS, METRICS, PICTURES, SERVICE
+from server.web.keys import EVENTS, METRICS, PICTURES, READERS, SERVICE
 from server.web.metrics import registry
 from server.web.operator_permission import PERMISSION, Permission, operators_only
 from server.web.queries import refuse_what_is_not_there
+from server.web.readers import Readers
 from server.web.share import to_the_right_service
 from server.wire.errors import UserError
 from server.wire.sections import Http
@@ -67,7 +68,8 @@ def make_app(service: BestViewService) -> web.Application:
         ]
     )
     app[SERVICE], app[EVENTS], app[PICTURES] = service, Events(service), Pictures(service)
-    app[METRICS] = registry(service, app[PICTURES])
+    app[READERS] = Readers(service.splicer.plan.target_s)
+    app[METRICS] = registry(service, app[PICTURES], app[READERS])
     app[PERMISSION] = Permission(service.config.http.operator_token)
     for module in (api, video, past, hls, pictures, openapi, page, operator_session, operator_cameras):
         app.add_routes(module.routes)

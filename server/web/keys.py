@@ -8,8 +8,10 @@ from prometheus_client import CollectorRegistry
 from server.view.pictures import Pictures
 from server.view.service import BestViewService
 from server.web.events import Events
+from server.web.readers import Readers
 
 SERVICE = web.AppKey("service", BestViewService)
 EVENTS = web.AppKey("events", Events)
+READERS = web.AppKey("readers", Readers)
 PICTURES = web.AppKey("pictures", Pictures)
 METRICS = web.AppKey("metrics", CollectorRegistry)

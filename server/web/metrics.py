@@ -10,22 +10,22 @@ from prometheus_client.registry import Collector
 
 from server.view.pictures import Pictures
 from server.view.service import BestViewService
+from server.web.readers import Readers
 
 
 class ServiceCollector(Collector):
     """Gives the service's numbers."""
 
-    def __init__(self, service: BestViewService) -> None:
-        self._service = service
+    def __init__(self, service: BestViewService, readers: Readers) -> None:
+        self._service, self._readers = service, readers
 
     def collect(self) -> Iterable[Metric]:
         """Give all metrics as they are now."""
         service = self._service
         yield GaugeMetricFamily("myview_pulse", "Newest pulse.", value=service.pulse)
         yield GaugeMetricFamily("myview_objects", "People known.", value=len(service.board.standings))
-        yield GaugeMetricFamily(
-            "myview_viewers", "Streams being watched.", value=service.splicer.viewers + service.past.viewers
-        )
+        viewers = service.splicer.viewers + service.past.viewers + self._readers.all
+        yield GaugeMetricFamily("myview_viewers", "Streams being watched.", value=viewers)
         yield CounterMetricFamily("myview_cuts", "Changes of view.", value=service.board.cuts)
         yield CounterMetricFamily(
             "myview_late_epochs",
@@ -96,10 +96,10 @@ class PicturesCollector(Collector):
         )
 
 
-def registry(service: BestViewService, pictures: Pictures) -> CollectorRegistry:
+def registry(service: BestViewService, pictures: Pictures, readers: Readers) -> CollectorRegistry:
     """Give the metrics of a service and its process."""
     metrics = CollectorRegistry()
-    metrics.register(ServiceCollector(service))
+    metrics.register(ServiceCollector(service, readers))
     metrics.register(PicturesCollector(pictures))
     ProcessCollector(registry=metrics)
     return metrics

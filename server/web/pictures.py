@@ -17,7 +17,7 @@ from server.view.pictures import (
     Subject,
 )
 from server.view.pictures.multipart import BEGIN, CONTENT_TYPE, PULSE, part
-from server.web.api import no_camera, not_now, problem
+from server.web.api import no_camera, no_object, not_now, problem
 from server.web.forms import MP4
 from server.web.keys import PICTURES, SERVICE
 from server.web.limits import no_place
@@ -134,7 +134,7 @@ def _person(request: web.Request) -> Subject:
     service, number = request.app[SERVICE], int(request.match_info["object"])
     known = service.board.resolve(number)
     if known not in service.splicer.objects:
-        raise _RefusedError(problem(404, f"there is no object {number}"))
+        raise _RefusedError(no_object(number))
     return PersonView(known)
 
 

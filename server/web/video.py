@@ -5,12 +5,13 @@ from __future__ import annotations
 from aiohttp import web
 
 from server.view.channel import Channel
-from server.web.api import no_camera, not_now, problem
+from server.web.api import no_camera, no_object, not_now
 from server.web.forms import MP4, TS, WEBM, Form
-from server.web.keys import SERVICE
+from server.web.keys import READERS, SERVICE
 from server.web.limits import no_place
 from server.web.past import asks_for_the_past, best_of_the_past, camera_of_the_past
 from server.web.pictures import best_with_boxes, wants_boxes
+from server.web.readers import of_camera, of_person
 from server.web.streams import send_stream
 
 routes = web.RouteTableDef()
@@ -62,16 +63,19 @@ async def _best(request: web.Request, form: Form) -> web.StreamResponse:
     person = service.board.resolve(number)
     channel = service.splicer.objects.get(person)
     if channel is None:
-        return problem(404, f"there is no object {number}")
+        return no_object(number)
     held, preferred = request.query.get("camera"), request.query.get("prefer")
     for camera in (held, preferred):
         if camera is not None and camera not in service.shelves:
             return no_camera(service, camera)
+    watching = channel.viewers + request.app[READERS].of(of_person(person))
     if held is not None:
         channel = service.splicer.decided[held]
+        watching = channel.viewers + request.app[READERS].of(of_camera(held))
     elif preferred is not None:
         channel = service.splicer.preferring.channel(person, preferred)
-    return await _send(request, channel, form)
+        watching = channel.viewers
+    return await _send(request, channel, watching, form)
 
 
 async def _live(request: web.Request, form: Form) -> web.StreamResponse:
@@ -82,14 +86,15 @@ async def _live(request: web.Request, form: Form) -> web.StreamResponse:
     channel = service.splicer.cameras.get(camera)
     if channel is None:
         return no_camera(service, camera)
-    return await _send(request, channel, form)
+    watching = channel.viewers + request.app[READERS].of(of_camera(camera))
+    return await _send(request, channel, watching, form)
 
 
-async def _send(request: web.Request, channel: Channel, form: Form) -> web.StreamResponse:
+async def _send(request: web.Request, channel: Channel, watching: int, form: Form) -> web.StreamResponse:
     head = form.head(request.app[SERVICE])
     if head is None:
         return not_now("no camera has delivered a picture yet")
-    full = no_place(request, channel.viewers)
+    full = no_place(request, watching)
     if full is not None:
         return full
     return await send_stream(request, channel, head, {"Content-Type": form.content_type}, form.packed)
