@@ -8,12 +8,12 @@ import pytest
 
 from server.camera.scene import Scene, write_recording
 
-SECONDS = 14.0
+SECONDS = 10.0
 
 
 @pytest.fixture(scope="session")
 def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Three views of the synthetic room with four people in it."""
     folder = tmp_path_factory.mktemp("recording") / "room"
-    write_recording(Scene("room", 3, 4, 1, 640, 360, 25.0), folder, SECONDS)
+    write_recording(Scene("room", 3, 4, 1, 320, 180, 25.0), folder, SECONDS)
     return folder

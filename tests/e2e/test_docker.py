@@ -18,7 +18,7 @@ import pytest
 
 import client
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(1200)]
+pytestmark = [pytest.mark.live, pytest.mark.slow, pytest.mark.timeout(1200)]
 
 ROOT = Path(__file__).resolve().parents[2]
 SERVICES = {"sync", "bestview", "c0", "c1", "c2"}

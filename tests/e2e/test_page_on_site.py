@@ -13,13 +13,14 @@ import numpy as np
 import pytest
 import pytest_asyncio
 from beeps import heard, write_beeps
-from playwright.async_api import Page
+from playwright.async_api import Browser, Page
 from running_site import PATIENCE_S, RunningSite, bounded, configuration, running
 from spliced import FPS, record
 
 from benchmarks.browser import CHROMIUM, chromium
 
 pytestmark = [
+    pytest.mark.live,
     pytest.mark.asyncio(loop_scope="module"),
     pytest.mark.timeout(300),
     pytest.mark.skipif(not CHROMIUM.exists(), reason=f"needs a Chromium at {CHROMIUM}"),
@@ -37,17 +38,23 @@ async def site(recording: Path, tmp_path_factory: pytest.TempPathFactory) -> Asy
         yield site
 
 
+@pytest_asyncio.fixture(scope="module", loop_scope="module")
+async def browser() -> AsyncIterator[Browser]:
+    async with chromium() as running:
+        yield running
+
+
 @pytest_asyncio.fixture(loop_scope="module")
-async def page(site: RunningSite) -> AsyncIterator[Page]:
+async def page(site: RunningSite, browser: Browser) -> AsyncIterator[Page]:
     """The page, opened; an error in it fails the test."""
     errors: list[str] = []
-    async with chromium() as browser:
-        # Waiting for a condition in the page evaluates it as a string, which the page's policy forbids.
-        page = await browser.new_page(bypass_csp=True)
-        page.on("pageerror", lambda error: errors.append(str(error)))
-        page.set_default_timeout(1000 * PATIENCE_S)
-        await page.goto(site.url)
-        yield page
+    # Waiting for a condition in the page evaluates it as a string, which the page's policy forbids.
+    page = await browser.new_page(bypass_csp=True)
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    page.set_default_timeout(1000 * PATIENCE_S)
+    await page.goto(site.url)
+    yield page
+    await page.close()
     assert errors == []
 
 

@@ -18,6 +18,7 @@ from running_site import CAMERAS, PATIENCE_S, RunningSite, bounded, configuratio
 from spliced import FPS, pictures
 
 pytestmark = [
+    pytest.mark.live,
     pytest.mark.timeout(300),
     pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="needs ffmpeg"),
 ]

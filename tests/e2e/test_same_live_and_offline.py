@@ -10,6 +10,8 @@ from running_site import CAMERAS, MYVIEW, bounded, configuration, running
 
 WRITTEN = ("choices.csv", "corrections.csv", "late.csv", *(f"tracks/{camera}.txt" for camera in CAMERAS))
 
+pytestmark = [pytest.mark.live, pytest.mark.timeout(300)]
+
 
 async def rendered(config: Path, recording: Path, out: Path) -> None:
     process = await asyncio.create_subprocess_exec(
@@ -24,7 +26,6 @@ async def rendered(config: Path, recording: Path, out: Path) -> None:
     assert await bounded(process.wait()) == 0
 
 
-@pytest.mark.timeout(300)
 async def test_live_equals_offline_to_the_byte(recording: Path, tmp_path: Path) -> None:
     # However busy this machine is, no frame may be left out: that is what the comparison is about.
     patient = {"backlog_s": 60, "witness_wait_s": 60}

@@ -38,6 +38,7 @@ def site(folder: Path, **cameras: str) -> Config:
         "sync": {"port": free_port(), "start_timeout_s": PATIENCE},
         "zenoh": {"connect": bus, "listen": bus},
         "cameras": [{"id": camera, "source": source} for camera, source in cameras.items()],
+        "track": {"backlog_s": PATIENCE},
         "view": {"late_after_s": PATIENCE},
     }
     return build_config(content, where="hall", folder=folder)
