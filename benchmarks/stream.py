@@ -19,6 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.report import Report
+from benchmarks.stream_bare import bare_sends
 from benchmarks.stream_cameras import ENCODE, SITE, draw_room
 from benchmarks.stream_drift import drift
 from benchmarks.stream_hls import hls_delays
@@ -81,7 +82,10 @@ def _watch(
             found.here = hls_here(site, numbers[0], seconds)
             found.nginx = hls_of_nginx(site, numbers[0], seconds, folder / "nginx")
             found.too_many = [it for it in counts if it + _FREE > files]
-            found.steps = step_up(site, crowd, numbers, [it for it in counts if it + _FREE <= files], seconds)
+            possible = [it for it in counts if it + _FREE <= files]
+            found.steps = step_up(site, crowd, numbers, possible, seconds)
+            crowd.watch([])
+            found.bare = bare_sends(films[0], max(possible), seconds) if possible else None
 
 
 def _open_files() -> int:

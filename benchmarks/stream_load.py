@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from benchmarks.stream_cameras import ENCODE, SITE
 from benchmarks.stream_crowd import Heard
+from benchmarks.stream_service import Given
 from benchmarks.stream_site import StreamSite, Viewers
 from benchmarks.stream_splice import encode_again
 from server.camera.encode import AccessUnit
@@ -90,6 +91,8 @@ class Step:
     """Share of what was sent meanwhile; what is lost is whole GOPs."""
     delays: tuple[float, float, float]
     """Milliseconds from when a GOP was given to the streams to when its end was read: p50, p95, p99."""
+    given: float
+    """Milliseconds until the last viewer's socket has accepted a GOP; the median."""
     load: float
     """Of the machine, over the last minute."""
 
@@ -102,7 +105,8 @@ def step_up(
     for count in counts:
         viewers.watch([_path(numbers[place % len(numbers)]) for place in range(count)], _SETTLE_S)
         cores, heard = _used(site, viewers, seconds)
-        delays = send_delays(heard, site.sent)
+        sent = site.sent
+        delays = send_delays(heard, {first: it.began for first, it in sent.items()})
         low, middle, high = np.percentile(delays, [50, 95, 99]).tolist()
         steps.append(
             Step(
@@ -112,10 +116,17 @@ def step_up(
                 kbits=8e3 * heard.megabytes / heard.seconds / count,
                 arrived=len(delays) / (count * heard.seconds * SITE.fps / ENCODE.gop),
                 delays=(low, middle, high),
+                given=statistics.median(_given(heard, sent)),
                 load=os.getloadavg()[0],
             )
         )
     return steps
+
+
+def _given(heard: Heard, sent: dict[int, Given]) -> list[float]:
+    """Give the milliseconds that giving out took, of the GOPs that have come."""
+    gops = {round(tick * SITE.fps / TIMESCALE) // ENCODE.gop * ENCODE.gop for tick in heard.ticks}
+    return [1e3 * (it.ended - it.began) for first, it in sent.items() if first in gops]
 
 
 def send_delays(heard: Heard, sent: dict[int, float]) -> NDArray[np.float64]:

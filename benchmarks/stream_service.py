@@ -1,4 +1,4 @@
-"""The real best-view process, which notes when each GOP was given to the streams.
+"""The real best-view process, which notes when each GOP was given to the streams, and how long that took.
 
     python -m benchmarks.stream_service NOTES bestview SITE.yaml
 
@@ -10,6 +10,7 @@ from __future__ import annotations
 import functools
 import sys
 import time
+from dataclasses import dataclass
 from pathlib import Path
 
 from server.run.cli import main as command_line
@@ -18,22 +19,31 @@ from server.view.splice import Splicer
 
 
 def note(path: Path) -> None:
-    """Write a line for each GOP before it is sent: its first pulse, and when that was."""
+    """Write a line for each GOP: its first pulse, when it was given out, when all sockets had been tried."""
     original = Splicer.decision
     notes = path.open("a", encoding="ascii", buffering=1)
 
     @functools.wraps(original)
     def run(self: Splicer, decision: GopDecision) -> None:
-        notes.write(f"{decision.first} {time.monotonic()}\n")
+        began = time.monotonic()
         original(self, decision)
+        notes.write(f"{decision.first} {began} {time.monotonic()}\n")
 
     Splicer.decision = run  # type: ignore[method-assign]
 
 
-def read(path: Path) -> dict[int, float]:
+@dataclass(frozen=True, slots=True)
+class Given:
+    """When a GOP was given out, and when every viewer's socket had accepted it or was found full."""
+
+    began: float
+    ended: float
+
+
+def read(path: Path) -> dict[int, Given]:
     """Give when each GOP was sent, by its first pulse."""
-    lines = path.read_text(encoding="ascii").splitlines()
-    return {int(first): float(at) for first, at in (line.split() for line in lines if " " in line)}
+    lines = (line.split() for line in path.read_text(encoding="ascii").split("\n")[:-1])
+    return {int(first): Given(float(began), float(ended)) for first, began, ended in lines}
 
 
 if __name__ == "__main__":

@@ -70,7 +70,7 @@ class StreamSite:
         return (int(words[11]) + int(words[12])) * _TICK_S
 
     @property
-    def sent(self) -> dict[int, float]:
+    def sent(self) -> dict[int, stream_service.Given]:
         """When each GOP was given to the streams."""
         return stream_service.read(self.folder / "sent")
 

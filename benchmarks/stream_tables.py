@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from benchmarks.report import Report
+from benchmarks.stream_bare import Bare
 from benchmarks.stream_cameras import SITE
 from benchmarks.stream_drift import Drift
 from benchmarks.stream_hls import Late
@@ -35,6 +36,7 @@ class Found:
     """Microseconds a frame."""
     watched: Watched | None = None
     steps: list[Step] = field(default_factory=list)
+    bare: Bare | None = None
     too_many: list[int] = field(default_factory=list)
     """Viewers that a process here may not have."""
     here: Served | None = None
@@ -87,13 +89,17 @@ def _steps(report: Report, found: Found) -> None:
             f"{it.crowd:.2f}",
             f"{it.kbits:.0f}",
             f"{100 * it.arrived:.0f} %",
+            f"{it.given:.0f}",
             *(f"{value:.0f}" for value in it.delays),
             f"{it.load:.1f}",
         ]
         for it in found.steps
     ]
-    columns = ["viewers", "cores", "reader's", "kbit/s each", "arrived", "p50 ms", "p95 ms", "p99 ms", "load"]
+    columns = ["viewers", "cores", "reader's", "kbit/s each", "arrived"]
+    columns += ["sent ms", "p50 ms", "p95 ms", "p99 ms", "load"]
     report.table("Viewers of 50 objects: from when a GOP is given out to when its end is read", columns, rows)
+    if found.bare:
+        report.say(_bare(found.bare))
     for count in found.too_many:
         report.say(f"{count} viewers: left out: a process may not open so many files (ulimit -Hn)")
     if found.here:
@@ -102,6 +108,14 @@ def _steps(report: Report, found: Found) -> None:
         report.say(f"HLS of nginx, the same files: {_served(found.nginx)}")
     else:
         report.say("HLS of nginx: left out: needs nginx; on Debian: apt install nginx-light")
+
+
+def _bare(it: Bare) -> str:
+    late = ", ".join(f"{value:.0f}" for value in it.delays)
+    return (
+        f"A bare loop of sends to {it.viewers} sockets, beside it: {it.each:.1f} µs of the processor each, "
+        f"sent in {it.given:.0f} ms; read after {late} ms (p50, p95, p99)"
+    )
 
 
 def _served(served: Served) -> str:

@@ -13,6 +13,7 @@ from socket import create_server
 import pytest
 
 from benchmarks.report import Report
+from benchmarks.stream_bare import bare_sends
 from benchmarks.stream_cameras import draw_room, load, save
 from benchmarks.stream_crowd import Crowd, Heard
 from benchmarks.stream_drift import drift, times
@@ -20,6 +21,7 @@ from benchmarks.stream_hls import hls_delays
 from benchmarks.stream_load import Step, end_of_first_fragment, first_pictures, send_delays, watch_objects
 from benchmarks.stream_peers import ffmpeg_switching
 from benchmarks.stream_right import Right
+from benchmarks.stream_service import Given, read
 from benchmarks.stream_site import running, viewers
 from benchmarks.stream_splice import encode_again, splice
 from benchmarks.stream_tables import Found, describe, per_core, plot
@@ -91,6 +93,19 @@ def test_a_send_delay_ends_with_the_last_frame_of_a_gop() -> None:
     assert send_delays(heard, {10: 5.0, 20: 5.4}).tolist() == [250.0]
 
 
+def test_when_gops_were_given_out_is_read_up_to_the_line_that_is_being_written(tmp_path: Path) -> None:
+    (tmp_path / "sent").write_text("10 5.0 5.25\n20 5.4 5.5\n30 5.8", encoding="ascii")
+    assert read(tmp_path / "sent") == {10: Given(5.0, 5.25), 20: Given(5.4, 5.5)}
+
+
+def test_a_bare_loop_sends_whole_gops_to_all(films: Films) -> None:
+    bare = bare_sends(films[0], 20, 1.0)
+    assert bare.viewers == 20
+    assert 0 < bare.each < 1000
+    assert 0 < bare.given < 1000
+    assert 0 < bare.delays[0] <= bare.delays[1] <= bare.delays[2]
+
+
 @contextmanager
 def shouting(data: bytes) -> Iterator[int]:
     """Serve whoever comes with the same bytes, and hang up."""
@@ -123,7 +138,7 @@ def test_a_crowd_hears_all_that_is_sent_and_notices_who_hangs_up() -> None:
 
 
 def step(count: int, cores: float, late: float) -> Step:
-    return Step(count, cores, 0.1, 500.0, 1.0, (1.0, 2.0, late), 1.0)
+    return Step(count, cores, 0.1, 500.0, 1.0, (1.0, 2.0, late), 3.0, 1.0)
 
 
 def test_viewers_of_a_core_are_on_a_line_beside_what_the_service_uses_anyway() -> None:
