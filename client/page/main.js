@@ -74,13 +74,14 @@ function readOut() {
   const status = viewer.status();
   const { probe, site, palette, decisions, override } = viewer;
   stage.dataset.state = status.state;
-  stage.classList.toggle('pictured', probe.pulse !== null && !['unknown', 'empty'].includes(status.state));
+  stage.classList.toggle('pictured', viewer.pictured && !['unknown', 'empty'].includes(status.state));
   write(title, status.title);
   write(text, status.text);
   write(element('notice'), viewer.notice.text);
   const delay = median(probe.delays.slice(-DELAY_FRAMES).map(({ delayMs }) => delayMs ?? NaN));
   element('delay').textContent = viewer.flowing && delay > 0 ? `${(delay / 1000).toFixed(1)} s` : MISSING;
-  if (!site || probe.pulse === null || viewer.object === null) return strip.clear();
+  if (!viewer.mapped) reason.put('This browser does not say which moment it shows: no boxes, no past, no reasons.');
+  if (!site || !viewer.mapped || probe.pulse === null || viewer.object === null) return strip.clear();
   const live = viewer.past.moment === null;
   const views = (/** @type {number} */ from) => viewer.views(from);
   void viewer.kept.about(viewer.object);

@@ -6,12 +6,14 @@
  */
 
 import { MediaBuffer } from './buffer.js';
+import { Going } from './going.js';
 import { join } from './mp4.js';
 import { Pace } from './pace.js';
 import { Run } from './run.js';
 import { same } from './subject.js';
 
 /** @import {Segment} from './mp4.js' */
+/** @import {Form} from './players.js' */
 /** @import {Subject} from './subject.js' */
 
 const TICK_MS = 100;
@@ -44,14 +46,11 @@ export class Player {
   #ticking;
   #codec = '';
   #container = 'mp4';
-  #asked = false; // the page said that the picture is to go on
+  #going;
   /** @type {Subject | null} whose picture the element shows */
   shown = null;
   /** @type {Subject | null} whose stream was left because the picture was paused for long */
   #left = null;
-  /** Seconds from an element's time to the site's media time. */
-  offset = 0;
-
   /**
    * @param {HTMLVideoElement} video
    * @param {Listener} listener
@@ -64,20 +63,15 @@ export class Player {
       if (!video.seeking && this.#run?.landed) this.#pace.stalled();
     });
     video.addEventListener('error', () => this.#reopen());
-    video.addEventListener('play', () => {
-      const asked = this.#asked;
-      this.#asked = false;
-      if (!asked && this.shown && (!this.#run || this.#run.landed)) this.listener.resumed();
-    });
+    this.#going = new Going(video, () => this.shown && (!this.#run || this.#run.landed) && listener.resumed());
     this.#ticking = setInterval(() => this.#tick(), TICK_MS);
   }
 
   /**
-   * @param {string} container mp4 or webm
-   * @param {string} codec of the pictures, and after a comma of the sound if there is any
+   * @param {Form} form
    * @returns {boolean} whether this browser can play such streams at all
    */
-  configure(container, codec) {
+  configure({ container, codec }) {
     if (!Source?.isTypeSupported(mime(container, codec))) return false;
     if (container !== this.#container || codec !== this.#codec) {
       this.#container = container;
@@ -103,9 +97,7 @@ export class Player {
 
   /** Let the picture go on, wherever it is. */
   play() {
-    if (!this.video.paused) return;
-    this.#asked = true;
-    this.video.play().catch(() => undefined); // the page says that it is paused, and how to go on
+    this.#going.on();
   }
 
   #reopen() {
@@ -190,6 +182,14 @@ export class Player {
     this.video.addEventListener('seeked', () => this.#showing(run), { once: true });
     this.#seek(time);
     this.play();
+  }
+
+  /**
+   * @param {number} time of a frame, as the browser tells it
+   * @returns {number} media time of the site, pulse / fps
+   */
+  mediaTime(time) {
+    return time;
   }
 
   /** @returns {boolean} whether it is open just now if the picture is still of who was shown before */

@@ -24,6 +24,15 @@ export function streamOf({ object, camera, prefer }, container, from) {
 }
 
 /**
+ * @param {Subject} subject whose preferred camera HLS does not know
+ * @returns {string} where its playlist is
+ */
+export function playlistOf({ object, camera, past }) {
+  const stream = camera === null ? `objects/${object}` : `cameras/${encodeURIComponent(camera)}`;
+  return `${stream}/hls/index.m3u8${past ? `?from=p${past.pulse}` : ''}`;
+}
+
+/**
  * @param {Subject} one
  * @param {Subject} other
  */

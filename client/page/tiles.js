@@ -2,10 +2,11 @@
 
 import { take, watchFrames } from './frames.js';
 import { Overlay } from './overlay.js';
-import { Player } from './player.js';
+import { playerOf } from './players.js';
 
 /** @import {Decisions} from './decisions.js' */
 /** @import {Frame} from './frames.js' */
+/** @import {Form} from './players.js' */
 /** @import {Site} from './contract.js' */
 
 /**
@@ -13,8 +14,7 @@ import { Player } from './player.js';
  *
  * @typedef {object} Shared
  * @property {Site | null} site
- * @property {string} container of all streams
- * @property {string} codec
+ * @property {Form} form
  * @property {Decisions} decisions
  * @property {boolean} boxesOn
  */
@@ -87,13 +87,12 @@ class Tile {
     this.element.append(this.video, canvas, number);
     this.overlay = new Overlay(canvas);
     const [landed, resumed] = [() => this.repaint(), () => this.play()];
-    this.player = new Player(this.video, { landed, resumed, ended: () => undefined });
+    this.player = playerOf(this.video, { landed, resumed, ended: () => undefined });
     watchFrames(this.video, () => shared.boxesOn, (frame) => this.#paint(frame), this.#enough.signal);
   }
 
   play() {
-    const { container, codec } = this.shared;
-    if (!this.player.configure(container, codec)) return;
+    if (!this.player.configure(this.shared.form)) return;
     this.player.choose({ object: this.object, camera: null, prefer: null, past: null });
     // Nobody pauses it by hand: a browser did, unseen.
     if (this.player.shown && this.video.paused && !document.hidden) this.video.play().catch(() => undefined);
@@ -114,7 +113,7 @@ class Tile {
     const { site, decisions, boxesOn } = this.shared;
     this.#mediaTime = mediaTime;
     if (site && boxesOn && !this.player.landing) {
-      const pulse = Math.round(mediaTime * site.fps);
+      const pulse = Math.round(this.player.mediaTime(mediaTime) * site.fps); // may be not known: NaN
       const camera = decisions.camera(this.object, pulse);
       this.overlay.draw(camera === null ? [] : decisions.boxes(camera, pulse), this.object, site, image, null);
     } else this.overlay.clear();

@@ -9,7 +9,7 @@ import { Notice } from './notice.js';
 import { Override } from './override.js';
 import { Palette } from './palette.js';
 import { Past } from './past.js';
-import { Player } from './player.js';
+import { playerOf } from './players.js';
 import { Probe } from './probe.js';
 import { Recall } from './recall.js';
 import { describe } from './status.js';
@@ -18,6 +18,7 @@ import { describe } from './status.js';
 /** @import {Part} from './follow.js' */
 /** @import {Frame} from './frames.js' */
 /** @import {View} from './kept.js' */
+/** @import {Form} from './players.js' */
 /** @import {Subject} from './subject.js' */
 /** @import {Status} from './status.js' */
 
@@ -46,12 +47,13 @@ export class Viewer {
   probe = new Probe();
   connected = false;
   supported = true;
-  container = 'mp4';
-  codec = '';
+  /** @type {Form} */
+  form = { container: 'mp4', codec: '', pulse0: null };
   boxesOn = true;
   /** @type {Part | null} of the frame now shown, where the person is followed; null: all of it */
   part = null;
   mediaTime = 0; // seconds, of the frame now shown
+  mapped = true; // it is known which pulse that is
   /** @type {Box[]} of the frame now shown */
   boxes = [];
   #asked = this.object !== null; // by the viewer, not by default
@@ -67,7 +69,7 @@ export class Viewer {
   constructor(video, changed) {
     this.changed = changed;
     this.recall = new Recall(1, changed);
-    this.player = new Player(video, {
+    this.player = playerOf(video, {
       landed: changed,
       ended: (refused) => (refused ? this.#losePast() : this.live()),
       resumed: () => (this.#asleep ? this.live() : this.#resume()),
@@ -100,9 +102,9 @@ export class Viewer {
     this.override.configure(site.cameras);
     this.site = this.probe.site = site;
     this.palette = new Palette(site.cameras);
-    this.container = site.container ?? 'mp4';
-    this.codec = site.sound ? `${site.codec},${site.sound}` : site.codec;
-    this.supported = this.player.configure(this.container, this.codec);
+    const codec = site.sound ? `${site.codec},${site.sound}` : site.codec;
+    this.form = { container: site.container ?? 'mp4', codec, pulse0: site.pulse0 };
+    this.supported = this.player.configure(this.form);
     this.#play();
     this.changed();
   }
@@ -164,7 +166,7 @@ export class Viewer {
     const { fps } = this.site;
     const pulse = Math.max(0, wanted);
     if (this.#stale || pulse >= this.decisions.end - LIVE_S * fps) return this.live();
-    if (this.container === 'webm') return this.#losePast(); // of such a site nothing is
+    if (this.form.container === 'webm') return this.#losePast(); // of such a site nothing is
     this.past.begin(pulse, fps, resumed);
     this.player.play();
     this.#play();
@@ -200,7 +202,7 @@ export class Viewer {
   #moveOn() {
     const { shown, video } = this.player;
     if (!this.site || shown?.past !== this.past.moment) return;
-    this.past.moveOn(Math.floor(video.currentTime * this.site.fps), this.site.fps);
+    this.past.moveOn(Math.floor(this.player.mediaTime(video.currentTime) * this.site.fps), this.site.fps);
   }
 
   #losePast() {
@@ -259,9 +261,11 @@ export class Viewer {
 
   /** @param {Frame} frame */
   shown({ mediaTime, shownAt }) {
-    const pulse = Math.round(mediaTime * (this.site?.fps ?? 1));
+    const pulse = Math.round(this.player.mediaTime(mediaTime) * (this.site?.fps ?? 1));
     const passed = mediaTime - this.mediaTime;
     this.mediaTime = mediaTime;
+    this.mapped = !Number.isNaN(pulse);
+    if (!this.mapped) return this.#showUnmapped(shownAt);
     // The same moment may be shown again, of somebody else.
     if (pulse !== this.probe.pulse) {
       this.#frameAt = performance.now();
@@ -277,6 +281,23 @@ export class Viewer {
     this.boxes = camera === null ? [] : said.boxes(camera, pulse);
     const box = this.boxes.find(([number]) => number === object);
     this.part = this.framing.step(`${object} ${camera}`, box, this.site, passed);
+  }
+
+  /**
+   * It is not known which frame this is: it is shown, and nothing is said of it.
+   *
+   * @param {number} shownAt
+   */
+  #showUnmapped(shownAt) {
+    this.#frameAt = performance.now();
+    this.boxes = [];
+    this.part = null;
+    if (this.player.shown) this.probe.view(this.player.shown.object, null, shownAt);
+  }
+
+  /** @returns {boolean} whether a picture has been shown */
+  get pictured() {
+    return this.#frameAt > -Infinity;
   }
 
   /**
@@ -323,7 +344,7 @@ export class Viewer {
       object: this.object,
       listed: this.chosen !== undefined,
       visible: this.chosen?.visible ?? false,
-      paused: this.player.video.paused && this.probe.pulse !== null,
+      paused: this.player.video.paused && this.pictured,
       moving: flowing && (this.player.shown?.object === this.object || performance.now() - this.#chosenAt < STANDING_MS),
     });
     this.probe.state = status.state;

@@ -54,14 +54,21 @@ class Visit:
 
 @contextlib.asynccontextmanager
 async def visiting(
-    browser: Browser, site: FakeSite | None = None, query: str = "", width: int = 800, height: int = 900
+    browser: Browser,
+    site: FakeSite | None = None,
+    query: str = "",
+    width: int = 800,
+    height: int = 900,
+    script: str = "",
 ) -> AsyncIterator[Visit]:
-    """Open the page on a site; an exception in the page fails the test."""
+    """Open the page on a site, after a script of its own; an exception in the page fails the test."""
     failures: list[str] = []
     async with serving(site or FakeSite()) as server:
         # The site's policy forbids eval, which the conditions of these tests are evaluated with.
         page = await browser.new_page(viewport={"width": width, "height": height}, bypass_csp=True)
         page.on("pageerror", lambda error: failures.append(str(error)))
+        if script:
+            await page.add_init_script(script)
         try:
             await page.goto(server.url + query)
             yield Visit(page, server)

@@ -9,6 +9,7 @@ import json
 import time
 from collections.abc import AsyncIterator
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from page_pattern import CAMERAS, FPS, GOP, HEIGHT, SQUARE, WIDTH, pattern, pict
 
 PAGE = Path(__file__).resolve().parents[2] / "client" / "page"
 LOOKAHEAD = 10  # frames between the pulse and what is served
+SEGMENT = 2 * GOP  # frames of a segment of HLS
 HOLD = 3 * GOP  # frames for which person 1 is shown by one camera
 STARTS_AT = 12_345_678  # the pulse of the site's first moment: far from zero, as on a site up for days
 
@@ -38,6 +40,8 @@ class FakeSite:
         first_pulse: Pulse of about the moment at which the site is made.
         skipped: Pulses whose frames are missing from every stream.
         opened: Whose stream was asked for, in order.
+        listed: Playlists of HLS that were asked for, in order.
+        fetched: First pulses of the segments of HLS that were asked for, in order.
         kept_from: The first pulse that can be seen again.
         recorded: Seconds of the past that are recorded.
         ahead: Seconds that the streams run ahead of the clock: minutes pass in no time.
@@ -52,6 +56,8 @@ class FakeSite:
     first_pulse: int = STARTS_AT
     skipped: range = range(0)
     opened: list[int] = field(default_factory=list)
+    listed: list[str] = field(default_factory=list)
+    fetched: list[int] = field(default_factory=list)
     kept_from: int = 0
     recorded: int = 0
     ahead: float = 0.0
@@ -229,6 +235,8 @@ class SiteServer:
         app.router.add_get("/api/past", self._told)
         app.router.add_get("/objects/{k}/best.mp4", self._best)
         app.router.add_get("/cameras/{camera}/live.mp4", self._best)
+        app.router.add_get("/{of}/{k}/hls/index.m3u8", self._playlist)
+        app.router.add_get("/{of}/{k}/hls/{file}", self._segment)
         app.router.add_get("/objects/{k}/thumb.jpg", self._thumbnail)
         app.router.add_get("/recording.mp4", self._recording)
         self._runner = web.AppRunner(app, shutdown_timeout=0.05, handler_cancellation=True)
@@ -297,6 +305,29 @@ class SiteServer:
                     shown = site.shown(k, pulse, held, request.query.get("prefer"))
                     await response.write(pattern(shown).fragment(pulse))
         return response
+
+    async def _playlist(self, request: web.Request) -> web.Response:
+        site, lines = self.site, ["#EXTM3U", "#EXT-X-VERSION:7", "#EXT-X-TARGETDURATION:1"]
+        last = site.boundary() - site.boundary() % SEGMENT
+        first = int(request.query.get("from", f"p{last - 8 * SEGMENT}")[1:]) // SEGMENT * SEGMENT
+        begun = datetime.fromtimestamp(site.pulse0 + first / FPS, UTC).isoformat(timespec="milliseconds")
+        lines += [f"#EXT-X-MEDIA-SEQUENCE:{first // SEGMENT}", '#EXT-X-MAP:URI="init.mp4"']
+        lines += ["#EXT-X-START:TIME-OFFSET=0"] if "from" in request.query else []
+        lines += [f"#EXT-X-PROGRAM-DATE-TIME:{begun}"]
+        for pulse in range(first, last, SEGMENT):
+            lines += [f"#EXTINF:{SEGMENT / FPS:.3f},", f"{pulse}.m4s"]
+        site.listed.append(request.path_qs)
+        return web.Response(text="\n".join(lines) + "\n", content_type="application/vnd.apple.mpegurl")
+
+    async def _segment(self, request: web.Request) -> web.Response:
+        site, k, file = self.site, request.match_info["k"], request.match_info["file"]
+        if file == "init.mp4":
+            return web.Response(body=pattern(0).init, content_type="video/mp4")
+        pulses = range(int(file.split(".")[0]), int(file.split(".")[0]) + SEGMENT)
+        shown = [CAMERAS.index(k) if k in CAMERAS else site.camera(int(k), pulse) for pulse in pulses]
+        site.fetched.append(pulses.start)
+        data = b"".join(pattern(m).fragment(n) for m, n in zip(shown, pulses, strict=True))
+        return web.Response(body=data, content_type="video/mp4")
 
     async def _recording(self, request: web.Request) -> web.Response:
         frames = range(int(request.query["first"]), int(request.query["end"]))

@@ -1,0 +1,22 @@
+/** A player as this browser has it. */
+
+import { HlsPlayer } from './hls_player.js';
+import { Player, Source } from './player.js';
+
+/** @import {Listener} from './player.js' */
+
+/**
+ * @typedef {object} Form of all streams of a site
+ * @property {string} container mp4 or webm
+ * @property {string} codec of the pictures, and after a comma of the sound if there is any
+ * @property {number | null} pulse0 unix seconds of media time 0
+ */
+
+/**
+ * @param {HTMLVideoElement} video
+ * @param {Listener} listener
+ * @returns {Player | HlsPlayer}
+ */
+export function playerOf(video, listener) {
+  return Source ? new Player(video, listener) : new HlsPlayer(video, listener);
+}
