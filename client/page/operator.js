@@ -3,6 +3,8 @@
 import { ServerEvents } from './events.js';
 import { getJson } from './http.js';
 import { CameraTiles } from './operator_cameras.js';
+import { ChoosingForm } from './operator_choosing.js';
+import { Configuration } from './operator_config.js';
 import { FloorPlan } from './operator_floor.js';
 import { ask, Refused } from './operator_http.js';
 import { element } from './operator_parts.js';
@@ -57,7 +59,10 @@ function build(site) {
   element('site').textContent = site.name;
   document.documentElement.style.setProperty('--picture', String(site.width / site.height));
   const floor = new FloorPlan(site, palette, tell);
-  sections.set('cameras', new CameraTiles(palette, tell)).set('floor', floor);
+  sections.set('cameras', new CameraTiles(palette, tell));
+  sections.set('floor', floor);
+  sections.set('choosing', new ChoosingForm(tell));
+  sections.set('configuration', new Configuration(tell));
   new ServerEvents({
     opened: () => tell(null),
     lost: () => tell(new Error('The connection is lost; it is tried again.')),

@@ -43,6 +43,19 @@
  * @typedef {object} Floor /api/operator/floor
  * @property {FloorCamera[]} cameras
  * @property {string[]} uncalibrated
+ *
+ * @typedef {object} Setting an entry of /api/operator/config
+ * @property {string} key
+ * @property {string} value as the configuration writes it
+ * @property {string | null} default
+ * @property {boolean} differs
+ *
+ * @typedef {Record<string, number | boolean>} Values
+ *
+ * @typedef {object} Choosing /api/operator/choosing
+ * @property {Values} values in force
+ * @property {Values} file what the configuration says
+ * @property {string} lines for the configuration
  */
 
 export {};

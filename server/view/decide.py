@@ -18,8 +18,12 @@ from server.view.sight import Sight
 from server.view.why import Why
 from server.wire.config import Config
 from server.wire.messages import NumberedBox
+from server.wire.sections import View
 
 Floats = NDArray[np.float64]
+
+TUNED = ("switch_cost_s", "goes_on_s", "missed_s", "min_shot_s", "quality")
+"""Settings of the choice that can be changed while it runs."""
 
 _LAST = 5
 """How the look-ahead ends is read from its last fifth: a single frame would be too uncertain."""
@@ -74,19 +78,40 @@ class Decider:
         self, config: Config, homographies: Mapping[str, Floats | None], has: Callable[[str, int], bool]
     ) -> None:
         self._config = config
+        self._take(config.view)
         self._cameras: Sequence[str] = config.camera_ids
         self._has = has
         size = (config.site.width, config.site.height)
         lag, share = config.track.window.lag, config.view.share
         self.people = People(config.view.identity, self._cameras, homographies, size, lag, share)
         self._sight = Sight(config, homographies, self.people.fits)
-        self.switch_cost = config.view.switch_cost_s * config.site.fps
-        self.least_shot = -(-round(config.view.min_shot_s * config.site.fps) // config.encode.gop)
-        """GOPs that a shot lasts at least."""
-        self._goes_on = config.view.goes_on_s * config.site.fps
         self._shots = Shots()
         self._lately = Lately()
         self._next_gop: int | None = None
+
+    @property
+    def view(self) -> View:
+        """What the choices are made by now."""
+        return self._config.view
+
+    def choose_by(self, view: View) -> None:
+        """Choose by other settings from the next GOP on; those that `TUNED` does not name stay as they are.
+
+        What is decided then cannot be had again from the recordings and the configuration alone.
+        """
+        kept = self._config.view.model_copy(update={name: getattr(view, name) for name in TUNED})
+        anew = kept.quality != self._config.view.quality
+        self._config = self._config.model_copy(update={"view": kept})
+        self._take(kept)
+        if anew:
+            self._sight.weigh_anew(kept.quality)
+
+    def _take(self, view: View) -> None:
+        fps = self._config.site.fps
+        self.switch_cost = view.switch_cost_s * fps
+        self.least_shot = -(-round(view.min_shot_s * fps) // self._config.encode.gop)
+        """GOPs that a shot lasts at least."""
+        self._goes_on = view.goes_on_s * fps
 
     def step(self, epoch: Epoch) -> list[GopDecision]:
         """Take an epoch in; give the GOPs whose look-ahead it completes."""

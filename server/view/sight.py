@@ -16,6 +16,8 @@ from server.wire.fit import Fit
 
 Floats = NDArray[np.float64]
 
+_FOR_EVER = 2**62
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SeenWindow:
@@ -50,18 +52,17 @@ class Sight:
 
     def put(self, windows: Sequence[CameraWindow]) -> None:
         """Take over what cameras said of an epoch."""
-        if not windows:
-            return
-        start = min(window.first for window in windows)
-        weighed = self._weigh(windows, start)
-        quality, terms = weighed.quality.T, weighed.terms.transpose(0, 2, 1)
-        ends = np.cumsum([len(window.keys) for window in windows]).tolist()
-        for window, end in zip(windows, ends, strict=True):
-            count, frames = window.boxes.shape[:2]
-            rows, tracks = slice(window.first - start, window.first - start + frames), slice(end - count, end)
-            seen = SeenWindow(window, quality[rows, tracks], terms[:, rows, tracks])
-            history = self._histories[window.message.camera]
-            history.put(seen, window.first, window.first + frames - 1)
+        for seen in self._seen(windows):
+            first, frames = seen.window.first, len(seen.quality)
+            self._histories[seen.window.message.camera].put(seen, first, first + frames - 1)
+
+    def weigh_anew(self, settings: QualitySettings) -> None:
+        """Go by other settings from now on, also of what was said already."""
+        self._settings = settings
+        for history in self._histories.values():
+            for said in history.over(0, _FOR_EVER):
+                (seen,) = self._seen([said.window.window])
+                history.put(seen, said.first, said.last)
 
     def over(self, camera: str, first: int, last: int) -> list[Stretch[SeenWindow]]:
         """Give what was last said of a camera's frames from `first` to `last`."""
@@ -71,6 +72,21 @@ class Sight:
         """Let go of the frames before a pulse."""
         for history in self._histories.values():
             history.forget_before(pulse)
+
+    def _seen(self, windows: Sequence[CameraWindow]) -> list[SeenWindow]:
+        """Weigh the views of some windows, all at once."""
+        if not windows:
+            return []
+        start = min(window.first for window in windows)
+        weighed = self._weigh(windows, start)
+        quality, terms = weighed.quality.T, weighed.terms.transpose(0, 2, 1)
+        ends = np.cumsum([len(window.keys) for window in windows]).tolist()
+        seen = []
+        for window, end in zip(windows, ends, strict=True):
+            count, frames = window.boxes.shape[:2]
+            rows, tracks = slice(window.first - start, window.first - start + frames), slice(end - count, end)
+            seen.append(SeenWindow(window, quality[rows, tracks], terms[:, rows, tracks]))
+        return seen
 
     def _weigh(self, windows: Sequence[CameraWindow], start: int) -> Quality:
         """Weigh the views of all windows at once, track after track; frames that one lacks are hidden."""

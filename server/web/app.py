@@ -11,7 +11,7 @@ from aiohttp import web
 
 from server.view.pictures import Pictures
 from server.view.service import BestViewService
-from server.web import api, hls, openapi, operator_cameras, operator_session, page, past, pictures, video
+from server.web import api, hls, openapi, operator_routes, page, past, pictures, video
 from server.web.api import problem
 from server.web.containers import refuse_other_containers
 from server.web.cors import preflight
@@ -71,7 +71,7 @@ def make_app(service: BestViewService) -> web.Application:
     app[READERS] = Readers(service.splicer.plan.target_s)
     app[METRICS] = registry(service, app[PICTURES], app[READERS])
     app[PERMISSION] = Permission(service.config.http.operator_token)
-    for module in (api, video, past, hls, pictures, openapi, page, operator_session, operator_cameras):
+    for module in (api, video, past, hls, pictures, openapi, page, operator_routes):
         app.add_routes(module.routes)
     app.cleanup_ctx.append(_telling)
     app.on_shutdown.append(_end_streams)

@@ -101,10 +101,41 @@ class Floor(msgspec.Struct, frozen=True):
     uncalibrated: list[str]
 
 
+class Setting(msgspec.Struct, frozen=True):
+    """One setting that is in force. Values are as the configuration writes them."""
+
+    key: str
+    """Such as view.switch_cost_s, or cameras.c0.offset."""
+    value: str
+    default: str | None
+    """Null: it has none."""
+    differs: bool
+    """From the default."""
+
+
+class Settings(msgspec.Struct, frozen=True):
+    """The configuration that is in force."""
+
+    settings: list[Setting]
+
+
+class Choosing(msgspec.Struct, frozen=True):
+    """What views are chosen by; keys such as switch_cost_s and quality.size."""
+
+    values: dict[str, float | bool]
+    """In force now."""
+    file: dict[str, float | bool]
+    """What the configuration says."""
+    lines: str
+    """Of the configuration, for what is in force and is not its default or not what the file says."""
+
+
 OPERATOR: dict[str, type[msgspec.Struct]] = {
     "/api/operator/session": OperatorSession,
     "/api/operator/cameras": OperatorCameras,
     "/api/operator/pulses": Pulses,
     "/api/operator/floor": Floor,
+    "/api/operator/config": Settings,
+    "/api/operator/choosing": Choosing,
 }
 """What GET of each address answers; what changes something answers with the same, as it is then."""

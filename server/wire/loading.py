@@ -18,7 +18,7 @@ from pydantic_settings import SettingsError
 from bestview import checked_homography
 from server.wire.config import Config
 from server.wire.errors import UserError
-from server.wire.sections import Camera
+from server.wire.sections import Camera, View
 from server.wire.sources import resolved
 
 
@@ -79,6 +79,27 @@ def build_config(content: Mapping[str, Any], *, where: str, folder: Path) -> Con
     return config.model_copy(update={"cameras": cameras, "detect": detect, "sound": sound, "record": record})
 
 
+def changed_view(view: View, changes: Mapping[str, Any], where: str) -> View:
+    """Give the settings of the choice with some of them changed, checked as those of a file are.
+
+    Raises:
+        UserError: something is wrong; the text begins with ``where``.
+    """
+    try:
+        return View.model_validate(_merged(view.model_dump(), changes))
+    except ValidationError as error:
+        raise UserError(_one_line(where, error, ("view",))) from error
+
+
+def _merged(content: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Give the content with changes to it, section by section."""
+    merged = dict(content)
+    for key, value in changes.items():
+        inner = merged.get(key)
+        merged[key] = _merged(inner, value) if isinstance(inner, dict) and isinstance(value, dict) else value
+    return merged
+
+
 def _resolved(camera: Camera, homographies: Mapping[str, Any], folder: Path) -> Camera:
     """Make paths absolute and fill in the ground homography from the file for all cameras."""
     ground = camera.ground if camera.ground is not None else homographies.get(camera.id)
@@ -114,17 +135,18 @@ def _reason(error: Exception) -> str:
     return " ".join(str(error).split())
 
 
-def _one_line(where: str, error: ValidationError) -> str:
+def _one_line(where: str, error: ValidationError, within: tuple[str, ...] = ()) -> str:
     errors = error.errors()
     more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
-    return f"{where}: {_plain(errors[0])}{more}"
+    return f"{where}: {_plain(errors[0], within)}{more}"
 
 
-def _plain(detail: ErrorDetails) -> str:
-    place = ".".join(str(part) for part in detail["loc"])
+def _plain(detail: ErrorDetails, within: tuple[str, ...]) -> str:
+    loc = (*within, *detail["loc"])
+    place = ".".join(str(part) for part in loc)
     message = detail["msg"].removeprefix("Value error, ")
     if detail["type"] == "extra_forbidden":
-        close = difflib.get_close_matches(str(detail["loc"][-1]), _known_keys(detail["loc"][:-1]), n=1)
+        close = difflib.get_close_matches(str(loc[-1]), _known_keys(loc[:-1]), n=1)
         message = "unknown key" + (f"; did you mean {close[0]!r}?" if close else "")
     return f"{place}: {message}" if place else message
 

@@ -19,7 +19,7 @@ from server.wire.messages import Keys
 
 PAGE = Path(__file__).parents[2] / "client" / "page"
 AXE = PAGE.parents[1] / "node_modules/axe-core/axe.min.js"
-SECTIONS = ["cameras", "floor"]
+SECTIONS = ["cameras", "floor", "choosing", "configuration"]
 PLAN = [[0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 1.0]]
 """Of a camera that looks straight down: ten pixels are one unit of the floor."""
 TOKEN = "a token of theirs"  # noqa: S105 — of a test
@@ -129,6 +129,40 @@ async def test_a_site_that_is_not_calibrated_says_what_to_do(browser: Browser) -
         see(hall)
         await expect(page.locator("#floor-words")).to_contain_text("No camera is calibrated")
         await expect(page.locator("#plan")).to_be_hidden()
+
+
+async def test_what_is_tried_out_holds_and_the_file_can_be_had_back(browser: Browser) -> None:
+    async with operating(browser, "#choosing") as (hall, page):
+        decider, lines = hall.service.decider, page.get_by_label("Lines for the configuration")
+        cost = page.get_by_label("Cut cost λ, s")
+        await expect(cost).to_have_value("0.04")
+        await cost.fill("2")
+        await page.get_by_label("Central").fill("0.5")
+        await page.keyboard.press("Enter")
+        await expect(page.locator("#choosing-state")).to_have_text("2 tried out, not as the file says.")
+        assert (decider.view.switch_cost_s, decider.view.quality.central) == (2.0, 0.5)
+        assert "switch_cost_s: 2.0" in await lines.input_value()
+        await page.get_by_label("Size").fill("0")  # the page lets it pass, the site does not: all are 0
+        for name in ("Whole", "Unhidden", "Central"):
+            await page.get_by_label(name).fill("0")
+        await page.get_by_role("button", name="Try it").click()
+        await expect(page.locator("#trouble")).to_contain_text("all weights are 0")
+        await page.get_by_role("button", name="Back to the file").click()
+        await expect(page.locator("#choosing-state")).to_have_text("As the file says.")
+        await expect(page.locator("#trouble")).to_be_empty()
+        assert decider.view == hall.service.config.view
+
+
+async def test_the_configuration_shows_what_differs_and_finds_the_rest(browser: Browser) -> None:
+    async with operating(browser, "#configuration") as (_, page):
+        rows = page.locator("#settings tr")
+        await expect(rows.filter(has_text="encode.gop")).to_have_text("encode.gop510")
+        await expect(rows.filter(has_text="http.jpeg_quality")).to_have_count(0)
+        await page.get_by_role("button", name="Only what differs").click()
+        await page.get_by_label("Find").fill("jpeg")
+        await expect(rows).to_have_text(["http.jpeg_quality80"])
+        await page.get_by_label("Find").fill("no such")
+        await expect(page.get_by_text("No setting is like that.")).to_be_visible()
 
 
 async def test_at_every_width_nothing_overflows_and_axe_finds_no_serious_fault(browser: Browser) -> None:

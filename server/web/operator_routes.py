@@ -1,0 +1,7 @@
+"""All of the operator's addresses."""
+
+from __future__ import annotations
+
+from server.web import operator_cameras, operator_session, operator_settings
+
+routes = [*operator_session.routes, *operator_cameras.routes, *operator_settings.routes]
