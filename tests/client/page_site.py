@@ -271,8 +271,6 @@ class SiteServer:
         return web.json_response(self.site.choice(k, pulse - pulse % GOP))
 
     async def _past(self, request: web.Request) -> web.Response:
-        if not self.site.recorded:
-            return web.json_response({"error": "nothing is kept"}, status=404)
         return web.json_response(self.site.past(int(request.match_info["k"])))
 
     async def _told(self, request: web.Request) -> web.Response:

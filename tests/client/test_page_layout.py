@@ -88,7 +88,7 @@ async def test_everything_comes_from_the_server_and_keeps_to_its_policy(browser:
         page.on("console", lambda message: complaints.append(message.text))
         page.on("request", lambda request: asked.append(request.url))
         await page.goto(server.url)
-        await expect(page.locator("#stage")).to_have_attribute("data-state", "playing", timeout=15_000)
+        await expect(page.locator("#stage")).to_have_attribute("data-state", "playing")
         await expect(page.locator("#camera")).not_to_be_empty()
         await page.close()
     assert complaints == []

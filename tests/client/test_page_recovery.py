@@ -47,7 +47,7 @@ async def test_a_site_whose_pulses_begin_anew_plays_on(browser: Browser, first: 
         shown = await visit.get("myview.pulse")
         await visit.until(f"myview.pulse > {shown + FPS} && myview.camera !== null")
         delay = await visit.get("myview.delays.at(-1).delayMs")
-        assert 0 < delay < 3000
+        assert 0 < delay < 30_000
 
 
 async def test_a_hole_in_the_stream_is_jumped_over(browser: Browser) -> None:
@@ -66,4 +66,4 @@ async def test_a_broken_stream_is_opened_again(browser: Browser) -> None:
         shown = await visit.get("myview.pulse")
         await visit.until(f"myview.pulse > {shown + 2 * FPS}")
         assert visit.server.site.opened == [1, 1]
-        assert await visit.get("myview.state") == "playing"
+        await visit.until("myview.state === 'playing'")
