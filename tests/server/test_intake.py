@@ -110,7 +110,7 @@ def test_one_wrong_field_raises_neither_here_nor_further_on(data: st.DataObject,
         what, Message(good.key, good.payload, changed) if in_head else Message(good.key, changed, b"")
     )
     people = People(IdentitySettings(), CAMERAS, dict.fromkeys(CAMERAS), (WIDTH, HEIGHT), lag=0)
-    for epoch in hall.aligner.ready(now=10**4):
+    for epoch in hall.aligner.ready(now=1000):
         people.update(epoch)
 
 
