@@ -28,13 +28,13 @@ export function listenToControls({ video, viewer, painter, overlay, strip, expla
   /** @type {[string, string, () => void][]} element, key, what both do */
   const controls = [
     ['toggle-boxes', 'b', () => toggle('toggle-boxes', (viewer.boxesOn = !viewer.boxesOn))],
-    ['toggle-follow', 'z', () => toggle('toggle-follow', (viewer.framing.on = !viewer.framing.on))],
+    ['toggle-follow', 'z', () => toggle('toggle-follow', (viewer.now.framing.on = !viewer.now.framing.on))],
     ['toggle-why', 'w', toggleWhy],
     ['toggle-sound', 'm', toggleSound],
     ['prefer', 'p', () => viewer.prefer()],
     ['automatic', '0', () => viewer.hold(null)],
-    ['pause', ' ', () => viewer.pause()],
-    ['live', 'End', () => viewer.live()],
+    ['pause', ' ', () => viewer.travel.pause()],
+    ['live', 'End', () => viewer.travel.live()],
     ['full-screen', 'f', fullScreen],
     ['snapshot', 's', snapshot],
     ['copy-link', 'l', copyLink],
@@ -46,8 +46,8 @@ export function listenToControls({ video, viewer, painter, overlay, strip, expla
     ...Object.fromEntries([1, 2, 3, 4, 5, 6, 7, 8, 9].map((number) => [number, () => holdNumber(number)])),
     ArrowRight: () => viewer.step(1),
     ArrowLeft: () => viewer.step(-1),
-    ',': () => viewer.skip(-SKIP_S),
-    '.': () => viewer.skip(SKIP_S),
+    ',': () => viewer.travel.skip(-SKIP_S),
+    '.': () => viewer.travel.skip(SKIP_S),
     Escape: () => (more.open = false),
   });
 
@@ -96,13 +96,13 @@ export function listenToControls({ video, viewer, painter, overlay, strip, expla
 
   /** @param {MouseEvent} event */
   function personAt(event) {
-    return viewer.site ? overlay.hit(viewer.boxes, viewer.site, event) : null;
+    return viewer.site ? overlay.hit(viewer.now.boxes, viewer.site, event) : null;
   }
 
   strip.surface.canvas.addEventListener('click', ({ offsetX }) => {
     const pulse = strip.pulseAt(offsetX);
-    if (pulse === null) viewer.live();
-    else viewer.watchFrom(pulse);
+    if (pulse === null) viewer.travel.live();
+    else viewer.travel.watchFrom(pulse);
   });
   for (const name of ['play', 'pause']) {
     video.addEventListener(name, () => {
@@ -118,6 +118,6 @@ export function listenToControls({ video, viewer, painter, overlay, strip, expla
   stage.addEventListener('click', (event) => {
     const object = personAt(event);
     if (object !== null) viewer.choose(object);
-    else if (video.paused) viewer.pause();
+    else if (video.paused) viewer.travel.pause();
   });
 }

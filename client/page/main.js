@@ -56,7 +56,7 @@ function show() {
     cameras.mark(viewer.probe.camera, override);
     element('automatic').hidden = element('prefer').hidden = override.camera === null;
     element('prefer').setAttribute('aria-pressed', String(override.prefers));
-    element('live').hidden = viewer.past.moment === null;
+    element('live').hidden = viewer.travel.moment === null;
   }
   if (viewer.people) {
     people.show(viewer.people, viewer.object, viewer.tiles, viewer.palette, (person) => viewer.isGone(person));
@@ -74,15 +74,15 @@ function readOut() {
   const status = viewer.status();
   const { probe, site, palette, decisions, override } = viewer;
   stage.dataset.state = status.state;
-  stage.classList.toggle('pictured', viewer.pictured && !['unknown', 'empty'].includes(status.state));
+  stage.classList.toggle('pictured', viewer.now.any && !['unknown', 'empty'].includes(status.state));
   write(title, status.title);
   write(text, status.text);
   write(element('notice'), viewer.notice.text);
   const delay = median(probe.delays.slice(-DELAY_FRAMES).map(({ delayMs }) => delayMs ?? NaN));
-  element('delay').textContent = viewer.flowing && delay > 0 ? `${(delay / 1000).toFixed(1)} s` : MISSING;
-  if (!viewer.mapped) reason.put('This browser does not say which moment it shows: no boxes, no past, no reasons.');
-  if (!site || !viewer.mapped || probe.pulse === null || viewer.object === null) return strip.clear();
-  const live = viewer.past.moment === null;
+  element('delay').textContent = viewer.now.flowing && delay > 0 ? `${(delay / 1000).toFixed(1)} s` : MISSING;
+  if (!viewer.now.mapped) reason.put('This browser does not say which moment it shows: no boxes, no past, no reasons.');
+  if (!site || !viewer.now.mapped || probe.pulse === null || viewer.object === null) return strip.clear();
+  const live = viewer.travel.moment === null;
   const views = (/** @type {number} */ from) => viewer.views(from);
   void viewer.kept.about(viewer.object);
   const seconds = span.offer((decisions.end - viewer.kept.first) / site.fps);

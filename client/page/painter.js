@@ -21,7 +21,7 @@ export class Painter {
     this.overlay = overlay;
     watchFrames(video, () => this.#wanted, (frame) => {
       if (viewer.player.landing) return frame.image?.close(); // told of again, when it is known whose it is
-      viewer.shown(frame);
+      viewer.now.take(frame);
       this.#paint(frame.image);
       if (viewer.probe.camera === this.#camera) return;
       this.#camera = viewer.probe.camera;
@@ -33,19 +33,20 @@ export class Painter {
   repaint() {
     const { video, viewer } = this;
     if (viewer.probe.pulse === null || viewer.player.landing) return;
-    const frame = take(video, viewer.mediaTime, this.#wanted);
-    if (frame.image) viewer.shown({ ...frame, shownAt: Date.now() });
+    const frame = take(video, viewer.now.mediaTime, this.#wanted);
+    if (frame.image) viewer.now.take({ ...frame, shownAt: Date.now() });
     this.#paint(frame.image);
   }
 
   /** Whether the picture is painted here, and not only shown by the video element. */
   get #wanted() {
-    return this.viewer.boxesOn || this.viewer.framing.on;
+    return this.viewer.boxesOn || this.viewer.now.framing.on;
   }
 
   /** @param {VideoFrame | null} image of the frame now shown */
   #paint(image) {
-    const { site, object, boxes, boxesOn, part } = this.viewer;
+    const { site, object, boxesOn } = this.viewer;
+    const { boxes, part } = this.viewer.now;
     if (site && this.#wanted) this.overlay.draw(boxesOn ? boxes : [], object, site, image, part);
     else this.overlay.clear();
     this.video.style.transform = site && !image ? this.overlay.transform(site) : 'none';

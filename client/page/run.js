@@ -6,7 +6,7 @@ import { pause, Refused } from './http.js';
 import { streamOf } from './subject.js';
 
 /** @import {Segment} from './mp4.js' */
-/** @import {Moment} from './past.js' */
+/** @import {Moment} from './travel.js' */
 /** @import {Subject} from './subject.js' */
 
 /**

@@ -1,6 +1,6 @@
 /** Whom a player is to show, by which camera and from when on; and where the server has that stream. */
 
-/** @import {Moment} from './past.js' */
+/** @import {Moment} from './travel.js' */
 
 /**
  * @typedef {object} Subject

@@ -32,7 +32,7 @@ export class Timekeeper {
       const sent = Date.now();
       const site = await getJson('api/site');
       this.#clock.add(sent, Date.now(), site.now);
-      this.viewer.clockOffset = this.#clock.offset;
+      this.viewer.now.clockOffset = this.#clock.offset;
       this.viewer.setSite(site);
     } catch {
       // The events say when the server is away, and when it is back.
