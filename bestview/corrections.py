@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from bestview.keys import EpisodeKey
@@ -50,6 +50,10 @@ class Corrections:
         }
         self._last.update(numbers)
         return tuple(sorted(splits))
+
+    def part(self, keys: Iterable[EpisodeKey], number: int) -> None:
+        """Take over that tracks are said to stand for somebody else: who said so knows."""
+        self._last.update((key, number) for key in keys if key in self._last)
 
     def keep_only(self, keys: Collection[EpisodeKey]) -> None:
         """Forget all other tracks."""

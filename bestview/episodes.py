@@ -6,7 +6,7 @@ or comes back after a while unseen, begins a new episode: who it is, is asked an
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
 
@@ -96,6 +96,12 @@ class Episode:
         self.untold = self.untold[len(told) :]
         return bool(told and self.number)
 
+    def become(self, number: int) -> None:
+        """Count all that was told as told to be this person."""
+        self.told = {number: max(1, sum(self.told.values()))}
+        self.number = number
+        self.firm = number if self.firm else 0
+
     def told_anew(self, lost: int, kept: int) -> None:
         """Count what was told to be one person as told to be another: the two turned out to be one."""
         frames = self.told.pop(lost, 0)
@@ -169,6 +175,11 @@ class Episodes:
         settings = self._settings
         out_of_crowd = not crowded and episode.crowd >= settings.crowd_frames and episode.free >= _ROOTED
         return out_of_crowd or frame - episode.end.frame > settings.gap
+
+    def shown(self, tracks: Iterable[TrackKey], people: Collection[int]) -> list[Episode]:
+        """Give what these tracks show now where it is one of these people, in the tracks' order."""
+        now = [self._current[key] for key in sorted(set(tracks)) if key in self._current]
+        return [it for it in now if (it.firm or it.number) in people]
 
     def told_anew(self, lost: int, kept: int) -> None:
         """Take over that two numbers turned out to be one person's."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +16,7 @@ from bestview.ground import checked_homography
 from bestview.groups import Group, groups_of
 from bestview.heights import HeightScale
 from bestview.identity_settings import IdentitySettings
-from bestview.keys import EpisodeKey
+from bestview.keys import EpisodeKey, TrackKey
 from bestview.meeting import Standing, at_once, near
 from bestview.pairs import PairTables
 from bestview.people import People
@@ -133,6 +133,31 @@ class IdentityRegistry:
         if anew:
             self._settle(last_frame)
         return IdentityUpdate(numbers, born, returned, gone, merged, split)
+
+    def part(self, tracks: Collection[TrackKey], people: Collection[int]) -> int | None:
+        """Take somebody's word that what these tracks show now is none of these people, but somebody new.
+
+        It stays so: none of them is ever taken for the new person again, as long as they are remembered.
+
+        Returns:
+            The new person's number; None: none of the tracks is said to be any of these people now.
+        """
+        if self._last_frame is None:
+            return None
+        known = [number for number in sorted(people) if number in self._people]
+        shown = self._episodes.shown(tracks, known)
+        if not shown:
+            return None
+        new = self._people.part(known, {it.key.camera for it in shown}, self._last_frame)
+        for episode in shown:
+            episode.become(new)
+        mine = {episode.key for episode in shown}
+        rows = [it.key for it in self._episodes.open]
+        others = [it.key for it in self._episodes.open if it.number in known and it.key not in mine]
+        self._tables.make_room([new, *known])
+        self._corrections.part(mine, new)
+        self._tables.set_apart([new, *(it for it in rows if it in mine)], [*known, *others])
+        return new
 
     @property
     def pairs(self) -> int:

@@ -89,6 +89,12 @@ class PairTables:
         one, two = once(one[new], two[new])
         self._apart.put(one, two, np.ones((one.size, 1)))
 
+    def set_apart(self, one: Sequence[Row], two: Sequence[Row]) -> None:
+        """Note that each of some rows is another person than each of some others, as if seen at once."""
+        rows = [[self._place[it] for it in side if it in self._place] for side in (one, two)]
+        first, second = np.meshgrid(*(np.array(side, dtype=np.int64) for side in rows))
+        self.add_apart(first.ravel(), second.ravel())
+
     def apart(self, one: Ints, two: Ints) -> NDArray[np.bool_]:
         """Say of (P,) pairs of rows whether they were seen at once in one camera: two people."""
         return self._apart.find(*self._names_of(one, two)) >= 0

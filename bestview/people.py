@@ -28,6 +28,10 @@ class People:
         """Count everybody remembered."""
         return len(self._persons)
 
+    def __contains__(self, number: object) -> bool:
+        """Say whether somebody of this number is remembered."""
+        return number in self._persons
+
     def recent(self, frame: int) -> list[Person]:
         """List those who are compared like everybody, by number: some episode of theirs is settled."""
         oldest = frame - self._settings.recent
@@ -112,6 +116,17 @@ class People:
         for merge in merged:
             self._persons[merge.kept].absorb(self._persons.pop(merge.lost))
         return tuple(merged)
+
+    def part(self, people: Iterable[int], cameras: Iterable[str], frame: int) -> int:
+        """Give the number of somebody new whom some cameras see, and whom these people were taken for."""
+        new = Person(self._next_number)
+        self._next_number += 1
+        self._persons[new.number] = new
+        for camera in cameras:
+            new.see(camera, frame)
+        for person in (new, *(self._persons[number] for number in people)):
+            person.settled = max(1, person.settled)  # so that it has a row, by which they are kept apart
+        return new.number
 
     def settle(self, episodes: Iterable[Episode]) -> None:
         """Take over episodes that stay whose they were told to be."""

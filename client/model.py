@@ -46,6 +46,8 @@ class SeenObject(msgspec.Struct, frozen=True):
     """A path on the server."""
     also: tuple[int, ...] = ()
     """Other numbers that this person once had; they go on to work."""
+    name: str | None = None
+    """What the operator calls them."""
 
 
 class Camera(msgspec.Struct, frozen=True):

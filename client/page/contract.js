@@ -19,6 +19,7 @@
  *
  * @typedef {object} Person an entry of /api/objects
  * @property {number} object
+ * @property {string | null} [name] what the operator calls them
  * @property {number[]} [also] other numbers that this person once had
  * @property {number} first_seen pulse
  * @property {number} last_seen pulse

@@ -5,6 +5,7 @@ import { listenToControls } from './controls.js';
 import { element } from './element.js';
 import { ServerEvents } from './events.js';
 import { Explaining } from './explaining.js';
+import { person } from './names.js';
 import { Overlay } from './overlay.js';
 import { Painter } from './painter.js';
 import { People } from './people.js';
@@ -63,7 +64,7 @@ function show() {
     element('nobody').hidden = viewer.people.length > 0;
   }
   tiles.show(viewer.tiles);
-  document.title = viewer.object === null ? 'MyView' : `Person ${viewer.object} · MyView`;
+  document.title = viewer.object === null ? 'MyView' : `${person(viewer.object)} · MyView`;
   readOut();
   painter.repaint();
   tiles.repaint();

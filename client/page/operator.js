@@ -3,11 +3,13 @@
 import { ServerEvents } from './events.js';
 import { getJson } from './http.js';
 import { CameraTiles } from './operator_cameras.js';
+import { learnNames } from './names.js';
 import { ChoosingForm } from './operator_choosing.js';
 import { Configuration } from './operator_config.js';
 import { FloorPlan } from './operator_floor.js';
 import { ask, Refused } from './operator_http.js';
 import { element } from './operator_parts.js';
+import { KnownPeople } from './operator_people.js';
 import { Palette } from './palette.js';
 
 /** @import {Site} from './contract.js' */
@@ -61,6 +63,8 @@ function build(site) {
   const floor = new FloorPlan(site, palette, tell);
   sections.set('cameras', new CameraTiles(palette, tell));
   sections.set('floor', floor);
+  const known = new KnownPeople(site, tell);
+  sections.set('known', known);
   sections.set('choosing', new ChoosingForm(tell));
   sections.set('configuration', new Configuration(tell));
   new ServerEvents({
@@ -68,6 +72,10 @@ function build(site) {
     lost: () => tell(new Error('The connection is lost; it is tried again.')),
     heard: (name, data) => {
       if (name === 'gop') floor.add(data);
+      if (name === 'objects') {
+        learnNames(data.objects);
+        known.show(data.objects);
+      }
     },
   });
 }

@@ -56,6 +56,12 @@
  * @property {Values} values in force
  * @property {Values} file what the configuration says
  * @property {string} lines for the configuration
+ *
+ * @typedef {object} ByHand /api/operator/people
+ * @property {Record<string, string>} names by number
+ * @property {Record<string, number>} merged by number: whose it is
+ * @property {number | null} parted the number of somebody who was just said to be new
+ * @property {string} cannot why nothing can be said; empty: it can
  */
 
 export {};

@@ -1,5 +1,6 @@
 /** The floor plan: what the cameras cover, who is on the floor, and the ways of the last seconds. */
 
+import { label } from './names.js';
 import { ask } from './operator_http.js';
 import { element, make, put, Repeated } from './operator_parts.js';
 import { Ways } from './operator_place.js';
@@ -25,7 +26,6 @@ export class FloorPlan {
   #drawn = '';
   #size = 1;
   #people = svg('g');
-  #names = (/** @type {number} */ object) => String(object);
 
   /**
    * @param {Site} site
@@ -53,11 +53,6 @@ export class FloorPlan {
   add(gop) {
     this.#ways.add(gop, this.#cameras);
     if (this.#open) this.#show();
-  }
-
-  /** @param {(object: number) => string} names what a person is called */
-  call(names) {
-    this.#names = names;
   }
 
   async #ask() {
@@ -98,7 +93,7 @@ export class FloorPlan {
     this.#people.replaceChildren(...walkers.flatMap((it) => this.#walker(it, size)));
     const lines = walkers.map(({ object, way, cameras }) => {
       const [x, y] = way[way.length - 1];
-      return `${this.#names(object)} at ${x.toFixed(2)}, ${y.toFixed(2)}, seen by ${cameras.join(', ')}`;
+      return `${label(object)} at ${x.toFixed(2)}, ${y.toFixed(2)}, seen by ${cameras.join(', ')}`;
     });
     const list = element('places');
     while (list.children.length > lines.length) list.lastChild?.remove();
@@ -113,7 +108,7 @@ export class FloorPlan {
   #walker({ object, way }, size) {
     const [x, y] = way[way.length - 1];
     const name = svg('text', { x, y: -y - size * DOT * 1.6, 'font-size': size * 0.035, class: 'name' });
-    name.textContent = this.#names(object);
+    name.textContent = label(object);
     return [
       svg('polyline', { points: points(way), class: 'way' }),
       svg('circle', { cx: x, cy: -y, r: size * DOT, class: 'walker' }),

@@ -1,22 +1,14 @@
 /** What every section of the operator's page is made of. */
 
-/** @param {unknown} error what went wrong; null: nothing does any more */
-/** @typedef {(error: unknown) => void} Tell */
+export { element } from './element.js';
+
+/** @typedef {(error: unknown) => void} Tell what went wrong; null: nothing does any more */
 
 /**
  * @typedef {object} Section of the page
  * @property {() => void} open it is shown from now on
  * @property {() => void} close it is not
  */
-
-/**
- * @template {HTMLElement} T
- * @param {string} id
- * @returns {T}
- */
-export function element(id) {
-  return /** @type {T} */ (document.getElementById(id));
-}
 
 /**
  * @template {keyof HTMLElementTagNameMap} Name

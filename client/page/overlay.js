@@ -1,5 +1,6 @@
 /** A frame, or a part of it, and its boxes: the chosen person in the accent, the others thin and neutral. */
 
+import { label } from './names.js';
 import { Surface } from './surface.js';
 
 /** @import {Box} from './contract.js' */
@@ -108,7 +109,7 @@ function drawBox(context, [object, left, top, right, bottom], scale, chosen) {
   context.lineWidth = line;
   context.strokeStyle = chosen ? ACCENT : NEUTRAL;
   context.strokeRect(x, y, width, height);
-  drawNumber(context, String(object), x, y, chosen);
+  drawNumber(context, label(object), x, y, chosen);
 }
 
 /**

@@ -5,6 +5,7 @@
  */
 
 import { relative } from './http.js';
+import { label, person as personCalled } from './names.js';
 
 /** @import {Person} from './contract.js' */
 /** @import {Palette} from './palette.js' */
@@ -94,11 +95,10 @@ class Card {
     this.image.hidden = true;
     this.seenBy = element('span', 'seen-by');
     const picture = element('span', 'thumbnail');
-    const number = element('span', 'number');
-    number.textContent = String(object);
+    this.number = element('span', 'number');
     this.words = element('span', 'unseen'); // what is to be seen, for those who hear it
     picture.ariaHidden = this.seenBy.ariaHidden = 'true';
-    picture.append(this.image, number);
+    picture.append(this.image, this.number);
     this.button.append(picture, this.seenBy, this.words);
     this.plus = document.createElement('button');
     this.plus.type = 'button';
@@ -121,7 +121,9 @@ class Card {
     this.button.setAttribute('aria-current', String(chosen));
     this.button.classList.toggle('away', !person.visible);
     const seen = person.cameras.length ? `seen by ${person.cameras.join(', ')}` : 'not in view';
-    this.words.textContent = this.button.title = `Person ${person.object}, ${seen}`;
+    this.words.textContent = this.button.title = `${personCalled(person.object)}, ${seen}`;
+    const called = label(person.object);
+    if (this.number.textContent !== called) this.number.textContent = called;
     this.#showCameras(person, palette);
     if (person.thumbnail && person.thumbnail !== this.#thumbnail) void this.#load(person.thumbnail);
   }

@@ -4,6 +4,7 @@ import { onAddress, watchedInAddress, writeAddress } from './address.js';
 import { Beside } from './beside.js';
 import { Decisions } from './decisions.js';
 import { Kept } from './kept.js';
+import { learnNames } from './names.js';
 import { Notice } from './notice.js';
 import { NowShown } from './now_shown.js';
 import { Override } from './override.js';
@@ -94,6 +95,7 @@ export class Viewer {
   /** @param {Person[]} people */
   setPeople(people) {
     this.people = people;
+    learnNames(people);
     this.#rename();
     this.#followMerge();
     const lost = this.object !== null && !this.chosen;

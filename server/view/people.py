@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from itertools import chain
 from typing import NamedTuple
 
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from bestview import EpisodeKey, IdentityRegistry, IdentitySettings, Merge, Split, TrackKey
 from server.view.align import Epoch
+from server.view.by_hand import ByHand
 from server.view.history import History
 from server.view.numbered import numbered_boxes
 from server.view.reading import CameraWindow, Reader
@@ -73,6 +74,11 @@ class People:
         self.merged: dict[int, int] = {}
         """Numbers that turned out to be another's."""
         self._corrections: list[Merge | Split] = []
+        self._by_hand = ByHand()
+        self._now = -1
+        """The last frame that was spoken of."""
+        self.names: dict[int, str] = {}
+        """What people are called, by number; said by hand, as merges and parts may be."""
 
     def update(self, epoch: Epoch) -> Sequence[CameraWindow]:
         """Take over what all cameras said about an epoch; give it as it was read."""
@@ -81,7 +87,8 @@ class People:
             self._histories[window.message.camera].put(window, window.first, window.message.last)
         tracks = [track for window in windows for track in window.local_tracks()]
         pictures = {window.message.camera: window.message.size for window in windows}
-        update = self._registry.update(tracks, epoch.last - self._lag, pictures)
+        self._now = epoch.last
+        update = self._by_hand.read(self._registry.update(tracks, epoch.last - self._lag, pictures))
         for key, parts in _parts(update.numbers).items():
             self._parts[key] = self._with_settled(key, parts)
         keys = chain.from_iterable(window.keys for window in windows)
@@ -111,6 +118,47 @@ class People:
         """The other people's numbers, in order: another service decides for them."""
         mine = set(self.known)
         return [number for number in sorted(self.first_seen) if number not in mine]
+
+    def call(self, number: int, name: str) -> None:
+        """Give somebody a name; an empty one takes it back."""
+        self.names.pop(number, None)
+        if name:
+            self.names[number] = name
+
+    @property
+    def merged_by_hand(self) -> dict[int, int]:
+        """Give by number that was said to be another's whose it is."""
+        return self._by_hand.said
+
+    def merge(self, kept: int, lost: int) -> None:
+        """Take somebody's word that two numbers are one person's, whatever the evidence says from now on."""
+        here = not {kept, lost} <= self.away
+        self._by_hand.merge(kept, lost, self.away)
+        self._merge(kept, lost)
+        if here:
+            self.away.discard(kept)
+        self._corrections.append(Merge(kept, lost))
+
+    def part(self, number: int, cameras: Collection[str]) -> int | None:
+        """Take somebody's word that whom these cameras show as this person now is somebody new.
+
+        Returns:
+            Their number; None: none of the cameras shows the person now.
+        """
+        tracks = [
+            key
+            for key, parts in self._parts.items()
+            if key.camera in cameras and parts[-1].number == number and self._heard.get(key) == self._now
+        ]
+        new = self._registry.part(tracks, self._by_hand.worked_out(number))
+        if new is None:
+            return None
+        for key in tracks:  # those that the registry has settled it does not speak of again
+            since = max(self._asked_from, self._parts[key][-1].first)
+            self._parts[key] = [*self._parts[key], Part(since, new)]
+            self._note_seen([Part(since, new)], since, max(since, self._now))
+        self._corrections += [Split(number, new, camera) for camera in sorted({it.camera for it in tracks})]
+        return new
 
     def number(self, camera: str, local: int, pulse: int) -> int | None:
         """Give the person's number behind a camera's local one in a frame; None while it is not confirmed."""
@@ -178,6 +226,9 @@ class People:
 
     def _merge(self, kept: int, lost: int) -> None:
         self.merged = {old: kept if new == lost else new for old, new in self.merged.items()} | {lost: kept}
+        name = self.names.pop(lost, "")
+        if name:
+            self.names.setdefault(kept, name)
         self._parts = {
             key: [Part(part.first, kept) if part.number == lost else part for part in parts]
             for key, parts in self._parts.items()
@@ -197,6 +248,7 @@ class People:
         for number in [number for number, last in self.last_seen.items() if last < now - self._remembered]:
             del self.first_seen[number], self.last_seen[number]
             self.away.discard(number)
+            self.names.pop(number, None)
             self.merged = {old: new for old, new in self.merged.items() if new != number}
 
 

@@ -130,11 +130,24 @@ class Choosing(msgspec.Struct, frozen=True):
     """Of the configuration, for what is in force and is not its default or not what the file says."""
 
 
+class PeopleByHand(msgspec.Struct, frozen=True):
+    """What was said of people by hand."""
+
+    names: dict[int, str]
+    merged: dict[int, int]
+    """By number that was merged by hand: whose it is said to be."""
+    parted: int | None
+    """The number of somebody who was just said to be new."""
+    cannot: str
+    """Why nothing can be said here; empty: it can."""
+
+
 OPERATOR: dict[str, type[msgspec.Struct]] = {
     "/api/operator/session": OperatorSession,
     "/api/operator/cameras": OperatorCameras,
     "/api/operator/pulses": Pulses,
     "/api/operator/floor": Floor,
+    "/api/operator/people": PeopleByHand,
     "/api/operator/config": Settings,
     "/api/operator/choosing": Choosing,
 }

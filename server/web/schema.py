@@ -31,6 +31,8 @@ class ObjectInfo(msgspec.Struct, frozen=True):
     """One person."""
 
     object: int
+    name: str | None
+    """What the operator calls them."""
     also: list[int]
     """Other numbers that this person once had; they go on to work."""
     first_seen: int

@@ -39,6 +39,7 @@ def objects_info(service: BestViewService) -> Objects:
         objects.append(
             ObjectInfo(
                 object=number,
+                name=people.names.get(number),
                 also=people.also(number),
                 first_seen=people.first_seen.get(number, standing.first),
                 last_seen=people.last_seen.get(number, standing.first),

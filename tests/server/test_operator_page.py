@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import AsyncIterator
 from contextlib import aclosing, asynccontextmanager
 from pathlib import Path
@@ -14,12 +15,13 @@ from halls import A, B, Hall, opened
 from playwright.async_api import Browser, Page, expect
 
 from benchmarks.browser import CHROMIUM, chromium
+from bestview import IdentityRegistry
 from server.web.operator_permission import digest_of
 from server.wire.messages import Keys
 
 PAGE = Path(__file__).parents[2] / "client" / "page"
 AXE = PAGE.parents[1] / "node_modules/axe-core/axe.min.js"
-SECTIONS = ["cameras", "floor", "choosing", "configuration"]
+SECTIONS = ["cameras", "floor", "known", "choosing", "configuration"]
 PLAN = [[0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 1.0]]
 """Of a camera that looks straight down: ten pixels are one unit of the floor."""
 TOKEN = "a token of theirs"  # noqa: S105 — of a test
@@ -129,6 +131,34 @@ async def test_a_site_that_is_not_calibrated_says_what_to_do(browser: Browser) -
         see(hall)
         await expect(page.locator("#floor-words")).to_contain_text("No camera is calibrated")
         await expect(page.locator("#plan")).to_be_hidden()
+
+
+async def test_people_are_named_merged_and_parted_and_the_viewers_page_says_so(browser: Browser) -> None:
+    async with operating(browser, "#known") as (hall, page):
+        people = hall.service.decider.people
+        people._registry = IdentityRegistry(hall.service.config.view.identity, dict.fromkeys(CAMERAS))
+        await expect(page.locator("#known-words")).to_have_text("Nobody is known yet.")
+        see(hall)
+        first, second, *_ = people.known
+        await page.get_by_label(f"Name of person {first}").fill("Ann")
+        await page.keyboard.press("Enter")
+        await expect(page.locator("#known-words")).to_have_text(f"{first} is called Ann.")
+        await expect(page.locator("#merge-kept option").first).to_have_text(f"{first} Ann")
+        await page.get_by_label("who is also").select_option(str(second))
+        await page.get_by_role("button", name="Merge").click()
+        await expect(page.locator("#known-words")).to_have_text(f"{second} is {first} from now on.")
+        assert people.merged == {second: first}
+        hall.service.feed(3, {A: {1: SMALL, 2: SMALL}, B: {1: LARGE}})
+        await expect(page.locator(f'#known-people [data-object="{second}"]')).to_have_count(0)
+        shown = people.number(A, 1, 15)
+        await page.get_by_label("As whom").select_option(str(shown))
+        await page.get_by_label("Which camera").select_option(A)
+        await page.get_by_role("button", name="Is somebody new").click()
+        await expect(page.locator("#known-words")).to_have_text(re.compile(r"They are \d+ from now on\."))
+        assert people.number(A, 1, 19) != shown
+        await page.goto(f"http://127.0.0.1:{hall.port}/?object={first}")
+        await expect(page.locator("#people .number").first).to_have_text(f"{first} Ann")
+        await expect(page).to_have_title(f"Person {first}, Ann · MyView")
 
 
 async def test_what_is_tried_out_holds_and_the_file_can_be_had_back(browser: Browser) -> None:

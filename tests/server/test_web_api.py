@@ -41,6 +41,7 @@ async def test_everybody_is_listed_with_who_shows_and_who_sees_them(busy: Hall) 
     one, two = (await busy.get_json("/api/objects"))["objects"]
     assert one == {
         "object": 1,
+        "name": None,
         "also": [],
         "first_seen": 0,
         "last_seen": 14,
