@@ -31,6 +31,8 @@ class CameraState:
     ended: bool = False
     bad_messages: int = 0
     frames: int = 0
+    unheard: int = 0
+    """Frames in which people were followed without what some other camera found."""
     gauge: Gauge = field(default_factory=Gauge)
     """What is measured of it, for the operator."""
 

@@ -177,6 +177,8 @@ class BestViewService:
         for camera in epoch.late:
             self.late_epochs += 1
             log.warning("camera %s: its tracks for pulses up to %d came too late", camera, epoch.last)
+        for camera, message in epoch.tracks.items():
+            self.intake.states[camera].unheard += len(message.alone)
         if self._recorder is None:
             return
         for camera in epoch.late:

@@ -55,6 +55,11 @@ class ServiceCollector(Collector):
         frames = CounterMetricFamily("myview_camera_frames", "Frames received.", labels=["camera"])
         missed = CounterMetricFamily("myview_camera_missed", "Pulses without a frame.", labels=["camera"])
         shed = CounterMetricFamily("myview_camera_shed", "Frames not searched for people.", labels=["camera"])
+        unheard = CounterMetricFamily(
+            "myview_camera_unheard",
+            "Frames in which people were followed without what some other camera found.",
+            labels=["camera"],
+        )
         bad = CounterMetricFamily("myview_camera_bad_messages", "Messages not understood.", labels=["camera"])
         offset = GaugeMetricFamily(
             "myview_camera_clock_offset_seconds",
@@ -65,12 +70,13 @@ class ServiceCollector(Collector):
             labels = [camera]
             live.add_metric(labels, float(state.word == "live"))
             frames.add_metric(labels, state.frames)
+            unheard.add_metric(labels, state.unheard)
             bad.add_metric(labels, state.bad_messages)
             if state.status is not None:
                 missed.add_metric(labels, state.status.missed)
                 shed.add_metric(labels, state.status.shed)
                 offset.add_metric(labels, state.status.clock_offset)
-        return [live, frames, missed, shed, bad, offset]
+        return [live, frames, missed, shed, unheard, bad, offset]
 
 
 class PicturesCollector(Collector):

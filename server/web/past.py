@@ -16,7 +16,7 @@ from server.view.past.stream import PastStream, Wish
 from server.view.past.told import told
 from server.view.service import BestViewService
 from server.view.timeline import Timeline
-from server.web.api import answer, no_camera, not_now, problem
+from server.web.api import answer, no_camera, no_object, not_now, problem
 from server.web.forms import Form
 from server.web.keys import SERVICE
 from server.web.limits import no_place
@@ -41,7 +41,7 @@ async def best_of_the_past(request: web.Request, form: Form) -> web.StreamRespon
         return service.splicer.objects.get(service.board.resolve(number))
 
     if live() is None and kept_from(source, 0) is None:
-        return problem(404, f"there is no object {number}")
+        return no_object(number)
     return await _stream(request, form, source, f"object {number}", live)
 
 

@@ -16,6 +16,8 @@ _DROP_AFTER_US = 20_000
 """zenoh drops a message after 1 ms in a full queue by default: too soon for an I picture's burst."""
 
 _OPEN_WITHIN_MS = 5_000
+_PUBLISHERS = 64
+"""Keys for which something is prepared: of more, those not sent to for longest are prepared anew."""
 
 
 class Bus:
@@ -24,6 +26,7 @@ class Bus:
     def __init__(self, session: zenoh.Session) -> None:
         self._session = session
         self._publishers: dict[str, zenoh.Publisher] = {}
+        """Whoever was sent to last is the last."""
         self._undeclare: list[Callable[[], None]] = []
 
     @classmethod
@@ -98,14 +101,16 @@ class Bus:
 
     def publish(self, key: str, payload: bytes, attachment: bytes | None = None) -> None:
         """Send a message; it is dropped where a receiver is too slow or nobody is there."""
-        publisher = self._publishers.get(key)
+        publisher = self._publishers.pop(key, None)
         if publisher is None:
+            if len(self._publishers) >= _PUBLISHERS:
+                self._publishers.pop(next(iter(self._publishers))).undeclare()
             publisher = self._session.declare_publisher(
                 key,
                 congestion_control=zenoh.CongestionControl.DROP,
                 priority=zenoh.Priority.DATA,  # one priority for all: a camera's messages stay in order
             )
-            self._publishers[key] = publisher
+        self._publishers[key] = publisher
         publisher.put(payload, attachment=attachment)
 
     def subscribe(self, key: str, handler: Callable[[Message], None]) -> Inbox[Message]:

@@ -77,6 +77,18 @@ class Config(BaseSettings):
         return self
 
     @model_validator(mode="after")
+    def _nobody_is_settled_untold(self) -> Self:
+        identity = self.view.identity
+        least = identity.told_after + 2 * identity.regroup
+        if identity.settled_after < least:
+            raise ValueError(
+                f"view.identity.settled_after: is {identity.settled_after} frames but must be "
+                f"at least {least} (told_after + 2 * regroup), "
+                "so that whoever is settled has been told to be somebody"
+            )
+        return self
+
+    @model_validator(mode="after")
     def _streams_can_be_of_this_codec(self) -> Self:
         for place, wanted in (("record.folder", self.record.folder), ("sound.source", self.sound.source)):
             if self.encode.codec == "vp8" and wanted is not None:

@@ -86,6 +86,26 @@ async def test_messages_of_one_session_stay_in_order(settings: Zenoh) -> None:
     router.close()
 
 
+async def test_however_many_keys_there_were_few_are_kept_and_all_messages_come(settings: Zenoh) -> None:
+    router, client = Bus.router(settings), Bus.client(settings)
+    heard, there = Heard(), Presence()
+    router.subscribe("thumbs/**", heard.queue.put_nowait)
+    client.watch_alive("router", there.note)
+    router.declare_alive("router")
+    await there.until("router")
+    keys = [f"thumbs/{number}" for number in range(200)]
+    for key in keys:
+        client.publish(key, b"jpeg")
+        client.publish("thumbs/often", b"jpeg")
+        await asyncio.sleep(0)
+    got = [(await heard.next()).key for _ in range(400)]
+    assert [key for key in got if key != "thumbs/often"] == keys
+    assert len(client._publishers) <= 64
+    assert list(client._publishers)[-2:] == ["thumbs/199", "thumbs/often"]
+    client.close()
+    router.close()
+
+
 async def test_a_client_may_come_before_the_router_and_survives_its_restart(settings: Zenoh) -> None:
     client = Bus.client(settings)
     there = Presence()

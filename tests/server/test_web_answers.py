@@ -6,8 +6,8 @@ import asyncio
 import re
 
 import pytest
-from cameras_by_hand import status
-from halls import A, Hall
+from cameras_by_hand import status, tracks, word
+from halls import A, B, Hall
 
 from server.web.app import make_app
 
@@ -178,6 +178,9 @@ async def test_the_page_and_its_files_are_served(hall: Hall) -> None:
 
 async def test_metrics_count_what_happens(busy: Hall) -> None:
     busy.service.intake.status(status(A, missed=3, shed=2, clock_offset=0.25))
+    busy.service.intake.tracks(tracks(word(A, 3, {}, alone=[15, 17])))
+    busy.service.intake.tracks(tracks(word(B, 3, {})))
+    busy.service.decide()
     async with busy.session.get("/metrics") as answer:
         lines = (await answer.text()).splitlines()
     assert "myview_pulse 14.0" in lines
@@ -185,4 +188,6 @@ async def test_metrics_count_what_happens(busy: Hall) -> None:
     assert 'myview_camera_frames_total{camera="c0"} 15.0' in lines
     assert 'myview_camera_missed_total{camera="c0"} 3.0' in lines
     assert 'myview_camera_live{camera="c1"} 1.0' in lines
+    assert 'myview_camera_unheard_total{camera="c0"} 2.0' in lines
+    assert 'myview_camera_unheard_total{camera="c1"} 0.0' in lines
     assert 'myview_camera_clock_offset_seconds{camera="c0"} 0.25' in lines
