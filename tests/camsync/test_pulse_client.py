@@ -70,7 +70,7 @@ async def counted(client: PulseClient, number: int) -> None:
 
 async def test_clients_that_are_expected_all_get_every_pulse_from_the_first_on() -> None:
     names = ["c0", "c1", "bestview"]
-    patient = ClientSettings(own_after=PATIENCE)
+    patient = ClientSettings(own_after=PATIENCE, queue=200)
     async with PulseServer(FPS, expect=names, limits=ServerLimits(catch_up=PATIENCE)) as server:
         clients = [PulseClient("127.0.0.1", server.port, name, settings=patient) for name in names]
         heard = await asyncio.gather(*(take(client, 100) for client in clients))
