@@ -104,7 +104,7 @@ class Bus:
         publisher = self._publishers.pop(key, None)
         if publisher is None:
             if len(self._publishers) >= _PUBLISHERS:
-                self._publishers.pop(next(iter(self._publishers))).undeclare()
+                self._publishers.pop(next(iter(self._publishers))).undeclare()  # type: ignore[no-untyped-call]
             publisher = self._session.declare_publisher(
                 key,
                 congestion_control=zenoh.CongestionControl.DROP,
