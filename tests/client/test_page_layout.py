@@ -50,6 +50,19 @@ async def test_nothing_needs_scrolling_sideways(
         assert stage["width"] / stage["height"] == pytest.approx(WIDTH / HEIGHT, rel=0.01)
 
 
+@pytest.mark.parametrize("shown", ["#tiles", "#why table"])
+async def test_at_a_desk_all_is_seen_without_scrolling(browser: Browser, shown: str) -> None:
+    async with visiting(browser, width=1600, height=900) as visit:
+        await visit.playing(1)
+        if shown == "#tiles":
+            await visit.page.get_by_role("button", name="Person 2 beside the large picture").click()
+        else:
+            await visit.page.keyboard.press("w")
+        await expect(visit.page.locator(shown)).to_be_visible()
+        for part in ("#stage", shown, "#pause", "#strip", ".legend"):
+            await expect(visit.page.locator(part)).to_be_in_viewport(ratio=1)
+
+
 @pytest.mark.parametrize("width", [360, 1600])
 async def test_nothing_jumps_from_opening_to_switching(browser: Browser, width: int) -> None:
     async with visiting(browser, width=width) as visit:
