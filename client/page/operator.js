@@ -7,6 +7,7 @@ import { learnNames } from './names.js';
 import { ChoosingForm } from './operator_choosing.js';
 import { Configuration } from './operator_config.js';
 import { FloorPlan } from './operator_floor.js';
+import { Downloads } from './operator_downloads.js';
 import { ask, Refused } from './operator_http.js';
 import { element } from './operator_parts.js';
 import { KnownPeople } from './operator_people.js';
@@ -65,6 +66,8 @@ function build(site) {
   sections.set('floor', floor);
   const known = new KnownPeople(site, tell);
   sections.set('known', known);
+  const downloads = new Downloads(site);
+  sections.set('downloads', downloads);
   sections.set('choosing', new ChoosingForm(tell));
   sections.set('configuration', new Configuration(tell));
   new ServerEvents({
@@ -75,6 +78,7 @@ function build(site) {
       if (name === 'objects') {
         learnNames(data.objects);
         known.show(data.objects);
+        downloads.show(data.objects);
       }
     },
   });

@@ -18,7 +18,7 @@ from server.web.cors import preflight
 from server.web.events import Events
 from server.web.keys import EVENTS, METRICS, PICTURES, READERS, SERVICE
 from server.web.metrics import registry
-from server.web.operator_permission import PERMISSION, Permission, operators_only
+from server.web.operator_permission import PERMISSION, Permission, operators_only, tell_no_other_origin
 from server.web.queries import refuse_what_is_not_there
 from server.web.readers import Readers
 from server.web.share import to_the_right_service
@@ -73,6 +73,7 @@ def make_app(service: BestViewService) -> web.Application:
     app[PERMISSION] = Permission(service.config.http.operator_token)
     for module in (api, video, past, hls, pictures, openapi, page, operator_routes):
         app.add_routes(module.routes)
+    app.on_response_prepare.append(tell_no_other_origin)
     app.cleanup_ctx.append(_telling)
     app.on_shutdown.append(_end_streams)
     return app

@@ -11,7 +11,7 @@ from typing import Any
 import msgspec
 from aiohttp import web
 
-from server.web.operator_schema import OPERATOR
+from server.web.operator_schema import OPERATOR, OPERATOR_FILES
 from server.web.queries import HELD, OVERLAY, PAST
 from server.web.schema import Cameras, Choice, Objects, Past, Problem, SiteInfo
 
@@ -51,10 +51,12 @@ _OTHER = {
     "/healthz": "text/plain",
     "/readyz": "text/plain",
     "/metrics": "text/plain",
+    **OPERATOR_FILES,
 }
 _UNAVAILABLE = {"/objects/{object}/best.mp4", "/cameras/{camera}/live.mp4", "/readyz"} | {
     path for path in _OTHER if path.endswith((".webm", ".ts", ".m3u8", ".mjpeg", "best.jpg", "live.jpg"))
 }
+_FROM_IS_NEEDED = {"/api/past", *OPERATOR_FILES}
 _MOMENT = {"type": "string", "examples": ["-60", "p1250", "2026-11-21T16:13:36Z"]}
 _SCHEMAS: dict[str, Any] = {
     "object": {"type": "integer", "minimum": 0},
@@ -106,7 +108,7 @@ def _operation(path: str, summary: str) -> dict[str, Any]:
         responses["404"] = {"description": "There is none of this name.", "content": error}
     if path in OVERLAY | PAST | HELD or path.endswith("/choice"):
         responses["400"] = {"description": "The query asks for what there is not.", "content": error}
-    if path in OPERATOR:
+    if path in OPERATOR or path in OPERATOR_FILES:
         responses["403"] = {"description": "Only the operator may.", "content": error}
     if path in PAST - {"/api/past"}:
         responses["416"] = {"description": "Nothing is kept of that time.", "content": error}
@@ -115,12 +117,17 @@ def _operation(path: str, summary: str) -> dict[str, Any]:
     parameters = [{"name": name, "in": "path", "required": True, "schema": _SCHEMAS[name]} for name in names]
     queries = ["prefer"] * (path in HELD)
     queries += ["overlay"] * (path in OVERLAY) + ["fps"] * path.endswith(".mjpeg")
-    queries += ["from", "to"] * (path in PAST) + ["at"] * path.endswith("/choice")
+    queries += ["from", "to"] * (path in PAST or path in OPERATOR_FILES) + ["at"] * path.endswith("/choice")
     queries += ["_HLS_msn", "_HLS_part"] * path.endswith(".m3u8")
     if path in HELD:
         parameters.append({"name": "camera", "in": "query", "required": False, "schema": _SCHEMAS["held"]})
     parameters += [
-        {"name": it, "in": "query", "required": (path, it) == ("/api/past", "from"), "schema": _SCHEMAS[it]}
+        {
+            "name": it,
+            "in": "query",
+            "required": path in _FROM_IS_NEEDED and it == "from",
+            "schema": _SCHEMAS[it],
+        }
         for it in queries
     ]
     return {"summary": summary.splitlines()[0], "parameters": parameters, "responses": responses}

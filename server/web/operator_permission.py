@@ -135,14 +135,24 @@ PERMISSION = web.AppKey("permission", Permission)
 
 @web.middleware
 async def operators_only(request: web.Request, handler: Handler) -> web.StreamResponse:
-    """Let nobody else to the operator's addresses; and tell pages of other origins nothing of them."""
+    """Let nobody else to the operator's addresses."""
+    path = _path(request)
+    return (_refused(request, path) if _is_theirs(path) else None) or await handler(request)
+
+
+async def tell_no_other_origin(request: web.Request, response: web.StreamResponse) -> None:
+    """Take back that pages of other origins may read an answer, before any of it is sent."""
+    if _is_theirs(_path(request)):
+        response.headers.popall("Access-Control-Allow-Origin", None)
+
+
+def _path(request: web.Request) -> str:
     resource = request.match_info.route.resource
-    path = request.path if resource is None else resource.canonical
-    if not (path == PREFIX or path.startswith(f"{PREFIX}/")):
-        return await handler(request)
-    response = _refused(request, path) or await handler(request)
-    response.headers.popall("Access-Control-Allow-Origin", None)
-    return response
+    return request.path if resource is None else resource.canonical
+
+
+def _is_theirs(path: str) -> bool:
+    return path == PREFIX or path.startswith(f"{PREFIX}/")
 
 
 def _refused(request: web.Request, path: str) -> web.Response | None:

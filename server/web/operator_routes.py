@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from server.web import operator_cameras, operator_people, operator_session, operator_settings
+from server.web import operator_cameras, operator_past, operator_people, operator_session, operator_settings
 
 routes = [
     *operator_session.routes,
     *operator_cameras.routes,
     *operator_settings.routes,
     *operator_people.routes,
+    *operator_past.routes,
 ]

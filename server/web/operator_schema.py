@@ -152,3 +152,6 @@ OPERATOR: dict[str, type[msgspec.Struct]] = {
     "/api/operator/choosing": Choosing,
 }
 """What GET of each address answers; what changes something answers with the same, as it is then."""
+
+OPERATOR_FILES = {"/api/operator/tracks.csv": "text/csv", "/api/operator/choices.csv": "text/csv"}
+"""What is given of a time span, from= and to=."""

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
+import time
 from collections.abc import AsyncIterator
 from contextlib import aclosing, asynccontextmanager
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +23,7 @@ from server.wire.messages import Keys
 
 PAGE = Path(__file__).parents[2] / "client" / "page"
 AXE = PAGE.parents[1] / "node_modules/axe-core/axe.min.js"
-SECTIONS = ["cameras", "floor", "known", "choosing", "configuration"]
+SECTIONS = ["cameras", "floor", "known", "downloads", "choosing", "configuration"]
 PLAN = [[0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 1.0]]
 """Of a camera that looks straight down: ten pixels are one unit of the floor."""
 TOKEN = "a token of theirs"  # noqa: S105 — of a test
@@ -159,6 +161,29 @@ async def test_people_are_named_merged_and_parted_and_the_viewers_page_says_so(b
         await page.goto(f"http://127.0.0.1:{hall.port}/?object={first}")
         await expect(page.locator("#people .number").first).to_have_text(f"{first} Ann")
         await expect(page).to_have_title(f"Person {first}, Ann · MyView")
+
+
+async def test_a_span_of_the_past_is_downloaded(browser: Browser) -> None:
+    async with operating(browser, "#downloads") as (hall, page):
+        end = int(time.time())
+        hall.service.pulse0 = end - 0.2  # five frames before
+        see(hall)
+        for label, moment in (("From", end - 60), ("to", end)):
+            local = datetime.fromtimestamp(moment)  # noqa: DTZ006 — as the page shows it
+            await page.get_by_label(label, exact=True).fill(local.isoformat())
+        await expect(page.get_by_role("link", name="Person 1")).to_be_visible()
+        async with page.expect_download() as download:
+            await page.get_by_role("link", name="Tracks (CSV)").click()
+        tracks = (await (await download.value).path()).read_text(encoding="utf-8").splitlines()
+        assert len(tracks) == 1 + 3 * 5
+        assert (await download.value).suggested_filename.startswith("hall-tracks-p0-")
+        async with page.expect_download() as download:
+            await page.get_by_role("link", name=A, exact=True).click()
+        assert (await download.value).suggested_filename.endswith(".mp4")
+        assert b"moof" in (await (await download.value).path()).read_bytes()
+        await page.get_by_label("From").fill("2020-01-02T00:00:00")
+        await page.get_by_label("to", exact=True).fill("2020-01-01T00:00:00")
+        await expect(page.locator("#download-tables")).to_have_text("The end is not after the beginning.")
 
 
 async def test_what_is_tried_out_holds_and_the_file_can_be_had_back(browser: Browser) -> None:
