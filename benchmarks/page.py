@@ -1,10 +1,11 @@
 """The page on the demo: from a click to the new person's first frame, and what a visit costs the browser.
 
     python -m benchmarks.page --out out/bench
+    python -m benchmarks.page --part hours
 
 A switch is a press on another person's card. It is over when the first frame of their best view has been
 shown, by the browser's own clock. Memory is the JavaScript heap after a collection, and what the player keeps
-buffered.
+buffered. ``--part hours`` plays eight hours of a small site in a quarter of an hour.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from playwright.async_api import CDPSession, Page
 
+from benchmarks import page_hours
 from benchmarks.browser import check_chromium, chromium
 from benchmarks.picture import demo
 from benchmarks.report import Report
@@ -160,12 +162,19 @@ async def run(options: argparse.Namespace) -> Visit:
 def main() -> None:
     """Run the benchmark."""
     options = parser(__doc__, "page")
+    options.add_argument("--part", choices=("visit", "hours"), default="visit")
+    options.add_argument("--hours", type=float, default=8.0, help="that are played, of --part hours")
+    options.add_argument("--speed", type=float, default=33.0, help="how many times as fast")
     options.add_argument("--switches", type=int, default=50)
     options.add_argument("--minutes", type=float, default=2.0, help="of watching after them")
     try:
         check_chromium()
         chosen = options.parse_args()
         report = Report()
+        if chosen.part == "hours":
+            page_hours.run(report, chosen.hours, chosen.speed)
+            report.save(chosen.out / "page_hours.txt")
+            return
         it = asyncio.run(run(chosen))
         describe(report, it)
         chosen.out.mkdir(parents=True, exist_ok=True)

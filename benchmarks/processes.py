@@ -79,3 +79,10 @@ def _name(pid: int) -> str:
         return "browser"
     command, *rest = words[words.index("server.run.cli") + 1 :]
     return f"camera {rest[1]}" if command == "camera" else command
+
+
+def running_pids(name: str) -> list[int]:
+    """Give the processes below this one that are called so, such as ``camera c1``."""
+    running = {int(entry.name): _stat(entry) for entry in _PROC.iterdir() if entry.name.isdecimal()}
+    family = _family({pid: stat for pid, stat in running.items() if stat})
+    return [pid for pid in sorted(family) if _name(pid) == name]
