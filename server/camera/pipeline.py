@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from server.camera.ahead import ready_detector
 from server.camera.encode import AccessUnit, Encoder
-from server.camera.observe import make_detector
 from server.camera.own import Passing, open_own
 from server.camera.report import Reporter
 from server.camera.sharpness import Sharpness
@@ -69,7 +69,7 @@ class CameraPipeline:
         self.source: Source = own.source or open_source(camera, site, listener)
         self._fit = Fit(self.source.size, (site.width, site.height))
         self._encoder = Passing(own.source) if own.source else Encoder(site, config.encode)
-        self._detector = make_detector(config, camera, self._fit)
+        self._detector = ready_detector(config, camera, self.source, self._fit)
         window = config.track.window
         self._tracker = OnlineTracker(window, config.track.costs, solver_named(config.track.solver))
         self._reporter = Reporter(camera_id, boot, self.source.size, window.stride)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from server.camera.observe import make_detector
+from server.camera.ahead import ready_detector
 from server.camera.sources import Image, Source, SourceEnded, open_source
 from server.run.setup import config_for_videos
 from server.wire.config import Config
@@ -82,7 +82,7 @@ def _from_video(config: Config) -> Iterator[tuple[int, Detections]]:
     camera = config.cameras[0]
     source = open_source(camera, config.site)
     fit = Fit(source.size, (config.site.width, config.site.height))
-    detector = make_detector(config, camera, fit)
+    detector = ready_detector(config, camera, source, fit)
     for number, image in pictures(source):
         if image is not None:
             found = detector.detect(fit.image(image), number)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -23,6 +25,8 @@ from server.wire.sections import Site
 
 FRAMES = 48
 STRIDE = 5
+LIVE = {"ahead_frames": 0}
+"""The scene is learned as it goes."""
 
 
 @pytest.fixture(scope="module")
@@ -33,8 +37,9 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-def config_of(recording: Path, **camera: Any) -> Config:
+def config_of(recording: Path, *, detect: Mapping[str, Any] = MappingProxyType({}), **camera: Any) -> Config:
     content = {
+        "detect": dict(detect),
         "site": {"fps": 25, "width": 192, "height": 108},
         "cameras": [{"id": "c0", "source": str(recording / "c0.mp4"), **camera}],
     }
@@ -87,7 +92,8 @@ def test_epochs_follow_one_another_and_the_last_closes_the_recording(recording: 
 
 
 def test_an_offset_moves_everything_by_so_many_pulses(recording: Path) -> None:
-    plain, moved = offline(config_of(recording)), offline(config_of(recording, offset=2 * STRIDE))
+    # Not ahead: who is there in the very first frame has no window of frames before it, moved they have.
+    plain, moved = (offline(config_of(recording, offset=it, detect=LIVE)) for it in (0, 2 * STRIDE))
     boxes = [_boxes(batches) for batches in (plain, moved)]
     assert boxes[1] == {(pulse + 2 * STRIDE, track): box for (pulse, track), box in boxes[0].items()}
     assert [unit.pulse for batch in moved for unit in batch.units] == list(range(10, FRAMES + 10))
@@ -103,6 +109,16 @@ def _boxes(batches: list[Batch]) -> dict[tuple[int, int], Box]:
         for place, box in enumerate(track.boxes)
         if box is not None
     }
+
+
+@pytest.mark.parametrize(("detect", "first"), [({}, 0), (LIVE, 24)], ids=["recording", "as if live"])
+def test_people_in_a_recording_are_looked_for_from_its_first_frame_on(
+    recording: Path, detect: dict[str, Any], first: int
+) -> None:
+    pipeline = CameraPipeline(config_of(recording, detect=detect), "c0")
+    looked = [pipeline.search(pulse, pipeline.take(pulse)).looked for pulse in range(30)]
+    pipeline.close()
+    assert looked == [pulse >= first for pulse in range(30)]
 
 
 def test_frames_that_were_missed_are_reported_once_and_begin_a_new_gop_where_they_must(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from contextlib import suppress
 from pathlib import Path
+from typing import Literal
 
 import av
 import cv2
@@ -73,6 +74,27 @@ def test_a_repeated_recording_shows_the_very_frame_whatever_pulses_were_missed(
         index = pulse - offset
         assert shown(recording, pulse) == (None if index < 0 else index % FRAMES)
     recording.close()
+
+
+@pytest.mark.parametrize("at_end", ["stop", "loop"])
+@pytest.mark.parametrize("offset", [0, 3, -20])
+def test_looking_ahead_shows_the_recording_s_own_frames_and_moves_nothing(
+    video: str, offset: int, at_end: Literal["stop", "loop"]
+) -> None:
+    source = Recording(video, offset, at_end)
+    assert [frame_in(picture) for picture in source.ahead(range(0, 500, 7))] == [0, 7, 14, 21]
+    first = max(offset, 0)
+    assert shown(source, first) == first - offset
+    source.close()
+
+
+def test_looking_ahead_in_a_folder_leaves_out_what_cannot_be_read(folder: Path, tmp_path: Path) -> None:
+    for file in folder.iterdir():
+        (tmp_path / file.name).write_bytes(file.read_bytes())
+    (tmp_path / "002.png").write_text("no image")
+    source = Folder(str(tmp_path), 2, "loop")
+    assert [frame_in(picture) for picture in source.ahead(range(0, 500, 2))] == [0, 4]
+    assert shown(source, 2) == 0
 
 
 def test_a_skip_to_beyond_the_end_is_the_end(video: str) -> None:

@@ -54,6 +54,26 @@ def test_somebody_who_stands_still_is_not_absorbed() -> None:
     assert np.mean([best_overlap(seen[frame], arrived[1], frame) >= 0.5 for frame in range(110, 200)]) > 0.95
 
 
+def test_who_is_in_a_recording_s_first_frame_is_found_there_and_leaves_no_ghost() -> None:
+    walker = Figure(10, 200, speed=2.0, begin=0)
+    detector = BackgroundDetector()
+    assert detector.blind
+    detector.prepare([picture([walker], frame) for frame in range(0, 160, 20)], every=20)
+    seen = watched(detector, [walker], range(100))
+    assert not detector.blind
+    assert np.mean([best_overlap(seen[frame], walker, frame) >= 0.5 for frame in range(100)]) >= 0.95
+    left = [(seen[frame].scores >= SURE) & (seen[frame].boxes[:, 2] < 40.0) for frame in range(60, 100)]
+    assert not any(ghosts.any() for ghosts in left)
+
+
+def test_what_a_recording_shows_ahead_is_learned_and_forgotten_when_the_light_changes() -> None:
+    detector = BackgroundDetector()
+    detector.prepare([picture([], frame) for frame in range(3)], every=1)
+    upside_down = [np.ascontiguousarray(picture([], frame)[::-1]) for frame in range(120)]
+    seen = [detector.detect(image) for image in upside_down]
+    assert (seen[-1].scores < SURE).all()
+
+
 def test_the_ghost_of_somebody_who_was_there_from_the_start_vanishes() -> None:
     leaves = Figure(150, 200, end=60)
     detector = BackgroundDetector()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal, Protocol
 
@@ -35,6 +36,8 @@ class BackgroundSettings:
     model: Literal["median", "mog2"] = "median"  # how the background is learned
     work_width: int = 360  # pixels; wider pictures are made smaller first
     bins: int = 64  # bins of the grey histograms
+    ahead_frames: int = 500  # of a recording, seen before the first is searched; 0: none
+    ahead_every: int = 20  # of these, one in so many is looked at
     ignore: tuple[tuple[tuple[float, float], ...], ...] = ()  # polygons of (x, y) in pixels to ignore
     outside: float = 0.25  # people may be out of the picture by this share of the picture's height
     looks: LooksSettings = field(default_factory=LooksSettings)
@@ -91,6 +94,28 @@ class BackgroundDetector:
         self._band: Band | None = None
         self.blind = True
         """Whether the last frame could not be searched, since the background was not known."""
+
+    def prepare(self, images: Sequence[Image], every: int) -> None:
+        """Learn the empty scene and how tall people look from frames of a recording, before its first one.
+
+        Args:
+            images: people may come and go in them.
+            every: how many frames each of them stands for.
+
+        Raises:
+            ValueError: not `(H, W, 3)` uint8 pictures of one size.
+        """
+        background = self._background
+        if not isinstance(background, MedianBackground):
+            return
+        small = [self._grid_of(image).shrunk(image) for image in images]
+        background.prepare(small)
+        for image in small:
+            split = background.glance(image)
+            if split is not None and self._grid is not None:
+                self._learner.watch(
+                    _cleaned(split.foreground & self._grid.visible), self._grid.visible, every
+                )
 
     def detect(self, image: Image, frame: int | None = None) -> Detections:  # noqa: ARG002 — Detector
         """Give the hypotheses of the next frame; none while the background is not known yet.

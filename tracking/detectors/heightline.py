@@ -81,14 +81,17 @@ class HeightLineLearner:
         self._seen = 0
         self.line: HeightLine | None = None
 
-    def watch(self, foreground: Mask, visible: Mask) -> None:
-        """Look at one frame's foreground `(H, W)`; `visible` is 0 where the picture is ignored."""
+    def watch(self, foreground: Mask, visible: Mask, frames: int = 1) -> None:
+        """Look at one frame's foreground `(H, W)`; `visible` is 0 where the picture is ignored.
+
+        It stands for so many `frames` in a row.
+        """
         self._frames += 1
         if not self._settings.use or self._frames % self._settings.sample_every:
             return
         for foot, height in isolated_people(foreground, visible):
-            self._samples.append((foot, height))
-            self._seen += 1
+            self._samples.extend([(foot, height)] * frames)
+            self._seen += frames
         # Refit when the samples have grown by a tenth: early often, later seldom.
         if len(self._samples) >= self._settings.least_samples and self._seen >= 1.1 * self._fitted_on:
             self._fitted_on = self._seen

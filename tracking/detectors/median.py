@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -46,22 +47,28 @@ class MedianBackground:
         self._last: tuple[Image, npt.NDArray[np.float64]] | None = None
         """The frame last seen, and its gains."""
 
+    def prepare(self, images: Sequence[Image]) -> None:
+        """Take the background from pictures seen before the first frame; without any, learn it as it goes."""
+        for image in images:
+            self._sample(image)
+        if self._samples:
+            self._take_median()
+            self._frames, self._samples = self._settings.bootstrap_frames, []
+
+    def glance(self, image: Image) -> Split | None:
+        """Tell foreground from shadow and background in a picture that is not the next frame."""
+        return None if self._rounded is None else self._compared(image, self._rounded)[0]
+
     def split(self, image: Image) -> Split | None:
         """Tell foreground from shadow and background; `None` while the background is not known yet."""
         self._bootstrap(image)
         self._frames += 1
         if self._rounded is None:
             return None
-        gains = channel_gains(image, self._rounded)
+        split, gains = self._compared(image, self._rounded)
         self._last = image, gains
-        expected = scaled(self._rounded, gains)
-        blue, green, red = cv2.split(cv2.absdiff(image, expected))
-        difference = cv2.max(cv2.max(blue, green), red)
-        _, binary = cv2.threshold(difference, self._settings.threshold, 255, cv2.THRESH_BINARY)
-        mask = np.asarray(binary, dtype=np.uint8)
-        self._watch_for_new_light(mask)
-        shadow = shadow_mask(image, expected, mask, self._shadows)
-        return Split(mask & ~shadow, shadow)
+        self._watch_for_new_light(split.foreground | split.shadow)
+        return split
 
     def learn(self, foreground: Mask, occupied: Mask) -> None:
         """Update the background with the frame last seen, except where somebody is.
@@ -87,6 +94,17 @@ class MedianBackground:
             return
         self._rounded = np.rint(self._exact).astype(np.uint8)
 
+    def _compared(self, image: Image, background: Image) -> tuple[Split, npt.NDArray[np.float64]]:
+        """Give what differs from the background at the picture's gains, and the gains."""
+        gains = channel_gains(image, background)
+        expected = scaled(background, gains)
+        blue, green, red = cv2.split(cv2.absdiff(image, expected))
+        difference = cv2.max(cv2.max(blue, green), red)
+        _, binary = cv2.threshold(difference, self._settings.threshold, 255, cv2.THRESH_BINARY)
+        mask = np.asarray(binary, dtype=np.uint8)
+        shadow = shadow_mask(image, expected, mask, self._shadows)
+        return Split(mask & ~shadow, shadow), gains
+
     def _bootstrap(self, image: Image) -> None:
         settings = self._settings
         if self._frames >= settings.bootstrap_frames:
@@ -94,15 +112,21 @@ class MedianBackground:
         # Spread the samples evenly, the last one on the last frame.
         taken = (self._frames + 1) * settings.samples // settings.bootstrap_frames
         if taken > self._frames * settings.samples // settings.bootstrap_frames:
-            first = self._samples[0] if self._samples else image
-            self._samples.append(scaled(image, 1.0 / channel_gains(image, first)))
+            self._sample(image)
         done = self._frames + 1
         if done in {(settings.bootstrap_frames + 1) // 2, settings.bootstrap_frames} and self._samples:
-            ordered = np.sort(np.stack(self._samples), axis=0)
-            self._rounded = np.asarray(ordered[len(ordered) // 2], dtype=np.uint8)
-            self._exact = self._rounded.astype(np.float32)
+            self._take_median()
         if done == settings.bootstrap_frames:
             self._samples = []
+
+    def _sample(self, image: Image) -> None:
+        first = self._samples[0] if self._samples else image
+        self._samples.append(scaled(image, 1.0 / channel_gains(image, first)))
+
+    def _take_median(self) -> None:
+        ordered = np.sort(np.stack(self._samples), axis=0)
+        self._rounded = np.asarray(ordered[len(ordered) // 2], dtype=np.uint8)
+        self._exact = self._rounded.astype(np.float32)
 
     def _watch_for_new_light(self, mask: Mask) -> None:
         flooded = cv2.countNonZero(mask) > self._settings.restart_share * mask.size

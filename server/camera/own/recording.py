@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Literal
 
@@ -15,6 +15,7 @@ from server.camera.own.fitting import Fitting, MisfitError, Wanted
 from server.camera.own.passing import Unit
 from server.camera.sources.base import Image, SourceEnded
 from server.camera.sources.opening import Opened, bgr, open_video
+from server.camera.sources.recording import frames_at
 from server.wire.errors import UserError
 
 
@@ -54,6 +55,10 @@ class OwnRecording:
         while self._next <= index:
             self._read()
         return None if self.taken is None else self.taken.image
+
+    def ahead(self, places: Sequence[int]) -> Iterator[Image]:
+        """Decode the frames at some places, from the file opened once more."""
+        return frames_at(self._path, places)
 
     def close(self) -> None:
         """Close the file."""

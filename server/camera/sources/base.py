@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from typing import Protocol
 
 import numpy as np
@@ -28,6 +29,13 @@ class Source(Protocol):
 
         Raises:
             SourceEnded: the recording is over.
+        """
+        ...
+
+    def ahead(self, places: Sequence[int]) -> Iterator[Image]:
+        """Give the pictures at some places of a recording, counted from its beginning, by rising place.
+
+        What is played stays where it is. Fewer where the recording is shorter; none of what is no recording.
         """
         ...
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Literal
 
@@ -49,6 +50,11 @@ class Folder:
         if image is not None:
             self._newest = image
         return self._newest
+
+    def ahead(self, places: Sequence[int]) -> Iterator[Image]:
+        """Read some of the images; one that cannot be read is left out."""
+        images = (_read(self._files[place]) for place in places if place < len(self._files))
+        return (image for image in images if image is not None)
 
     def close(self) -> None:
         """Nothing is held open."""

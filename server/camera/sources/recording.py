@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Literal
 
@@ -57,6 +58,10 @@ class Recording:
                 raise
             return self._forward(self._place(index))
 
+    def ahead(self, places: Sequence[int]) -> Iterator[Image]:
+        """Decode the frames at some places, from the file opened once more."""
+        return frames_at(self._path, places)
+
     def _place(self, index: int) -> int:
         """Give the frame that stands at ``index`` of a recording that repeats, rewound if need be."""
         if not self._loop or not self._length:
@@ -87,3 +92,21 @@ class Recording:
     def close(self) -> None:
         """Close the file."""
         self._opened.container.close()
+
+
+def frames_at(path: str, places: Sequence[int]) -> Iterator[Image]:
+    """Give the frames at some places of a file, by rising place; fewer where it is shorter.
+
+    Raises:
+        UserError: it cannot be opened.
+    """
+    recording = Recording(path, offset=0, at_end="stop")
+    try:
+        for place in places:
+            image = recording.take(place)
+            if image is not None:
+                yield image
+    except SourceEnded:
+        return
+    finally:
+        recording.close()

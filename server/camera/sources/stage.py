@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator, Sequence
 from typing import Self
 from urllib.parse import parse_qsl
 
@@ -50,6 +51,10 @@ class Stage:
     def take(self, pulse: int) -> Image | None:
         """Draw the picture of a pulse."""
         return self._scene.image(self._camera, pulse)
+
+    def ahead(self, places: Sequence[int]) -> Iterator[Image]:
+        """Draw the pictures of some pulses."""
+        return (self._scene.image(self._camera, place) for place in places)
 
     @property
     def ground(self) -> list[list[float]]:

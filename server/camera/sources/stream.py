@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import cast
 
 import av
@@ -49,6 +49,10 @@ class Stream:
         with self._lock:
             picture = self._newest if time.monotonic() - self._newest_at < _STALE_S else None
         return None if picture is None else bgr(picture)
+
+    def ahead(self, places: Sequence[int]) -> Iterator[Image]:  # noqa: ARG002 — Source
+        """Give nothing: what a camera will show nobody knows."""
+        return iter(())
 
     def close(self) -> None:
         """Stop reading."""

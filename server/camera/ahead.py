@@ -1,0 +1,25 @@
+"""A recording's scene is learned before its first frame is searched: people are found from the start."""
+
+from __future__ import annotations
+
+from server.camera.observe import Observer, make_detector
+from server.camera.sources import Source
+from server.wire.config import Config
+from server.wire.fit import Fit
+from server.wire.sections import Camera
+from tracking.detectors import BackgroundDetector
+
+
+def ready_detector(config: Config, camera: Camera, source: Source, fit: Fit) -> Observer:
+    """Give a camera's detector, ready for the first frame where the source is a recording.
+
+    A live camera's learns as it goes.
+
+    Raises:
+        UserError: the detector's files or the recording cannot be read.
+    """
+    detector, settings = make_detector(config, camera, fit), config.detect
+    if isinstance(detector, BackgroundDetector):
+        places = range(0, settings.ahead_frames, settings.ahead_every)
+        detector.prepare([fit.image(image) for image in source.ahead(places)], settings.ahead_every)
+    return detector
