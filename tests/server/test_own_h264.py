@@ -21,6 +21,7 @@ from av.video.stream import VideoStream
 from cameras_by_hand import FPS, GOP, HEIGHT, WIDTH, encoded, small_config
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from rtsp_by_hand import RtspCamera
 from videos_by_hand import write_video
 
 from server.camera.encode import AccessUnit, Encoder
@@ -304,21 +305,30 @@ class NetworkCamera:
         self._thread.start()
         self.url = f"http://127.0.0.1:{self._server.server_address[1]}/live.ts"
 
-    def until_some_wait(self, source: OwnStream) -> None:
-        """Let more come until there is enough for a pulse, wherever in a GOP that is."""
-        end = time.monotonic() + PATIENCE_S
-        while (waiting := len(source._waiting._units)) < GOP + 2:
-            self.let += 1
-            while len(source._waiting._units) <= waiting:
-                assert time.monotonic() < end, "nothing comes"
-                time.sleep(0.002)
-
     def close(self) -> None:
         self._stop.set()
         if self._thread.is_alive():
             self._server.shutdown()
             self._thread.join()
             self._server.server_close()
+
+
+def until_some_wait(camera: NetworkCamera | RtspCamera, source: OwnStream) -> None:
+    """Let more come until there is enough for a pulse, wherever in a GOP that is."""
+    end = time.monotonic() + PATIENCE_S
+    while (waiting := len(source._waiting._units)) < GOP + 2:
+        camera.let += 1
+        while len(source._waiting._units) <= waiting:
+            assert time.monotonic() < end, "nothing comes"
+            time.sleep(0.002)
+
+
+@pytest.fixture
+def rtsp() -> Iterator[RtspCamera]:
+    units = encoded(0, 1000)
+    camera = RtspCamera([units[first : first + GOP] for first in range(0, 1000, GOP)], FPS)
+    yield camera
+    camera.close()
 
 
 @pytest.fixture
@@ -332,7 +342,11 @@ def network() -> Iterator[NetworkCamera]:
     camera.close()
 
 
-def test_a_network_camera_passes_too_in_whole_gops_at_the_sites_pulses(network: NetworkCamera) -> None:
+@pytest.mark.parametrize("kind", ["network", "rtsp"])
+def test_a_network_camera_passes_too_in_whole_gops_at_the_sites_pulses(
+    kind: str, request: pytest.FixtureRequest
+) -> None:
+    network = request.getfixturevalue(kind)
     camera = {"options": {"probesize": "20000", "analyzeduration": "200000"}}
     pipeline = CameraPipeline(site(network.url, camera=camera), "c0")
     assert pipeline.passes
@@ -342,7 +356,7 @@ def test_a_network_camera_passes_too_in_whole_gops_at_the_sites_pulses(network: 
     assert not pipeline.away, "it waits for a GOP to begin"
     sent: list[AccessUnit] = []
     for pulse in range(2, 62):
-        network.until_some_wait(source)
+        until_some_wait(network, source)
         image = pipeline.take(pulse)
         if image is not None:
             sent.append(pipeline.encode(pulse, image))
@@ -372,7 +386,7 @@ def test_sound_beside_it_waits_as_long_as_the_pictures(network: NetworkCamera) -
     own = {tuple(nals(unit.data)): unit.pulse for unit in encoded(0, 1000)}
     in_a_row, waited = 0, 0
     for pulse in range(300):
-        network.until_some_wait(source)
+        until_some_wait(network, source)
         listener.at(pulse)
         if source.take(pulse) is None or source.taken is None:
             continue

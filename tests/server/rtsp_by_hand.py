@@ -1,0 +1,122 @@
+"""An RTSP server by hand (RFC 2326): H.264 over RTP (RFC 6184), interleaved with its answers."""
+
+from __future__ import annotations
+
+import base64
+import contextlib
+import socketserver
+import struct
+import threading
+from collections.abc import Iterator, Sequence
+
+from server.camera.encode import AccessUnit
+from server.wire.h264 import NAL_PPS, NAL_SPS, nal_type, nal_units
+
+_PAYLOAD_TYPE = 96
+_MOST = 200
+"""Bytes of a NAL unit in one packet: few, so that small pictures are taken apart, too."""
+_FU_A = 28
+
+
+class RtspCamera:
+    """Serves access units of so many pulses a second, GOP by GOP, as far as it is let; not over UDP."""
+
+    def __init__(self, gops: Sequence[Sequence[AccessUnit]], fps: float) -> None:
+        self.gops, self.fps, self.let = gops, fps, 40
+        self.stop = threading.Event()
+        self._server = _Server(self)
+        self._thread = threading.Thread(target=self._server.serve_forever, args=(0.02,))
+        self._thread.start()
+        self.url = f"rtsp://127.0.0.1:{self._server.server_address[1]}/live"
+
+    def close(self) -> None:
+        """Hang up."""
+        self.stop.set()
+        if self._thread.is_alive():
+            self._server.shutdown()
+            self._thread.join()
+            self._server.server_close()
+
+
+class _Server(socketserver.ThreadingTCPServer):
+    daemon_threads = True
+
+    def __init__(self, camera: RtspCamera) -> None:
+        super().__init__(("127.0.0.1", 0), _Handler)
+        self.camera = camera
+
+
+class _Handler(socketserver.StreamRequestHandler):
+    server: _Server
+
+    def handle(self) -> None:
+        while request := self.rfile.readline().decode():
+            method, address, _ = request.split()
+            self._answer(method, address, dict(iter(self._header, None)))
+            if method == "PLAY":
+                with contextlib.suppress(OSError):
+                    self._play(self.server.camera)
+                return
+
+    def _header(self) -> tuple[str, str] | None:
+        name, colon, value = self.rfile.readline().decode().partition(":")
+        return (name.lower(), value.strip()) if colon else None
+
+    def _answer(self, method: str, address: str, headers: dict[str, str]) -> None:
+        status, told, body = "200 OK", [f"CSeq: {headers['cseq']}"], b""
+        if method == "OPTIONS":
+            told.append("Public: OPTIONS, DESCRIBE, SETUP, PLAY, TEARDOWN")
+        elif method == "DESCRIBE":
+            body = _described(self.server.camera.gops[0][0])
+            told += [f"Content-Base: {address}/", "Content-Type: application/sdp"]
+            told.append(f"Content-Length: {len(body)}")
+        elif "TCP" in headers.get("transport", "TCP"):
+            told += ["Session: 1", "Transport: RTP/AVP/TCP;unicast;interleaved=0-1"]
+        else:
+            status = "461 Unsupported Transport"
+        self.wfile.write("\r\n".join([f"RTSP/1.0 {status}", *told, "", ""]).encode() + body)
+
+    def _play(self, camera: RtspCamera) -> None:
+        number = 0
+        for place, gop in enumerate(camera.gops):
+            while place >= camera.let:
+                if camera.stop.wait(0.002):
+                    return
+            for unit in gop:
+                time = round(unit.pulse * 90_000 / camera.fps)
+                for payload, is_last in _payloads(unit):
+                    kind = _PAYLOAD_TYPE | is_last << 7
+                    packet = struct.pack(">BBHII", 0x80, kind, number % 2**16, time, 1) + payload
+                    self.wfile.write(struct.pack(">cBH", b"$", 0, len(packet)) + packet)
+                    number += 1
+
+
+def _described(key: AccessUnit) -> bytes:
+    sets = [it for it in nal_units(key.data) if nal_type(it) in (NAL_SPS, NAL_PPS)]
+    sprop = ",".join(base64.b64encode(it).decode() for it in sets)
+    lines = [
+        "v=0",
+        "o=- 0 0 IN IP4 127.0.0.1",
+        "s=a camera",
+        "t=0 0",
+        f"m=video 0 RTP/AVP {_PAYLOAD_TYPE}",
+        f"a=rtpmap:{_PAYLOAD_TYPE} H264/90000",
+        f"a=fmtp:{_PAYLOAD_TYPE} packetization-mode=1;sprop-parameter-sets={sprop}",
+        "a=control:video",
+    ]
+    return "\r\n".join([*lines, ""]).encode()
+
+
+def _payloads(unit: AccessUnit) -> Iterator[tuple[bytes, bool]]:
+    """Give what goes into packets, and whether it ends the picture."""
+    units = list(nal_units(unit.data))
+    for place, nal in enumerate(units):
+        ends = place == len(units) - 1
+        if len(nal) <= _MOST:
+            yield nal, ends
+            continue
+        rest = range(1, len(nal), _MOST)
+        for at in rest:
+            begun, done = at == rest[0], at == rest[-1]
+            head = bytes([nal[0] & 0xE0 | _FU_A, begun << 7 | done << 6 | nal[0] & 0x1F])
+            yield head + nal[at : at + _MOST], ends and done
