@@ -10,6 +10,7 @@ import { FloorPlan } from './operator_floor.js';
 import { Downloads } from './operator_downloads.js';
 import { ask, Refused } from './operator_http.js';
 import { element } from './operator_parts.js';
+import { Marks } from './operator_marks.js';
 import { KnownPeople } from './operator_people.js';
 import { Palette } from './palette.js';
 
@@ -68,6 +69,7 @@ function build(site) {
   sections.set('known', known);
   const downloads = new Downloads(site);
   sections.set('downloads', downloads);
+  sections.set('marks', new Marks(site, tell));
   sections.set('choosing', new ChoosingForm(tell));
   sections.set('configuration', new Configuration(tell));
   new ServerEvents({

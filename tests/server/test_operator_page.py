@@ -10,20 +10,23 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import pytest_asyncio
-from cameras_by_hand import CAMERAS, LARGE, SMALL, status
+import yaml
+from cameras_by_hand import CAMERAS, LARGE, SMALL, small_config, status
 from halls import A, B, Hall, opened
 from playwright.async_api import Browser, Page, expect
 
 from benchmarks.browser import CHROMIUM, chromium
 from bestview import IdentityRegistry
+from server.run.calibrate_points import read_points
 from server.web.operator_permission import digest_of
 from server.wire.messages import Keys
 
 PAGE = Path(__file__).parents[2] / "client" / "page"
 AXE = PAGE.parents[1] / "node_modules/axe-core/axe.min.js"
-SECTIONS = ["cameras", "floor", "known", "downloads", "choosing", "configuration"]
+SECTIONS = ["cameras", "floor", "known", "downloads", "marks", "choosing", "configuration"]
 PLAN = [[0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 1.0]]
 """Of a camera that looks straight down: ten pixels are one unit of the floor."""
 TOKEN = "a token of theirs"  # noqa: S105 — of a test
@@ -184,6 +187,63 @@ async def test_a_span_of_the_past_is_downloaded(browser: Browser) -> None:
         await page.get_by_label("From").fill("2020-01-02T00:00:00")
         await page.get_by_label("to", exact=True).fill("2020-01-01T00:00:00")
         await expect(page.locator("#download-tables")).to_have_text("The end is not after the beginning.")
+
+
+async def test_areas_to_ignore_become_lines_of_a_configuration(browser: Browser) -> None:
+    known = [[[0.0, 0.0], [9.0, 0.0], [9.0, 9.0]]]
+    cameras = [{"id": A, "source": "scene:room", "ignore": known}, B]
+    async with operating(browser, "#marks", cameras=cameras) as (hall, page):
+        see(hall)
+        await page.reload()
+        stage, lines = page.locator("#mark-stage"), page.get_by_label("What the marks become")
+        await expect(page.locator("#mark-drawing .area")).to_have_count(2)  # the known one, and one begun
+        box = await stage.bounding_box()
+        assert box is not None
+        for x, y in ((0.25, 0.25), (0.75, 0.25)):
+            await stage.click(position={"x": x * box["width"], "y": y * box["height"]})
+        await page.keyboard.press("Shift+ArrowDown")
+        await page.keyboard.press("ArrowLeft")
+        await page.keyboard.press("Enter")
+        await page.keyboard.press("Enter")
+        await page.keyboard.press("Backspace")
+        written = yaml.safe_load(await lines.input_value())["cameras"][0]
+        site = hall.service.config.site
+        mine = np.array(written["ignore"][1])
+        right, top = 0.75 * site.width, 0.25 * site.height
+        expected = [[0.25 * site.width, top], [right, top], [right - 1, top + 10]]
+        np.testing.assert_allclose(mine, expected, atol=0.2)
+        assert written["ignore"][0] == known[0]
+        small_config(cameras=[{**written, "source": "scene:room"}])
+        await page.get_by_role("button", name="Clear").click()
+        assert "ignore: []" in await lines.input_value()
+
+
+async def test_places_on_the_floor_become_a_file_that_calibrate_takes(
+    browser: Browser, tmp_path: Path
+) -> None:
+    async with operating(browser, "#marks") as (hall, page):
+        see(hall)
+        await page.reload()
+        await page.get_by_label("Camera", exact=True).select_option(B)
+        await page.get_by_role("button", name="Places on the floor").click()
+        stage = page.locator("#mark-stage")
+        box = await stage.bounding_box()
+        assert box is not None
+        for pair, (x, y) in enumerate(((0.1, 0.9), (0.9, 0.9), (0.9, 0.5), (0.1, 0.5)), 1):
+            await stage.click(position={"x": x * box["width"], "y": y * box["height"]})
+            await page.get_by_label(f"Pair {pair}, x on the floor").fill(str(10 * x))
+            if pair == 4:
+                await expect(page.locator("#mark-said")).to_contain_text("1 of 4 pairs have no place")
+            await page.get_by_label(f"Pair {pair}, y on the floor").fill(str(-10 * y))
+        await expect(page.locator("#mark-said")).to_be_empty()
+        async with page.expect_download() as download:
+            await page.get_by_role("button", name="Download the points").click()
+        await (await download.value).save_as(tmp_path / "points.json")
+    points = read_points(tmp_path / "points.json")
+    assert points.unit == "m"
+    [camera] = points.cameras
+    assert camera.camera == B
+    np.testing.assert_allclose(camera.image / (64, 48), np.abs(camera.floor) / 10, atol=0.01)
 
 
 async def test_what_is_tried_out_holds_and_the_file_can_be_had_back(browser: Browser) -> None:
