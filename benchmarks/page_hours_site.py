@@ -149,12 +149,12 @@ class FastSite:
 
     async def _events(self, request: web.Request) -> web.StreamResponse:
         response = web.StreamResponse(headers={"Content-Type": "text/event-stream"})
-        await response.prepare(request)
         cameras = [
             {"camera": it, "state": "live", "pulse": 0, "late": 0, "fps": _FPS, "message": ""}
             for it in _CAMERAS
         ]
         with contextlib.suppress(ConnectionError):
+            await response.prepare(request)
             await response.write(_event("site", self._describe()))
             await response.write(_event("cameras", {"cameras": cameras}))
             async for first in self._released():

@@ -16,8 +16,8 @@ import pytest
 from cameras_by_hand import FPS, GOP, HEIGHT, NO_REASON, WIDTH, small_config
 from halls import A, B, Hall, opened
 from numpy.typing import NDArray
+from played_in_chromium import READ, needs_chromium, seen_in_chromium
 
-from benchmarks.browser import CHROMIUM, chromium
 from server.camera.encode import AccessUnit, Encoder
 from server.view.agreement import ParameterMismatchError
 from server.view.channel import Piece
@@ -139,16 +139,10 @@ async def test_where_they_must_be_equal_the_second_camera_is_refused() -> None:
         await spliced(small_config())
 
 
-PLAY = """async ([url, codec, width, height]) => {
-  const video = document.createElement('video');
-  const source = new MediaSource();
-  video.muted = true;
-  video.src = URL.createObjectURL(source);
-  await new Promise((done) => source.addEventListener('sourceopen', done, { once: true }));
-  const buffer = source.addSourceBuffer(`video/mp4; codecs="${codec}"`);
-  buffer.appendBuffer(await (await fetch(url)).arrayBuffer());
-  await new Promise((done) => buffer.addEventListener('updateend', done, { once: true }));
-  source.endOfStream();
+LOOK = (
+    "async ([url, type, width, height]) => {"
+    + READ
+    + """
   const canvas = new OffscreenCanvas(width, height).getContext('2d');
   const greens = [];
   for (let pulse = 0; pulse < buffer.buffered.end(0) * 25 - 0.5; pulse += 3) {
@@ -170,9 +164,10 @@ PLAY = """async ([url, codec, width, height]) => {
   }
   return { ranges: buffer.buffered.length, greens, error: video.error?.message ?? '' };
 }"""
+)
 
 
-@pytest.mark.skipif(not CHROMIUM.exists(), reason=f"needs a Chromium at {CHROMIUM}")
+@needs_chromium
 async def test_chromium_shows_the_chosen_cameras_pictures() -> None:
     async for hall in opened(patience=60, **OWN, http={"viewer_queue_gops": 100}):
         seen = await _played(hall)
@@ -192,17 +187,7 @@ async def _played(hall: Hall) -> dict[str, Any]:
     splicer.decision(decision(0))
     assert agreement.codec is not None
     assert agreement.codec.startswith("avc3.")
-    async with chromium() as browser:
-        page = await browser.new_page(bypass_csp=True)
-        await page.goto(f"http://127.0.0.1:{hall.port}/healthz")
-        playing = asyncio.create_task(
-            page.evaluate(PLAY, ["/objects/1/best.mp4", agreement.codec, WIDTH, HEIGHT])
-        )
-        while not splicer.viewers:  # noqa: ASYNC110 — the browser comes when it comes
-            await asyncio.sleep(0.01)
-        for gop in range(1, GOPS):
-            splicer.decision(decision(gop))
-            await asyncio.sleep(0.01)
-        splicer.close()
-        found: dict[str, Any] = await playing
-    return found
+    return await seen_in_chromium(
+        *(hall.port, splicer, GOPS, lambda gop: splicer.decision(decision(gop))),
+        *(LOOK, "/objects/1/best.mp4", f'video/mp4; codecs="{agreement.codec}"', WIDTH, HEIGHT),
+    )

@@ -11,6 +11,7 @@ import pytest
 from cameras_by_hand import CAMERAS, FPS, GOP, NO_REASON, SMALL, FedService, encoded, small_config, video
 from ffprobe_by_hand import needs_ffprobe, probed
 from halls import A, B, Hall, opened
+from played_in_chromium import PLAY, needs_chromium, seen_in_chromium
 from sounds_by_hand import (
     BEEPS,
     FRAMES,
@@ -28,7 +29,6 @@ from sounds_by_hand import (
 from test_ts import check_counters, taken_apart
 
 import client
-from benchmarks.browser import CHROMIUM, chromium
 from server.camera.sound import RecordedSound
 from server.view.decide import GopDecision, ObjectChoice
 from server.view.fmp4 import init_segment
@@ -226,52 +226,26 @@ async def test_ffprobe_has_nothing_to_say(loud: Hall, recording: Path, tmp_path:
         assert found["aac"] >= FRAMES * 48_000 // FPS // FRAME
 
 
-PLAY = """async ([url, codecs]) => {
-  const video = document.createElement('video');
-  const source = new MediaSource();
-  video.src = URL.createObjectURL(source);
-  await new Promise((done) => source.addEventListener('sourceopen', done, { once: true }));
-  const buffer = source.addSourceBuffer(`video/mp4; codecs="${codecs}"`);
-  buffer.appendBuffer(await (await fetch(url)).arrayBuffer());
-  await new Promise((done) => buffer.addEventListener('updateend', done, { once: true }));
-  source.endOfStream();
-  const ended = new Promise((done) => video.addEventListener('ended', done, { once: true }));
-  const range = [buffer.buffered.start(0), buffer.buffered.end(0)];
-  video.muted = true;
-  video.playbackRate = 4;
-  await video.play();
-  await ended;
-  return { ranges: buffer.buffered.length, range, error: video.error?.message ?? '',
-    tracks: [video.webkitAudioDecodedByteCount > 0, video.webkitVideoDecodedByteCount > 0] };
-}"""
-
-
-@pytest.mark.skipif(not CHROMIUM.exists(), reason=f"needs a Chromium at {CHROMIUM}")
+@needs_chromium
 async def test_chromium_plays_both_to_the_end_where_either_is_missing(loud: Hall, recording: Path) -> None:
     sends(loud.service, recording, silent=range(100, 1000))
-    async with chromium() as browser:
-        page = await browser.new_page(bypass_csp=True)
-        await page.goto(f"http://127.0.0.1:{loud.port}/healthz")
-        service = loud.service
-        service.come(*CAMERAS)
-        for camera in CAMERAS:
-            for unit in flashing(recording):
-                if unit.pulse not in range(30, 45):
-                    service.intake.video(video(camera, unit))
-        decide(service, 0, A)
-        parameters = service.agreement.parameters
-        assert parameters is not None
-        playing = asyncio.create_task(
-            page.evaluate(PLAY, ["/objects/1/best.mp4", f"{parameters.codec},mp4a.40.2"])
-        )
-        while not service.splicer.viewers:  # noqa: ASYNC110 — the browser comes when it comes
-            await asyncio.sleep(0.01)
-        for gop in range(1, GOPS):
-            decide(service, gop, CAMERAS[gop % 2])
-            await asyncio.sleep(0.01)
-        service.splicer.close()
-        async with asyncio.timeout(60):
-            seen = await playing
+    service = loud.service
+    service.come(*CAMERAS)
+    for camera in CAMERAS:
+        for unit in flashing(recording):
+            if unit.pulse not in range(30, 45):
+                service.intake.video(video(camera, unit))
+
+    def show(gop: int) -> None:
+        decide(service, gop, CAMERAS[gop % 2])
+
+    decide(service, 0, A)
+    parameters = service.agreement.parameters
+    assert parameters is not None
+    seen = await seen_in_chromium(
+        *(loud.port, service.splicer, GOPS, show),
+        *(PLAY, "/objects/1/best.mp4", f'video/mp4; codecs="{parameters.codec},mp4a.40.2"', 4),
+    )
     assert (seen["error"], seen["ranges"], seen["tracks"]) == ("", 1, [True, True])
     assert seen["range"] == [0, pytest.approx(FRAMES / FPS, abs=0.03)]
 

@@ -25,9 +25,10 @@ from cameras_by_hand import (
     word,
 )
 from halls import A, B, Hall
+from played_in_chromium import PLAY, needs_chromium, seen_in_chromium
 from vp8_by_hand import EPOCHS, feed, own
 
-from benchmarks.browser import CHROMIUM, chromium
+from benchmarks.browser import chromium
 from server.view.decide import GopDecision, ObjectChoice
 from server.wire.epochs import end_of_epoch
 
@@ -84,26 +85,6 @@ async def test_mpv_plays_to_the_end_without_a_warning(free: Hall) -> None:
         assert it == (0, b"", ""), path
 
 
-PLAY = """async ([url, codec]) => {
-  const video = document.createElement('video');
-  const source = new MediaSource();
-  video.muted = true;
-  video.src = URL.createObjectURL(source);
-  await new Promise((done) => source.addEventListener('sourceopen', done, { once: true }));
-  const buffer = source.addSourceBuffer(`video/webm; codecs="${codec}"`);
-  buffer.appendBuffer(await (await fetch(url)).arrayBuffer());
-  await new Promise((done) => buffer.addEventListener('updateend', done, { once: true }));
-  source.endOfStream();
-  const ended = new Promise((done) => video.addEventListener('ended', done, { once: true }));
-  const range = [buffer.buffered.start(0), buffer.buffered.end(0)];
-  const shown = [];
-  const tell = (now, { mediaTime }) => { shown.push(mediaTime); video.requestVideoFrameCallback(tell); };
-  video.requestVideoFrameCallback(tell);
-  video.currentTime = range[0];
-  await video.play();
-  await ended;
-  return { ranges: buffer.buffered.length, range, shown, error: video.error?.message ?? '' };
-}"""
 GOPS = 8
 SILENT = (2, 3, 6)
 """GOPs of which nothing comes, as if no camera could be shown."""
@@ -111,7 +92,7 @@ LOST = 22
 """A pulse whose picture is lost, in a GOP of which the others have come."""
 
 
-@pytest.mark.skipif(not CHROMIUM.exists(), reason=f"needs a Chromium at {CHROMIUM}")
+@needs_chromium
 async def test_chromium_plays_over_cuts_and_what_is_missing_to_the_end(free: Hall) -> None:
     splicer, shelves = free.service.splicer, free.service.shelves
     splicer.forget([])  # begin with somebody new
@@ -128,18 +109,9 @@ async def test_chromium_plays_over_cuts_and_what_is_missing_to_the_end(free: Hal
         splicer.decision(GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
 
     show(0)
-    async with chromium() as browser:
-        page = await browser.new_page(bypass_csp=True)
-        await page.goto(f"http://127.0.0.1:{free.port}/healthz")
-        playing = asyncio.create_task(page.evaluate(PLAY, ["/objects/7/best.webm", "vp8"]))
-        while not splicer.viewers:  # noqa: ASYNC110 — the browser comes when it comes
-            await asyncio.sleep(0.01)
-        for gop in range(1, GOPS):
-            show(gop)
-            await asyncio.sleep(0.01)
-        splicer.close()
-        async with asyncio.timeout(60):
-            seen = await playing
+    seen = await seen_in_chromium(
+        *(free.port, splicer, GOPS, show), *(PLAY, "/objects/7/best.webm", 'video/webm; codecs="vp8"', 1)
+    )
     assert (seen["error"], seen["ranges"]) == ("", 1)
     assert seen["range"] == [0, pytest.approx(GOPS * GOP / FPS)]
     pulses = [time * FPS for time in seen["shown"]]
@@ -162,7 +134,7 @@ async def go_on(hall: Hall) -> None:
         await asyncio.sleep(STRIDE / FPS)
 
 
-@pytest.mark.skipif(not CHROMIUM.exists(), reason=f"needs a Chromium at {CHROMIUM}")
+@needs_chromium
 @pytest.mark.slow
 async def test_the_page_plays_across_cuts_and_from_one_person_to_another(free: Hall) -> None:
     errors: list[str] = []
