@@ -7,6 +7,7 @@ the next one, and is answered when it has; others pass over what they do not kno
 from __future__ import annotations
 
 import asyncio
+from weakref import WeakKeyDictionary
 
 from aiohttp import web
 
@@ -23,6 +24,8 @@ _FAR = 2
 """Segments ahead that may be asked for (6.2.5.2)."""
 _WAIT = 3
 """Target durations after which what was asked for does not come (6.2.5.2)."""
+_WRITTEN: WeakKeyDictionary[Reel, tuple[tuple[int, bool, float | None], str]] = WeakKeyDictionary()
+"""The newest playlist of each stream, and of what state of it that is."""
 
 
 async def newest(request: web.Request, reel: Reel, pulse0: float | None) -> web.Response:
@@ -45,6 +48,15 @@ async def coming_part(reel: Reel, number: int, index: int) -> Part | None:
 
 
 def _newest(reel: Reel, pulse0: float | None) -> str:
+    """Write the newest playlist, once however many wait for it."""
+    state = (reel.until, reel.ended, pulse0)
+    known = _WRITTEN.get(reel)
+    if known is None or known[0] != state:
+        known = _WRITTEN[reel] = (state, _written(reel, pulse0))
+    return known[1]
+
+
+def _written(reel: Reel, pulse0: float | None) -> str:
     plan, growing = reel.plan, reel.growing
     oldest = reel.until - _RECENT * plan.target_s * plan.fps
     listed = [Listed(it.number, it.first, it.until, _parts(it, oldest)) for it in reel.listed]

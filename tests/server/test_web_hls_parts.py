@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from server.view.decide import GopDecision, ObjectChoice
 from server.view.reel import Reel
+from server.web.hls_live import _newest
 
 HTTP = {"hls_segment_s": 0.6, "hls_window_s": 6.0}
 PARTS = 3
@@ -136,6 +137,19 @@ async def test_playlists_keep_to_the_draft_and_go_on_part_by_part(hall: Hall) ->
         before = now
     hall.service.splicer.close()
     assert read(await text_of(hall)).hint is None
+
+
+async def test_a_playlist_is_written_once_for_all_who_ask_and_anew_for_the_next_part(hall: Hall) -> None:
+    shows(hall, range(PARTS))
+    reel = hall.service.splicer.reel(1)
+    assert reel is not None
+    texts = [_newest(reel, pulse0) for pulse0 in (None, None, 1_800_000_000.0)]
+    assert texts[0] is texts[1]
+    assert texts[1] != texts[2], "the time of day is known now"
+    shows(hall, range(PARTS, PARTS + 1))
+    assert _newest(reel, 1_800_000_000.0) not in texts
+    reel.end()
+    assert _newest(reel, 1_800_000_000.0).endswith("#EXT-X-ENDLIST\n")
 
 
 async def test_who_asks_for_a_part_is_answered_as_soon_as_it_is_there(hall: Hall) -> None:
