@@ -20,6 +20,6 @@ export class Going {
   on() {
     if (!this.video.paused) return;
     this.#asked = true;
-    this.video.play().catch(() => undefined); // the page says that it is paused, and how to go on
+    this.video.play().catch(() => (this.#asked = false)); // the page says that it is paused, and how to go on
   }
 }

@@ -15,6 +15,8 @@ import { playlistOf, same } from './subject.js';
 /** @import {Subject} from './subject.js' */
 
 const TYPE = 'application/vnd.apple.mpegurl';
+const FAR_S = 15; // behind the newest that the browser would go to
+const BEHIND_S = 3; // it, so that there is something to play
 const SAME_S = 1; // a frame whose time is further from the element's has that of the stream itself
 
 export class HlsPlayer {
@@ -55,8 +57,12 @@ export class HlsPlayer {
     this.#load();
   }
 
-  /** Let the picture go on, wherever it is. */
+  /** Let the picture go on; live, from where it is live. */
   play() {
+    const { video } = this;
+    const { seekable } = video;
+    const edge = seekable.length ? seekable.end(seekable.length - 1) : 0;
+    if (video.paused && !this.#subject?.past && edge - video.currentTime > FAR_S) video.currentTime = edge - BEHIND_S;
     this.#going.on();
   }
 
