@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from test_identity import HOWEVER_MANY, both, known, play, registry
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from test_identity import HOWEVER_MANY, both, known, numbers, play, registry
 
 from bestview import Split, TrackKey
 from bestview.identity import IdentityUpdate
 
 WEST = TrackKey("west", 1)
+TRACKS = [TrackKey(camera, local) for camera in ("south", "west") for local in (1, 2, 3)]
 
 
 def told(updates: Sequence[IdentityUpdate]) -> list[Split]:
@@ -21,7 +24,7 @@ def test_whom_a_camera_shows_is_somebody_new_and_stays_it(most: int) -> None:
     who, stays = registry(most=most), both(1, (0, 0))
     assert known(play(who, stays, 100)) == {("south", 1): 1, ("west", 1): 1}
     assert who.part([WEST], [1]) == 2
-    after = play(who, stays, 700, begin=100)
+    after = play(who, stays, 400, begin=100)
     for update in after:
         for key, number in update.numbers.items():
             assert number == (2 if key.camera == "west" else 1)
@@ -48,6 +51,33 @@ def test_nobody_is_parted_from_whom_they_are_not() -> None:
     assert who.part([WEST], [7]) is None
     assert who.part([TrackKey("west", 9)], [1]) is None
     assert set(known(play(who, stays, 200, begin=100)).values()) == {1}
+
+
+@settings(deadline=None, max_examples=8)
+@given(
+    st.lists(
+        st.tuples(st.integers(1, 11), st.sets(st.sampled_from(TRACKS), min_size=1), st.integers(1, 5)),
+        max_size=5,
+    )
+)
+def test_whatever_is_said_two_tracks_seen_at_once_in_one_camera_share_no_number(
+    said: list[tuple[int, set[TrackKey], int]],
+) -> None:
+    who = registry()
+    stays = [
+        it for local, at in ((1, (0.0, 0.0)), (2, (2.0, 1.0)), (3, (-2.0, 2.0))) for it in both(local, at)
+    ]
+    given_so: set[int] = set()
+    for step in range(12):
+        for update in play(who, stays, 10 * step + 10, begin=10 * step):
+            for camera in ("south", "west"):
+                shown = [number for (of, _), number in numbers(update).items() if of == camera]
+                assert len(shown) == len(set(shown))
+        for at, tracks, number in said:
+            if at == step:
+                new = who.part(tracks, [number])
+                assert new is None or new not in given_so
+                given_so.add(new or 0)
 
 
 def test_a_number_that_was_given_so_is_given_to_nobody_else() -> None:
