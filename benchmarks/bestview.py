@@ -11,6 +11,8 @@ the number of the person it is at, and the same with short gaps bridged; *own tr
 with the number of the person it is mostly at; *again*: all as MyView numbered it at last, known at once, and
 nobody ever away. The mean of *own tracks, not joined* is what each camera's tracker is worth by itself.
 
+Recordings are looked at ahead, as MyView does with recordings; `--as-live` has them learned as they go.
+
 *Looks alone* are those of sites whose cameras have no floor in common, told without travel times.
 
 *No evidence* is without what the cameras tell each other about each frame. *Calibrated* has the homographies
@@ -24,6 +26,7 @@ from __future__ import annotations
 import argparse
 import tempfile
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -40,10 +43,11 @@ from benchmarks.peer_environment import PeerEnvironment, PeersAwayError, default
 from benchmarks.report import Report
 from benchmarks.surroundings import CannotRunError, parser
 
-SCENES = ("terrace", "auditorium", "room", "gallery")
 ROOMS = ((2, 3, 40.0), (4, 8, 40.0), (8, 20, 30.0))
 """Cameras, people, seconds."""
 QUICK_ROOMS = ((2, 3, 12.0),)
+SCENES = ("terrace", "auditorium", "room", "gallery")
+ONE_ROOM = tuple(f"room-{cameras}-{people}" for cameras, people, _ in ROOMS)
 GALLERY, QUICK_GALLERY = (6, 240.0), (3, 30.0)
 """People, seconds."""
 COLUMNS = ["", "joint", "mean", "Agree", "Regret", "Visible", "Chosen", "Cuts", "Best", "Shot"]
@@ -60,11 +64,16 @@ def cases(options: argparse.Namespace, folder: Path, report: Report) -> Iterator
                 yield find(options.data)
             except CannotRunError as problem:
                 report.say(f"{name}: left out: {problem}")
-    if "room" in wanted:
-        for cameras, people, seconds in QUICK_ROOMS if options.quick else ROOMS:
+    for cameras, people, seconds in QUICK_ROOMS if options.quick else ROOMS:
+        if "room" in wanted or f"room-{cameras}-{people}" in wanted:
             yield room(folder, cameras, people, seconds)
     if "gallery" in wanted:
         yield gallery(folder, *(QUICK_GALLERY if options.quick else GALLERY))
+
+
+def as_live(case: Case) -> Case:
+    """Give the scene as cameras would show it: nothing is known of it before its first frame."""
+    return replace(case, content={**case.content, "detect": {"ahead_frames": 0}})
 
 
 def row_of(it: Outcome) -> list[str]:
@@ -117,7 +126,8 @@ def measure(options: argparse.Namespace) -> None:
     found: dict[str, list[Outcome]] = {}
     swept: dict[str, list[Swept]] = {}
     with tempfile.TemporaryDirectory(prefix="myview-bestview-") as name:
-        for case in cases(options, Path(name), report):
+        for found_case in cases(options, Path(name), report):
+            case = as_live(found_case) if options.as_live else found_case
             truth = case.truth()
             seen = case.watch()
             walked = None if options.quick else walked_of(case, seen, Path(name), report)
@@ -143,7 +153,10 @@ def measure(options: argparse.Namespace) -> None:
 def main() -> None:
     """Run the benchmark."""
     options = parser(__doc__, "bestview")
-    options.add_argument("--scene", action="append", choices=SCENES, help="only this one; may be repeated")
+    options.add_argument(
+        "--scene", action="append", choices=SCENES + ONE_ROOM, help="only this one; may be repeated"
+    )
+    options.add_argument("--as-live", action="store_true", help="recordings are not looked at ahead")
     options.add_argument("--quick", action="store_true", help="short synthetic scenes, no other trackers")
     options.add_argument("--no-peers", action="store_true", help="leave out the other tracker")
     options.add_argument(
