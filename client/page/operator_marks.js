@@ -1,12 +1,9 @@
-/**
- * Marks on a camera's picture: areas where nobody is looked for, and places that are known on the floor.
- *
- * The picture can be pressed, or have the focus and be marked by keys: arrows move a cross, Enter sets a mark.
- */
+/** Marks on a camera's picture: areas where nobody is looked for, and places that are known on the floor. */
 
 import { ignoreLines, missing, pointsFile, toOwn, toSite } from './operator_drawn.js';
 import { ask } from './operator_http.js';
 import { element, make, put } from './operator_parts.js';
+import { MarkedPicture } from './operator_picture.js';
 import { load } from './operator_stills.js';
 import { copy } from './tools.js';
 
@@ -14,12 +11,6 @@ import { copy } from './tools.js';
 /** @import {OperatorCamera, OwnPicture, Setting} from './operator_contract.js' */
 /** @import {Pair, Place} from './operator_drawn.js' */
 /** @import {Section, Tell} from './operator_parts.js' */
-
-const SVG = 'http://www.w3.org/2000/svg';
-const STEP = 1; // pixels of the site's picture that an arrow key moves the cross
-const LEAP = 10; // with shift
-/** @type {Record<string, [number, number]>} */
-const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
 
 /** @implements {Section} */
 export class Marks {
@@ -29,8 +20,7 @@ export class Marks {
   #shapes = new Map();
   /** @type {Map<string, Pair[]>} */
   #pairs = new Map();
-  /** @type {Place} where the cross is, in the site's picture */
-  #cross;
+  #marked;
   /** @type {HTMLSelectElement} */
   #select = element('mark-camera');
   /** @type {HTMLImageElement} */
@@ -39,8 +29,6 @@ export class Marks {
   #lines = element('mark-lines');
   /** @type {HTMLInputElement} */
   #unit = element('mark-unit');
-  #stage = element('mark-stage');
-  #drawing = element('mark-drawing');
   #said = element('mark-said');
   #areas = element('mark-areas');
 
@@ -51,14 +39,12 @@ export class Marks {
   constructor(site, tell) {
     this.site = site;
     this.tell = tell;
-    this.#cross = [site.width / 2, site.height / 2];
-    this.#drawing.setAttribute('viewBox', `0 0 ${site.width} ${site.height}`);
+    const [stage, drawing] = [element('mark-stage'), element('mark-drawing')];
+    this.#marked = new MarkedPicture(stage, drawing, site, (place) => this.#mark(place), () => this.#undo());
     this.#select.replaceChildren(...site.cameras.map((it) => make('option', { value: it, textContent: it })));
     this.#select.addEventListener('change', () => this.#chooseCamera());
     this.#areas.addEventListener('click', () => this.#chooseKind(true));
     element('mark-points').addEventListener('click', () => this.#chooseKind(false));
-    this.#stage.addEventListener('click', (event) => this.#press(event));
-    this.#stage.addEventListener('keydown', (event) => this.#key(event));
     element('mark-next').addEventListener('click', () => this.#nextArea());
     element('mark-undo').addEventListener('click', () => this.#undo());
     element('mark-clear').addEventListener('click', () => this.#clear());
@@ -128,31 +114,11 @@ export class Marks {
     this.#show();
   }
 
-  /** @param {MouseEvent} event */
-  #press({ clientX, clientY }) {
-    const { left, top, width, height } = this.#stage.getBoundingClientRect();
-    this.#cross = [((clientX - left) / width) * this.site.width, ((clientY - top) / height) * this.site.height];
-    this.#mark();
-  }
-
-  /** @param {KeyboardEvent} event */
-  #key(event) {
-    const arrow = ARROWS[event.key];
-    if (arrow) {
-      const by = event.shiftKey ? LEAP : STEP;
-      const [x, y] = this.#cross;
-      this.#cross = [clamp(x + by * arrow[0], this.site.width), clamp(y + by * arrow[1], this.site.height)];
-      this.#draw();
-    } else if (event.key === 'Enter' || event.key === ' ') this.#mark();
-    else if (event.key === 'Backspace') this.#undo();
-    else return;
-    event.preventDefault();
-  }
-
-  #mark() {
+  /** @param {Place} at in the site's picture */
+  #mark(at) {
     const picture = this.#picture;
     if (!picture) return;
-    const place = toOwn(this.#cross, picture);
+    const place = toOwn(at, picture);
     if (this.#onAreas) this.#areasHere()[this.#areasHere().length - 1].push(place);
     else this.#pairsHere().push({ image: place, floor: ['', ''] });
     this.#show();
@@ -231,24 +197,9 @@ export class Marks {
 
   #draw() {
     const picture = this.#picture;
-    const [x, y] = this.#cross;
-    const [w, h] = [this.site.width / 40, this.site.width / 40];
-    const cross = svg('path', { d: `M${x - w},${y}H${x + w}M${x},${y - h}V${y + h}`, class: 'cross' });
-    if (!picture) return this.#drawing.replaceChildren(cross);
-    if (this.#onAreas) {
-      const areas = this.#areasHere().map((shape) => {
-        const corners = shape.map((it) => toSite(it, picture).join(','));
-        return svg('polygon', { points: corners.join(' '), class: 'area' });
-      });
-      return this.#drawing.replaceChildren(...areas, cross);
-    }
-    const points = this.#pairsHere().flatMap(({ image }, at) => {
-      const [left, top] = toSite(image, picture);
-      const number = svg('text', { x: left + w / 3, y: top - h / 3, 'font-size': w });
-      number.textContent = String(at + 1);
-      return [svg('circle', { cx: left, cy: top, r: w / 4, class: 'point' }), number];
-    });
-    this.#drawing.replaceChildren(...points, cross);
+    if (!picture) this.#marked.drawPoints([]);
+    else if (this.#onAreas) this.#marked.drawAreas(this.#areasHere().map((area) => area.map((it) => toSite(it, picture))));
+    else this.#marked.drawPoints(this.#pairsHere().map(({ image }) => toSite(image, picture)));
   }
 
   #download() {
@@ -256,22 +207,4 @@ export class Marks {
     make('a', { href: address, download: 'points.json' }).click();
     setTimeout(() => URL.revokeObjectURL(address), 1000);
   }
-}
-
-/**
- * @param {number} value
- * @param {number} most
- */
-function clamp(value, most) {
-  return Math.min(most, Math.max(0, value));
-}
-
-/**
- * @param {string} name
- * @param {Record<string, string | number>} attributes
- */
-function svg(name, attributes) {
-  const made = document.createElementNS(SVG, name);
-  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, String(value));
-  return made;
 }

@@ -73,6 +73,7 @@ export class KnownPeople {
     }
     const choices = [...known.keys()].sort((one, other) => one - other).map((it) => /** @type {[string, string]} */ ([String(it), label(it)]));
     for (const select of [this.#kept, this.#lost, this.#who]) options(select, choices);
+    if (this.#lost.value === this.#kept.value) this.#lost.value = choices.find(([it]) => it !== this.#kept.value)?.[0] ?? '';
     if (!people.length) put(this.#words, 'Nobody is known yet.');
     else if (this.#words.textContent === 'Nobody is known yet.') put(this.#words, '');
   }

@@ -84,6 +84,13 @@ async def test_who_has_the_token_signs_in_and_out(browser: Browser) -> None:
         await expect(page.locator("#trouble")).to_be_empty()
         assert await page.evaluate("document.cookie") == ""
         await page.reload()
+        await expect(page.locator("#cameras")).to_be_visible()
+        await page.context.clear_cookies()  # as when the sign-in has run out
+        await expect(field).to_be_visible()
+        await expect(page.locator("#cameras")).to_be_hidden()
+        await field.fill(TOKEN)
+        await page.keyboard.press("Enter")
+        await expect(page.locator("#cameras")).to_be_visible()
         await page.get_by_role("button", name="Sign out").click()
         await expect(field).to_be_visible()
 
