@@ -91,11 +91,12 @@ class Aligner:
     def ready(self, now: int) -> list[Epoch]:
         """Take out the epochs that can be decided at pulse ``now``, in order."""
         epochs = []
-        while (epoch := self._ready(now)) is not None:
+        while (epoch := self.next_ready(now)) is not None:
             epochs.append(epoch)
         return epochs
 
-    def _ready(self, now: int) -> Epoch | None:
+    def next_ready(self, now: int) -> Epoch | None:
+        """Take out the next one of them; None: there is none."""
         number = self._next
         if number is None or self.all_ended:
             return None

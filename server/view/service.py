@@ -100,7 +100,7 @@ class BestViewService:
                 self._changed.clear()
                 if follow.done():
                     await follow  # raises what ended it
-                self.decide()
+                await self.decide_by_turns()
             last = max(shelf.newest for shelf in self.shelves.values())
             for decision in self.decider.finish(last):
                 self._publish(decision)
@@ -111,8 +111,22 @@ class BestViewService:
 
     def decide(self) -> None:
         """Decide and publish whatever can be decided by now."""
-        for epoch in self.aligner.ready(self.pulse):
+        while self._decide_next():
+            pass
+
+    async def decide_by_turns(self) -> None:
+        """Do the same, and let viewers, cameras and signals have their turn between two epochs.
+
+        On a machine with too much to do there may always be one more.
+        """
+        while self._decide_next():  # noqa: ASYNC110 — it waits for nothing
+            await asyncio.sleep(0)
+
+    def _decide_next(self) -> bool:
+        epoch = self.aligner.next_ready(self.pulse)
+        if epoch is not None:
             self._step(epoch)
+        return epoch is not None
 
     def _record(self, out: Path) -> Recorder:
         try:
