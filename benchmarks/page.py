@@ -21,7 +21,7 @@ from playwright.async_api import CDPSession, Page
 
 from benchmarks import page_hours
 from benchmarks.browser import check_chromium, chromium
-from benchmarks.picture import demo
+from benchmarks.demo_site import demo_at, open_when_there
 from benchmarks.report import Report
 from benchmarks.surroundings import CannotRunError, finish, parser
 
@@ -65,7 +65,7 @@ async def visit(url: str, switches: int, minutes: float) -> Visit:
     async with chromium() as browser:
         # The page's policy forbids eval, which it is asked with here.
         page = await browser.new_page(viewport={"width": 1280, "height": 800}, bypass_csp=True)
-        await page.goto(url)
+        await open_when_there(page, url)
         await page.wait_for_function("myview.state === 'playing'", timeout=_PLAYING_MS)
         await asyncio.sleep(_SETTLE_S)
         tools = await page.context.new_cdp_session(page)
@@ -155,7 +155,7 @@ def plot(it: Visit, path: Path) -> None:
 
 async def run(options: argparse.Namespace) -> Visit:
     """Run the demo and visit it."""
-    async with demo() as url:
+    async with demo_at(options.fps) as url:
         return await visit(url, options.switches, options.minutes)
 
 
@@ -165,6 +165,9 @@ def main() -> None:
     options.add_argument("--part", choices=("visit", "hours"), default="visit")
     options.add_argument("--hours", type=float, default=8.0, help="that are played, of --part hours")
     options.add_argument("--speed", type=float, default=33.0, help="how many times as fast")
+    options.add_argument(
+        "--fps", type=float, default=25.0, help="of the demo; less where there is other work"
+    )
     options.add_argument("--switches", type=int, default=50)
     options.add_argument("--minutes", type=float, default=2.0, help="of watching after them")
     try:

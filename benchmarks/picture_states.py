@@ -21,14 +21,12 @@ from pathlib import Path
 
 from PIL import Image
 from playwright.async_api import Browser, Page
-from playwright.async_api import Error as BrowserError
 from playwright.async_api import TimeoutError as LateError
 
 from benchmarks.browser import check_chromium, chromium
+from benchmarks.demo_site import demo_at, open_when_there
 from benchmarks.processes import running_pids
 from benchmarks.surroundings import ROOT, CannotRunError, finish
-from server.run.demo import run_demo
-from server.run.setup import DEMO, free_port
 
 WIDTHS = {360: 740, 800: 900, 1600: 900}
 """Widths of the window, and its heights."""
@@ -123,23 +121,10 @@ class Sitting:
         raise RuntimeError("nobody was in view, or had left, for long enough")
 
 
-@contextlib.asynccontextmanager
-async def _demo(fps: float) -> AsyncIterator[str]:
-    """Run the demo at a frame rate; give its address."""
-    DEMO["site"]["fps"] = fps
-    port = free_port()
-    running = asyncio.create_task(run_demo(port, None, open_browser=False))
-    try:
-        yield f"http://127.0.0.1:{port}/"
-    finally:
-        running.cancel()
-        await asyncio.gather(running, return_exceptions=True)
-
-
 async def take(out: Path, fps: float) -> None:
     """Run the demo and take all pictures."""
     async with chromium() as browser, contextlib.AsyncExitStack() as stack:
-        url = await stack.enter_async_context(_demo(fps))
+        url = await stack.enter_async_context(demo_at(fps))
         async with _sitting(browser, url, out, _NOBODY) as sitting:
             await sitting.shoot("nobody", sitting.as_it_is, "myview.state === 'empty'")
         async with _sitting(browser, url, out) as sitting:
@@ -157,11 +142,7 @@ async def _sitting(browser: Browser, url: str, out: Path, script: str = "") -> A
     page = await browser.new_page(bypass_csp=True)
     if script:
         await page.add_init_script(script)
-    while True:
-        with contextlib.suppress(BrowserError):  # the server is not there yet
-            await page.goto(url)
-            break
-        await page.wait_for_timeout(_LANDED_MS)
+    await open_when_there(page, url)
     yield Sitting(page, out)
     await page.close()
 

@@ -1,0 +1,36 @@
+"""The demo at another frame rate, for machines that have other work."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import AsyncIterator
+
+from playwright.async_api import Error, Page
+
+from server.run.demo import run_demo
+from server.run.setup import DEMO, free_port
+
+_AGAIN_MS = 1000
+
+
+@contextlib.asynccontextmanager
+async def demo_at(fps: float) -> AsyncIterator[str]:
+    """Run the demo at a frame rate; give its address, where nothing may answer yet."""
+    DEMO["site"]["fps"] = fps
+    port = free_port()
+    running = asyncio.create_task(run_demo(port, None, open_browser=False))
+    try:
+        yield f"http://127.0.0.1:{port}/"
+    finally:
+        running.cancel()
+        await asyncio.gather(running, return_exceptions=True)
+
+
+async def open_when_there(page: Page, url: str) -> None:
+    """Open a page as soon as its server answers."""
+    while True:
+        with contextlib.suppress(Error):
+            await page.goto(url)
+            return
+        await page.wait_for_timeout(_AGAIN_MS)
