@@ -111,7 +111,7 @@ class Card {
   constructor(object, call) {
     this.image = make('img', { alt: '' });
     this.seen = make('span', { className: 'quiet' });
-    this.input = make('input', { type: 'text', maxLength: 40, autocomplete: 'off', ariaLabel: `Name of person ${object}` });
+    this.input = make('input', { type: 'text', maxLength: 40, autocomplete: 'off', placeholder: 'Name', ariaLabel: `Name of person ${object}` });
     const form = make('form', {}, this.input, make('button', { type: 'submit', textContent: 'Call them so' }));
     form.addEventListener('submit', (event) => {
       event.preventDefault();

@@ -14,4 +14,4 @@ DOCS = (ROOT / "docs/operator.md").read_text(encoding="utf-8")
 
 @pytest.mark.parametrize("words", re.findall(r"<(?:button|a) [^>]*>([^<]+)<", PAGE))
 def test_every_section_and_button_is_described(words: str) -> None:
-    assert f"**{words}**" in DOCS
+    assert f"**{words}**" in DOCS or f"\n## {words}\n" in DOCS

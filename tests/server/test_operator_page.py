@@ -31,6 +31,9 @@ PLAN = [[0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 1.0]]
 """Of a camera that looks straight down: ten pixels are one unit of the floor."""
 TOKEN = "a token of theirs"  # noqa: S105 — of a test
 
+PATIENCE_MS = 20_000  # a slow core with other work
+expect.set_options(timeout=PATIENCE_MS)
+
 pytestmark = [
     pytest.mark.skipif(not CHROMIUM.exists(), reason=f"needs a Chromium at {CHROMIUM}"),
     pytest.mark.asyncio(loop_scope="module"),
@@ -53,7 +56,7 @@ async def operating(
         hall = await anext(halls)
         page = await browser.new_page(viewport={"width": 1000, "height": 800})
         await page.add_init_script(axe)  # where the site's policy does not hold
-        page.set_default_timeout(15_000)
+        page.set_default_timeout(PATIENCE_MS)
         page.on("pageerror", lambda error: complaints.append(str(error)))
         page.on(
             "console",
