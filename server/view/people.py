@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from itertools import chain
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview import EpisodeKey, IdentityRegistry, IdentitySettings, Merge, Split, TrackKey
+from bestview import IdentityRegistry, IdentitySettings, Merge, Split, TrackKey
 from server.view.align import Epoch
 from server.view.by_hand import ByHand
 from server.view.history import History
 from server.view.numbered import numbered_boxes
+from server.view.parts import NOBODY_YET, UNKNOWN, Part, numbers_over, parts_of, with_settled
 from server.view.reading import CameraWindow, Reader
 from server.view.share import served
 from server.wire.fit import Fit
@@ -22,22 +22,6 @@ from server.wire.sections import Share
 
 ALL = Share()
 """One service for everybody."""
-
-NOBODY_YET = -1
-"""Stands for a person's number where a track is not confirmed to be anybody."""
-
-
-class Part(NamedTuple):
-    """From which frame on a track is somebody's.
-
-    A named tuple, since one is made of every track in every update.
-    """
-
-    first: int
-    number: int
-
-
-_UNKNOWN = (Part(0, NOBODY_YET),)
 
 
 class People:
@@ -89,8 +73,8 @@ class People:
         pictures = {window.message.camera: window.message.size for window in windows}
         self._now = epoch.last
         update = self._by_hand.read(self._registry.update(tracks, epoch.last - self._lag, pictures))
-        for key, parts in _parts(update.numbers).items():
-            self._parts[key] = self._with_settled(key, parts)
+        for key, parts in parts_of(update.numbers).items():
+            self._parts[key] = with_settled(self._parts.get(key, ()), parts, self._asked_from)
         keys = chain.from_iterable(window.keys for window in windows)
         seen = chain.from_iterable(window.seen() for window in windows)
         for key, (first, last) in zip(keys, seen, strict=True):
@@ -177,17 +161,7 @@ class People:
 
     def numbers(self, keys: Sequence[TrackKey], first: int, frames: int) -> NDArray[np.int64]:
         """Give the persons' numbers behind T tracks, frame by frame, (T, frames); -1: nobody yet."""
-        known = [self._parts.get(key, _UNKNOWN) for key in keys]
-        newest = np.fromiter((parts[-1].number for parts in known), dtype=np.int64, count=len(keys))
-        since = np.fromiter((parts[-1].first for parts in known), dtype=np.int64, count=len(keys))
-        if (since <= first).all():
-            return np.broadcast_to(newest[:, None], (len(keys), frames))
-        numbers = np.repeat(newest[:, None], frames, axis=1)
-        for row in np.flatnonzero(since > first).tolist():
-            numbers[row] = NOBODY_YET
-            for part in known[row]:
-                numbers[row, max(0, part.first - first) :] = part.number
-        return numbers
+        return numbers_over([self._parts.get(key, UNKNOWN) for key in keys], first, frames)
 
     def also(self, number: int) -> list[int]:
         """Give the other numbers that somebody once had, in order."""
@@ -203,18 +177,6 @@ class People:
         self._asked_from = max(self._asked_from, pulse)
         for history in self._histories.values():
             history.forget_before(pulse)
-
-    def _with_settled(self, key: TrackKey, parts: list[Part]) -> list[Part]:
-        """Put parts that the registry has settled before those that may still change.
-
-        A long look-ahead asks for frames that are older than what the registry still speaks of.
-        """
-        settled = [part for part in self._parts.get(key, ()) if part.first < parts[0].first]
-        if not settled:
-            return parts
-        ends = [*(part.first for part in settled[1:]), parts[0].first]
-        asked = [part for part, end in zip(settled, ends, strict=True) if end > self._asked_from]
-        return asked + parts
 
     def _note_seen(self, parts: Sequence[Part], first: int, last: int) -> None:
         for place, part in enumerate(parts):
@@ -250,11 +212,3 @@ class People:
             self.away.discard(number)
             self.names.pop(number, None)
             self.merged = {old: new for old, new in self.merged.items() if new != number}
-
-
-def _parts(numbers: Mapping[EpisodeKey, int]) -> dict[TrackKey, list[Part]]:
-    """Sort the numbers of episodes by track, the episodes of each in order."""
-    parts: dict[TrackKey, list[Part]] = {}
-    for key, number in numbers.items():
-        parts.setdefault(key.track, []).append(Part(key.first, number or NOBODY_YET))
-    return parts
