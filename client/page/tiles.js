@@ -1,6 +1,7 @@
 /** Others beside the chosen person: a small player each, live, with boxes on their own frames as in the large one. */
 
 import { take, watchFrames } from './frames.js';
+import { label, person } from './names.js';
 import { Overlay } from './overlay.js';
 import { playerOf } from './players.js';
 
@@ -50,6 +51,7 @@ export class Tiles {
         this.place.insertBefore(tile.element, this.place.children[at] ?? null);
         if (focused) tile.element.focus(); // it has the place of the one that was pressed
       }
+      this.#tiles.get(object)?.call();
       this.#tiles.get(object)?.play();
     }
     this.place.hidden = this.#tiles.size === 0;
@@ -75,20 +77,25 @@ class Tile {
     this.element = document.createElement('button');
     this.element.type = 'button';
     this.element.className = 'stage tile pictured';
-    this.element.title = `Person ${object}: make large`;
-    this.element.ariaLabel = this.element.title;
     this.element.addEventListener('click', pressed);
     this.video = document.createElement('video');
     this.video.muted = this.video.autoplay = this.video.playsInline = true;
     const canvas = document.createElement('canvas');
-    const number = document.createElement('span');
-    number.className = 'number';
-    number.textContent = String(object);
-    this.element.append(this.video, canvas, number);
+    this.number = document.createElement('span');
+    this.number.className = 'number';
+    this.element.append(this.video, canvas, this.number);
     this.overlay = new Overlay(canvas);
     const [landed, resumed] = [() => this.repaint(), () => this.play()];
     this.player = playerOf(this.video, { landed, resumed, ended: () => undefined });
     watchFrames(this.video, () => shared.boxesOn, (frame) => this.#paint(frame), this.#enough.signal);
+  }
+
+  /** What the person is called may have changed. */
+  call() {
+    const words = `${person(this.object)}: make large`;
+    if (this.element.title === words) return;
+    this.element.title = this.element.ariaLabel = words;
+    this.number.textContent = label(this.object);
   }
 
   play() {
