@@ -7,6 +7,7 @@ from pathlib import Path
 
 import typer
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from client import ClientError, Progress, objects, watch
@@ -46,7 +47,8 @@ async def run_watch(
 async def _list(url: str) -> None:
     table = Table("object", "visible", "shown by", "seen by", box=None)
     for it in await objects(url):
-        table.add_row(str(it.object), "yes" if it.visible else "no", it.camera or "-", " ".join(it.cameras))
+        who = escape(f"{it.object} {it.name}") if it.name else str(it.object)
+        table.add_row(who, "yes" if it.visible else "no", it.camera or "-", " ".join(it.cameras))
     Console().print(table)
 
 

@@ -11,6 +11,7 @@ from cameras_by_hand import CAMERAS, LARGE, SMALL
 from halls import A, B, Hall, opened
 
 from bestview import IdentityRegistry
+from server.run.watch import run_watch
 from server.view.decide import homographies
 from server.web.operator_permission import CHANGES
 
@@ -50,6 +51,14 @@ async def test_a_name_goes_with_the_person_wherever_they_are_listed(busy: Hall) 
     assert (await busy.get_json(PEOPLE))["names"] == {"1": "Ann Lee"}
     await say(busy, object=1, name="")
     assert (await objects(busy))[1]["name"] is None
+
+
+async def test_a_name_is_listed_as_it_is(busy: Hall, capsys: pytest.CaptureFixture[str]) -> None:
+    await say(busy, object=1, name="Ann [bold]")
+    await run_watch(f"http://127.0.0.1:{busy.port}", None, None, None, None, None)
+    lines = capsys.readouterr().out.splitlines()
+    assert any(it.split()[:3] == ["1", "Ann", "[bold]"] for it in lines)
+    assert any(it.split()[:2] == ["2", "yes"] for it in lines)
 
 
 async def test_two_that_are_one_are_one_to_everybody_from_the_next_gop_on(real: Hall) -> None:
