@@ -49,7 +49,7 @@ _FASTER = """(() => {
 })();"""
 _STATE = """() => ({
   delays: myview.delays.slice(-200).map((it) => it.delayMs),
-  pulse: myview.pulse,
+  stood: (Date.now() - myview.delays.at(-1).shownAt) / 1000,
   ranges: video.buffered.length,
   buffered: video.buffered.end(video.buffered.length - 1) - video.buffered.start(0),
 })"""
@@ -70,6 +70,7 @@ class Reading:
         ranges: of the SourceBuffer.
         buffered: seconds of video from the first of them to the last.
         behind: milliseconds of the site's time, the median of the last frames shown.
+        stood: seconds of the site's time since the last frame was shown.
         shown: frames since the beginning.
         load: of the machine, tasks per minute that ran or wanted to.
     """
@@ -81,6 +82,7 @@ class Reading:
     ranges: int
     buffered: float
     behind: float
+    stood: float
     shown: int
     load: float
 
@@ -121,6 +123,7 @@ async def _read(page: Page, tools: CDPSession, hours: float) -> Reading:
         state["ranges"],
         state["buffered"],
         float(np.median(behind or [np.nan])),
+        state["stood"],
         await page.evaluate("shown"),
         os.getloadavg()[0],
     )
@@ -138,13 +141,15 @@ def describe(report: Report, readings: list[Reading], speed: float) -> None:
             "ranges",
             "buffered, s",
             "behind, s",
-            "frames shown",
+            "stood, s",
+            "frames",
             "load",
         ],
         [
             [
                 *(f"{it.hours:.1f}", f"{it.heap:.2f}", str(it.nodes), str(it.listeners), str(it.ranges)),
-                *(f"{it.buffered:.0f}", f"{it.behind / 1000:.1f}", str(it.shown), f"{it.load:.0f}"),
+                *(f"{it.buffered:.0f}", f"{it.behind / 1000:.1f}", f"{it.stood:.1f}"),
+                *(str(it.shown), f"{it.load:.0f}"),
             ]
             for it in readings
         ],
