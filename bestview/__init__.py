@@ -5,7 +5,15 @@ from bestview.choice_missed import LastSeen, with_missed
 from bestview.choice_program import Gops
 from bestview.choice_seen import SeenViews
 from bestview.corrections import Merge, Split
-from bestview.ground import checked_homography, feet, foot_spread, person_heights, to_ground
+from bestview.ground import (
+    camera_height,
+    checked_homography,
+    feet,
+    foot_spread,
+    horizon,
+    person_heights,
+    to_ground,
+)
 from bestview.identity import IdentityRegistry, IdentityUpdate
 from bestview.identity_settings import IdentitySettings
 from bestview.keys import EpisodeKey, TrackKey
@@ -41,12 +49,14 @@ __all__ = [
     "ViewTruth",
     "WitnessSettings",
     "best_views",
+    "camera_height",
     "checked_homography",
     "choose_by_gops",
     "choose_views",
     "cuts_of",
     "feet",
     "foot_spread",
+    "horizon",
     "overlook",
     "person_heights",
     "score_views",

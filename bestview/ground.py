@@ -68,6 +68,26 @@ def from_ground(homography: NDArray[np.float64], points: NDArray[np.float64]) ->
     return np.where(there[..., None], pixels, np.nan)
 
 
+def horizon(homography: NDArray[np.float64], x: float) -> float | None:
+    """Give the row of the picture's column `x` in which the ground plane ends, in pixels; None: in no row."""
+    down = float(homography[2, 1])
+    row = -(float(homography[2, 0]) * x + float(homography[2, 2])) / down if down else np.inf
+    return row if np.isfinite(row) else None
+
+
+def camera_height(homography: NDArray[np.float64], x: float) -> float | None:
+    """Guess how high above the ground the camera is, in ground units; None: unknown. `x` is any column.
+
+    At a foot so many rows below the horizon as somebody is tall in the picture, they are as tall as the
+    camera is high (square pixels, little roll): ground units per sideways pixel times rows below the horizon.
+    """
+    row = horizon(homography, x)
+    if row is None:
+        return None
+    height = float(person_heights(homography, np.array([x, row, x, row + 100.0])))
+    return height if np.isfinite(height) else None
+
+
 def feet_cut_off(
     boxes: NDArray[np.float64], picture_height: float | NDArray[np.float64]
 ) -> NDArray[np.bool_]:

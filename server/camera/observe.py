@@ -9,6 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
+from bestview import camera_height, horizon
 from server.wire.config import Config
 from server.wire.detect import DetectSettings
 from server.wire.errors import UserError
@@ -18,6 +19,7 @@ from tracking import Detections
 from tracking.detectors import (
     BackgroundDetector,
     Detector,
+    Floor,
     HogDetector,
     Looks,
     MotFileDetector,
@@ -56,10 +58,37 @@ def make_detector(config: Config, camera: Camera, fit: Fit) -> Observer:
     polygons = [fit.to_site(np.asarray(polygon, dtype=np.float64)) for polygon in camera.ignore]
     ignore = tuple(tuple((float(x), float(y)) for x, y in polygon) for polygon in polygons)
     with _told(f"camera {camera.id}: detect"):
-        return _of_kind(replace(config.detect, ignore=(*config.detect.ignore, *ignore)))
+        settings = replace(config.detect, ignore=(*config.detect.ignore, *ignore))
+        return _of_kind(settings, _floor(config, camera, fit))
 
 
-def _of_kind(settings: DetectSettings) -> Observer:
+_PERSON_M = 1.7
+_PER_METRE = {"m": 1.0, "cm": 100.0, "mm": 1000.0}
+_LEAST_SLOPE, _MOST_SLOPE = 0.03, 1.5
+"""A person's height over the camera's: cameras at 1.1 to 57 metres. Beyond these the unit is another."""
+
+
+def _floor(config: Config, camera: Camera, fit: Fit) -> Floor | None:
+    """Give what metres of ground say about people's heights in the site's picture; None: nothing."""
+    per_metre = _PER_METRE.get(camera.ground_unit or "")
+    if camera.ground is None or per_metre is None:
+        return None
+    homography = np.array(camera.ground, dtype=np.float64)
+    width, height = config.site.width, config.site.height
+    middle = float(fit.to_own(np.array([width / 2.0, 0.0]))[0])
+    row = horizon(homography, middle)
+    if row is None:
+        return None
+    seen = float(fit.to_site(np.array([middle, row]))[1])
+    # Below the middle of the picture it says where people do not stand rather than how tall they are.
+    if seen > height / 2.0:
+        return None
+    above = camera_height(homography, middle)
+    slope = _PERSON_M * per_metre / above if above else 0.0
+    return Floor(seen, slope) if _LEAST_SLOPE <= slope <= _MOST_SLOPE else None
+
+
+def _of_kind(settings: DetectSettings, floor: Floor | None) -> Observer:
     """Give the detector that the settings name."""
     looks = Looks(settings.looks, settings.bins)
     match settings.kind:
@@ -70,7 +99,7 @@ def _of_kind(settings: DetectSettings) -> Observer:
         case "boxes":
             return BackgroundDetector(paper_boxes(settings))
         case "background":
-            return BackgroundDetector(settings)
+            return BackgroundDetector(settings, floor)
 
 
 @contextmanager

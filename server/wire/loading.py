@@ -63,9 +63,9 @@ def build_config(content: Mapping[str, Any], *, where: str, folder: Path) -> Con
         raise UserError(_one_line(where, error)) from error
     except SettingsError as error:
         raise UserError(f"{where}: environment: {error}; a section's whole value must be JSON") from error
-    homographies = _homographies(folder / config.ground, where) if config.ground else {}
+    homographies, unit = _homographies(folder / config.ground, where) if config.ground else ({}, None)
     try:
-        cameras = [_resolved(camera, homographies, folder) for camera in config.cameras]
+        cameras = [_resolved(camera, homographies, unit, folder) for camera in config.cameras]
     except ValueError as error:
         raise UserError(f"{where}: {error}") from error
     onnx = replace(config.detect.onnx, model=config.detect.model_in(folder))
@@ -100,16 +100,20 @@ def _merged(content: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str,
     return merged
 
 
-def _resolved(camera: Camera, homographies: Mapping[str, Any], folder: Path) -> Camera:
-    """Make paths absolute and fill in the ground homography from the file for all cameras."""
-    ground = camera.ground if camera.ground is not None else homographies.get(camera.id)
+def _resolved(camera: Camera, homographies: Mapping[str, Any], unit: str | None, folder: Path) -> Camera:
+    """Make paths absolute and fill in the ground homography from the file for all cameras, and its unit."""
+    ground, ground_unit = camera.ground, camera.ground_unit
+    if ground is None:
+        ground, ground_unit = homographies.get(camera.id), ground_unit or unit
     detections = folder / camera.detections if camera.detections else None
     source = resolved(camera.source, folder)
-    return camera.model_copy(update={"ground": ground, "source": source, "detections": detections})
+    return camera.model_copy(
+        update={"ground": ground, "ground_unit": ground_unit, "source": source, "detections": detections}
+    )
 
 
-def _homographies(path: Path, where: str) -> dict[str, list[list[float]]]:
-    """Read ``{"homography": {"c0": [[…], […], […]]}}``.
+def _homographies(path: Path, where: str) -> tuple[dict[str, list[list[float]]], str | None]:
+    """Read ``{"unit": "m", "homography": {"c0": [[…], […], […]]}}``; the unit may be left out.
 
     Raises:
         UserError: it cannot be read, or a matrix in it is not an invertible 3x3.
@@ -126,7 +130,8 @@ def _homographies(path: Path, where: str) -> dict[str, list[list[float]]]:
             checked_homography(matrix, f"camera {camera_id}")
         except ValueError as error:
             raise UserError(f"{where}: ground: {path}: {error}") from error
-    return matrices
+    unit = content.get("unit")
+    return matrices, unit if isinstance(unit, str) else None
 
 
 def _reason(error: Exception) -> str:

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from bestview import checked_homography, feet, foot_spread, person_heights, to_ground
+from bestview import camera_height, checked_homography, feet, foot_spread, horizon, person_heights, to_ground
 from bestview.ground import feet_cut_off, from_ground
 
 
@@ -34,6 +34,26 @@ def test_nobody_stands_on_or_above_the_horizon(scale: float) -> None:
     ground = to_ground(scale * looking_along(), points)
     assert np.isnan(ground[:3]).all()
     assert np.isfinite(ground[3]).all()
+
+
+@pytest.mark.parametrize("scale", [1.0, -2.5])
+def test_the_horizon_is_where_the_ground_ends(scale: float) -> None:
+    assert horizon(scale * looking_along(), 320.0) == pytest.approx(240.0)
+    tilted = looking_along() @ np.array([[1.0, 0.0, 0.0], [0.1, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    for x in (0.0, 320.0, 640.0):
+        row = horizon(tilted, x)
+        assert row == pytest.approx(240.0 - 0.1 * x)
+        above, below = to_ground(tilted, np.array([[x, row - 1.0], [x, row + 1.0]]))
+        assert np.isnan(above).all()
+        assert np.isfinite(below).all()
+    assert horizon(np.diag([0.02, 0.02, 1.0]), 0.0) is None
+
+
+@pytest.mark.parametrize("high", [1.9, 7.5])
+def test_the_camera_is_as_high_as_the_horizon_is_above_the_feet_of_somebody_as_tall(high: float) -> None:
+    for x in (100.0, 320.0):
+        assert camera_height(looking_along(high), x) == pytest.approx(high)
+    assert camera_height(np.diag([0.02, 0.02, 1.0]), 0.0) is None
 
 
 def test_feet_are_in_the_middle_of_the_lower_edge() -> None:

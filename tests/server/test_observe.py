@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -38,6 +39,33 @@ def test_boxes_are_the_papers_whatever_else_is_set(tmp_path: Path) -> None:
     assert isinstance(boxes, BackgroundDetector)
     for part in ("looks", "shadows", "boxes", "heights", "hypotheses"):
         assert getattr(boxes.settings, part) == getattr(PAPER_BOXES, part)
+
+
+@pytest.mark.parametrize(
+    ("row", "unit", "slope"),
+    [(-10.0, "m", 0.5), (8.0, "cm", 0.5), (8.0, "grid", None), (8.0, "mm", None), (30.0, "m", None)],
+)
+def test_metres_of_ground_that_ends_above_the_middle_say_how_tall_people_are(
+    tmp_path: Path, row: float, unit: str, slope: float | None
+) -> None:
+    high = 3.4 * {"cm": 100.0}.get(unit, 1.0)
+    ground = [[high, 0.0, -high * SIZE[0] / 2.0], [0.0, 0.0, 60.0 * high], [0.0, 1.0, -row]]
+    detector = observer(tmp_path, {}, ground=ground, ground_unit=unit)
+    detector.detect(np.zeros((SIZE[1], SIZE[0], 3), dtype=np.uint8))
+    line = detector.height_line
+    assert (line is not None) == (slope is not None)
+    if line is not None:
+        assert line.at(np.array([row, row + 20.0])) == pytest.approx([0.0, 20.0 * slope])
+
+
+def test_the_unit_of_the_file_is_that_of_its_homographies(tmp_path: Path) -> None:
+    matrix = [[1.0, 0.0, 0.0], [0.0, 0.0, 50.0], [0.0, 1.0, 0.0]]
+    (tmp_path / "ground.json").write_text(
+        json.dumps({"unit": "m", "homography": {"c0": matrix, "c1": matrix}})
+    )
+    cameras = [{"id": "c0", "source": "a"}, {"id": "c1", "source": "b", "ground": matrix}]
+    config = build_config({"cameras": cameras, "ground": "ground.json"}, where="site.yaml", folder=tmp_path)
+    assert [it.ground_unit for it in config.cameras] == ["m", None]
 
 
 @pytest.mark.parametrize("kind", ["background", "boxes", "hog"])

@@ -129,6 +129,27 @@ def test_a_small_set_explains_the_foreground_and_the_rest_scores_low() -> None:
     assert (explained.scores[3:] < 0.4).all()
 
 
+def test_a_crowd_is_explained_by_as_many_as_there_are() -> None:
+    weight = np.ones((ROWS, COLUMNS), dtype=np.float32)
+    crowd = [
+        (4.0 + 12.0 * k, 4.0 + 40.0 * row, 16.0 + 12.0 * k, 36.0 + 40.0 * row)
+        for row in (0, 1)
+        for k in range(9)
+    ]
+    foreground = np.zeros_like(weight)
+    for box in crowd:
+        foreground[body_of(np.array(box))] = 1.0
+    cost = (0.35 * (1.0 - foreground)).astype(np.float32)
+    peaks = BoxFilter(weight, ROWS, BoxFilterSettings(least_height=0.3, most_height=0.4)).peaks(
+        foreground - cost, None
+    )
+    settings = ExplainSettings()
+    explained = explain(peaks, foreground, cost, weight, settings)
+    assert explained.people == len(crowd) > settings.most_hypotheses
+    assert explained.people < len(explained.boxes) <= len(crowd) + settings.runners_up
+    assert explain(peaks, foreground, cost, weight, ExplainSettings(most_people=7)).people == 7
+
+
 def test_without_explanation_boxes_score_by_themselves() -> None:
     foreground, cost, weight = scene()
     peaks = found()

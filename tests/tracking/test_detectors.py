@@ -5,11 +5,19 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from drawn_people import HEIGHT, WIDTH, Figure, picture, watched
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from tracking.boxes import iou
 from tracking.detections import Detections
 from tracking.detectors import BackgroundDetector, BackgroundSettings, LooksSettings
-from tracking.detectors.heightline import HeightLineSettings, fit_line
+from tracking.detectors.heightline import (
+    Floor,
+    HeightLineLearner,
+    HeightLineSettings,
+    fit_line,
+    prior_of,
+)
 
 SURE = 0.4
 WALKER = Figure(10, 200, speed=2.0, begin=40)
@@ -140,3 +148,79 @@ def test_people_all_of_one_height_everywhere_are_no_floor() -> None:
     foot = np.linspace(60, 280, 400)
     steep = np.stack([foot, 200.0 - 0.5 * foot], axis=1)
     assert fit_line(steep, HeightLineSettings()) is None
+
+
+@settings(deadline=None, max_examples=40)
+@given(st.floats(0.35, 1.0), st.floats(-80.0, 60.0), st.integers(0, 1000))
+def test_by_metres_pieces_and_pairs_of_people_do_not_lead_the_line_astray(
+    slope: float, row: float, seed: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    foot = rng.uniform(190, 220, 60)
+    height = slope * (foot - row) * rng.normal(1.0, 0.04, 60)
+    height[:24] *= rng.uniform(0.2, 0.6, 24)
+    height[24:32] *= rng.uniform(1.2, 1.5, 8)
+    prior = prior_of(HeightLineSettings(), Floor(row, slope), HEIGHT)
+    line = fit_line(np.stack([foot, height], axis=1), HeightLineSettings(), prior)
+    assert line is not None
+    rows = np.array([130.0, 200.0, 270.0])
+    np.testing.assert_allclose(line.at(rows), slope * (rows - row), rtol=0.08)
+
+
+def test_by_metres_there_is_a_line_before_anybody_was_seen_and_where_nothing_agrees() -> None:
+    floor = Floor(20.0, 0.65)
+    before = HeightLineLearner(HeightLineSettings(), floor, HEIGHT).line
+    assert before is not None
+    assert before.at(np.array([20.0, 120.0])).tolist() == [0.0, 65.0]
+    assert HeightLineLearner(HeightLineSettings()).line is None
+    rng = np.random.default_rng(3)
+    wild = np.stack([rng.uniform(100, 280, 200), rng.uniform(20, 250, 200)], axis=1)
+    assert fit_line(wild, HeightLineSettings(), prior_of(HeightLineSettings(), floor, HEIGHT)) == before
+    assert fit_line(wild, HeightLineSettings()) is None
+
+
+def test_children_are_learned_to_be_smaller_than_people_of_the_usual_height() -> None:
+    rng = np.random.default_rng(5)
+    foot = rng.uniform(100, 280, 300)
+    height = 0.8 * 0.6 * (foot - 30.0) * rng.normal(1.0, 0.05, 300)
+    prior = prior_of(HeightLineSettings(), Floor(30.0, 0.6), HEIGHT)
+    line = fit_line(np.stack([foot, height], axis=1), HeightLineSettings(), prior)
+    assert line is not None
+    np.testing.assert_allclose(line.at(np.array([120.0, 200.0])), [43.2, 81.6], rtol=0.08)
+
+
+def test_more_pieces_than_people_do_not_lead_the_line_astray() -> None:
+    rng = np.random.default_rng(6)
+    foot = rng.uniform(110, 260, 200)
+    height = (0.6 * foot - 20.0) * rng.normal(1.0, 0.04, 200)
+    height[:120] *= rng.choice([0.3, 0.4], 120)
+    line = fit_line(np.stack([foot, height], axis=1), HeightLineSettings())
+    assert line is not None
+    np.testing.assert_allclose(line.at(np.array([120.0, 200.0, 260.0])), [52.0, 100.0, 136.0], rtol=0.08)
+
+
+def test_how_tall_people_are_is_sure_by_metres_or_by_many_people() -> None:
+    alone = HeightLineLearner(HeightLineSettings())
+    assert not alone.sure
+    assert HeightLineLearner(HeightLineSettings(), Floor(57.0, 0.7), HEIGHT).sure
+    visible = np.full((HEIGHT, WIDTH), 255, dtype=np.uint8)
+    surely = []
+    for step in range(120):
+        foreground = np.zeros_like(visible)
+        foot = 120 + step
+        tall = int(0.7 * foot - 40)
+        foreground[foot - tall : foot, 100 : 100 + int(0.36 * tall)] = 255
+        alone.watch(foreground, visible)
+        surely.append(alone.sure)
+    assert not surely[5]
+    assert surely[-1]
+
+
+def test_what_was_measured_of_the_floor_says_how_tall_people_are_in_every_size_of_picture() -> None:
+    lines = []
+    for factor in (1, 2):
+        detector = BackgroundDetector(floor=Floor(57.0 * factor, 0.7))
+        assert detector.height_line is None
+        detector.detect(np.zeros((factor * HEIGHT, factor * WIDTH, 3), dtype=np.uint8))
+        lines.append(detector.height_line)
+    assert lines[0] == lines[1] == prior_of(HeightLineSettings(), Floor(57.0, 0.7), HEIGHT).line

@@ -5,7 +5,7 @@ from tracking.detectors.base import Detector, Image
 from tracking.detectors.boxfilter import BoxFilterSettings
 from tracking.detectors.explain import ExplainSettings
 from tracking.detectors.ghosts import GhostSettings
-from tracking.detectors.heightline import HeightLineSettings
+from tracking.detectors.heightline import Floor, HeightLineSettings
 from tracking.detectors.hog import HogDetector, HogSettings
 from tracking.detectors.looks import Looks, LooksSettings, colour_histograms
 from tracking.detectors.median import MedianSettings
@@ -22,6 +22,7 @@ __all__ = [
     "BoxFilterSettings",
     "Detector",
     "ExplainSettings",
+    "Floor",
     "GhostSettings",
     "HeightLineSettings",
     "HogDetector",

@@ -18,7 +18,12 @@ from tracking.detectors.explain import ExplainSettings, Explanation, explain
 from tracking.detectors.fit import shrink
 from tracking.detectors.ghosts import GhostSettings
 from tracking.detectors.grid import Grid
-from tracking.detectors.heightline import HeightLine, HeightLineLearner, HeightLineSettings
+from tracking.detectors.heightline import (
+    Floor,
+    HeightLine,
+    HeightLineLearner,
+    HeightLineSettings,
+)
 from tracking.detectors.looks import Looks, LooksSettings
 from tracking.detectors.median import MedianBackground, MedianSettings
 from tracking.detectors.mog2 import Mog2Background, Mog2Settings
@@ -78,9 +83,11 @@ class _Background(Protocol):
 class BackgroundDetector:
     """Finds standing people in the foreground of one camera. Deterministic, about a second to warm up."""
 
-    def __init__(self, settings: BackgroundSettings | None = None) -> None:
+    def __init__(self, settings: BackgroundSettings | None = None, floor: Floor | None = None) -> None:
+        """Begin with an empty memory; `floor` is what was measured of it in the pictures."""
         self.settings = settings or BackgroundSettings()
         self._looks = Looks(self.settings.looks, self.settings.bins)
+        self._floor = floor
         self._learner = HeightLineLearner(self.settings.heights)
         self._background: _Background = (
             MedianBackground(self.settings.median, self.settings.ghosts, self.settings.shadows)
@@ -141,6 +148,11 @@ class BackgroundDetector:
         """The length of a row of the histograms."""
         return self._looks.bins
 
+    @property
+    def height_line(self) -> HeightLine | None:
+        """How tall people are where, in pixels of the working picture; None: not known yet."""
+        return self._learner.line
+
     def _hypotheses(self, mask: Mask, shadow: Mask, grid: Grid) -> Explanation:
         settings = self.settings
         foreground = grid.cells(mask)
@@ -149,7 +161,11 @@ class BackgroundDetector:
         if self._filter is None:
             self._filter = BoxFilter(grid.weight, mask.shape[0] // CELL, settings.boxes)
         peaks = self._filter.peaks(foreground - cost, self._heights(grid))
-        found = explain(peaks, foreground, cost, grid.weight, settings.hypotheses)
+        explaining = settings.hypotheses
+        if not self._learner.sure:
+            fewer = min(explaining.most_people, explaining.most_unsure)
+            explaining = replace(explaining, most_people=fewer)
+        found = explain(peaks, foreground, cost, grid.weight, explaining)
         return Explanation(shrink(found.boxes, foreground, grid.weight), found.scores, found.people)
 
     def _heights(self, grid: Grid) -> Band | None:
@@ -171,6 +187,9 @@ class BackgroundDetector:
             self._grid = Grid(
                 image.shape[:2], self.settings.work_width, CELL, self.settings.outside, self.settings.ignore
             )
+            if self._floor is not None:
+                floor = self._floor.in_rows(self._grid.scale)
+                self._learner = HeightLineLearner(self.settings.heights, floor, self._grid.rows)
         if image.shape != self._shape:
             raise ValueError(f"the frames' size changed from {self._shape} to {image.shape}")
         return self._grid

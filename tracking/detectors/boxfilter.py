@@ -26,7 +26,7 @@ class BoxFilterSettings:
     background_cost: float = 0.35  # what a background pixel inside the body costs, a foreground one brings 1
     least_gain: float = 0.3  # least gain of a hypothesis, in areas of its body
     least_seen: float = 0.45  # least share of a box that is inside the picture and not ignored
-    most_peaks: int = 120  # local maxima kept for what follows, best first
+    most_peaks: int = 240  # local maxima kept for what follows, best first
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -18,11 +18,15 @@ class ExplainSettings:
     """Which hypotheses of a frame are handed on."""
 
     use: bool = True  # false: the boxes as the scan found them, each by itself (the paper)
-    most_people: int = 10  # people that a frame's foreground is explained by at most
+    most_people: int = 40  # people that a frame's foreground is explained by at most
+    most_unsure: int = (
+        10  # and while it is not known well how tall people are: many small ones explain anything
+    )
     least_share: float = (
         0.3  # least gain of a further person, in areas of the part of the body that nobody covers
     )
-    most_hypotheses: int = 16  # K: hypotheses handed on at most, people and runners-up
+    most_hypotheses: int = 16  # K: hypotheses handed on, people and runners-up, where people are few
+    runners_up: int = 8  # handed on beside the people however many these are
     apart: float = 0.55  # runners-up overlap (IoU) what is handed on already by less than this
 
 
@@ -96,11 +100,12 @@ class Search:
         # What a covered cell no longer adds to the gain of the others, and to what is visible of them.
         self._lost = np.stack([np.maximum(foreground - cost, 0.0), weight], axis=-1)
         self._covers = np.zeros(weight.shape, dtype=np.int32)
+        self._extent = peaks.corners.extent
 
     def people(self) -> list[int]:
         """Give the indices of the chosen, in the order in which they were first chosen."""
         chosen: list[int] = []
-        while len(chosen) < min(self._settings.most_people, self._settings.most_hypotheses):
+        while len(chosen) < self._settings.most_people:
             best = self._best(chosen)
             if best is None:
                 break
@@ -137,11 +142,14 @@ class Search:
         self._lose(place, inside & (self._covers[place] == 0), 1.0)
 
     def _lose(self, place: tuple[slice, slice], cells: npt.NDArray[np.bool_], sign: float) -> None:
-        """Change gains and visible parts by what the cells are worth; only this piece has to be summed."""
+        """Change gains and visible parts by what the cells are worth, of the bodies on this piece."""
         lost = integral(self._lost[place] * cells[..., None].astype(np.float32))
-        change = self._peaks.corners.within(place).sums(lost)
-        self.gains += sign * change[:, 0]
-        self.visible += sign * change[:, 1]
+        (top, bottom), (left, right) = ((it.start, it.stop) for it in place)
+        lefts, tops, rights, bottoms = self._extent
+        near = np.flatnonzero((lefts < right) & (rights > left) & (tops < bottom) & (bottoms > top))
+        change = self._peaks.corners.only(near).within(place).sums(lost)
+        self.gains[near] += sign * change[:, 0]
+        self.visible[near] += sign * change[:, 1]
 
     def _best(self, chosen: list[int]) -> int | None:
         """Give the candidate that gains most beside the chosen; `None` where none gains enough."""
@@ -162,8 +170,11 @@ def _runners_up(boxes: npt.NDArray[np.float64], chosen: list[int], settings: Exp
     nearest = overlaps[chosen].max(axis=0, initial=0.0)
     nearest[chosen] = np.inf
     extra: list[int] = []
+    most = settings.most_hypotheses
+    if settings.use:
+        most = max(most, len(chosen) + settings.runners_up)
     for index in range(len(boxes)):
-        if len(chosen) + len(extra) >= settings.most_hypotheses:
+        if len(chosen) + len(extra) >= most:
             break
         if nearest[index] < settings.apart:
             extra.append(index)

@@ -53,6 +53,16 @@ class Grid:
         limits = np.array([width, height, width, height], dtype=np.float64)
         return np.asarray(np.clip((boxes - self.margin) * per_cell, 0.0, limits))
 
+    @property
+    def rows(self) -> int:
+        """The height of the working picture."""
+        return self._work[0]
+
+    @property
+    def scale(self) -> float:
+        """How many times as large as the camera's the working picture is."""
+        return self._work[0] / self._size[0]
+
     def to_picture(self, boxes: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """Turn boxes in pixels of the working picture into boxes in pixels of the camera's picture."""
         per_pixel = np.array([self._size[1] / self._work[1], self._size[0] / self._work[0]] * 2)

@@ -2,7 +2,9 @@
 
 A pinhole camera `c` above a flat floor sees a person of height `p` as `h = p / c (y - horizon)` rows
 tall: one slope for the whole picture. So the slope is about known before anybody is seen (people are
-some 1.7 m, cameras hang at 1.5 to 6 m), and a few people who stand alone fix the rest.
+some 1.7 m, cameras hang at 1.5 to 6 m), and a few people who stand alone fix the rest. Where the floor was
+measured in metres there is a line before anybody is seen, and people in a crowd, of whom the foreground
+shows pieces and pairs, hardly lead it astray.
 """
 
 from __future__ import annotations
@@ -11,7 +13,6 @@ from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from tracking.boxes import Floats
 from tracking.detectors.base import Mask
@@ -32,6 +33,23 @@ class HeightLineSettings:
     tolerance: float = 0.15  # a hypothesis may be this share taller or smaller than the line says
     doubt: float = 1.0  # standard deviations of the line by which it may be taller or smaller besides
     most_scatter: float = 0.13  # median deviation, in heights, above which there is no line (stairs)
+
+
+@dataclass(frozen=True, slots=True)
+class Floor:
+    """What measuring the floor in metres says of people's heights.
+
+    Attributes:
+        horizon: the row of the picture in which the floor ends: people there would be without height.
+        slope: rows of a person's height for each row that their feet are below.
+    """
+
+    horizon: float
+    slope: float
+
+    def in_rows(self, scale: float) -> Floor:
+        """Give the same in a picture that is so many times as large."""
+        return Floor(self.horizon * scale, self.slope)
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,15 +89,30 @@ class HeightLine:
 
 
 class HeightLineLearner:
-    """Collects isolated standing blobs as it goes and fits the line to them."""
+    """Collects isolated standing blobs as it goes and fits the line to them.
 
-    def __init__(self, settings: HeightLineSettings) -> None:
+    Where people's heights follow from the floor there is a line from the beginning.
+    """
+
+    def __init__(self, settings: HeightLineSettings, floor: Floor | None = None, rows: float = 0.0) -> None:
+        """Begin without samples; `rows` is the height of the picture that the `floor` is seen in."""
         self._settings = settings
+        self._prior = prior_of(settings, floor, rows)
         self._samples: deque[tuple[float, float]] = deque(maxlen=settings.most_samples)
         self._frames = 0
         self._fitted_on = 0
         self._seen = 0
         self.line: HeightLine | None = None
+        if settings.use:
+            self.line = self._prior.line
+
+    @property
+    def sure(self) -> bool:
+        """Whether it is known how tall people are: by metres of floor, or by many who were seen alone."""
+        line = self.line
+        if line is None or self._prior.line is not None:
+            return line is not None
+        return line.spread <= _SURE * (line.slope * line.centre + line.offset)
 
     def watch(self, foreground: Mask, visible: Mask, frames: int = 1) -> None:
         """Look at one frame's foreground `(H, W)`; `visible` is 0 where the picture is ignored.
@@ -95,7 +128,8 @@ class HeightLineLearner:
         # Refit when the samples have grown by a tenth: early often, later seldom.
         if len(self._samples) >= self._settings.least_samples and self._seen >= 1.1 * self._fitted_on:
             self._fitted_on = self._seen
-            self.line = fit_line(np.asarray(self._samples, dtype=np.float64), self._settings)
+            samples = np.asarray(self._samples, dtype=np.float64)
+            self.line = fit_line(samples, self._settings, self._prior)
 
 
 # One person gives a sample in every frame: so many of them are worth one independent one.
@@ -109,50 +143,99 @@ _ROUNDS = 5
 _SMALLER, _LOW = 0.8, 0.05
 _SLOPES = np.linspace(-2.0, 2.0, 17)
 _SAMPLES_A_SLOPE = 40
+# Standard deviation of a measured line at the horizon, in picture heights: heights are no straight line
+# where a camera looks steeply down, and homographies not exact.
+_HORIZON = 0.02
+# Standard deviation of a line, in heights, up to which it is sure.
+_SURE = 0.05
+# Standard deviation of a measured slope, in slopes.
+_MEASURED = 0.06
 
 
-def fit_line(samples: Floats, settings: HeightLineSettings) -> HeightLine | None:
-    """Fit the line to samples `(N, 2)` of foot and height, or give `None` where they fit none.
+@dataclass(frozen=True, slots=True)
+class Prior:
+    """What is known of the line before anybody was seen.
 
-    The most likely line under Tukey's biweight, `N(usual_slope, slope_spread^2)` before the slope and
-    nothing before the offset: the best of a grid of slopes first, so that no share of wild samples
-    below a half leads astray, then a few rounds of reweighted least squares.
+    The slope is `N(slope, slope_spread^2)`, and the line `N(0, spread^2)` at the horizon where there is one.
     """
+
+    slope: float
+    slope_spread: float
+    horizon: float | None = None
+    spread: float = 0.0
+    line: HeightLine | None = None
+    """The line to go by while samples tell none."""
+
+
+def prior_of(settings: HeightLineSettings, floor: Floor | None = None, rows: float = 0.0) -> Prior:
+    """Give what is known before anybody was seen in a picture of so many rows."""
+    if floor is None:
+        return Prior(settings.usual_slope, settings.slope_spread)
+    spread, off = _MEASURED * floor.slope, _HORIZON * rows
+    line = HeightLine(floor.slope, -floor.slope * floor.horizon, floor.horizon, off, spread)
+    return Prior(floor.slope, spread, floor.horizon, off, line)
+
+
+def fit_line(samples: Floats, settings: HeightLineSettings, prior: Prior | None = None) -> HeightLine | None:
+    """Fit the line to samples `(N, 2)` of foot and height; where they fit none, give what is known before.
+
+    The most likely line under Tukey's biweight and the prior: the best of a grid of slopes first, so that
+    no share of wild samples below a half leads astray, then a few rounds of reweighted least squares.
+    """
+    prior = prior or prior_of(settings)
     foot, height = samples.T
-    slope, offset = _best_of_grid(foot, height, settings)
-    precision = np.diag([1e-9, settings.slope_spread**-2])
+    slope, offset = _best_of_grid(foot, height, prior)
+    precision = np.diag([1e-9, prior.slope_spread**-2])
     centre = float(foot.mean())
     for _ in range(_ROUNDS):
         deviation = (height - slope * foot - offset) / height
         weight = np.maximum(1.0 - (deviation / _WILD) ** 2, 0.0) ** 2
         if not weight.any():
-            return None
+            return prior.line
         centre = float(np.average(foot, weights=weight))
         weight = weight / (_ALIKE * (_NOISE * height) ** 2)
         terms = np.stack([np.ones_like(foot), foot - centre])
         evidence = (terms * weight) @ terms.T + precision
-        pull = (terms * weight) @ height + precision @ [0.0, settings.usual_slope]
+        pull = (terms * weight) @ height + precision @ [0.0, prior.slope]
+        if prior.horizon is not None:
+            there = np.array([1.0, prior.horizon - centre])
+            evidence += np.outer(there, there) / prior.spread**2
         level, slope = (float(value) for value in np.linalg.solve(evidence, pull))
         offset = level - slope * centre
-    scatter = float(np.median(np.abs(height - slope * foot - offset) / height))
+    scatter = _median(np.abs(height - slope * foot - offset) / height, _says(height))
     # Upright cameras see people grow towards the bottom of the picture; anything else is a misfit.
     if slope <= 0.0 or scatter > settings.most_scatter:
-        return None
-    # Nearly uncorrelated, as the feet are counted from their weighted mean.
-    level_spread, slope_spread = np.sqrt(np.diag(np.linalg.inv(evidence)))
+        return prior.line
+    (level, mixed), (_, steep) = np.linalg.inv(evidence)
     smallest = _SMALLER * float(np.quantile(height[weight > 0.0], _LOW))
-    return HeightLine(slope, offset, centre, float(level_spread), float(slope_spread), smallest)
+    # Level and slope are uncorrelated, and the line known best, a little off the mean of the feet.
+    spread = float(np.sqrt(max(level - mixed**2 / steep, 0.0)))
+    return HeightLine(slope, offset, centre - float(mixed / steep), spread, float(np.sqrt(steep)), smallest)
 
 
-def _best_of_grid(
-    foot: npt.NDArray[np.float64], height: npt.NDArray[np.float64], settings: HeightLineSettings
-) -> tuple[float, float]:
-    """Give slope and offset of the line through one sample that most samples are close to."""
-    slopes = settings.usual_slope + settings.slope_spread * _SLOPES
+def _says(height: Floats) -> Floats:
+    """Give how much each sample says, 1 on the mean: tall ones more, since pieces of people are small."""
+    return np.asarray(height / height.mean())
+
+
+def _median(values: Floats, weights: Floats) -> float:
+    """Give the weighted median."""
+    order = np.argsort(values, kind="stable")
+    total = np.cumsum(weights[order])
+    return float(values[order][np.searchsorted(total, total[-1] / 2.0)])
+
+
+def _best_of_grid(foot: Floats, height: Floats, prior: Prior) -> tuple[float, float]:
+    """Give slope and offset of the line through a sample or the horizon that most samples are close to."""
+    slopes = prior.slope + prior.slope_spread * _SLOPES
     through = np.linspace(0, len(foot) - 1, min(len(foot), _SAMPLES_A_SLOPE)).astype(np.int64)
     offsets = height[through] - slopes[:, None] * foot[through]
+    if prior.horizon is not None:
+        offsets = np.concatenate([offsets, -slopes[:, None] * prior.horizon], axis=1)
     deviation = (height - slopes[:, None, None] * foot - offsets[..., None]) / height
-    loss = np.minimum((deviation / _WILD) ** 2, 1.0).sum(axis=-1) * (_WILD / _NOISE) ** 2 / _ALIKE
-    best = int(np.argmin(loss + (_SLOPES**2)[:, None]))
-    row, column = divmod(best, len(through))
+    loss = np.minimum((deviation / _WILD) ** 2, 1.0) @ _says(height) * (_WILD / _NOISE) ** 2 / _ALIKE
+    loss += (_SLOPES**2)[:, None]
+    if prior.horizon is not None:
+        loss += ((offsets + slopes[:, None] * prior.horizon) / prior.spread) ** 2
+    row, column = divmod(int(np.argmin(loss)), offsets.shape[1])
     return float(slopes[row]), float(offsets[row, column])

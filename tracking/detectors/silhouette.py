@@ -69,6 +69,11 @@ class Corners:
         lower = integrals[self.bottom, self.right] - integrals[self.bottom, self.left]
         return np.asarray((lower - upper).sum(axis=1))
 
+    @property
+    def extent(self) -> tuple[npt.NDArray[np.int64], ...]:
+        """Left, top, right and bottom of the bodies as wholes, each `(K,)`."""
+        return self.left.min(axis=1), self.top.min(axis=1), self.right.max(axis=1), self.bottom.max(axis=1)
+
     def only(self, chosen: npt.NDArray[np.int64]) -> Corners:
         """Give those of some of the bodies."""
         return Corners(self.left[chosen], self.top[chosen], self.right[chosen], self.bottom[chosen])

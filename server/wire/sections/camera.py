@@ -31,6 +31,8 @@ class Camera(Section):
     """Parts of the picture where nobody is looked for, in pixels of the camera's own picture."""
     ground: list[list[float]] | None = None
     """3x3 homography from the camera's own picture (pixels) to the ground plane."""
+    ground_unit: str | None = None
+    """The ground plane's unit: by m, cm or mm it is known how tall people are in the picture."""
     detections: Path | None = None
     """A MOTChallenge detection file to use instead of looking for people in the picture."""
 
