@@ -77,7 +77,14 @@ def test_who_is_settled_must_have_been_told_first() -> None:
 
 @pytest.mark.parametrize(
     ("section", "value"),
-    [("site", {"fps": 0}), ("site", {"width": 333}), ("encode", {"gop": 0}), ("http", {"port": 70000})],
+    [
+        ("site", {"fps": 0}),
+        ("site", {"width": 333}),
+        ("encode", {"gop": 0}),
+        ("http", {"port": 70000}),
+        ("view", {"min_shot_s": 1e9}),
+        ("view", {"goes_on_s": float("inf")}),
+    ],
 )
 def test_values_out_of_range_are_refused(section: str, value: dict[str, Any]) -> None:
     assert f"{section}.{next(iter(value))}" in complaint(site(**{section: value}))

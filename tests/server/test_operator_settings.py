@@ -102,6 +102,8 @@ async def test_what_is_tried_out_is_in_force_at_once_with_its_lines(busy: Hall) 
     ("json", "error"),
     [
         ({"switch_cost_s": -1}, "to try out: view.switch_cost_s: "),
+        ({"switch_cost_s": 1e308}, "to try out: view.switch_cost_s: Input should be less than or equal to"),
+        ({"min_shot_s": 1e6}, "to try out: view.min_shot_s: Input should be less than or equal to 600"),
         ({"quality.size": 2}, "to try out: view.quality: the weight size"),
         ({"lookahead": 30}, "view.lookahead: cannot be changed here; what can is switch_cost_s, "),
         ({"switch_cost": 1}, "view.switch_cost: cannot be changed here"),

@@ -5,11 +5,13 @@ from __future__ import annotations
 import re
 from typing import Annotated, Self
 
-from pydantic import NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt, model_validator
+from pydantic import Field, NonNegativeInt, PositiveFloat, PositiveInt, model_validator
 
 from bestview import IdentitySettings, QualitySettings
 from server.wire.library import validated
 from server.wire.sections.base import Section
+
+Seconds = Annotated[float, Field(ge=0, le=3600)]
 
 
 class Share(Section):
@@ -39,14 +41,14 @@ class View(Section):
 
     lookahead: PositiveInt = 25
     """Frames the choice of a view looks ahead: N of the paper's section III; all of it is delay."""
-    switch_cost_s: NonNegativeFloat = 0.3
+    switch_cost_s: Seconds = 0.3
     """λ: how many seconds of not seeing the person, while another camera does, are worth a cut; of a view
     that is worth half the best one it takes twice as many."""
-    goes_on_s: NonNegativeFloat = 0.5
+    goes_on_s: Seconds = 0.5
     """For how long the views at the end of the look-ahead are taken to go on as they are."""
-    missed_s: NonNegativeFloat = 1.0
+    missed_s: Seconds = 1.0
     """Who is not found any more is taken to be still there, less and less, for so long; 0: not at all."""
-    min_shot_s: NonNegativeFloat = 0.0
+    min_shot_s: Annotated[float, Field(ge=0, le=600)] = 0.0
     """A camera is shown for so long at least, in whole GOPs; one that sees nobody may be left sooner."""
     late_after_s: PositiveFloat = 0.5
     """How long to wait for a camera's tracks before going on without that camera."""
