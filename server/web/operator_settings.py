@@ -27,9 +27,11 @@ from server.wire.sections import View
 routes = web.RouteTableDef()
 
 HIDDEN = "(not shown)"
-_SECRET = re.compile(r"pass|token|secret|key|auth|header|cookie", re.IGNORECASE)
+_WORDS = "pas|pwd|psw|token|secret|key|auth"
+_SECRET = re.compile(f"{_WORDS}|header|cookie", re.IGNORECASE)
 _LOGIN = re.compile(r"(?<=://)[^/\s]+@")
-_QUERY = re.compile(r"([?&][^=&]*(?:pass|token|secret|key|auth)[^=&]*=)[^&#]*", re.IGNORECASE)
+_QUERY = re.compile(rf"((?:{_WORDS})[^=&?/#]*=)[^&#]*", re.IGNORECASE)
+"""Some cameras have their password in the path, as ``user=…_password=…_channel=1``."""
 
 
 @routes.get(f"{PREFIX}/config")

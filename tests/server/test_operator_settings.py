@@ -144,6 +144,21 @@ async def test_the_configuration_says_what_differs_and_no_secret(open_hall: Hall
     assert options["value"] == "{headers: (not shown), rtsp_transport: tcp}"
 
 
+@pytest.mark.parametrize(
+    "source",
+    [
+        "rtsp://10.0.0.1/live?usr=admin&pwd=hush&size=1",
+        "http://10.0.0.1/video.cgi?loginuse=admin&loginpas=hush",
+        "rtsp://10.0.0.1:554/user=admin_password=hush_channel=1.sdp?real_stream",
+    ],
+)
+def test_a_password_is_not_shown_wherever_a_camera_has_it(source: str) -> None:
+    config = small_config(cameras=[{"id": A, "source": source}])
+    [shown] = [it.value for it in settings_of(config) if it.key == f"cameras.{A}.source"]
+    assert "hush" not in shown
+    assert shown.startswith(source.partition("=")[0])
+
+
 async def test_the_configuration_does_not_tell_the_tokens_sum() -> None:
     digest = 64 * "a"
     async with aclosing(opened(http={"operator_token": digest})) as halls:
