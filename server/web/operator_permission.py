@@ -46,7 +46,7 @@ Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 def digest_of(token: str) -> str:
     """Give what the configuration knows of a token: its SHA-256, in hex."""
-    return hashlib.sha256(token.encode()).hexdigest()
+    return hashlib.sha256(token.encode(errors="surrogatepass")).hexdigest()  # heads may hold any bytes
 
 
 @dataclass(slots=True)

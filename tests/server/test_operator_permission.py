@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import AsyncIterator
 
 import pytest
@@ -132,6 +133,16 @@ async def test_a_session_ends_and_so_do_the_oldest_of_very_many() -> None:
     assert all(may(it) for it in later)
     now[0] = 13 * 3600.0
     assert not may(later[-1])
+
+
+@pytest.mark.parametrize("head", [b"Authorization: Bearer \xff\xfe", f"Cookie: {COOKIE}=".encode() + b"\xff"])
+async def test_bytes_that_are_no_text_are_no_token_and_no_sign_in(locked: Hall, head: bytes) -> None:
+    reader, writer = await asyncio.open_connection("127.0.0.1", locked.port)
+    writer.write(f"GET {SESSION} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n".encode() + head)
+    writer.write(b"\r\n\r\n")
+    assert (await reader.readline()).split()[1] == b"401"
+    writer.close()
+    await writer.wait_closed()
 
 
 async def test_wrong_tokens_are_limited_in_rate_and_the_right_one_waits_too(locked: Hall) -> None:
