@@ -43,7 +43,7 @@ async def post_people(request: web.Request) -> web.Response:
     said = await asked_for(request, Said)
     if _cannot(service):
         return problem(409, _cannot(service))
-    number = service.board.resolve(said.object)
+    number = people.merged.get(said.object, said.object)  # also of a merge that nobody was told of yet
     if number not in people.known:
         return problem(404, f"there is no object {said.object}")
     given = [it for it in ("name", "merge", "part") if getattr(said, it) is not None]

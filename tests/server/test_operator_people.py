@@ -66,8 +66,8 @@ async def test_two_that_are_one_are_one_to_everybody_from_the_next_gop_on(real: 
     kept, lost = sorted(people)[:2]
     told: list[Any] = []
     real.service.on_decision.append(told.append)
-    await say(real, object=lost, name="Bob")
     status, answer = await say(real, object=kept, merge=lost)
+    assert (await say(real, object=lost, name="Bob"))[0] == 200, "at once, too, the lost number is theirs"
     assert (status, answer["merged"]) == (200, {str(lost): kept})
     for epoch in range(3, 8):
         feed(real, epoch)
