@@ -45,21 +45,30 @@ export class Stills {
   }
 }
 
+/** @type {WeakMap<HTMLImageElement, string>} addresses of what is shown */
+const shown = new WeakMap();
+/** @type {WeakMap<HTMLImageElement, string>} what was asked for last */
+const wanted = new WeakMap();
+
 /**
- * Shows a picture of now; where there is none, the last one stays, marked as old.
+ * Shows a picture of now; where there is none, the last one stays, marked as old. An answer that comes after
+ * another camera's picture was asked for is not shown.
  *
  * @param {HTMLImageElement} image
  * @param {string} address
  * @returns {Promise<boolean>} there is one
  */
 export async function load(image, address) {
+  wanted.set(image, address);
   const response = await fetch(address, { cache: 'no-store' }).catch(() => null);
-  const there = response?.ok === true;
-  image.classList.toggle('old', !there);
-  if (!response || !there) return false;
-  const before = image.src;
-  image.src = URL.createObjectURL(await response.blob());
+  const picture = response?.ok ? await response.blob().catch(() => null) : null;
+  if (wanted.get(image) !== address) return false;
+  image.classList.toggle('old', !picture);
+  if (!picture) return false;
+  const before = shown.get(image);
+  image.src = URL.createObjectURL(picture);
+  shown.set(image, image.src);
   await image.decode().catch(() => undefined);
-  if (before.startsWith('blob:')) URL.revokeObjectURL(before);
+  if (before) URL.revokeObjectURL(before);
   return true;
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import re
 import time
 from collections.abc import AsyncIterator
@@ -16,7 +17,7 @@ import pytest_asyncio
 import yaml
 from cameras_by_hand import CAMERAS, LARGE, SMALL, small_config, status
 from halls import A, B, Hall, opened
-from playwright.async_api import Browser, Page, expect
+from playwright.async_api import Browser, Page, Route, expect
 
 from benchmarks.browser import CHROMIUM, chromium
 from bestview import IdentityRegistry
@@ -197,6 +198,32 @@ async def test_a_span_of_the_past_is_downloaded(browser: Browser) -> None:
         await page.get_by_label("From").fill("2020-01-02T00:00:00")
         await page.get_by_label("to", exact=True).fill("2020-01-01T00:00:00")
         await expect(page.locator("#download-tables")).to_have_text("The end is not after the beginning.")
+
+
+async def test_the_picture_is_of_the_camera_that_is_marked_though_anothers_comes_late(
+    browser: Browser,
+) -> None:
+    async with operating(browser, "#marks") as (hall, page):
+        see(hall)
+        late = asyncio.Event()
+
+        async def answer(route: Route) -> None:
+            if f"/{A}/" in route.request.url:
+                await late.wait()
+            await route.continue_()
+
+        await page.route("**/live.jpg", answer)
+        async with page.expect_request(f"**/{A}/live.jpg"):
+            await page.reload()
+        await page.get_by_label("Camera", exact=True).select_option(B)
+        image = page.locator("#mark-image")
+        await expect(image).to_have_attribute("src", re.compile("^blob:"))
+        shown = await image.get_attribute("src")
+        async with page.expect_response(f"**/{A}/live.jpg") as response:
+            late.set()
+        await (await response.value).finished()
+        await page.evaluate("new Promise((seen) => setTimeout(seen, 100))")
+        assert await image.get_attribute("src") == shown
 
 
 async def test_areas_to_ignore_become_lines_of_a_configuration(browser: Browser) -> None:
