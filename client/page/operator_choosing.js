@@ -17,7 +17,7 @@ const FIELDS = [
   ['quality.whole', 'Whole', "How much of the person the picture's edges leave."],
   ['quality.unhidden', 'Unhidden', 'How much of the person other people leave to be seen.'],
   ['quality.central', 'Central', 'How near the middle of the picture.'],
-  ['quality.sharp', 'Sharp', 'How much detail there is.'],
+  ['quality.sharp', 'Sharp', 'How much detail there is; cameras measure it only where the file has a weight for it.'],
   ['quality.facing', 'Facing', 'Walking towards the camera, not away from it; needs the ground.'],
   ['quality.sure', 'Sure', 'How surely the track is there.'],
   ['quality.relative', 'Relative', 'A view is measured by the best view of the moment.'],

@@ -43,6 +43,6 @@ async function send(what, method, content) {
       signal: AbortSignal.timeout(PATIENCE_MS),
     });
   } catch {
-    throw new Error('The server does not answer; it is tried again.');
+    throw new Error('The server does not answer.');
   }
 }
