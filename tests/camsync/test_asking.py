@@ -7,7 +7,7 @@ import socket
 from contextlib import suppress
 
 import pytest
-from pulses_by_hand import Connect
+from pulses_by_hand import PATIENCE, Connect
 
 from camsync import Listener, PulseServer, SyncError, clients_of
 from camsync.messages import Clients, Greeting, Pong
@@ -70,5 +70,5 @@ async def test_what_is_no_pulse_server_is_given_up(said: bytes, error: str) -> N
     async with await asyncio.start_server(answer, "127.0.0.1", 0) as server:
         port = server.sockets[0].getsockname()[1]
         with pytest.raises(SyncError, match=error):
-            await clients_of("127.0.0.1", port, patience=0.3)
+            await clients_of("127.0.0.1", port, patience=0.3 if error == "does not answer" else PATIENCE)
         await over.wait()

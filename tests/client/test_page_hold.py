@@ -79,11 +79,12 @@ async def test_a_preferred_camera_gives_way_where_it_does_not_see_the_person(bro
         await expect(visit.page.locator("#reason")).to_have_text("Preferred. The best view just now is c2.")
         site = visit.server.site
         first = site.edge - site.edge % GOP + 3 * GOP
-        site.blind = range(first, first + 5 * GOP)
+        site.blind = range(first, first + 10_000 * GOP)  # until it has been looked at
         await visit.until(f"myview.pulse > {first + GOP}")
         assert await visit.get("myview.camera") == "c2"
         assert await camera_on_the_stage(visit) == "c2"
         await expect(visit.page.locator("#reason")).to_contain_text("does not see this person")
+        site.blind = range(first, site.edge - site.edge % GOP + 3 * GOP)
         await visit.until(f"myview.pulse > {site.blind.stop + GOP}")
         cuts = await visit.get("myview.cuts.slice(-2)")
         assert [(it["pulse"], it["to"]) for it in cuts] == [(first, "c2"), (site.blind.stop + GOP, "c0")]
