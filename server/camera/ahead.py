@@ -21,5 +21,5 @@ def ready_detector(config: Config, camera: Camera, source: Source, fit: Fit) -> 
     detector, settings = make_detector(config, camera, fit), config.detect
     if isinstance(detector, BackgroundDetector):
         places = range(0, settings.ahead_frames, settings.ahead_every)
-        detector.prepare([fit.image(image) for image in source.ahead(places)], settings.ahead_every)
+        detector.prepare((fit.image(image) for image in source.ahead(places)), settings.ahead_every)
     return detector

@@ -20,6 +20,7 @@ class DetectSettings(BackgroundSettings):
     onnx: OnnxSettings = field(default_factory=OnnxSettings)
 
     def __post_init__(self) -> None:
+        BackgroundSettings.__post_init__(self)
         if self.kind == "onnx" and self.onnx.model is None:
             raise ValueError("onnx.model: kind onnx needs the path of an ONNX file")
 

@@ -40,6 +40,13 @@ def test_unknown_key_in_a_librarys_settings_is_refused_at_any_depth() -> None:
     assert "unknown key" in complaint(site(detect={"median": {"no_such": 5}}))
 
 
+@pytest.mark.parametrize("detect", [{"ahead_every": 0}, {"ahead_frames": -1}])
+def test_a_recording_cannot_be_looked_at_ahead_in_no_steps(detect: dict[str, Any]) -> None:
+    assert "detect: ahead_frames must be at least 0, and ahead_every at least 1" in complaint(
+        site(detect=detect)
+    )
+
+
 def test_two_cameras_of_one_name_are_refused() -> None:
     cameras = [{"id": "c0", "source": "a"}, {"id": "c0", "source": "b"}]
     assert "two cameras are called 'c0'" in complaint({"cameras": cameras})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import Literal, Protocol
 
@@ -54,6 +54,10 @@ class BackgroundSettings:
     heights: HeightLineSettings = field(default_factory=HeightLineSettings)
     hypotheses: ExplainSettings = field(default_factory=ExplainSettings)
 
+    def __post_init__(self) -> None:
+        if self.ahead_frames < 0 or self.ahead_every < 1:
+            raise ValueError("ahead_frames must be at least 0, and ahead_every at least 1")
+
 
 def paper_boxes(settings: BackgroundSettings) -> BackgroundSettings:
     """Give the settings with all off that is not in the paper (IV.A.2).
@@ -102,11 +106,11 @@ class BackgroundDetector:
         self.blind = True
         """Whether the last frame could not be searched, since the background was not known."""
 
-    def prepare(self, images: Sequence[Image], every: int) -> None:
+    def prepare(self, images: Iterable[Image], every: int) -> None:
         """Learn the empty scene and how tall people look from frames of a recording, before its first one.
 
         Args:
-            images: people may come and go in them.
+            images: people may come and go in them; they are taken one by one, and kept small.
             every: how many frames each of them stands for.
 
         Raises:
