@@ -133,7 +133,10 @@ def test_videos_are_tracked_first_and_must_have_one_rate(run: Run, tmp_path: Pat
     write_video(tmp_path / "c1.mp4", 20, fps=30)
     line = refusal(run("c0.mp4", "c1.mp4", "--out", "ground.json"))
     assert "c1 has 30 frames a second and c0 25" in line
-    (tmp_path / "site.yaml").write_text("ground: ground.json\n")  # which is to be made
+    (tmp_path / "site.yaml").write_text(
+        "ground: ground.json\n"  # which is to be made
+        "detect: {ahead_frames: 0}\n"  # so that twenty frames are too few to know the scene
+    )
     ended = run("c0.mp4", "c1.mp4", "--fps", "25", "--config", "site.yaml", "--out", "ground.json")
     assert (ended.code, ended.err) == (2, "tracking c0\nmyview: c0.mp4: nobody is in it\n")
     assert {it.name for it in tmp_path.iterdir()} == {"c0.mp4", "c1.mp4", "site.yaml"}

@@ -42,7 +42,13 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def config_of(
-    recording: Path, views: int = 3, *, use: bool = True, wait: float = PATIENCE, **offsets: int
+    recording: Path,
+    views: int = 3,
+    *,
+    use: bool = True,
+    wait: float = PATIENCE,
+    ahead: bool = True,
+    **offsets: int,
 ) -> Config:
     """Give a site of that room's views on ports of its own, some of them with an offset."""
     bus = f"tcp/127.0.0.1:{free_port()}"
@@ -54,6 +60,7 @@ def config_of(
         "sync": {"port": free_port(), "start_timeout_s": PATIENCE},
         "zenoh": {"connect": bus, "listen": bus},
         "cameras": cameras,
+        "detect": {} if ahead else {"ahead_frames": 0},
         "ground": "ground.json",
         "track": {"backlog_s": PATIENCE, "witness": {"use": use}, "witness_wait_s": wait},
         "view": {"late_after_s": PATIENCE},
@@ -255,7 +262,7 @@ def test_only_the_surest_boxes_are_told_and_in_their_order() -> None:
 
 
 def test_what_cannot_be_searched_is_no_word_that_nobody_is_there(recording: Path) -> None:
-    config = config_of(recording)
+    config = config_of(recording, ahead=False)
     pipeline = CameraPipeline(config, "c0")
     said = []
     for pulse in range(40):

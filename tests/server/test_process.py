@@ -62,9 +62,14 @@ class Running:
         self._pulses = PulseServer(FPS, expect=expect, start_timeout=PATIENCE, port=config.sync.port)
 
     def camera(self, camera: str) -> asyncio.Task[None]:
-        task = asyncio.create_task(CameraProcess(self.config, camera).run())
+        task = asyncio.create_task(self._run(camera))
         self._tasks.append(task)
         return task
+
+    async def _run(self, camera: str) -> None:
+        # In a thread: it looks at its recording ahead, and here the pulses come from the same loop.
+        process = await asyncio.to_thread(CameraProcess, self.config, camera)
+        await process.run()
 
     async def start(self) -> asyncio.Task[None]:
         await self._pulses.start()

@@ -234,6 +234,6 @@ async def test_chromium_plays_it(hall: Hall, recording: Path) -> None:
         page = await browser.new_page(bypass_csp=True)
         await page.goto(f"http://127.0.0.1:{hall.port}/healthz")
         url = f"/objects/1/best.mp4?from=p0&to=p{FRAMES}"
-        seen = await page.evaluate(PLAY, [url, f"{parameters.codec},opus"])
+        seen = await page.evaluate(PLAY, [url, f'video/mp4; codecs="{parameters.codec},opus"', 4])
     assert (seen["error"], seen["ranges"], seen["tracks"]) == ("", 1, [True, True])
     assert seen["range"] == [0, pytest.approx(FRAMES / FPS, abs=0.03)]
