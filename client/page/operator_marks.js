@@ -20,6 +20,7 @@ export class Marks {
   #shapes = new Map();
   /** @type {Map<string, Pair[]>} */
   #pairs = new Map();
+  #learned = false; // the areas of the configuration
   #marked;
   /** @type {HTMLSelectElement} */
   #select = element('mark-camera');
@@ -82,9 +83,10 @@ export class Marks {
       for (const { camera, picture } of /** @type {OperatorCamera[]} */ (cameras)) this.#pictures.set(camera, picture);
       for (const { key, value } of /** @type {Setting[]} */ (settings)) {
         const [section, camera, name] = key.split('.');
-        const known = section === 'cameras' && name === 'ignore' && !this.#shapes.has(camera);
+        const known = section === 'cameras' && name === 'ignore' && !this.#learned;
         if (known) this.#shapes.set(camera, [...JSON.parse(value), []]); // such lists are JSON, too
       }
+      this.#learned = true;
       this.#chooseCamera();
     } catch (error) {
       this.tell(error);

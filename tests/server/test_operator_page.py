@@ -226,6 +226,28 @@ async def test_the_picture_is_of_the_camera_that_is_marked_though_anothers_comes
         assert await image.get_attribute("src") == shown
 
 
+async def test_areas_of_the_configuration_are_there_whatever_is_pressed_before_they_come(
+    browser: Browser,
+) -> None:
+    cameras = [A, {"id": B, "source": "scene:room", "ignore": [[[0.0, 0.0], [9.0, 0.0], [9.0, 9.0]]]}]
+    async with operating(browser, "#marks", cameras=cameras) as (hall, page):
+        see(hall)
+        pressed = asyncio.Event()
+
+        async def answer(route: Route) -> None:
+            await pressed.wait()
+            await route.continue_()
+
+        await page.route("**/api/operator/config", answer)
+        await page.reload()
+        await page.get_by_label("Camera", exact=True).select_option(B)
+        await page.get_by_role("button", name="Next area").click()
+        pressed.set()
+        await expect(page.get_by_label("What the marks become")).to_have_value(
+            f"cameras:\n  - id: {B}\n    ignore: [[[0, 0], [9, 0], [9, 9]]]\n"
+        )
+
+
 async def test_areas_to_ignore_become_lines_of_a_configuration(browser: Browser) -> None:
     known = [[[0.0, 0.0], [9.0, 0.0], [9.0, 9.0]]]
     cameras = [{"id": A, "source": "scene:room", "ignore": known}, B]
