@@ -109,7 +109,9 @@ def _operation(path: str, summary: str) -> dict[str, Any]:
     if path in OVERLAY | PAST | HELD or path.endswith("/choice"):
         responses["400"] = {"description": "The query asks for what there is not.", "content": error}
     if path in OPERATOR or path in OPERATOR_FILES:
+        responses["401"] = {"description": "The operator's token is needed.", "content": error}
         responses["403"] = {"description": "Only the operator may.", "content": error}
+        responses["429"] = {"description": "Too many wrong tokens; try again later.", "content": error}
     if path in PAST - {"/api/past"}:
         responses["416"] = {"description": "Nothing is kept of that time.", "content": error}
     if path in _UNAVAILABLE:
