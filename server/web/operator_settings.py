@@ -111,11 +111,15 @@ def _written(key: str, value: Any) -> str:
     if name == "operator_token" and value is not None:
         return HIDDEN
     if isinstance(value, Mapping):
-        value = {it: HIDDEN if _SECRET.search(it) else inner for it, inner in value.items()}
-    if isinstance(value, str):
-        value = _QUERY.sub(rf"\1{HIDDEN}", _LOGIN.sub(f"{HIDDEN}@", value))
+        value = {it: HIDDEN if _SECRET.search(it) else _shown(inner) for it, inner in value.items()}
+    value = _shown(value)
     plain = value if isinstance(value, bool | int | float | str | list | dict | None) else _plain(value)
     return yaml.safe_dump(plain, default_flow_style=True, width=1000).removesuffix("...\n").strip()
+
+
+def _shown(value: Any) -> Any:
+    """Take passwords out of an address."""
+    return _QUERY.sub(rf"\1{HIDDEN}", _LOGIN.sub(f"{HIDDEN}@", value)) if isinstance(value, str) else value
 
 
 def _plain(value: Any) -> Any:

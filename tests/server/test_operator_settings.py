@@ -125,7 +125,11 @@ async def open_hall() -> AsyncIterator[Hall]:
         {
             "id": A,
             "source": "rtsp://user:pa@ss@10.0.0.1/live?token=abc&size=1",
-            "options": {"headers": "Cookie: 1", "rtsp_transport": "tcp"},
+            "options": {
+                "headers": "Cookie: 1",
+                "http_proxy": "http://me:hush@proxy",
+                "rtsp_transport": "tcp",
+            },
         },
         B,
     ]
@@ -141,7 +145,10 @@ async def test_the_configuration_says_what_differs_and_no_secret(open_hall: Hall
     source, options = settings[f"cameras.{A}.source"], settings[f"cameras.{A}.options"]
     assert source["value"] == "rtsp://(not shown)@10.0.0.1/live?token=(not shown)&size=1"
     assert (source["default"], source["differs"]) == (None, False)
-    assert options["value"] == "{headers: (not shown), rtsp_transport: tcp}"
+    assert (
+        options["value"]
+        == "{headers: (not shown), http_proxy: 'http://(not shown)@proxy', rtsp_transport: tcp}"
+    )
 
 
 @pytest.mark.parametrize(
