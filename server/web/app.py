@@ -70,7 +70,8 @@ def make_app(service: BestViewService) -> web.Application:
     app[SERVICE], app[EVENTS], app[PICTURES] = service, Events(service), Pictures(service)
     app[READERS] = Readers(service.splicer.plan.target_s)
     app[METRICS] = registry(service, app[PICTURES], app[READERS])
-    app[PERMISSION] = Permission(service.config.http.operator_token)
+    what = f"{service.config.site.name}_{service.config.view.share.index}"
+    app[PERMISSION] = Permission(service.config.http.operator_token, what=what)
     for module in (api, video, past, hls, pictures, openapi, page, operator_routes):
         app.add_routes(module.routes)
     app.on_response_prepare.append(tell_no_other_origin)

@@ -22,6 +22,7 @@ from server.web.api import problem
 
 PREFIX = "/api/operator"
 COOKIE = "myview_operator"
+"""What the cookie's name begins with."""
 SIGN_IN = f"{PREFIX}/session"
 CHANGES = "X-MyView-Operator"
 """The head of a request that changes something."""
@@ -71,9 +72,13 @@ class Failures:
 
 
 class Permission:
-    """Says who may operate. ``digest`` is the token's SHA-256 in hex; None: only this machine may."""
+    """Says who may operate what; ``digest`` is the token's SHA-256 in hex, None: only this machine may."""
 
-    def __init__(self, digest: str | None, now: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self, digest: str | None, now: Callable[[], float] = time.monotonic, what: str = "site"
+    ) -> None:
+        self.cookie = f"{COOKIE}_{what}"
+        """Each has its own: all ports of a machine are one to a cookie (RFC 6265, 8.5)."""
         self._digest = digest
         self._now = now
         self._failures = Failures(now)
@@ -89,7 +94,7 @@ class Permission:
         """Say why a request may not operate; None: it may."""
         if self._digest is None:
             return None if _from_here(request) else problem(403, HOW)
-        if self._ends(request.cookies.get(COOKIE, "")) is not None:
+        if self._ends(request.cookies.get(self.cookie, "")) is not None:
             return None
         kind, _, token = request.headers.get("Authorization", "").partition(" ")
         if kind.lower() == "bearer":
@@ -123,7 +128,7 @@ class Permission:
 
     def close_session(self, request: web.Request) -> None:
         """End the session of a request."""
-        self._sessions.pop(digest_of(request.cookies.get(COOKIE, "")), None)
+        self._sessions.pop(digest_of(request.cookies.get(self.cookie, "")), None)
 
     def _ends(self, session: str) -> float | None:
         ends = self._sessions.get(digest_of(session))

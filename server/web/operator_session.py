@@ -8,7 +8,7 @@ import msgspec
 from aiohttp import web
 
 from server.web.api import answer, problem
-from server.web.operator_permission import COOKIE, PERMISSION, SESSION_S, SIGN_IN
+from server.web.operator_permission import PERMISSION, SESSION_S, SIGN_IN
 from server.web.operator_schema import OperatorSession
 from server.web.page import page_file
 
@@ -52,7 +52,7 @@ async def post_session(request: web.Request) -> web.StreamResponse:
     response = answer(OperatorSession(by_token=True))
     encrypted = "https" in (request.scheme, request.headers.get("X-Forwarded-Proto"))
     response.set_cookie(
-        COOKIE,
+        permission.cookie,
         permission.open_session(),
         max_age=SESSION_S,
         httponly=True,
@@ -68,7 +68,7 @@ async def delete_session(request: web.Request) -> web.Response:
     permission = request.app[PERMISSION]
     permission.close_session(request)
     response = answer(OperatorSession(by_token=permission.by_token))
-    response.del_cookie(COOKIE, samesite="Strict", httponly=True)
+    response.del_cookie(permission.cookie, samesite="Strict", httponly=True)
     return response
 
 

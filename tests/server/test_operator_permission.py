@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator
+from contextlib import aclosing
 
 import pytest
+from aiohttp import ClientSession, CookieJar
 from aiohttp.test_utils import make_mocked_request
 from command_line import Run
 from halls import Hall, opened
@@ -105,15 +107,31 @@ async def test_a_token_is_needed_where_there_is_one_and_nobody_is_told_of_it(loc
 async def test_who_signs_in_has_a_cookie_that_no_script_reads_and_signs_out(locked: Hall) -> None:
     async with locked.session.post(SESSION, headers=MINE, json={"token": TOKEN}) as answer:
         assert answer.status == 200
-        cookie = answer.cookies[COOKIE]
+        [cookie] = answer.cookies.values()
     assert cookie["httponly"]
     assert cookie["samesite"] == "Strict"
     assert TOKEN not in cookie.value
-    kept = f"{COOKIE}={cookie.value}"
+    kept = f"{cookie.key}={cookie.value}"
     assert await asked(locked, Cookie=kept) == (200, "")
     async with locked.session.delete(SESSION, headers={**MINE, "Cookie": kept}) as answer:
         assert answer.status == 200
     assert (await asked(locked, Cookie=kept))[0] == 401  # not only forgotten by the browser
+
+
+async def test_who_signs_in_to_another_service_of_the_machine_stays_signed_in_here(locked: Hall) -> None:
+    url = f"http://127.0.0.1:{locked.port}{SESSION}"
+    other = {"site": {"name": "yard"}, "http": {"operator_token": digest_of(TOKEN)}}
+    async with (
+        aclosing(opened(**other)) as halls,
+        ClientSession(cookie_jar=CookieJar(unsafe=True)) as browser,
+    ):
+        for site in (url, f"http://127.0.0.1:{(await anext(halls)).port}{SESSION}", url):
+            async with browser.get(site) as answer:
+                known = answer.status == 200
+            if not known:
+                async with browser.post(site, headers=MINE, json={"token": TOKEN}) as answer:
+                    assert answer.status == 200
+    assert known
 
 
 async def test_a_session_ends_and_so_do_the_oldest_of_very_many() -> None:
@@ -121,7 +139,7 @@ async def test_a_session_ends_and_so_do_the_oldest_of_very_many() -> None:
     permission = Permission(digest_of(TOKEN), lambda: now[0])
 
     def may(session: str) -> bool:
-        request = make_mocked_request("GET", SESSION, headers={"Cookie": f"{COOKIE}={session}"})
+        request = make_mocked_request("GET", SESSION, headers={"Cookie": f"{permission.cookie}={session}"})
         return permission.refusal(request) is None
 
     first = permission.open_session()
@@ -135,7 +153,9 @@ async def test_a_session_ends_and_so_do_the_oldest_of_very_many() -> None:
     assert not may(later[-1])
 
 
-@pytest.mark.parametrize("head", [b"Authorization: Bearer \xff\xfe", f"Cookie: {COOKIE}=".encode() + b"\xff"])
+@pytest.mark.parametrize(
+    "head", [b"Authorization: Bearer \xff\xfe", f"Cookie: {COOKIE}_hall_0=".encode() + b"\xff"]
+)
 async def test_bytes_that_are_no_text_are_no_token_and_no_sign_in(locked: Hall, head: bytes) -> None:
     reader, writer = await asyncio.open_connection("127.0.0.1", locked.port)
     writer.write(f"GET {SESSION} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n".encode() + head)
