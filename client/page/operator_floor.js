@@ -2,7 +2,7 @@
 
 import { label } from './names.js';
 import { ask } from './operator_http.js';
-import { element, make, put, Repeated } from './operator_parts.js';
+import { element, make, put, Repeated, svg } from './operator_parts.js';
 import { Ways } from './operator_place.js';
 
 /** @import {Gop, Site} from './contract.js' */
@@ -12,7 +12,6 @@ import { Ways } from './operator_place.js';
 /** @import {Palette} from './palette.js' */
 
 const EVERY_MS = 5000; // the cameras' parts change when one comes that was not there
-const SVG = 'http://www.w3.org/2000/svg';
 const MARGIN = 0.05; // of the plan
 const DOT = 0.012;
 
@@ -142,14 +141,4 @@ function range(values) {
 /** @param {[number, number][]} places */
 function points(places) {
   return places.map(([x, y]) => `${x},${-y}`).join(' ');
-}
-
-/**
- * @param {string} name
- * @param {Record<string, string | number>} [attributes]
- */
-function svg(name, attributes = {}) {
-  const made = document.createElementNS(SVG, name);
-  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, String(value));
-  return made;
 }

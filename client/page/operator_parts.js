@@ -2,6 +2,8 @@
 
 export { element } from './element.js';
 
+const SVG = 'http://www.w3.org/2000/svg';
+
 /** @typedef {(error: unknown) => void} Tell what went wrong; null: nothing does any more */
 
 /**
@@ -20,6 +22,16 @@ export { element } from './element.js';
 export function make(name, properties = {}, ...children) {
   const made = Object.assign(document.createElement(name), properties);
   made.append(...children);
+  return made;
+}
+
+/**
+ * @param {string} name
+ * @param {Record<string, string | number>} [attributes]
+ */
+export function svg(name, attributes = {}) {
+  const made = document.createElementNS(SVG, name);
+  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, String(value));
   return made;
 }
 

@@ -3,10 +3,11 @@
  * Places are in pixels of the site's picture.
  */
 
+import { svg } from './operator_parts.js';
+
 /** @import {Site} from './contract.js' */
 /** @import {Place} from './operator_drawn.js' */
 
-const SVG = 'http://www.w3.org/2000/svg';
 const STEP = 1; // pixels that an arrow key moves the cross
 const LEAP = 10; // with shift
 const CROSS = 1 / 40; // of the picture's width
@@ -90,14 +91,4 @@ export class MarkedPicture {
  */
 function clamp(value, most) {
   return Math.min(most, Math.max(0, value));
-}
-
-/**
- * @param {string} name
- * @param {Record<string, string | number>} attributes
- */
-function svg(name, attributes) {
-  const made = document.createElementNS(SVG, name);
-  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, String(value));
-  return made;
 }
