@@ -37,7 +37,7 @@ from benchmarks.bestview_join import own_tracks
 from benchmarks.bestview_plot import plot_sweeps, plot_ways
 from benchmarks.bestview_sweep import Swept, sweep, sweep_tables
 from benchmarks.bestview_watch import Watched, followed
-from benchmarks.bestview_ways import Outcome, outcome, ways
+from benchmarks.bestview_ways import Outcome, Seen, outcome, ways
 from benchmarks.bestview_why import Losses, losses
 from benchmarks.peer_environment import PeerEnvironment, PeersAwayError, default_folder, peer_environment
 from benchmarks.report import Report
@@ -109,10 +109,11 @@ def peers_of(options: argparse.Namespace, report: Report) -> PeerEnvironment | N
         return None
 
 
-def walked_of(case: Case, seen: Watched, folder: Path, report: Report) -> Case | None:
+def walked_of(case: Case, blind: Watched, folder: Path, report: Report) -> Seen | None:
     """Give the scene calibrated by its own tracks, or say why it cannot be."""
     try:
-        return calibrated(case, own_tracks(followed(case.config(ground=False), seen.frames)), folder)
+        walked = calibrated(case, own_tracks(followed(case.config(ground=False), blind.frames)), folder)
+        return Seen(walked, walked.watch())
     except CannotCalibrateError as problem:
         report.say(f"{case.name}: not calibrated by its own tracks: {problem}")
         return None
@@ -130,8 +131,9 @@ def measure(options: argparse.Namespace) -> None:
             case = as_live(found_case) if options.as_live else found_case
             truth = case.truth()
             seen = case.watch()
-            walked = None if options.quick else walked_of(case, seen, Path(name), report)
-            tried = list(ways(case, truth, seen, peers, walked))
+            blind = case.watch(ground=False) if case.calibrated else seen
+            walked = None if options.quick else walked_of(case, blind, Path(name), report)
+            tried = list(ways(case, truth, seen, blind, peers, walked))
             found[case.name] = [outcome(case, truth, way) for way in tried]
             report.table(f"{case.name}: {case.about}", COLUMNS, [row_of(it) for it in found[case.name]])
             why = [(way.name, losses(case, truth, way)) for way in tried if not way.given]

@@ -67,9 +67,9 @@ class Case:
         """Give how well everybody could be seen."""
         return truth_of(self.gt, self.sizes, self.least_shown)
 
-    def watch(self) -> Watched:
-        """Let every camera look for people by itself."""
-        config = self.config()
+    def watch(self, *, ground: bool = True) -> Watched:
+        """Let every camera look for people by itself; how tall they are where it may know from the ground."""
+        config = self.config(ground=ground)
         if self.detections is not None:
             files = self.detections
             return Watched(

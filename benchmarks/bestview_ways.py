@@ -69,10 +69,37 @@ def visible_rows(case: Case, truth: Truth) -> dict[str, list[MotRow]]:
     }
 
 
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """A scene as its cameras see it, whose search for people knows the ground.
+
+    Attributes:
+        case: the scene.
+        watched: what they find.
+    """
+
+    case: Case
+    watched: Watched
+
+
 def ways(
-    case: Case, truth: Truth, seen: Watched, peers: PeerEnvironment | None, walked: Case | None
+    case: Case,
+    truth: Truth,
+    seen: Watched,
+    blind: Watched,
+    peers: PeerEnvironment | None,
+    walked: Seen | None,
 ) -> Iterator[Way]:
-    """Give them, truth first; `walked` is the scene with the homographies of its own tracks."""
+    """Give them, truth first.
+
+    Args:
+        case: the scene.
+        truth: who could be seen in it.
+        seen: what its cameras find.
+        blind: the same where no homographies are known.
+        peers: where the other tracker is installed.
+        walked: the scene with the homographies of its own tracks.
+    """
     frames = truth.boxes.shape[1]
     config = case.config()
 
@@ -92,17 +119,19 @@ def ways(
     yield Way("own tracks, true joins", chosen(tracks_by_truth(own, case.gt)))
     yield Way("own tracks, not joined", simple(not_joined(own)))
     uncalibrated = case.config(ground=False)
-    apart = followed(uncalibrated, seen.frames)
-    bare = decide(uncalibrated, apart)
+    bare_said = followed(uncalibrated, blind.frames)
+    bare = decide(uncalibrated, bare_said)
     yield Way(WITHOUT, bare)
     if case.apart:
-        yield Way("  looks alone", decide(case.config(ground=False, view=LOOKS_ALONE), apart))
+        yield Way("  looks alone", decide(case.config(ground=False, view=LOOKS_ALONE), bare_said))
     if not case.calibrated:
         yield Way(f"{WITHOUT}, largest", simple(bare.tracks))
-    for name, scene in ((OURS, case if case.calibrated else None), (CALIBRATED, walked)):
-        if scene is None:
+    for name, sight in ((OURS, Seen(case, seen) if case.calibrated else None), (CALIBRATED, walked)):
+        if sight is None:
             continue
-        said = followed(scene.config(), seen.frames)
+        scene, found = sight.case, sight.watched
+        said = followed(scene.config(), found.frames)
+        apart = followed(uncalibrated, found.frames)
         ours = decide(scene.config(), said)
         yield Way(name, ours)
         yield Way(f"{name}, no evidence", decide(scene.config(), apart))
@@ -114,7 +143,7 @@ def ways(
         short = "nearest feet" if scene is case else "nearest feet, calibr."
         yield Way(short, simple(by_nearest_feet(own_tracks(apart), ground)))
         if peers is not None:
-            theirs = by_nearest_feet(_peer_tracks(peers, seen.boxes), ground)
+            theirs = by_nearest_feet(_peer_tracks(peers, found.boxes), ground)
             yield Way(f"{PEER}, {short}", simple(theirs))
 
 
