@@ -100,8 +100,10 @@ async def test_the_camera_that_is_named_is_the_one_shown_however_fast_people_are
             shown = await visit.get("myview.pulse")
             await visit.until(f"myview.pulse > {shown + turn % 5}")
         seen = await visit.get("seen.slice(1)")
-        assert len(seen) > 50
-        assert [(named, painted) for named, painted in seen if named != painted] == []
+        # Where the word on a moment comes after its frame, no camera is named; never another one.
+        named = [(said, painted) for said, painted in seen if said is not None]
+        assert len(named) > 50
+        assert [(said, painted) for said, painted in named if said != painted] == []
 
 
 async def test_boxes_can_be_hidden_and_shown_again(browser: Browser) -> None:
