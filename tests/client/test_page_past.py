@@ -84,8 +84,8 @@ async def left_for_long(visit: Visit) -> int:
     visit.server.site.people[3] = False  # of whom the page is told
     await expect(visit.page.locator(".cards li")).to_have_count(3)
     await visit.page.wait_for_timeout(300)
-    # A frame may be told of that was on its way to the screen when the picture was stopped.
-    assert await visit.get("video.paused && myview.pulse") - stopped in {0, 1}
+    # A few frames may be told of that were on their way to the screen when the picture was stopped.
+    assert await visit.get("video.paused && myview.pulse") - stopped in range(6)
     assert visit.server.site.opened == [1], "nobody looks at what comes"
     return stopped
 
@@ -150,7 +150,7 @@ async def test_who_was_paused_while_the_site_began_anew_is_live(browser: Browser
         began_anew = "Math.abs(myview.site.pulse0 - Date.now() / 1000) < 40"
         await visit.until(f"myview.state === 'paused' && {began_anew}")
         await visit.page.wait_for_timeout(1000)
-        assert await visit.get("video.paused && myview.pulse") - stopped in {0, 1}, "the picture stays"
+        assert await visit.get("video.paused && myview.pulse") - stopped in range(6), "the picture stays"
         await visit.page.keyboard.press("Space")
         await visit.until(f"!video.paused && myview.pulse < 2000 && {LIVE}")
         await expect(visit.page.locator("#notice")).to_be_empty()

@@ -49,15 +49,17 @@ def test_a_signal_waits_even_when_another_thread_takes_it(
 ) -> None:
     number, seen = handled
     with ending_later():
-        signal.pthread_kill(other_thread, number)
-        signal.pthread_kill(other_thread, number)
+        for _ in range(5):
+            signal.pthread_kill(other_thread, number)
         while number in signal.sigpending():
             pass
         assert seen == []
     until(seen, 1)
-    assert seen == [number], "once, however often it came"
+    # The last of them may reach a thread that does not get to run only now.
+    assert seen in ([number], [number] * 2), "once, however often it came"
+    told = len(seen)
     signal.pthread_kill(other_thread, number)
-    until(seen, 2)  # and it is not put off afterwards
+    until(seen, told + 1)  # and it is not put off afterwards
 
 
 def test_nothing_came_nothing_happens(handled: tuple[signal.Signals, list[int]]) -> None:
