@@ -10,10 +10,10 @@ NODE_STAMP := node_modules/.installed
 demo: $(STAMP)
 	$(BIN)/myview demo
 
-# First what may share the machine, on two cores; then what runs whole sites in real time, one after the other.
+# First what may share the machine, on two cores; then browsers and whole sites in real time, one after the other.
 test: $(STAMP) $(NODE_STAMP)
-	$(BIN)/pytest -m "not slow and not live" -n 2 --dist loadfile
-	$(BIN)/pytest -m "not slow and live"
+	$(BIN)/pytest -m "not slow" -n 2 --dist loadfile --ignore tests/client --ignore tests/e2e
+	$(BIN)/pytest -m "not slow" tests/client tests/e2e
 
 test-slow: $(STAMP) $(NODE_STAMP)
 	$(BIN)/pytest -m slow --timeout 1800
