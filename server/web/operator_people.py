@@ -7,7 +7,7 @@ from aiohttp import web
 
 from server.view.people import People
 from server.view.service import BestViewService
-from server.web.api import answer, problem
+from server.web.api import answer, no_camera, no_object, problem
 from server.web.keys import SERVICE
 from server.web.operator_permission import PREFIX
 from server.web.operator_schema import PeopleByHand
@@ -45,7 +45,7 @@ async def post_people(request: web.Request) -> web.Response:
         return problem(409, _cannot(service))
     number = people.merged.get(said.object, said.object)  # also of a merge that nobody was told of yet
     if number not in people.known:
-        return problem(404, f"there is no object {said.object}")
+        return no_object(said.object)
     given = [it for it in ("name", "merge", "part") if getattr(said, it) is not None]
     if len(given) != 1:
         return problem(400, "say one thing at a time: name, merge or part")
@@ -67,7 +67,7 @@ def _call(service: BestViewService, number: int, name: str) -> web.Response:
 def _merge(service: BestViewService, people: People, number: int, other: int) -> web.Response:
     lost = people.merged.get(other, other)
     if lost not in people.known:
-        return problem(404, f"there is no object {other}")
+        return no_object(other)
     if lost == number:
         return problem(400, f"object {other} is object {number} already")
     people.merge(number, lost)
@@ -77,7 +77,7 @@ def _merge(service: BestViewService, people: People, number: int, other: int) ->
 def _part(service: BestViewService, people: People, number: int, cameras: list[str]) -> web.Response:
     unknown = [it for it in cameras if it not in service.shelves]
     if unknown:
-        return problem(404, f"there is no camera {unknown[0]!r}; there are {', '.join(service.shelves)}")
+        return no_camera(service, unknown[0])
     parted = people.part(number, cameras or list(service.shelves))
     if parted is None:
         return problem(409, f"no such camera shows object {number} now")

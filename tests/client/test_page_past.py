@@ -74,6 +74,15 @@ async def test_who_pauses_goes_on_where_they_stopped(browser: Browser) -> None:
         assert steps.max() > 10 * FPS, "at once"
 
 
+async def some_seconds_back(visit: Visit) -> int:
+    """Look at what was shown five seconds ago; give the pulse that is shown then."""
+    await visit.playing(1)
+    await seconds_of_playing(visit, 6)
+    await visit.page.keyboard.press(",")
+    await visit.until("myview.delays.at(-1).delayMs > 4000")
+    return int(await visit.get("myview.pulse"))
+
+
 async def left_for_long(visit: Visit) -> int:
     """Let the stream of a paused picture run on until the page leaves it; give the pulse that is shown."""
     await visit.until("video.paused")
@@ -172,11 +181,7 @@ async def test_who_plays_on_in_a_window_of_its_own_is_where_they_stopped(browser
 @pytest.mark.slow
 async def test_the_past_goes_on_where_its_stream_broke(browser: Browser) -> None:
     async with visiting(browser) as visit:
-        await visit.playing(1)
-        await seconds_of_playing(visit, 6)
-        await visit.page.keyboard.press(",")
-        await visit.until("myview.delays.at(-1).delayMs > 4000")
-        back = await visit.get("myview.pulse")
+        back = await some_seconds_back(visit)
         await visit.server.break_streams()
         await visit.until(f"myview.pulse > {back + 6 * FPS}")
         assert await visit.get("myview.delays.at(-1).delayMs") > 4000
@@ -207,11 +212,7 @@ async def test_what_is_not_kept_is_said_and_live_goes_on(browser: Browser) -> No
 
 async def test_another_person_is_watched_at_the_same_moment_of_the_past(browser: Browser) -> None:
     async with visiting(browser) as visit:
-        await visit.playing(1)
-        await seconds_of_playing(visit, 6)
-        await visit.page.keyboard.press(",")
-        await visit.until("myview.delays.at(-1).delayMs > 4000")
-        back = await visit.get("myview.pulse")
+        back = await some_seconds_back(visit)
         async with visit.page.expect_request(lambda request: "choice?at=p" in request.url):
             await visit.until(f"myview.pulse > {back + 2 * FPS}")
         await visit.page.keyboard.press("ArrowRight")
