@@ -203,7 +203,7 @@ async def test_a_span_of_the_past_is_downloaded(browser: Browser) -> None:
 async def test_the_picture_is_of_the_camera_that_is_marked_though_anothers_comes_late(
     browser: Browser,
 ) -> None:
-    async with operating(browser, "#marks") as (hall, page):
+    async with operating(browser, "#configuration") as (hall, page):  # which asks for no picture
         see(hall)
         late = asyncio.Event()
 
@@ -214,7 +214,7 @@ async def test_the_picture_is_of_the_camera_that_is_marked_though_anothers_comes
 
         await page.route("**/live.jpg", answer)
         async with page.expect_request(f"**/{A}/live.jpg"):
-            await page.reload()
+            await page.locator("#sections").get_by_role("link", name="Marks").click()
         await page.get_by_label("Camera", exact=True).select_option(B)
         image = page.locator("#mark-image")
         await expect(image).to_have_attribute("src", re.compile("^blob:"))
