@@ -4,6 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 NODE_STAMP := node_modules/.installed
+AGAIN ?= --reruns 2 --reruns-delay 1
 
 .PHONY: demo test test-slow lint format bench lock clean
 
@@ -11,9 +12,10 @@ demo: $(STAMP)
 	$(BIN)/myview demo
 
 # First what may share the machine, on two cores; then browsers and whole sites in real time, one after the other.
+# Machines are shared: what fails is tried again and told of as RERUN. What is wrong fails every time.
 test: $(STAMP) $(NODE_STAMP)
-	$(BIN)/pytest -m "not slow" -n 2 --dist loadfile --ignore tests/client --ignore tests/e2e
-	$(BIN)/pytest -m "not slow" tests/client tests/e2e
+	$(BIN)/pytest -m "not slow" $(AGAIN) -n 2 --dist loadfile --ignore tests/client --ignore tests/e2e
+	$(BIN)/pytest -m "not slow" $(AGAIN) tests/client tests/e2e
 
 test-slow: $(STAMP) $(NODE_STAMP)
 	$(BIN)/pytest -m slow --timeout 1800
