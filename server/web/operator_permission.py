@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import hmac
 import ipaddress
+import math
 import secrets
 import time
 from collections.abc import Awaitable, Callable
@@ -108,8 +109,9 @@ class Permission:
         address = request.remote or "?"
         wait = self._failures.wait(address)
         if wait > 0:
-            answer = problem(429, f"too many wrong tokens; try again in {wait:.0f} s")
-            answer.headers["Retry-After"] = f"{wait + 1:.0f}"
+            seconds = math.ceil(wait)  # not too soon by a fraction
+            answer = problem(429, f"too many wrong tokens; try again in {seconds} s")
+            answer.headers["Retry-After"] = str(seconds)
             return answer
         if self._digest is not None and hmac.compare_digest(digest_of(token), self._digest):
             return None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncIterator
 from contextlib import aclosing
+from json import loads
 
 import pytest
 from aiohttp import ClientSession, CookieJar
@@ -170,7 +171,23 @@ async def test_wrong_tokens_are_limited_in_rate_and_the_right_one_waits_too(lock
     assert codes == 5 * [401] + 2 * [429]
     async with locked.session.post(SESSION, headers=MINE, json={"token": TOKEN}) as answer:
         assert answer.status == 429
-        assert 1 <= int(answer.headers["Retry-After"]) <= 13
+        seconds = int(answer.headers["Retry-After"])
+        assert 1 <= seconds <= 12
+        assert (await answer.json())["error"] == f"too many wrong tokens; try again in {seconds} s"
+
+
+def test_nobody_is_told_to_wait_for_no_time() -> None:
+    now = [0.0]
+    permission = Permission(digest_of(TOKEN), lambda: now[0])
+    request = make_mocked_request("GET", "/")
+    for _ in range(5):
+        permission.token_refusal(request, "wrong")
+    now[0] = 12 - 0.1
+    answer = permission.token_refusal(request, TOKEN)
+    assert answer is not None
+    assert loads(answer.text or "")["error"].endswith("try again in 1 s")
+    now[0] = 12.0
+    assert permission.token_refusal(request, TOKEN) is None
 
 
 def test_failures_are_forgotten_one_by_one_and_each_address_has_its_own() -> None:
