@@ -12,7 +12,9 @@ from bestview.ground import (
     foot_spread,
     horizon,
     person_heights,
+    shows_floor,
     to_ground,
+    turns,
 )
 from bestview.identity import IdentityRegistry, IdentityUpdate
 from bestview.identity_settings import IdentitySettings
@@ -60,10 +62,12 @@ __all__ = [
     "overlook",
     "person_heights",
     "score_views",
+    "shows_floor",
     "size_quality",
     "stands_for",
     "to_ground",
     "true_views",
+    "turns",
     "view_cost",
     "with_missed",
     "witnessed",

@@ -75,6 +75,27 @@ def horizon(homography: NDArray[np.float64], x: float) -> float | None:
     return row if np.isfinite(row) else None
 
 
+def shows_floor(homography: NDArray[np.float64], size: tuple[int, int]) -> bool:
+    """Tell whether anything of a picture (width, height) lies below the horizon, and so can be floor.
+
+    Nothing does of a camera that is tilted past straight down, or hangs upside down: its floor ends below.
+    """
+    width, height = size
+    corners = np.array([[0.0, 0.0], [width, 0.0], [0.0, height], [width, height]])
+    return bool((_depth(homography, _homogeneous(homography, corners)) > 0).any())
+
+
+def turns(homography: NDArray[np.float64]) -> int:
+    """Say how the ground's axes turn in the picture, below the horizon: 1 as the picture's own, -1 against.
+
+    It is the same in every picture of a floor that is seen from above (Hartley and Zisserman, 2.4.1: the sign
+    of a homography's Jacobian is that of its determinant over the third coordinate cubed).
+    """
+    third = homography[2]
+    sign = next((float(np.sign(it)) for it in (third[1], third[2], third[0]) if it), 0.0)
+    return int(np.sign(np.linalg.det(homography)) * sign)
+
+
 def camera_height(homography: NDArray[np.float64], x: float) -> float | None:
     """Guess how high above the ground the camera is, in ground units; None: unknown. `x` is any column.
 

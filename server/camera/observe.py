@@ -14,6 +14,7 @@ from server.wire.config import Config
 from server.wire.detect import DetectSettings
 from server.wire.errors import UserError
 from server.wire.fit import Fit, Image
+from server.wire.ground_unit import METRES
 from server.wire.sections import Camera
 from tracking import Detections
 from tracking.detectors import (
@@ -63,14 +64,13 @@ def make_detector(config: Config, camera: Camera, fit: Fit) -> Observer:
 
 
 _PERSON_M = 1.7
-_PER_METRE = {"m": 1.0, "cm": 100.0, "mm": 1000.0}
 _LEAST_SLOPE, _MOST_SLOPE = 0.03, 1.5
 """A person's height over the camera's: cameras at 1.1 to 57 metres. Beyond these the unit is another."""
 
 
 def _floor(config: Config, camera: Camera, fit: Fit) -> Floor | None:
     """Give what metres of ground say about people's heights in the site's picture; None: nothing."""
-    per_metre = _PER_METRE.get(camera.ground_unit or "")
+    per_metre = METRES.get(camera.ground_unit or "")
     if camera.ground is None or per_metre is None:
         return None
     homography = np.array(camera.ground, dtype=np.float64)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from server.camera.ahead import ready_detector
 from server.camera.encode import AccessUnit, Encoder
+from server.camera.floor import check_floor
 from server.camera.own import Passing, open_own
 from server.camera.report import Reporter
 from server.camera.sharpness import Sharpness
@@ -54,7 +55,7 @@ class CameraPipeline:
     ``take`` and ``encode`` may run in one thread, ``search`` and ``follow`` in another: they share nothing.
 
     Raises:
-        UserError: the source or the detections cannot be opened.
+        UserError: the source or the detections cannot be opened, or the homography is of no such picture.
     """
 
     def __init__(
@@ -68,6 +69,7 @@ class CameraPipeline:
         """Why it is not, where it could have been; empty: nobody wished it."""
         self.source: Source = own.source or open_source(camera, site, listener)
         self._fit = Fit(self.source.size, (site.width, site.height))
+        check_floor(camera, self.source.size)
         self._encoder = Passing(own.source) if own.source else Encoder(site, config.encode)
         self._detector = ready_detector(config, camera, self.source, self._fit)
         window = config.track.window

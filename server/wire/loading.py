@@ -5,19 +5,21 @@ from __future__ import annotations
 import difflib
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import yaml
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 from pydantic_settings import SettingsError
 
-from bestview import checked_homography
+from bestview import checked_homography, turns
 from server.wire.config import Config
 from server.wire.errors import UserError
+from server.wire.ground_unit import checked_unit
 from server.wire.sections import Camera, View
 from server.wire.sources import resolved
 
@@ -66,6 +68,7 @@ def build_config(content: Mapping[str, Any], *, where: str, folder: Path) -> Con
     homographies, unit = _homographies(folder / config.ground, where) if config.ground else ({}, None)
     try:
         cameras = [_resolved(camera, homographies, unit, folder) for camera in config.cameras]
+        _one_side(cameras)
     except ValueError as error:
         raise UserError(f"{where}: {error}") from error
     onnx = replace(config.detect.onnx, model=config.detect.model_in(folder))
@@ -112,11 +115,27 @@ def _resolved(camera: Camera, homographies: Mapping[str, Any], unit: str | None,
     )
 
 
+def _one_side(cameras: Sequence[Camera]) -> None:
+    """Refuse homographies of which one sees the floor as from above and another as from below.
+
+    Raises:
+        ValueError: there are such.
+    """
+    sides = {it.id: turns(np.array(it.ground, dtype=np.float64)) for it in cameras if it.ground is not None}
+    ways = [[camera for camera, side in sides.items() if side == way] for way in (1, -1)]
+    fewer, others = sorted(ways, key=len)
+    if fewer:
+        raise ValueError(
+            f"ground: camera {fewer[0]} has the floor mirrored against camera {others[0]}: one of them has "
+            "its horizon below the floor, as if tilted past straight down, or its axes exchanged"
+        )
+
+
 def _homographies(path: Path, where: str) -> tuple[dict[str, list[list[float]]], str | None]:
     """Read ``{"unit": "m", "homography": {"c0": [[…], […], […]]}}``; the unit may be left out.
 
     Raises:
-        UserError: it cannot be read, or a matrix in it is not an invertible 3x3.
+        UserError: it cannot be read, a matrix in it is not an invertible 3x3, or the unit is not understood.
     """
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
@@ -130,8 +149,10 @@ def _homographies(path: Path, where: str) -> tuple[dict[str, list[list[float]]],
             checked_homography(matrix, f"camera {camera_id}")
         except ValueError as error:
             raise UserError(f"{where}: ground: {path}: {error}") from error
-    unit = content.get("unit")
-    return matrices, unit if isinstance(unit, str) else None
+    try:
+        return matrices, None if content.get("unit") is None else checked_unit(content["unit"])
+    except ValueError as error:
+        raise UserError(f"{where}: ground: {path}: unit: {error}") from error
 
 
 def _reason(error: Exception) -> str:

@@ -7,11 +7,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from bestview import camera_height, checked_homography, feet, foot_spread, horizon, person_heights, to_ground
+from bestview import (
+    camera_height,
+    checked_homography,
+    feet,
+    foot_spread,
+    horizon,
+    person_heights,
+    shows_floor,
+    to_ground,
+    turns,
+)
 from bestview.ground import feet_cut_off, from_ground
 
 
@@ -47,6 +57,31 @@ def test_the_horizon_is_where_the_ground_ends(scale: float) -> None:
         assert np.isnan(above).all()
         assert np.isfinite(below).all()
     assert horizon(np.diag([0.02, 0.02, 1.0]), 0.0) is None
+
+
+@settings(deadline=None, max_examples=60)
+@given(
+    st.floats(0.05, 3.0),
+    st.floats(-3.1, 3.1),
+    st.sampled_from([1.0, -1.0]),
+    st.sampled_from([1.0, -2.5]),
+)
+def test_a_camera_tilted_past_straight_down_has_the_floor_mirrored_and_shows_none(
+    tilt: float, pan: float, mirror: float, scale: float
+) -> None:
+    straight = np.pi / 2
+    assume(abs(tilt - straight) > 0.05)
+    # Rows: the picture's x, its y (down) and its depth, of a camera 3 above the floor, 640x480.
+    right = np.array([np.cos(pan), -np.sin(pan), 0.0])
+    ahead = np.array([np.sin(pan), np.cos(pan), 0.0])
+    forward = np.cos(tilt) * ahead - np.sin(tilt) * np.array([0.0, 0.0, 1.0])
+    axes = np.stack([right, np.cross(forward, right), forward])
+    floor = np.array([[mirror, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -3.0]])
+    lens = np.array([[400.0, 0.0, 320.0], [0.0, 400.0, 240.0], [0.0, 0.0, 1.0]])
+    homography = scale * np.linalg.inv(lens @ axes @ floor)
+    assert turns(homography) == (-mirror if tilt < straight else mirror)
+    horizon_row = 240.0 - 400.0 * np.tan(tilt)
+    assert shows_floor(homography, (640, 480)) == (horizon_row < 480.0)
 
 
 @pytest.mark.parametrize("high", [1.9, 7.5])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -47,6 +48,21 @@ def test_a_recording_cannot_be_looked_at_ahead_in_no_steps(detect: dict[str, Any
     )
 
 
+@pytest.mark.parametrize(
+    ("detect", "said"),
+    [
+        ({"bins": 0}, "bins must be 1 to 256, not 0"),
+        ({"work_width": 0}, "work_width must be at least 1, not 0"),
+        ({"median": {"samples": 0}}, "samples must be at least 1, not 0"),
+        ({"median": {"learn_every": 0}}, "learn_every must be at least 1, not 0"),
+        ({"median": {"bootstrap_frames": 0}}, "bootstrap_frames must be at least 1, not 0"),
+        ({"ghosts": {"check_every": 0}}, "check_every must be at least 1, not 0"),
+    ],
+)
+def test_counts_of_nothing_are_refused(detect: dict[str, Any], said: str) -> None:
+    assert said in complaint(site(detect=detect))
+
+
 def test_two_cameras_of_one_name_are_refused() -> None:
     cameras = [{"id": "c0", "source": "a"}, {"id": "c0", "source": "b"}]
     assert "two cameras are called 'c0'" in complaint({"cameras": cameras})
@@ -65,6 +81,46 @@ def test_ground_file_is_checked_as_a_cameras_own_homography_is(tmp_path: Path) -
     (tmp_path / "ground.json").write_text("not json")
     assert "cannot read" in complaint(site(ground="ground.json"), tmp_path)
     assert "No such file" in complaint(site(ground="absent.json"), tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("unit", "meant"), [("M", "m"), ("metres", "m"), ("meteres", "m"), ("Cm", "cm"), ("millimeter", "mm")]
+)
+def test_a_unit_that_was_meant_for_metres_is_refused_with_what_was_meant(
+    unit: str, meant: str, tmp_path: Path
+) -> None:
+    said = f"{unit!r} is not understood; did you mean {meant!r}?"
+    cameras = [{"id": "c0", "source": "a", "ground_unit": unit}]
+    assert f"cameras.0.ground_unit: {said}" in complaint({"cameras": cameras})
+    (tmp_path / "ground.json").write_text(json.dumps({"unit": unit, "homography": {}}))
+    assert f"unit: {said}" in complaint(site(ground="ground.json"), tmp_path)
+
+
+@pytest.mark.parametrize("unit", [1, "", ["m"]])
+def test_a_unit_that_is_no_word_is_refused(unit: Any, tmp_path: Path) -> None:
+    (tmp_path / "ground.json").write_text(json.dumps({"unit": unit, "homography": {}}))
+    assert f"unit: {unit!r} is no unit" in complaint(site(ground="ground.json"), tmp_path)
+
+
+@pytest.mark.parametrize("unit", ["m", "cm", "mm", "ft", "grid (of 358 x 360)", "person"])
+def test_any_other_word_is_a_unit(unit: str) -> None:
+    cameras = [{"id": "c0", "source": "a", "ground_unit": unit}]
+    assert build_config({"cameras": cameras}, where="", folder=Path()).cameras[0].ground_unit == unit
+
+
+def test_a_floor_that_one_camera_has_mirrored_is_refused_with_its_camera() -> None:
+    level = [[3.0, 0.0, -960.0], [0.0, 0.0, 1200.0], [0.0, 1.0, -240.0]]
+    down = [[0.02, 0.0, 0.0], [0.0, -0.02, 0.0], [0.0, 0.0, 1.0]]
+    past = [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, -1.0, 900.0]]
+    ways = {"c0": level, "c1": down, "c2": [[-it for it in row] for row in level]}
+
+    def cameras(grounds: dict[str, Any]) -> dict[str, Any]:
+        return {"cameras": [{"id": it, "source": "a", "ground": of} for it, of in grounds.items()]}
+
+    build_config(cameras(ways), where="", folder=Path())
+    assert "ground: camera c9 has the floor mirrored against camera c0: " in complaint(
+        cameras(ways | {"c9": past})
+    )
 
 
 def test_lookahead_shorter_than_the_trackers_lag_is_refused_with_the_least_that_would_do() -> None:

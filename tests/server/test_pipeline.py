@@ -199,3 +199,15 @@ def test_sharpness_is_measured_where_it_counts_alone(recording: Path) -> None:
         assert tracks, "somebody is there"
         assert any(track.sharpness is not None for track in tracks) == measured
     assert live(weighs)[1] == [batch.tracks for batch in offline(weighs)]
+
+
+def test_a_homography_that_has_no_floor_in_the_picture_is_refused(recording: Path) -> None:
+    past_down = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 109.0]]  # the floor ends below the picture
+    with pytest.raises(UserError) as caught:
+        CameraPipeline(config_of(recording, ground=past_down), "c0")
+    assert str(caught.value).startswith(
+        "camera c0: ground: all of its picture, 192x108, lies above the horizon"
+    )
+    assert "\n" not in str(caught.value)
+    past_down[2][2] = 107.0
+    CameraPipeline(config_of(recording, ground=past_down), "c0")

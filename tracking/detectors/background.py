@@ -10,10 +10,11 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from tracking.appearance import GREY_LEVELS
 from tracking.detections import Detections
 from tracking.detectors.base import Image, Mask
 from tracking.detectors.boxfilter import Band, BoxFilter, BoxFilterSettings
-from tracking.detectors.checked import checked_image
+from tracking.detectors.checked import at_least_one, checked_image
 from tracking.detectors.explain import ExplainSettings, Explanation, explain
 from tracking.detectors.fit import shrink
 from tracking.detectors.ghosts import GhostSettings
@@ -36,7 +37,11 @@ CELL = 2
 
 @dataclass(frozen=True, slots=True)
 class BackgroundSettings:
-    """The background-subtraction detector of paper IV.A.2."""
+    """The background-subtraction detector of paper IV.A.2.
+
+    Raises:
+        ValueError: nothing to look at ahead, no picture to work on, or so many bins do not fit.
+    """
 
     model: Literal["median", "mog2"] = "median"  # how the background is learned
     work_width: int = 360  # pixels; wider pictures are made smaller first
@@ -57,6 +62,9 @@ class BackgroundSettings:
     def __post_init__(self) -> None:
         if self.ahead_frames < 0 or self.ahead_every < 1:
             raise ValueError("ahead_frames must be at least 0, and ahead_every at least 1")
+        at_least_one(self, "work_width")
+        if not 1 <= self.bins <= GREY_LEVELS:
+            raise ValueError(f"bins must be 1 to {GREY_LEVELS}, not {self.bins}")
 
 
 def paper_boxes(settings: BackgroundSettings) -> BackgroundSettings:

@@ -1,4 +1,4 @@
-"""Frames that a detector can work on."""
+"""Frames that a detector can work on, and settings that it can work by."""
 
 from __future__ import annotations
 
@@ -18,3 +18,15 @@ def checked_image(image: Image) -> Image:
     if image.ndim != _CHANNELS or image.shape[2] != _CHANNELS or image.dtype != np.uint8:
         raise ValueError(f"a frame is (H, W, 3) uint8, not {image.shape} {image.dtype}")
     return image
+
+
+def at_least_one(settings: object, *names: str) -> None:
+    """Check counts among a detector's settings.
+
+    Raises:
+        ValueError: one of them is below 1; the text names it.
+    """
+    for name in names:
+        value = getattr(settings, name)
+        if value < 1:
+            raise ValueError(f"{name} must be at least 1, not {value}")

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tracking.detectors.base import Image, Mask, Plane
+from tracking.detectors.checked import at_least_one
 
 _RING = np.ones((5, 5), dtype=np.uint8)
 _SMALL = np.ones((3, 3), dtype=np.uint8)
@@ -20,7 +21,11 @@ _AROUND = (9, 9)
 
 @dataclass(frozen=True, slots=True)
 class GhostSettings:
-    """When a part of the foreground that never moves is taken into the background."""
+    """When a part of the foreground that never moves is taken into the background.
+
+    Raises:
+        ValueError: it is looked at in no steps.
+    """
 
     check_every: int = 5  # frames between two looks at what has not moved
     still_checks: int = 6  # looks in a row without motion before a part is judged
@@ -31,6 +36,9 @@ class GhostSettings:
     edge_ratio: float = 1.3  # how much sharper an outline is in the background than in the frame
     sharper_share: float = 0.65  # share of the outline towards the background that must be that sharp
     least_area: int = 40  # square pixels of the working picture; smaller parts are noise
+
+    def __post_init__(self) -> None:
+        at_least_one(self, "check_every")
 
 
 class GhostFinder:

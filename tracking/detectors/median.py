@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tracking.detectors.base import Image, Mask
+from tracking.detectors.checked import at_least_one
 from tracking.detectors.gain import channel_gains, scaled
 from tracking.detectors.ghosts import GhostFinder, GhostSettings
 from tracking.detectors.shadow import ShadowSettings, shadow_mask
@@ -18,7 +19,11 @@ from tracking.detectors.split import Split
 
 @dataclass(frozen=True, slots=True)
 class MedianSettings:
-    """The gain-compensated median background."""
+    """The gain-compensated median background.
+
+    Raises:
+        ValueError: no frames to learn from, or in no steps.
+    """
 
     bootstrap_frames: int = 50  # frames whose median is the first background (2 s at 25 frames/s)
     samples: int = 15  # how many of the bootstrap frames enter the median; odd
@@ -27,6 +32,9 @@ class MedianSettings:
     learn_rate: float = 0.02  # share of the new frame in each update, where nobody is
     restart_share: float = 0.6  # share of the picture in the foreground that means: the light changed
     restart_frames: int = 15  # frames that it must last before the background is learned anew
+
+    def __post_init__(self) -> None:
+        at_least_one(self, "bootstrap_frames", "samples", "learn_every")
 
 
 class MedianBackground:

@@ -5,9 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import NonNegativeFloat, PositiveFloat, ValidationInfo, field_validator
+from pydantic import AfterValidator, NonNegativeFloat, PositiveFloat, ValidationInfo, field_validator
 
 from bestview import WitnessSettings, checked_homography
+from server.wire.ground_unit import checked_unit
 from server.wire.library import validated
 from server.wire.sections.base import Name, Polygon, Section
 from tracking import DEFAULT_SOLVER, CostSettings, WindowSettings, solver_named
@@ -31,7 +32,7 @@ class Camera(Section):
     """Parts of the picture where nobody is looked for, in pixels of the camera's own picture."""
     ground: list[list[float]] | None = None
     """3x3 homography from the camera's own picture (pixels) to the ground plane."""
-    ground_unit: str | None = None
+    ground_unit: Annotated[str, AfterValidator(checked_unit)] | None = None
     """The ground plane's unit: by m, cm or mm it is known how tall people are in the picture."""
     detections: Path | None = None
     """A MOTChallenge detection file to use instead of looking for people in the picture."""

@@ -1,0 +1,34 @@
+"""The unit of the floor that cameras share: a word, of which three say how long something is."""
+
+from __future__ import annotations
+
+import difflib
+
+METRES = {"m": 1.0, "cm": 100.0, "mm": 1000.0}
+"""So many of each are a metre."""
+_MEANT = {
+    "m": ("meter", "meters", "metre", "metres"),
+    "cm": ("centimeter", "centimeters", "centimetre", "centimetres"),
+    "mm": ("millimeter", "millimeters", "millimetre", "millimetres"),
+}
+_CLOSE = 0.8
+"""How like one of these a word is that was meant for it (difflib's ratio)."""
+
+
+def checked_unit(unit: object) -> str:
+    """Give the unit back; any word will do, but not one that was meant for metres and is not taken for them.
+
+    Raises:
+        ValueError: in one line: it is no word, or another way to write m, cm or mm.
+    """
+    if not isinstance(unit, str) or not unit.strip():
+        raise ValueError(f'{unit!r} is no unit; it is a word, such as "m"')
+    if unit in METRES:
+        return unit
+    word = unit.strip(" .").lower()
+    names = {name: short for short, names in _MEANT.items() for name in names}
+    close = difflib.get_close_matches(word, names, n=1, cutoff=_CLOSE)
+    meant = word if word in METRES else names[close[0]] if close else None
+    if meant is not None:
+        raise ValueError(f"{unit!r} is not understood; did you mean {meant!r}?")
+    return unit
