@@ -10,11 +10,13 @@ import { getJson } from './http.js';
  */
 
 const EVERY_MS = 30_000;
+const ALL_EVERY_MS = 600_000; // in between only what is new is asked for: of a week there is much
 
 export class Kept {
   /** @type {View[]} in order */
   views = [];
   #asked = -Infinity;
+  #allAsked = -Infinity;
   /** @type {number | null} */
   #about = null;
 
@@ -34,10 +36,13 @@ export class Kept {
     if (object !== this.#about) this.views = [];
     this.#about = object;
     this.#asked = now;
+    const last = now - this.#allAsked < ALL_EVERY_MS ? this.views.at(-1) : undefined;
+    if (!last) this.#allAsked = now;
     try {
-      const { views } = await getJson(`api/objects/${object}/past`);
+      const { views } = await getJson(`api/objects/${object}/past${last ? `?from=p${last.first}` : ''}`);
       if (object !== this.#about) return;
-      this.views = /** @type {any[]} */ (views).map((it) => ({ ...it, end: it.first + it.frames }));
+      const since = /** @type {any[]} */ (views).map((it) => ({ ...it, end: it.first + it.frames }));
+      this.views = last ? [...this.views.filter((it) => it.end <= last.first), ...since] : since;
     } catch {
       // Nothing is kept of them, or the server is away: what was known before may still be so.
     }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from contextlib import aclosing
 
@@ -58,23 +59,23 @@ async def camera_of_the_past(request: web.Request, form: Form) -> web.StreamResp
 
 @routes.get("/api/objects/{object:[0-9]{1,9}}/past")
 async def getobject_past(request: web.Request) -> web.Response:
-    """Say from when to when a person's best view can be seen again."""
+    """Say from when to when a person's best view can be seen again; from= and to= say of which time."""
     service = request.app[SERVICE]
     number = int(request.match_info["object"])
     source = object_past(service, number)
-    if not known(source):
+    if kept_from(source, 0) is None:
         return problem(404, f"nothing is kept of object {number}")
-    return answer(_past(service, source))
+    return _past(request, source)
 
 
 @routes.get("/api/cameras/{camera}/past")
 async def get_camera_past(request: web.Request) -> web.Response:
-    """Say from when to when a camera can be seen again."""
+    """Say from when to when a camera can be seen again; from= and to= say of which time."""
     service = request.app[SERVICE]
     camera = request.match_info["camera"]
     if camera not in service.shelves:
         return no_camera(service, camera)
-    return answer(_past(service, CameraPast(service.past, camera)))
+    return _past(request, CameraPast(service.past, camera))
 
 
 @routes.get("/api/past")
@@ -96,8 +97,10 @@ def object_past(service: BestViewService, number: int) -> ObjectPast:
     return ObjectPast(service.past, (number,) if number == now else (now, number))
 
 
-def wish_of(request: web.Request, service: BestViewService, now: int) -> Wish:
+def wish_of(request: web.Request, service: BestViewService, now: int, *, start: int | None = None) -> Wish:
     """Read from= and to=; ``now`` is the pulse that seconds back are counted from.
+
+    ``start`` is from when on where from= is left out; None: it must not be.
 
     Raises:
         MomentError: they are no moments, or the second is not after the first.
@@ -110,9 +113,9 @@ def wish_of(request: web.Request, service: BestViewService, now: int) -> Wish:
                 moments[name] = pulse_at(request.query[name], now=now, fps=fps, pulse0=pulse0)
             except MomentError as error:
                 raise MomentError(f"{name}: {error}") from error
-    if "from" not in moments:
+    start, end = moments.get("from", start), moments.get("to")
+    if start is None:
         raise MomentError("from: is missing; it says from when on, such as ?from=-60")
-    start, end = moments["from"], moments.get("to")
     if end is not None and end <= start:
         raise MomentError(f"to: p{end} is not after from, which is p{start}")
     return Wish(start, end)
@@ -172,14 +175,19 @@ async def _stream(
         past.viewers -= counted
 
 
-def _past(service: BestViewService, source: Source) -> Past:
+def _past(request: web.Request, source: Source) -> web.Response:
+    service = request.app[SERVICE]
     fps, pulse0 = service.config.site.fps, service.pulse0
-    return Past(
-        [
-            PastSpan(
-                it.first, it.end - it.first, moment_of(it.first, fps, pulse0), moment_of(it.end, fps, pulse0)
-            )
-            for it in known(source)
-        ],
-        [PastView(it.camera, it.first, it.end - it.first) for it in shown(source)],
-    )
+    try:
+        wish = wish_of(request, service, source.end, start=0)
+    except MomentError as error:
+        return problem(400, str(error))
+    end = sys.maxsize if wish.end is None else wish.end
+    spans = [
+        PastSpan(
+            it.first, it.end - it.first, moment_of(it.first, fps, pulse0), moment_of(it.end, fps, pulse0)
+        )
+        for it in known(source, wish.start, end)
+    ]
+    views = [PastView(it.camera, it.first, it.end - it.first) for it in shown(source, wish.start, end)]
+    return answer(Past(spans, views))

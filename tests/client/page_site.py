@@ -171,12 +171,12 @@ class FakeSite:
             "reason": REASON,
         }
 
-    def past(self, person: int) -> dict[str, Any]:
-        """Give what can be seen again of a person, by camera."""
+    def past(self, person: int, since: int = 0) -> dict[str, Any]:
+        """Give what can be seen again of a person, by camera; from `since` on, which begins a view."""
         first = (self.edge - self.recorded * FPS) // HOLD * HOLD
         views = [
             {"camera": CAMERAS[self.camera(person, pulse)], "first": pulse, "frames": HOLD}
-            for pulse in range(first, self.edge - HOLD, HOLD)
+            for pulse in range(max(first, since), self.edge - HOLD, HOLD)
         ]
         return {"spans": [], "views": views}
 
@@ -271,7 +271,8 @@ class SiteServer:
         return web.json_response(self.site.choice(k, pulse - pulse % GOP))
 
     async def _past(self, request: web.Request) -> web.Response:
-        return web.json_response(self.site.past(int(request.match_info["k"])))
+        first = int(request.query.get("from", "p0")[1:])
+        return web.json_response(self.site.past(int(request.match_info["k"]), first))
 
     async def _told(self, request: web.Request) -> web.Response:
         first, end = (int(request.query[name][1:]) for name in ("from", "to"))

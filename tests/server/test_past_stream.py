@@ -7,6 +7,7 @@ import io
 import json
 from collections.abc import AsyncIterator, Mapping
 from pathlib import Path
+from typing import Any
 
 import av
 import numpy as np
@@ -177,6 +178,8 @@ async def test_without_a_recording_the_memory_is_the_past(busy: Hall) -> None:
             "from: the time of no pulse is known yet; say seconds back (-60) or a pulse (p1250)",
         ),
         ("/api/objects/9/past", 404, "nothing is kept of object 9"),
+        ("/api/objects/1/past?from=p9&to=p9", 400, "to: p9 is not after from, which is p9"),
+        ("/api/cameras/c0/past?to=yesterday", 400, f"to: 'yesterday' is no moment; {MOMENT}"),
     ],
 )
 async def test_what_cannot_be_played_is_told_in_one_line(
@@ -207,6 +210,22 @@ async def test_it_is_said_by_which_cameras(recorded: Hall) -> None:
     assert (await recorded.get_json("/api/cameras/c1/past"))["views"] == [
         {"camera": B, "first": 0, "frames": 35}
     ]
+
+
+@pytest.mark.parametrize(("query", "frames"), [("from=p7&to=p24", 17), ("from=p20", 10), ("to=p4", 4)])
+async def test_it_is_said_of_a_part_of_the_time(recorded: Hall, query: str, frames: int) -> None:
+    def cameras(views: list[dict[str, Any]]) -> dict[int, str]:
+        return {it["first"] + n: it["camera"] for it in views for n in range(it["frames"])}
+
+    whole = cameras((await recorded.get_json("/api/objects/1/past"))["views"])
+    part = await recorded.get_json(f"/api/objects/1/past?{query}")
+    begin = int(query.partition("from=p")[2].partition("&")[0] or 0)
+    assert [(it["first"], it["frames"]) for it in part["spans"]] == [(begin, frames)]
+    assert cameras(part["views"]) == {it: whole[it] for it in range(begin, begin + frames)}
+    span = (await recorded.get_json(f"/api/cameras/c1/past?{query}"))["spans"][0]
+    assert (span["first"], span["frames"]) == (begin, 15 if query == "from=p20" else frames)
+    nothing = await recorded.get_json("/api/objects/1/past?from=p900")
+    assert nothing == {"spans": [], "views": []}
 
 
 async def test_it_is_told_again_who_was_where(recorded: Hall) -> None:

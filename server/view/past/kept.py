@@ -3,25 +3,28 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
+from dataclasses import replace
 
 from server.view.past.play import Source
 from server.view.past.stretch import Span, Stretch, View, spans, views
 
 
-def known(source: Source) -> list[Span]:
-    """Say all that there is, on the disk and in memory."""
-    found: list[Stretch | Span] = [it for one in source.recorded for it in one.tape.all]
-    gop = source.recall(0)
-    while gop is not None:
+def known(source: Source, start: int = 0, end: int = sys.maxsize) -> list[Span]:
+    """Say what there is of the pulses ``start … end - 1``, on the disk and in memory."""
+    found: list[Stretch | Span] = [*_recorded(source, start, end)]
+    gop = source.recall(start)
+    while gop is not None and gop.first < end:
         found.append(Span(gop.first, gop.end))
         gop = source.recall(gop.end)
-    return spans(found)
+    return [replace(it, first=max(it.first, start), end=min(it.end, end)) for it in spans(found)]
 
 
-def shown(source: Source) -> list[View]:
+def shown(source: Source, start: int = 0, end: int = sys.maxsize) -> list[View]:
     """Say which cameras' frames they are, as far as they are known: on the disk, and after it in memory."""
-    recorded = [it for one in source.recorded for it in one.tape.all]
-    return views([*recorded, *source.remembered])
+    remembered = [it for it in source.remembered if it.end > start and it.first < end]
+    found = views([*_recorded(source, start, end), *remembered])
+    return [replace(it, first=max(it.first, start), end=min(it.end, end)) for it in found]
 
 
 def kept_from(source: Source, pulse: int) -> int | None:
@@ -37,3 +40,8 @@ def kept_until(source: Source) -> int:
     tapes = [it.end for one in source.recorded if (it := one.tape.before(sys.maxsize)) is not None]
     gop = source.recall_before(sys.maxsize)
     return max([*tapes, *([] if gop is None else [gop.end])], default=0)
+
+
+def _recorded(source: Source, start: int, end: int) -> Iterator[Stretch]:
+    for one in source.recorded:
+        yield from one.tape.between(start, end)
