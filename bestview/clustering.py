@@ -102,13 +102,15 @@ class _Looks:
         # Who was merged away has no frames, and so no evidence.
         return told * self._weights.known(self._count[one], self._count[two])
 
-    def add_evidence(self, row: int, to: Floats) -> None:
-        """Add to (N,) what looks say about a group and all others."""
+    def add_evidence(self, row: int, asked: NDArray[np.bool_], to: Floats) -> None:
+        """Add to (N,) what looks say about a group and those that are (N,) asked about."""
         mine = self._of[row]
         if not mine:
             return
         others = np.concatenate([self._camera[number] for number in mine])
         own = np.repeat(list(mine.values()), [self._camera[number].size for number in mine])
+        some = asked[self._group[others]]
+        others, own = others[some], own[some]
         to += np.bincount(self._group[others], self._evidence(others, own), to.size)
 
     def merge(self, keep: int, lose: int) -> None:
@@ -164,8 +166,9 @@ class _Groups:
 
     def _row(self, row: int) -> Floats:
         value = self._evidence[row].copy()
-        self._looks.add_evidence(row, value)
-        value[self._apart[row] | ~self._linked[row] | (self._past[row] & self._past)] = -np.inf
+        possible = self._linked[row] & ~(self._apart[row] | (self._past[row] & self._past))
+        self._looks.add_evidence(row, possible, value)
+        value[~possible] = -np.inf
         return np.asarray(value)
 
     def merge(self, keep: int, lose: int) -> None:
@@ -195,6 +198,6 @@ class _Groups:
         better = ~anew & ((row > self.best) | ((row == self.best) & (keep < self.at)))
         better &= self.best > -np.inf
         self.best[better], self.at[better] = row[better], keep
-        for group in np.flatnonzero(anew).tolist():
-            self.at[group] = int(np.argmax(self._value[group]))
-            self.best[group] = self._value[group, self.at[group]]
+        groups = anew.nonzero()[0]
+        self.at[groups] = at = self._value[groups].argmax(axis=1)
+        self.best[groups] = self._value[groups, at]
