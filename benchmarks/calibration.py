@@ -24,13 +24,14 @@ from benchmarks.surroundings import CannotRunError, parser
 from benchmarks.views import Views, find_views
 from bestview.calibrate import CalibrationError, Track, Walk, WalkCalibration, calibrate_walks
 from server.camera.scene import Scene, write_recording
-from server.run.calibrate_file import write_ground
-from server.run.calibrate_plan import plan_of, plot_plan
-from server.run.calibrate_tracks import Picture, walk_settings, walks_from_tracks
+from server.run.calibrate_tracks import Picture, walks_from_tracks
 from server.run.evaluate import evaluate_recordings, read_recordings
 from server.run.render import render
 from server.run.setup import config_for_videos
 from server.run.track import track_one
+from server.view.calibrate.file import ground_file
+from server.view.calibrate.plan import plan_of, plot_plan
+from server.view.calibrate.walked import walk_settings
 from tracking.motchallenge import write_rows
 
 _PERSON = 1.75
@@ -114,7 +115,7 @@ def terrace_rows(report: Report, data: Path, folder: Path, out: Path) -> None:
     found = calibrate_walks(walked.walks, walk_settings(walked.fps, _SHIFT_S), _PERSON)
     _plot(found, out / "calibration_terrace.png")
     ours = folder / "terrace.json"
-    write_ground(ours, "m", {it.camera: it.homography for it in found.cameras})
+    ours.write_text(ground_file("m", {it.camera: it.homography for it in found.cameras}))
     assert views.ground is not None  # noqa: S101 — the recording has one
     rows = []
     for name, ground in (("published", views.ground), ("from its own tracks", ours)):
@@ -147,7 +148,7 @@ def auditorium_rows(report: Report, data: Path, folder: Path, out: Path) -> None
     found = calibrate_walks(walked.walks, walk_settings(walked.fps, 0.0), _PERSON)
     _plot(found, out / "calibration_auditorium.png")
     ground = folder / "auditorium.json"
-    write_ground(ground, "m", {it.camera: it.homography for it in found.cameras})
+    ground.write_text(ground_file("m", {it.camera: it.homography for it in found.cameras}))
     rows = [
         [f"{one}, {other}", *_cells(seen)]
         for (one, other), seen in agreement(ground, source / "gt", size).items()

@@ -83,7 +83,7 @@ def make_walk(
             the middle of a track; the boxes between are drawn straight.
     """
     at, who = np.asarray(frames, dtype=np.intp), np.asarray(ids, dtype=np.intp)
-    whole = ~_cut(boxes, size)
+    whole = ~cut_off(boxes, size)
     tracks = []
     for number in np.unique(who):
         mine = np.flatnonzero((who == number) & whole)
@@ -94,8 +94,11 @@ def make_walk(
     return Walk(camera, size, tuple(sorted(tracks, key=lambda it: (it.first, it.end))))
 
 
-def _cut(boxes: Floats, size: tuple[int, int]) -> np.ndarray:
-    """Tell which boxes reach the picture's edge, where neither foot nor height nor middle is known."""
+def cut_off(boxes: Floats, size: tuple[int, int]) -> np.ndarray:
+    """Tell which boxes reach the picture's edge, where neither foot nor height nor middle is known.
+
+    (N, 4) pixels of a picture of width and height -> (N,).
+    """
     width, height = size
     margin = max(1.0, 0.004 * height)
     left, top, right, bottom = boxes.T

@@ -12,6 +12,7 @@ import { ask, Refused } from './operator_http.js';
 import { element } from './operator_parts.js';
 import { Marks } from './operator_marks.js';
 import { KnownPeople } from './operator_people.js';
+import { CalibrationWalk } from './operator_walk.js';
 import { Palette } from './palette.js';
 
 /** @import {Site} from './contract.js' */
@@ -70,6 +71,7 @@ function build(site) {
   const downloads = new Downloads(site);
   sections.set('downloads', downloads);
   sections.set('marks', new Marks(site, tell));
+  sections.set('walk', new CalibrationWalk(tell));
   sections.set('choosing', new ChoosingForm(tell));
   sections.set('configuration', new Configuration(tell));
   new ServerEvents({

@@ -44,6 +44,24 @@
  * @property {FloorCamera[]} cameras
  * @property {string[]} uncalibrated
  *
+ * @typedef {object} WalkCamera
+ * @property {string} camera
+ * @property {number} feet that another camera saw somebody with
+ * @property {number[]} thirds shares of them in the left, middle and right third of the picture
+ * @property {number | null} deep how many times as tall the nearest appear as the farthest
+ *
+ * @typedef {object} Walk /api/operator/walk
+ * @property {'none' | 'walking' | 'working' | 'done'} state
+ * @property {number} seconds
+ * @property {number} most seconds after which nothing more is taken in
+ * @property {WalkCamera[]} cameras
+ * @property {{one: string, other: string, seconds: number}[]} pairs for how long both saw somebody
+ * @property {string[]} lacking where to walk, too
+ * @property {string} error why nothing has come of it
+ * @property {string[]} lines what has come of it
+ * @property {string} too_little what was not walked, where the result is a guess
+ * @property {string} configuration lines; empty: there is no ground file
+ *
  * @typedef {object} Setting an entry of /api/operator/config
  * @property {string} key
  * @property {string} value as the configuration writes it

@@ -13,14 +13,13 @@ from bestview.calibrate import (
     MarkedPoints,
     PointFit,
     WalkSettings,
-    calibrate_walks,
     fit_cameras,
 )
-from server.run.calibrate_file import write_ground
-from server.run.calibrate_plan import PlanView, plan_of, plot_plan
 from server.run.calibrate_points import read_points
-from server.run.calibrate_tracks import Walked
-from server.run.calibrate_words import details, in_words, missed
+from server.view.calibrate.file import ground_file
+from server.view.calibrate.outcome import worked_out
+from server.view.calibrate.plan import PlanView, plan_of, plot_plan
+from server.view.calibrate.walked import Walked
 from server.wire.errors import UserError
 
 _UNNAMED = "unit"
@@ -39,7 +38,8 @@ def calibrate_points(points: Path, out: Path, plan: Path, unit: str | None) -> l
     views = [PlanView(it.camera, fits[it.camera].homography, it.image, it.floor) for it in given.cameras]
     plot_plan(views, unit, plan)
     homographies = {camera: fit.homography for camera, fit in fits.items()}
-    write_ground(out, unit, homographies, {"residuals": {name: _rounded(fit) for name, fit in fits.items()}})
+    residuals = {name: _rounded(fit) for name, fit in fits.items()}
+    out.write_text(ground_file(unit, homographies, {"residuals": residuals}), encoding="utf-8")
     return [_line(it, fits[it.camera], unit) for it in given.cameras]
 
 
@@ -52,17 +52,15 @@ def calibrate_from_walks(
         UserError: the walk says too little.
     """
     with refusing("calibrate"):
-        found = calibrate_walks(walked.walks, settings, person)
-    missing = [line for it in found.cameras for line in missed(it)]
-    if any(it.serious for it in missing) and not force:
-        worst = next(it for it in missing if it.serious)
+        outcome = worked_out(walked, settings, person)
+    if outcome.too_little and not force:
         raise UserError(
-            f"calibrate: the walk covered too little: {worst.words} (--force writes it all the same)"
+            f"calibrate: the walk covered too little: {outcome.too_little} (--force writes it all the same)"
         )
-    plot_plan(plan_of(found), "m", plan)
-    homographies = {it.camera: it.homography for it in found.cameras}
-    write_ground(out, "m", homographies, details(found, person))
-    return [*in_words(walked, found, settings), *(it.words for it in missing)]
+    plot_plan(plan_of(outcome.found), "m", plan)
+    out.write_text(outcome.ground, encoding="utf-8")
+    offsets = ["for the configuration:", *outcome.offsets.splitlines()] if outcome.offsets else []
+    return [*outcome.lines, *offsets]
 
 
 @contextmanager

@@ -39,8 +39,9 @@ def calibrate(
     """Find each camera's homography to the floor: from marked points, or from people who walk about."""
     from server.run.calibrate import calibrate_from_walks, calibrate_points
     from server.run.calibrate_points import ENDINGS
-    from server.run.calibrate_tracks import Picture, walk_settings, walks_of
+    from server.run.calibrate_tracks import Picture, walks_of
     from server.run.recorded import parse_size
+    from server.view.calibrate.walked import walk_settings
 
     for path in given:
         if not path.exists():

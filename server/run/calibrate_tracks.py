@@ -10,33 +10,18 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from bestview.calibrate import Walk, WalkSettings, make_walk
+from bestview.calibrate import Walk, make_walk
 from server.run.recorded import Size, look_at
 from server.run.setup import camera_name
 from server.run.track import loaded_for, track_one
+from server.view.calibrate.walked import Walked, moment
 from server.wire.errors import UserError
 from tracking.motchallenge import MotRow, read_rows
 
 ENDINGS = (".txt", ".txt.gz")
 _FPS = 25.0
-_MOMENT_S = 0.2
-"""Seconds between the moments at which cameras are compared: people walk a sixth of their height."""
 _SAME_RATE = 0.01
 """Share by which the rates that files tell of may differ; they are rounded, and a walk is short."""
-
-
-@dataclass(frozen=True, slots=True)
-class Walked:
-    """The cameras' walks, and how many frames there are in a second.
-
-    `guessed` are cameras whose picture's size is only guessed, from the boxes; `rate_guessed` is whether the
-    rate is only what is usual.
-    """
-
-    walks: tuple[Walk, ...]
-    fps: float
-    guessed: tuple[str, ...] = ()
-    rate_guessed: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,15 +30,6 @@ class Picture:
 
     size: Size | None
     fps: float | None
-
-
-def walk_settings(fps: float, shift: float) -> WalkSettings:
-    """Give the settings for recordings of so many frames a second, out of step by `shift` seconds at most."""
-    return WalkSettings(shift=round(shift * fps), step=_moment(fps))
-
-
-def _moment(fps: float) -> int:
-    return max(1, round(_MOMENT_S * fps))
 
 
 def walks_of(
@@ -140,7 +116,7 @@ def _walk(name: str, size: Size, rows: Sequence[MotRow], fps: float, offset: int
     boxes = np.array([row.box for row in rows], dtype=np.float64).reshape(-1, 4)
     # Files count frames from 1, pulses from 0.
     frames = [row.frame - 1 - offset for row in rows]
-    return make_walk(name, size, frames, [row.id for row in rows], boxes, _moment(fps))
+    return make_walk(name, size, frames, [row.id for row in rows], boxes, moment(fps))
 
 
 def _rows(path: Path, name: str | None = None) -> list[MotRow]:

@@ -12,6 +12,7 @@ import msgspec
 from camsync import PulseClient
 from server.view.align import Aligner, Epoch
 from server.view.board import Board
+from server.view.calibrate.walking import Walking
 from server.view.codec import agreement_for
 from server.view.decide import Decider, GopDecision, homographies
 from server.view.intake import Intake
@@ -50,6 +51,7 @@ class BestViewService:
             config, homographies(config), lambda camera, pulse: self.shelves[camera].has(pulse)
         )
         self.board = Board(config.site.fps)
+        self.walking = Walking(config)
         self.past = Past(config, self.shelves, self.agreement, frames, self.sound)
         self.pulse = -1
         self.pulse0: float | None = None
@@ -137,6 +139,7 @@ class BestViewService:
     def close(self) -> None:
         """End all streams and let go of the bus and the files."""
         self.splicer.close()
+        self.walking.stop()
         self.past.close()
         if self._recorder is not None:
             self._recorder.close()
@@ -162,6 +165,7 @@ class BestViewService:
 
     def _step(self, epoch: Epoch) -> None:
         self._note_late(epoch)
+        self.walking.take(epoch)
         for decision in self.decider.step(epoch):
             self._publish(decision)
 

@@ -11,7 +11,7 @@ from typing import Any
 import msgspec
 from aiohttp import web
 
-from server.web.operator_schema import OPERATOR, OPERATOR_FILES
+from server.web.operator_schema import OPERATOR, OPERATOR_FILES, OPERATOR_RESULTS
 from server.web.queries import HELD, OVERLAY, PAST
 from server.web.schema import Cameras, Choice, Objects, Past, Problem, SiteInfo
 
@@ -52,11 +52,13 @@ _OTHER = {
     "/readyz": "text/plain",
     "/metrics": "text/plain",
     **OPERATOR_FILES,
+    **OPERATOR_RESULTS,
 }
 _UNAVAILABLE = {"/objects/{object}/best.mp4", "/cameras/{camera}/live.mp4", "/readyz"} | {
     path for path in _OTHER if path.endswith((".webm", ".ts", ".m3u8", ".mjpeg", "best.jpg", "live.jpg"))
 }
 _FROM_IS_NEEDED = {"/api/past", *OPERATOR_FILES}
+_SPANS = {"/api/objects/{object}/past", "/api/cameras/{camera}/past"}
 _MOMENT = {"type": "string", "examples": ["-60", "p1250", "2026-11-21T16:13:36Z"]}
 _SCHEMAS: dict[str, Any] = {
     "object": {"type": "integer", "minimum": 0},
@@ -104,11 +106,11 @@ def _operation(path: str, summary: str) -> dict[str, Any]:
     error = {"application/json": {"schema": {"$ref": "#/components/schemas/Problem"}}}
     responses: dict[str, Any] = {"200": {"description": "OK", "content": content}}
     names = re.findall(r"\{(\w+)\}", path)
-    if names:
+    if names or path in OPERATOR_RESULTS:
         responses["404"] = {"description": "There is none of this name.", "content": error}
-    if path in OVERLAY | PAST | HELD or path.endswith("/choice"):
+    if path in OVERLAY | PAST | HELD | _SPANS or path.endswith("/choice"):
         responses["400"] = {"description": "The query asks for what there is not.", "content": error}
-    if path in OPERATOR or path in OPERATOR_FILES:
+    if path in OPERATOR.keys() | OPERATOR_FILES.keys() | OPERATOR_RESULTS.keys():
         responses["401"] = {"description": "The operator's token is needed.", "content": error}
         responses["403"] = {"description": "Only the operator may.", "content": error}
         responses["429"] = {"description": "Too many wrong tokens; try again later.", "content": error}
@@ -119,7 +121,8 @@ def _operation(path: str, summary: str) -> dict[str, Any]:
     parameters = [{"name": name, "in": "path", "required": True, "schema": _SCHEMAS[name]} for name in names]
     queries = ["prefer"] * (path in HELD)
     queries += ["overlay"] * (path in OVERLAY) + ["fps"] * path.endswith(".mjpeg")
-    queries += ["from", "to"] * (path in PAST or path in OPERATOR_FILES) + ["at"] * path.endswith("/choice")
+    queries += ["from", "to"] * (path in PAST | _SPANS | OPERATOR_FILES.keys())
+    queries += ["at"] * path.endswith("/choice")
     queries += ["_HLS_msn", "_HLS_part"] * path.endswith(".m3u8")
     if path in HELD:
         parameters.append({"name": "camera", "in": "query", "required": False, "schema": _SCHEMAS["held"]})

@@ -2,7 +2,14 @@
 
 from __future__ import annotations
 
-from server.web import operator_cameras, operator_past, operator_people, operator_session, operator_settings
+from server.web import (
+    operator_cameras,
+    operator_past,
+    operator_people,
+    operator_session,
+    operator_settings,
+    operator_walk,
+)
 
 routes = [
     *operator_session.routes,
@@ -10,4 +17,5 @@ routes = [
     *operator_settings.routes,
     *operator_people.routes,
     *operator_past.routes,
+    *operator_walk.routes,
 ]

@@ -101,6 +101,49 @@ class Floor(msgspec.Struct, frozen=True):
     uncalibrated: list[str]
 
 
+class WalkCamera(msgspec.Struct, frozen=True):
+    """What one camera has seen of a walk."""
+
+    camera: str
+    feet: int
+    """Feet that were seen while another camera saw somebody, too, some five a second."""
+    thirds: list[float]
+    """What shares of them were in the left, the middle and the right third of the picture."""
+    deep: float | None
+    """How many times as tall the nearest of them appear as the farthest; null: too few were seen."""
+
+
+class WalkPair(msgspec.Struct, frozen=True):
+    """For how many seconds two cameras saw somebody at once."""
+
+    one: str
+    other: str
+    seconds: float
+
+
+class OperatorWalk(msgspec.Struct, frozen=True):
+    """The walk that the cameras are calibrated from."""
+
+    state: str
+    """none, walking, working (it is calibrated from) or done."""
+    seconds: float
+    """For how long was walked."""
+    most: float
+    """Seconds after which nothing more is taken in."""
+    cameras: list[WalkCamera]
+    pairs: list[WalkPair]
+    lacking: list[str]
+    """Where to walk, too, as far as can be told before it is calibrated from."""
+    error: str
+    """Why nothing has come of it; empty: something has, or it is not done."""
+    lines: list[str]
+    """What has come of it, in words."""
+    too_little: str
+    """What was not walked, where the result is a guess for want of that; else empty."""
+    configuration: str
+    """The lines for the configuration; empty: there is no ground file."""
+
+
 class Setting(msgspec.Struct, frozen=True):
     """One setting that is in force. Values are as the configuration writes them."""
 
@@ -147,6 +190,7 @@ OPERATOR: dict[str, type[msgspec.Struct]] = {
     "/api/operator/cameras": OperatorCameras,
     "/api/operator/pulses": Pulses,
     "/api/operator/floor": Floor,
+    "/api/operator/walk": OperatorWalk,
     "/api/operator/people": PeopleByHand,
     "/api/operator/config": Settings,
     "/api/operator/choosing": Choosing,
@@ -155,3 +199,9 @@ OPERATOR: dict[str, type[msgspec.Struct]] = {
 
 OPERATOR_FILES = {"/api/operator/tracks.csv": "text/csv", "/api/operator/choices.csv": "text/csv"}
 """What is given of a time span, from= and to=."""
+
+OPERATOR_RESULTS = {
+    "/api/operator/walk/ground.json": "application/octet-stream",
+    "/api/operator/walk/plan.png": "image/png",
+}
+"""What has come of a walk."""

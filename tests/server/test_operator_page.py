@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import re
 import time
 from collections.abc import AsyncIterator
@@ -18,6 +19,7 @@ import yaml
 from cameras_by_hand import CAMERAS, LARGE, SMALL, small_config, status
 from halls import A, B, Hall, opened
 from playwright.async_api import Browser, Page, Route, expect
+from walk_by_hand import SITE, curved, errors_on_floor, words
 
 from benchmarks.browser import CHROMIUM, chromium
 from bestview import IdentityRegistry
@@ -27,7 +29,7 @@ from server.wire.messages import Keys
 
 PAGE = Path(__file__).parents[2] / "client" / "page"
 AXE = PAGE.parents[1] / "node_modules/axe-core/axe.min.js"
-SECTIONS = ["cameras", "floor", "known", "downloads", "marks", "choosing", "configuration"]
+SECTIONS = ["cameras", "floor", "known", "downloads", "marks", "walk", "choosing", "configuration"]
 PLAN = [[0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 1.0]]
 """Of a camera that looks straight down: ten pixels are one unit of the floor."""
 TOKEN = "a token of theirs"  # noqa: S105 — of a test
@@ -303,6 +305,37 @@ async def test_places_on_the_floor_become_a_file_that_calibrate_takes(
     [camera] = points.cameras
     assert camera.camera == B
     np.testing.assert_allclose(camera.image / (64, 48), np.abs(camera.floor) / 10, atol=0.01)
+
+
+async def test_a_walk_is_started_watched_and_finished_and_its_file_is_the_scenes_floor(
+    browser: Browser, tmp_path: Path
+) -> None:
+    async with operating(browser, "#walk", **SITE) as (hall, page):
+        walking, state = hall.service.walking, page.locator("#walk-state")
+        await expect(state).to_have_text("Nobody walks.")
+        await expect(page.get_by_role("button", name="Finish")).to_be_disabled()
+        await page.get_by_role("button", name="Start the walk").click()
+        await expect(state).to_have_text("Walk now. 0:00 minutes so far.")
+        await expect(page.locator("#walk-lacking li")).to_have_count(len(CAMERAS))
+        for said in words(hall.service.config, curved(500)):
+            walking.take(said)
+        await expect(state).to_have_text("Walk now. 0:20 minutes so far.")
+        await expect(page.locator("#walk-pairs li")).to_have_text(re.compile(rf"{A} and {B}: \d+ s"))
+        await expect(page.locator("#walk-cameras tr")).to_have_text([re.compile(r"(\d+ %){3}")] * 2)
+        await page.get_by_role("button", name="Finish").click()
+        await expect(page.locator("#walk-lines li").first).to_contain_text("feet that two cameras see are")
+        plan = await page.locator("#walk-plan").element_handle()
+        await page.wait_for_function("(it) => it.naturalWidth > 0", arg=plan)
+        async with page.expect_download() as download:
+            await page.get_by_role("link", name="Download the ground file").click()
+        await (await download.value).save_as(tmp_path / "ground.json")
+        found = yaml.safe_load(await page.get_by_label("Lines for the configuration, with").input_value())
+        assert found["ground"] == (await download.value).suggested_filename == "ground.json"
+        await page.get_by_role("button", name="Forget it").click()
+        await expect(state).to_have_text("Nobody walks.")
+        await expect(page.locator("#walk-result")).to_be_hidden()
+    matrices = json.loads((tmp_path / "ground.json").read_text())["homography"]
+    assert np.median(errors_on_floor([np.array(matrices[it]) for it in CAMERAS])) < 0.15  # metres
 
 
 async def test_what_is_tried_out_holds_and_the_file_can_be_had_back(browser: Browser) -> None:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from bestview.calibrate import Spread, WalkCalibration, WalkedCamera, WalkSettings
-from server.run.calibrate_tracks import Walked
+from server.view.calibrate.walked import Walked
 
 _THIRDS = ("left", "middle", "right")
 _LITTLE = 0.03
@@ -28,18 +28,18 @@ class Missed:
     serious: bool
 
 
-def missed(camera: WalkedCamera) -> Iterator[Missed]:
-    """Say where somebody should walk, too."""
-    bare = [name for name, share in zip(_THIRDS, camera.thirds, strict=True) if share < _LITTLE]
+def missed(camera: str, thirds: Sequence[float], deep: float) -> Iterator[Missed]:
+    """Say where somebody should walk, too; `thirds` and `deep` are as of a `WalkedCamera`."""
+    bare = [name for name, share in zip(_THIRDS, thirds, strict=True) if share < _LITTLE]
     if bare:
         where = " and the ".join(bare)
         yield Missed(
-            f"walk also through the {where} third of camera {camera.camera}, if there is floor and another "
+            f"walk also through the {where} third of camera {camera}, if there is floor and another "
             "camera sees it",
             serious=len(bare) > 1,
         )
-    if camera.deep < _SHALLOW:
-        yield Missed(f"walk also nearer to camera {camera.camera}, and farther from it", serious=True)
+    if deep < _SHALLOW:
+        yield Missed(f"walk also nearer to camera {camera}, and farther from it", serious=True)
 
 
 def in_words(walked: Walked, found: WalkCalibration, settings: WalkSettings) -> list[str]:
@@ -61,15 +61,15 @@ def in_words(walked: Walked, found: WalkCalibration, settings: WalkSettings) -> 
     if walked.rate_guessed:
         lines.append(f"{walked.fps:g} frames a second are taken for granted; --fps says it better")
     if settings.shift:
-        lines += _offsets(found, walked.fps)
+        lines += _offsets(walked, found)
     return lines
 
 
-def details(found: WalkCalibration, person: float) -> dict[str, Any]:
+def details(walked: Walked, found: WalkCalibration, person: float) -> dict[str, Any]:
     """Give what the file says beside the homographies."""
     return {
         "person": person,
-        "offset": {it.camera: _offset(it) for it in found.cameras},
+        "offset": {it.camera: _offset(walked, it) for it in found.cameras},
         "floor": {it.camera: it.floor for it in found.cameras},
         "residuals": {
             it.camera: {"heights": _numbers(it.heights), "picture": _numbers(it.picture)}
@@ -88,28 +88,41 @@ def _floors(found: WalkCalibration) -> list[str]:
     return [f"{said}; they lie far apart in the file, and offsets hold within each"]
 
 
-def _offsets(found: WalkCalibration, fps: float) -> list[str]:
-    """Give the offsets, as words and as lines of a configuration."""
-    first = found.cameras[0].camera
+def _offsets(walked: Walked, found: WalkCalibration) -> list[str]:
+    """Give the offsets as words."""
+    first, fps = found.cameras[0].camera, walked.fps
     lines = []
     for it in found.cameras:
         if it.offset or it.offset_error:
             how = "out of step" if _moved(it) else "in step, as far as can be told"
             if _moved(it) and abs(it.offset) / fps < _SHORT_S:
                 how = "perhaps out of step; feet that are found late look so, too: compare two frames first"
+            if _moved(it) and it.camera in walked.live:
+                how += "; its pictures come when they come: nothing can be set for that"
             frames = f"{it.offset:+.1f} frames ({it.offset / fps:+.2f} s)"
             unsure = f"give or take {_SURE * it.offset_error:.1f}"
             lines.append(f"{it.camera}: {frames} later than {first}, {unsure}: {how}")
-    moved = [it for it in found.cameras if _moved(it)]
-    if moved:
-        lines += ["for the configuration:", "cameras:"]
-        lines += [f"  - id: {it.camera}\n    offset: {round(it.offset)}" for it in moved]
     return lines
 
 
-def _offset(camera: WalkedCamera) -> dict[str, float]:
-    use = round(camera.offset) if _moved(camera) else 0
-    return {"frames": round(camera.offset, 2), "error": round(camera.offset_error, 2), "use": use}
+def offset_lines(walked: Walked, found: WalkCalibration) -> str:
+    """Give the lines of a configuration that bring the cameras into step; empty: they are."""
+    moved = [it for it in found.cameras if _moved(it) and it.camera not in walked.live]
+    lines = [f"  - id: {it.camera}\n    offset: {_use(walked, it)}\n" for it in moved]
+    return "".join(["cameras:\n", *lines]) if lines else ""
+
+
+def _offset(walked: Walked, camera: WalkedCamera) -> dict[str, float]:
+    return {
+        "frames": round(camera.offset, 2),
+        "error": round(camera.offset_error, 2),
+        "use": _use(walked, camera),
+    }
+
+
+def _use(walked: Walked, camera: WalkedCamera) -> int:
+    """Give the offset to write: what was found comes on top of what the frames have in them already."""
+    return walked.offsets.get(camera.camera, 0) + (round(camera.offset) if _moved(camera) else 0)
 
 
 def _moved(camera: WalkedCamera) -> bool:

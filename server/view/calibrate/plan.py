@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import BinaryIO
 
 import cv2
 import numpy as np
@@ -47,8 +48,8 @@ def plan_of(found: WalkCalibration) -> list[PlanView]:
     return [PlanView(it.camera, it.homography, it.image, it.place, it.floor) for it in found.cameras]
 
 
-def plot_plan(views: Sequence[PlanView], unit: str, out: Path) -> None:
-    """Draw the plan: an area and points for each camera, a line from each point to its place."""
+def plot_plan(views: Sequence[PlanView], unit: str, out: Path | BinaryIO) -> None:
+    """Draw the plan, as PNG: an area and points for each camera, a line from each point to its place."""
     floors = sorted({view.floor for view in views})
     figure = Figure(figsize=(_INCHES, _INCHES * len(floors)), layout="tight")
     FigureCanvasAgg(figure)

@@ -1,0 +1,48 @@
+"""What the service tells the process that calibrates, and what that answers: a message each, MessagePack."""
+
+from __future__ import annotations
+
+import msgspec
+
+
+class Seen(msgspec.Struct, frozen=True, array_like=True):
+    """What one camera saw of a walk: R boxes. Arrays as they lie in memory: they are long."""
+
+    camera: str
+    size: tuple[int, int]
+    """Width and height of its own picture, pixels."""
+    frames: bytes
+    """(R,) int64 from 0."""
+    who: bytes
+    """(R,) int64, whose track each is."""
+    boxes: bytes
+    """(R, 4) float64, left, top, right, bottom in pixels of that picture."""
+
+
+class Task(msgspec.Struct, frozen=True):
+    """A walk to calibrate from."""
+
+    seen: list[Seen]
+    fps: float
+    shift: float
+    """Seconds that cameras may be out of step."""
+    person: float
+    """How tall people are, metres."""
+    offsets: dict[str, int]
+    """By camera: what the frames have in them already; of those that it can be set of."""
+
+
+class Done(msgspec.Struct, frozen=True):
+    """What has come of it."""
+
+    error: str = ""
+    """Why nothing has; empty: something has."""
+    lines: list[str] = []
+    too_little: str = ""
+    """What the walk did not cover, where the result is a guess for want of that."""
+    offsets: str = ""
+    """Lines of a configuration that bring the cameras into step; empty: they are."""
+    ground: str = ""
+    """The text of the ground file."""
+    plan: bytes = b""
+    """The floor plan, PNG."""
