@@ -23,7 +23,7 @@ def checked_homography(matrix: ArrayLike, name: str) -> NDArray[np.float64]:
     """
     try:
         homography = np.array(matrix, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise ValueError(f"the homography of {name} is not a 3x3 matrix of numbers") from None
     if homography.shape != (3, 3):
         raise ValueError(f"the homography of {name} has shape {homography.shape}, not (3, 3)")

@@ -14,10 +14,10 @@ from camsync.hub import Hub
 from camsync.limits import ServerLimits
 from camsync.messages import Beat, Greeting, Hello, Wait
 from camsync.peer import ClientInfo
-from camsync.protocol import VERSION, encode, is_name
+from camsync.protocol import MAX_FPS, VERSION, encode, is_name
 
 _log = logging.getLogger(__name__)
-MAX_FPS = 10_000.0  # pulses per second that a server takes as a rate
+_FARTHEST = 2**39  # pulses that a client may claim to have counted: centuries at any camera's rate
 
 
 class PulseServer:
@@ -169,7 +169,10 @@ class PulseServer:
         now = self._clock()
         axis = PulseAxis.through(hello.known.number, now - hello.known.ago, self._fps)
         first = axis.number_at(now) + 1
-        if self._axis is None:
+        if first > _FARTHEST:
+            # Pulses from there on would soon be numbers that no line and no message can carry.
+            _log.warning("%s claims to have counted to %d: not believed", hello.name, first - 1)
+        elif self._axis is None:
             _log.info("%s has counted to %d: going on from there", hello.name, hello.known.number)
             self._begin(axis, first)
         # One pulse ahead is the error of measurement, not another axis.

@@ -18,6 +18,11 @@ _MOST_FIELDS = 10
 _CONFIDENCE = 6
 # Larger frame numbers are a file of something else (timestamps), and would make a reader wait for ever.
 _LAST_FRAME = 10_000_000
+# Pixels; beyond, a box has no area that counts to a number.
+_FARTHEST = 1e9
+# Beyond, not every whole number is one of its own.
+_LARGEST_ID = 2**53
+_MOST_UNPACKED = 300_000_000  # bytes
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,9 +62,12 @@ def read_rows(path: Path) -> list[MotRow]:
     data = path.read_bytes()
     if path.suffix == ".gz":
         try:
-            data = gzip.decompress(data)
+            with gzip.open(path) as file:
+                data = file.read(_MOST_UNPACKED + 1)
         except (gzip.BadGzipFile, EOFError, zlib.error) as error:
             raise ValueError(f"{path}: not a whole gzip file: {error}") from None
+        if len(data) > _MOST_UNPACKED:
+            raise ValueError(f"{path}: unpacks to more than {_MOST_UNPACKED // 10**6} megabytes")
     try:
         text = data.decode("ascii")
     except UnicodeDecodeError as error:
@@ -124,12 +132,17 @@ def _row(line: str) -> MotRow:
         _number(field, name)
         for field, name in zip(fields[2:6], ("left", "top", "width", "height"), strict=True)
     )
+    if max(map(abs, (left, top, width, height))) > _FARTHEST:
+        raise ValueError(f"a box is in pixels, none of them beyond {_FARTHEST:g}")
     if width <= 0.0 or height <= 0.0:
         raise ValueError(f"a box needs a positive width and height, not {width:g} x {height:g}")
     confidence = _number(fields[6], "confidence") if len(fields) > _CONFIDENCE else 1.0
     # Ground truth has nine fields, `..., class, visible`; results have ten, the last three of them -1.
     visible = _number(fields[8], "visible") if len(fields) == _MOST_FIELDS - 1 else -1.0
-    return MotRow(frame, _whole(fields[1], "id"), left, top, width, height, confidence, visible)
+    number = _whole(fields[1], "id")
+    if abs(number) > _LARGEST_ID:
+        raise ValueError(f"id {fields[1][:40]} is not between -2^53 and 2^53")
+    return MotRow(frame, number, left, top, width, height, confidence, visible)
 
 
 def _whole(text: str, name: str) -> int:

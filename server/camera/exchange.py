@@ -15,7 +15,7 @@ from server.wire.bus import Bus
 from server.wire.config import Config
 from server.wire.errors import UserError
 from server.wire.inbox import Message
-from server.wire.messages import Found, Keys, camera_of
+from server.wire.messages import UNREADABLE, Found, Keys, camera_of
 
 log = logging.getLogger(__name__)
 
@@ -138,7 +138,7 @@ class Exchange:
             word = _DECODER.decode(message.payload)
             if word.camera != camera_of(message.key):
                 raise msgspec.ValidationError("it is another camera's")
-        except (msgspec.DecodeError, UnicodeDecodeError) as problem:
+        except UNREADABLE as problem:
             self.bad_messages += 1
             log.warning("camera %s: a message on %s is none: %s", self._camera, message.key, problem)
             return None

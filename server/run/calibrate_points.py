@@ -17,6 +17,11 @@ from server.wire.errors import UserError
 
 COLUMNS = ("camera", "image_x", "image_y", "floor_x", "floor_y")
 ENDINGS = (".json", ".csv")
+_FARTHEST = 1e9
+"""Pixels, or the floor's units; beyond, squares of them say nothing any more."""
+_LONGEST_NAME = 64
+_SHOWN = 40
+"""Characters of what is wrong that an error repeats."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +86,7 @@ def _from_rows(rows: csv.DictReader[str], name: str) -> Iterator[_Pair]:
         camera = (row["camera"] or "").strip()
         if not camera:
             raise UserError(f"{where}: names no camera")
-        yield _Pair(camera, _four([row[column] for column in COLUMNS[1:]], where))
+        yield _Pair(_named(camera, where), _four([row[column] for column in COLUMNS[1:]], where))
 
 
 def _json(text: str, name: str) -> dict[str, Any]:
@@ -100,13 +105,14 @@ def _json(text: str, name: str) -> dict[str, Any]:
 
 def _unit(content: dict[str, Any], name: str) -> str | None:
     unit = content.get("unit")
-    if unit is not None and not isinstance(unit, str):
+    if unit is not None and not (isinstance(unit, str) and unit.isprintable() and len(unit) <= _SHOWN):
         raise UserError(f'{name}: unit: is a word, such as "m"')
     return unit
 
 
 def _from_json(content: dict[str, Any], name: str) -> Iterator[_Pair]:
     for camera, pairs in content["cameras"].items():
+        _named(camera, name)
         if not isinstance(pairs, list):
             raise UserError(f"{name}: camera {camera}: is a list of pairs")
         for number, pair in enumerate(pairs, start=1):
@@ -122,7 +128,18 @@ def _four(values: Sequence[Any], where: str) -> tuple[float, float, float, float
     try:
         x, y, right, far = (float(value) for value in values)
     except (TypeError, ValueError, OverflowError):
-        raise UserError(f"{where}: {', '.join(map(str, values))}: are not four numbers") from None
-    if not all(map(math.isfinite, (x, y, right, far))):
-        raise UserError(f"{where}: {', '.join(map(str, values))}: are not four finite numbers")
+        raise UserError(f"{where}: {_shown(values)}: are not four numbers") from None
+    if max(map(abs, (x, y, right, far))) > _FARTHEST or not all(map(math.isfinite, (x, y, right, far))):
+        raise UserError(f"{where}: {_shown(values)}: are not four finite numbers, none beyond {_FARTHEST:g}")
     return x, y, right, far
+
+
+def _shown(values: Sequence[Any]) -> str:
+    return ", ".join(" ".join(str(value).split())[:_SHOWN] for value in values)
+
+
+def _named(camera: str, where: str) -> str:
+    """Give a camera's name, if it is one that can be written into a line."""
+    if not camera or len(camera) > _LONGEST_NAME or not camera.isprintable():
+        raise UserError(f"{where}: camera {camera[:_SHOWN]!a}: no name that can be read")
+    return camera

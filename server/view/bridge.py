@@ -23,6 +23,9 @@ _NUMBERS_TOLD = 15
 class Bridge(Protocol):
     """Makes such pictures; how depends on the codec."""
 
+    def can_follow(self, picture: Picture) -> bool:
+        """Tell whether what this picture says of itself can be read, as all the other methods do."""
+
     def after(self, newest: Picture, spans: Sequence[Span]) -> list[Picture]:
         """Repeat the newest picture; only a key picture can follow."""
 
@@ -44,6 +47,14 @@ class H264Bridge:
     fps: float
     parameters: ParameterSets | None = None
     """As of :class:`Picture`."""
+
+    def can_follow(self, picture: Picture) -> bool:
+        """Tell whether it has a number."""
+        try:
+            self.how.frame_num(picture.sample)
+        except ValueError:
+            return False
+        return True
 
     def after(self, newest: Picture, spans: Sequence[Span]) -> list[Picture]:
         """Count on from the newest picture."""

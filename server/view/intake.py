@@ -12,10 +12,18 @@ from server.view.agreement import ParameterMismatchError
 from server.view.align import Aligner
 from server.view.gauge import Gauge
 from server.view.sense import makes_sense
-from server.view.shelf import Shelf, Shelved
+from server.view.shelf import NoPictureError, Shelf, Shelved
 from server.view.sound import SoundShelf
 from server.wire.inbox import Message
-from server.wire.messages import CameraStatus, CameraTracks, FrameHead, SoundHead, ThumbHead, camera_of
+from server.wire.messages import (
+    UNREADABLE,
+    CameraStatus,
+    CameraTracks,
+    FrameHead,
+    SoundHead,
+    ThumbHead,
+    camera_of,
+)
 
 log = logging.getLogger(__name__)
 
@@ -127,7 +135,7 @@ class Intake:
                 return
             shelf = self._shelves[camera]
             frame = shelf.put(head.pulse, head.boot, message.payload, key=head.key, after=head.after)
-        except msgspec.DecodeError as error:
+        except (*UNREADABLE, NoPictureError) as error:
             state.bad(error)
         except ParameterMismatchError as error:
             state.refused = f"{error}; are all cameras of this site run with the same configuration?"
@@ -145,7 +153,7 @@ class Intake:
             return
         try:
             self._sound.put(self._sound_head.decode(message.attachment), message.payload)
-        except ValueError:  # also what cannot be decoded
+        except (*UNREADABLE, ValueError):
             self.bad_sounds += 1
 
     def tracks(self, message: Message) -> None:
@@ -155,7 +163,7 @@ class Intake:
             return
         try:
             tracks = self._tracks.decode(message.payload)
-        except msgspec.DecodeError as error:
+        except UNREADABLE as error:
             state.bad(error)
             return
         if tracks.camera != camera or not makes_sense(tracks, self._aligner.stride):
@@ -172,7 +180,7 @@ class Intake:
             return
         try:
             status = self._status.decode(message.payload)
-        except msgspec.DecodeError as error:
+        except UNREADABLE as error:
             state.bad(error)
         else:
             was_away, state.status = state.away, status
@@ -186,7 +194,7 @@ class Intake:
             return
         try:
             head = self._thumb_head.decode(message.attachment)
-        except msgspec.DecodeError as error:
+        except UNREADABLE as error:
             state.bad(error)
             return
         self.thumbnails[camera, head.boot, head.track] = Thumbnail(message.payload, head.pulse)

@@ -12,6 +12,10 @@ Shelved: TypeAlias = Picture
 """One frame, ready to be sent to anybody."""
 
 
+class NoPictureError(ValueError):
+    """An access unit in which there is no picture, or none that says what it follows."""
+
+
 class Shelf:
     """Keeps the last ``frames`` frames of one camera; each is made into a fragment once, when it comes.
 
@@ -33,11 +37,15 @@ class Shelf:
 
         Raises:
             ParameterMismatchError: its parameters are not the site's, and the camera must be refused.
+            NoPictureError: it is damaged; nothing is shelved.
         """
         if key:
             self._parameters = self._agreement.accept(access_unit)
         made = self._agreement.pack(access_unit, pulse, self._fps, key=key)
         shelved = Shelved(pulse, key, made, boot, parameters=self._parameters, after=after)
+        bridge = self._agreement.bridge(shelved, self._fps)
+        if bridge is not None and not bridge.can_follow(shelved):
+            raise NoPictureError(f"no picture can be read in the access unit of pulse {pulse}")
         self._shelved[pulse] = shelved
         self.newest = max(self.newest, pulse)
         while len(self._shelved) > self._frames:

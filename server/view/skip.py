@@ -22,6 +22,9 @@ _REFERENCE = 0x40 | NAL_SLICE
 """NAL head with nal_ref_idc 2."""
 _ORDER_BY_DECODING = 2
 """pic_order_cnt_type of an encoder without B pictures."""
+_MOST_MACROBLOCKS = 139_264
+"""Of a picture at the highest level there is (table A-1); writing a picture takes time for each."""
+_MOST_FRAME_NUM_BITS = 16
 
 
 class UnfitError(Exception):
@@ -133,6 +136,8 @@ def _read_sps(bits: BitReader) -> tuple[int, int]:
     macroblocks = (bits.ue() + 1) * (bits.ue() + 1)
     if not bits.u(1):
         raise ValueError("interlaced")
+    if macroblocks > _MOST_MACROBLOCKS or frame_num_bits > _MOST_FRAME_NUM_BITS:
+        raise ValueError("beyond every level")
     return frame_num_bits, macroblocks
 
 

@@ -22,6 +22,7 @@ from server.web.operator_permission import PERMISSION, Permission, operators_onl
 from server.web.queries import refuse_what_is_not_there
 from server.web.readers import Readers
 from server.web.share import to_the_right_service
+from server.web.strangers import REQUESTS
 from server.wire.errors import UserError
 from server.wire.sections import Http
 
@@ -87,7 +88,9 @@ async def serving(app: web.Application, settings: Http) -> AsyncIterator[int]:
     Raises:
         UserError: the port cannot be listened on.
     """
-    runner = web.AppRunner(app, access_log=None, shutdown_timeout=_CLOSE_S, handler_cancellation=True)
+    runner = web.AppRunner(
+        app, access_log=None, logger=REQUESTS, shutdown_timeout=_CLOSE_S, handler_cancellation=True
+    )
     await runner.setup()
     try:
         site = web.TCPSite(runner, settings.host, settings.port)

@@ -11,6 +11,7 @@ from server.web.api import answer, problem
 from server.web.operator_permission import PERMISSION, SESSION_S, SIGN_IN
 from server.web.operator_schema import OperatorSession
 from server.web.page import page_file
+from server.wire.messages import UNREADABLE
 
 routes = web.RouteTableDef()
 
@@ -80,5 +81,5 @@ async def asked_for(request: web.Request, kind: type[Asked]) -> Asked:
     """
     try:
         return msgspec.json.decode(await request.read(), type=kind)
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+    except UNREADABLE as error:
         raise web.HTTPBadRequest(reason=f"the request's JSON: {' '.join(str(error).split())}") from error

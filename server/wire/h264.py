@@ -15,6 +15,8 @@ NAL_AUD = 9
 
 _SPS_MIN_BYTES = 4
 """NAL header, profile, constraint flags and level: what a decoder's configuration record repeats."""
+_SET_MOST_BYTES = 0xFFFF
+"""What the record can say of a set's length."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +73,7 @@ def parameter_sets(units: list[bytes]) -> ParameterSets | None:
     """Find the sequence and picture parameter sets among NAL units, or None where one is missing."""
     sps = next((unit for unit in units if nal_type(unit) == NAL_SPS), None)
     pps = next((unit for unit in units if nal_type(unit) == NAL_PPS), None)
-    if sps is None or pps is None or len(sps) < _SPS_MIN_BYTES:
+    if sps is None or pps is None or len(sps) < _SPS_MIN_BYTES or max(len(sps), len(pps)) > _SET_MOST_BYTES:
         return None
     return ParameterSets(sps, pps)
 

@@ -22,6 +22,11 @@ from server.wire.errors import UserError
 from server.wire.ground_unit import checked_unit
 from server.wire.sections import Camera, View
 from server.wire.sources import resolved
+from server.wire.values import check_values
+
+
+_SHOWN = 300
+"""Characters of what a library says that a line of ours repeats."""
 
 
 def load_config(path: Path) -> Config:
@@ -45,8 +50,12 @@ def read_content(path: Path) -> dict[str, Any]:
         raise UserError(f"{path}: cannot read the configuration: {_reason(error)}") from error
     try:
         content = yaml.safe_load(text)
-    except (yaml.YAMLError, ValueError) as error:  # ValueError: a date or a number that cannot be one
-        raise UserError(f"{path}: is not valid YAML: {' '.join(str(error).split())}") from error
+    except yaml.YAMLError as error:
+        raise UserError(f"{path}: is not valid YAML: {' '.join(str(error).split())[:_SHOWN]}") from error
+    except RecursionError as error:
+        raise UserError(f"{path}: is not valid YAML: brackets within brackets without end") from error
+    except (ValueError, LookupError, TypeError, AttributeError) as error:  # how PyYAML says `!!int x` is none
+        raise UserError(f"{path}: is not valid YAML: a date, a number or a tag that cannot be one") from error
     if not isinstance(content, dict) or not all(isinstance(section, str) for section in content):
         raise UserError(f"{path}: a configuration is a mapping of sections, such as 'cameras:'")
     return content
@@ -59,6 +68,7 @@ def build_config(content: Mapping[str, Any], *, where: str, folder: Path) -> Con
         UserError: something is wrong; the text begins with ``where``.
     """
     _no_unknown_environment(where)
+    check_values(content, where)
     try:
         config = Config(**content)
     except ValidationError as error:
@@ -88,6 +98,7 @@ def changed_view(view: View, changes: Mapping[str, Any], where: str) -> View:
     Raises:
         UserError: something is wrong; the text begins with ``where``.
     """
+    check_values(changes, where)
     try:
         return View.model_validate(_merged(view.model_dump(), changes))
     except ValidationError as error:
@@ -142,7 +153,7 @@ def _homographies(path: Path, where: str) -> tuple[dict[str, list[list[float]]],
         matrices = dict(content["homography"])
     except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
         raise UserError(f"{where}: ground: cannot read {path}: {_reason(error)}") from error
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, RecursionError) as error:
         raise UserError(f'{where}: ground: {path} has no {{"homography": {{camera: 3x3}}}}') from error
     for camera_id, matrix in matrices.items():
         try:

@@ -29,6 +29,9 @@ from typing import Annotated
 
 import msgspec
 
+UNREADABLE = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
+"""What a decoder raises: it is no JSON or other JSON, it is no text, it is nested without end."""
+
 Pulse = Annotated[int, msgspec.Meta(ge=0, le=2**40)]
 """A frame number; the bound is a thousand years at 25 frames a second, and keeps times within 64 bits."""
 
@@ -156,15 +159,15 @@ class CameraStatus(msgspec.Struct, frozen=True, kw_only=True):
     """How a camera is, once a second."""
 
     camera: str
-    boot: int
+    boot: Number
     state: str
     """starting, live, away (the source gives no pictures now) or ended."""
     pulse: int
     fps: float
     """Frames taken in the last second or so."""
-    missed: int
+    missed: Number
     """Pulses without a frame since the start."""
-    shed: int
+    shed: Number
     """Frames not searched for people since the start."""
     in_step: bool
     """Pulses come from the server; otherwise the camera goes on at its own rate."""

@@ -9,6 +9,7 @@ import pytest
 from pulses_by_hand import BUSY, PATIENCE, Connect
 
 from camsync import AxisLostError, ClientSettings, Pulse, PulseClient, PulseServer, ServerLimits
+from camsync.messages import Pong
 
 FPS = 200.0
 AWAY = round(1.5 * BUSY * FPS)
@@ -29,6 +30,19 @@ async def until(client: PulseClient, enough: Callable[[Pulse], bool]) -> list[Pu
 
 def in_step(pulse: Pulse) -> bool:
     return not pulse.own
+
+
+@pytest.mark.parametrize("claim", [b"last=9999999999999", b"last=1 ago=999999999999"])
+@pytest.mark.parametrize("expect", [(), ("c0",)])
+async def test_who_claims_to_have_counted_for_ever_is_not_believed(
+    by_hand: Connect, expect: tuple[str, ...], claim: bytes
+) -> None:
+    async with PulseServer(FPS, expect=expect) as server:
+        liar, other = await by_hand(server.port), await by_hand(server.port)
+        liar.say(b"HELLO 1 c0 " + claim + b"\nPING 1\n")
+        while not isinstance(await liar.message(), Pong):
+            pass
+        assert (await other.beat()).number < PATIENCE * FPS
 
 
 async def test_while_the_server_is_away_the_client_counts_on_at_the_same_rate() -> None:

@@ -63,6 +63,24 @@ class Hall:
 
 
 KINDS = ["video", "tracks", "status", "thumbs"]
+
+
+@pytest.mark.parametrize("what", KINDS)
+def test_json_that_is_no_text_is_counted_and_dropped(what: str) -> None:
+    hall = Hall()
+    broken = b'{"camera": "\xff", "histogram": "\xc3\x28", "state": "\xed\xa0\x80", "\xff": "\xff"}'
+    hall.handle(what, Message(KEYS.camera("c0", what), broken, broken))
+    assert hall.bad() == 1
+
+
+@pytest.mark.parametrize("field", ["missed", "shed", "boot"])
+def test_a_count_that_no_metric_could_say_is_refused(field: str) -> None:
+    hall = Hall()
+    hall.handle("status", status("c0", **{field: 10**400}))
+    assert hall.bad() == 1
+    assert hall.intake.states["c0"].status is None
+
+
 anything = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text(),
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=5), inner, max_size=3),

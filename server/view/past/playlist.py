@@ -18,9 +18,9 @@ from server.view.past.stretch import Stretch, Tape
 
 _END = "#EXT-X-ENDLIST\n"
 _ENTRY = re.compile(
-    r"#EXTINF:[0-9.]+,p([0-9]+)\+([0-9]+)\n"
-    r"#EXT-X-BYTERANGE:([0-9]+)@([0-9]+)\n"
-    r"(?:[^\n]*/)?([^/\n]+)/([0-9]+)\.mp4\n"
+    r"#EXTINF:[0-9.]+,p([0-9]{1,15})\+([0-9]{1,15})\n"
+    r"#EXT-X-BYTERANGE:([0-9]{1,15})@([0-9]{1,15})\n"
+    r"(?:[^\n]*/)?([^/\n]+)/([0-9]{1,15})\.mp4\n"
 )
 _NAME_DIGITS = 12
 

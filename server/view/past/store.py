@@ -14,13 +14,11 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
-import msgspec
-
 from server.view.past.media import Gop
 from server.view.past.run import HEAD, Headers, Run, RunHead, Segment
 from server.view.past.segment import OpenSegment
 from server.view.sound import Heard
-from server.wire.messages import GopChoices
+from server.wire.messages import UNREADABLE, GopChoices
 
 _SHARE = 8
 """A segment takes at most this part of the disk that the recording may take: only whole segments go."""
@@ -71,7 +69,7 @@ class Store:
         for head in sorted(self.folder.glob(f"*/{HEAD}")):
             try:
                 self.earlier.append(Run.found(head.parent, self._bounds.segment_s))
-            except msgspec.DecodeError:
+            except UNREADABLE:
                 continue  # not written by us, or not to its end: nothing that could be played
         self._retain()
 

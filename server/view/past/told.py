@@ -9,7 +9,7 @@ from pathlib import Path
 import msgspec
 
 from server.view.past.past import Past
-from server.wire.messages import GopChoices
+from server.wire.messages import UNREADABLE, GopChoices
 
 
 async def told(past: Past, start: int, end: int) -> AsyncIterator[bytes]:
@@ -38,7 +38,7 @@ def _lines(path: Path, start: int, end: int) -> list[tuple[bytes, GopChoices]]:
     for line in data.splitlines(keepends=True):
         try:
             choices = msgspec.json.decode(line, type=GopChoices)
-        except msgspec.DecodeError:
+        except UNREADABLE:
             continue
         if choices.first + choices.frames > start and choices.first < end:
             found.append((line, choices))

@@ -1,0 +1,94 @@
+"""Everything that reads bytes from outside is given bytes that nobody meant: what comes of them.
+
+    python -m benchmarks.fuzz --part mot --inputs 1000000
+    python -m benchmarks.fuzz --replay out/fuzz/mot-text.ValueError-read_rows.1.bin
+
+An input that is wrong is refused in one clear line, or counted and dropped. A crash is anything else: another
+exception, a traceback in an answer or in the log, an answer 500, two seconds of processor time, 200 MB more
+memory, a process that dies. Inputs are made from their number and --seed: every run has the same ones.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import sys
+from pathlib import Path
+
+from benchmarks.fuzz_run import Attempt, Crash, Plan, Runner, Tally
+from benchmarks.fuzz_target import Target
+from benchmarks.report import Report
+from benchmarks.surroundings import ROOT
+
+PARTS = ("pulse", "zenoh", "http", "config", "mot", "calibration", "media")
+_COLUMNS = ("target", "inputs", "a second", "refused", "accepted", "crashes", "kinds of crash")
+
+
+def targets_of(part: str) -> tuple[type[Target], ...]:
+    """Give the targets of a part, whose libraries are loaded only now."""
+    found: tuple[type[Target], ...] = importlib.import_module(f"benchmarks.fuzz_{part}").TARGETS
+    return found
+
+
+def replay(path: Path) -> int:
+    """Feed a saved input again; give 1 where it still crashes."""
+    name = path.name.split(".")[0]
+    part = name.split("-", maxsplit=1)[0]
+    kind = next((it for it in targets_of(part) if it.name == name), None) if part in PARTS else None
+    if kind is None:
+        sys.exit(f"{path}: no saved input of this name; they are called TARGET.KIND.NUMBER.bin")
+    target = kind()
+    attempt = Attempt(target)
+    with attempt.watching():
+        found = attempt.feed(path.read_bytes())
+    target.close()
+    if isinstance(found, Crash):
+        print(found.text)
+        return 1
+    print(f"{path}: {'accepted' if found else 'refused'}, as it should be")
+    return 0
+
+
+def row(name: str, tally: Tally) -> list[str]:
+    """Give a line of the table."""
+    rate = tally.inputs / tally.seconds if tally.seconds else 0.0
+    return [
+        name,
+        *(str(it) for it in (tally.inputs, round(rate), tally.refused, tally.accepted, tally.crashes)),
+        str(tally.kinds),
+    ]
+
+
+def main() -> None:
+    """Fuzz, print the table, and end with 1 where something crashed."""
+    options = argparse.ArgumentParser(prog="python -m benchmarks.fuzz", description=__doc__.splitlines()[0])
+    options.add_argument("--part", action="append", choices=PARTS, help="only this one; may be repeated")
+    options.add_argument("--target", action="append", help="only this one of a part; may be repeated")
+    options.add_argument(
+        "--inputs", type=int, default=1_000_000, help="of each target; what is slow gets its share of them"
+    )
+    options.add_argument("--seconds", type=float, help="of each target at most")
+    options.add_argument("--seed", type=int, default=1)
+    options.add_argument("--out", type=Path, default=ROOT / "out" / "fuzz", help="folder for what crashed")
+    options.add_argument("--replay", type=Path, metavar="FILE", help="only feed this input again")
+    chosen = options.parse_args()
+    if chosen.replay is not None:
+        sys.exit(replay(chosen.replay))
+    report, rows, crashes = Report(), [], 0
+    for part in chosen.part or PARTS:
+        for target in targets_of(part):
+            if chosen.target and target.name not in chosen.target:
+                continue
+            inputs = max(1, round(chosen.inputs * target.share))
+            plan = Plan(inputs, chosen.seconds, chosen.seed, chosen.out)
+            tally = Runner(target, target.name, plan).run()
+            rows.append(row(target.name, tally))
+            crashes += tally.crashes
+            print("  ".join(rows[-1]), file=sys.stderr, flush=True)
+    report.table("Inputs that nobody meant", _COLUMNS, rows)
+    report.save(chosen.out / f"fuzz-{'-'.join(chosen.part or ['all'])}.txt")
+    sys.exit(crashes > 0)
+
+
+if __name__ == "__main__":
+    main()

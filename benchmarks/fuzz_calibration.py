@@ -1,0 +1,156 @@
+"""Calibration files: marked points as JSON and CSV, the floor plan made of them, and ground.json."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from random import Random
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from benchmarks.fuzz_mutate import as_json, damaged, otherwise
+from benchmarks.fuzz_target import Target, refused
+from bestview.calibrate import CalibrationError, fit_cameras
+from server.run.calibrate import calibrate_points
+from server.run.calibrate_points import COLUMNS, read_points
+from server.view.floor import covered
+from server.wire.errors import UserError
+from server.wire.loading import build_config
+
+WORDS = (
+    b",", b'"', b"\n", b"\r", b"\x00", b"\xff", b"\xef\xbb\xbf", b"nan", b"NaN", b"Infinity", b"-Infinity",
+    b"1e308", b"1e400", b"9" * 400, b"9" * 5000, b"[" * 3000, b"{", b"}", b"null", b"true", b"\\ud800",
+    b"$", b"_", b"\\n",
+)  # fmt: skip
+_TRUE = np.array([[0.012, 0.001, -3.0], [0.0004, 0.03, -2.0], [0.00001, 0.002, 0.2]])
+
+
+def _pairs(rng: Random) -> list[dict[str, Any]]:
+    """Give points of a camera that looks down at a floor, and where on it they are."""
+    pairs = []
+    for _ in range(rng.choice((3, 4, 4, 5, 6, 8))):
+        x, y = rng.uniform(0, 640), rng.uniform(100, 360)
+        right, far, scale = _TRUE @ (x, y, 1.0)
+        pairs.append({"image": [round(x, 1), round(y, 1)], "floor": [right / scale, far / scale]})
+    return pairs
+
+
+def _as_csv(cameras: dict[str, list[dict[str, Any]]]) -> bytes:
+    lines = [",".join(COLUMNS)]
+    for camera, pairs in cameras.items():
+        lines += [",".join(map(str, (camera, *it["image"], *it["floor"]))) for it in pairs]
+    return ("\n".join(lines) + "\n").encode()
+
+
+def _points(rng: Random) -> bytes:
+    cameras = {f"c{number}": _pairs(rng) for number in range(rng.choice((1, 1, 2)))}
+    if rng.random() < 0.4:
+        data = _as_csv(cameras)
+        return damaged(rng, data, WORDS) if rng.random() < 0.9 else data
+    content: Any = {"unit": "m", "cameras": cameras}
+    if rng.random() < 0.6:
+        return as_json(otherwise(rng, content))
+    data = as_json(content)
+    return damaged(rng, data, WORDS) if rng.random() < 0.9 else data
+
+
+class _Files(Target):
+    """Files in a folder of their own."""
+
+    def __init__(self) -> None:
+        self._folder = TemporaryDirectory()
+        self._path = Path(self._folder.name)
+
+    def written(self, data: bytes) -> Path:
+        """Write a file of points, named by what it looks like."""
+        path = self._path / ("points.json" if data[:1] in {b"{", b"[", b'"'} else "points.csv")
+        path.write_bytes(data)
+        return path
+
+    def close(self) -> None:
+        """Take the folder away."""
+        self._folder.cleanup()
+
+
+class Points(_Files):
+    """Marked points are read and fitted."""
+
+    name = "calibration-points"
+
+    def make(self, rng: Random) -> bytes:
+        """Give a file of points."""
+        return _points(rng)
+
+    def feed(self, data: bytes) -> bool:
+        """Read it, and fit the cameras."""
+        try:
+            fits = fit_cameras(read_points(self.written(data)).cameras)
+        except (UserError, CalibrationError) as error:
+            return refused(error)
+        assert all(np.isfinite(it.homography).all() for it in fits.values())
+        return True
+
+
+class Plans(_Files):
+    """The whole command: homographies that the configuration takes, a plan, lines that can be printed."""
+
+    name = "calibration-plans"
+    share = 0.001
+
+    def make(self, rng: Random) -> bytes:
+        """Give a file of points that is nearly right."""
+        cameras = {f"c{number}": [*_pairs(rng), *_pairs(rng)] for number in range(rng.choice((1, 2)))}
+        content: Any = {"unit": rng.choice(("m", "$x", "", "\n", "\ud800", "$\\frac$")), "cameras": cameras}
+        if rng.random() < 0.5:
+            strange = rng.choice(("_c", "$\\frac{", "\ud800", "a\nb", "", "c" * 500, "é"))
+            content["cameras"][strange] = [*_pairs(rng), *_pairs(rng)]
+        return as_json(otherwise(rng, content) if rng.random() < 0.3 else content)
+
+    def feed(self, data: bytes) -> bool:
+        """Calibrate, and read what was written as a site's configuration does."""
+        out = self._path / "ground.json"
+        try:
+            lines = calibrate_points(self.written(data), out, self._path / "plan.png", None)
+        except UserError as error:
+            return refused(error)
+        for line in lines:
+            assert len(line.splitlines()) == 1, line
+            line.encode()
+        _site(self._path)
+        return True
+
+
+def _site(folder: Path) -> None:
+    cameras = [{"id": it, "source": "scene:room"} for it in ("c0", "c1")]
+    config = build_config({"cameras": cameras, "ground": "ground.json"}, where="site", folder=folder)
+    for camera in config.cameras:
+        if camera.ground is not None:
+            covered(np.array(camera.ground, dtype=np.float64), (640, 360), (640, 360))
+
+
+class Ground(_Files):
+    """The file of homographies, as a site's configuration reads it."""
+
+    name = "calibration-ground"
+
+    def make(self, rng: Random) -> bytes:
+        """Give a ground.json."""
+        content: Any = {"unit": "m", "homography": {"c0": _TRUE.tolist(), "c1": (_TRUE * 0.5).tolist()}}
+        if rng.random() < 0.6:
+            return as_json(otherwise(rng, content))
+        data = json.dumps(content).encode()
+        return damaged(rng, data, WORDS) if rng.random() < 0.95 else data
+
+    def feed(self, data: bytes) -> bool:
+        """Read a site with it, and lay its floor out."""
+        (self._path / "ground.json").write_bytes(data)
+        try:
+            _site(self._path)
+        except UserError as error:
+            return refused(error)
+        return True
+
+
+TARGETS = (Points, Ground, Plans)

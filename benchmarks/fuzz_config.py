@@ -1,0 +1,168 @@
+"""Configurations: as text, as values, from the environment; and what an operator tries out."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from random import Random
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import msgspec
+from pydantic import TypeAdapter
+
+from benchmarks.fuzz_mutate import as_json, damaged, odd, otherwise
+from benchmarks.fuzz_site import site
+from benchmarks.fuzz_target import Target, refused
+from server.view.service import BestViewService
+from server.web.operator_settings import settings_of
+from server.wire.config import Config
+from server.wire.errors import UserError
+from server.wire.loading import build_config, changed_view, load_config
+
+WORDS = (
+    b":", b": ", b"- ", b"\n", b"\n  ", b"\t", b"\x00", b"\xff", b"&a ", b"*a", b"!!int ''", b"!!float ''",
+    b"!!bool x", b"!!timestamp x", b"!!set ", b"!!binary =", b"!!python/object:os.system x", b"<<: *a\n",
+    b"? ", b"| ", b"> ", b"%YAML 9.9\n", b"---\n", b"...\n", b"0b_", b"0x", b"1:2", b"190:20:30", b".inf",
+    b"-.inf", b".nan", b"1e999", b"9" * 40, b"9" * 5000, b"[" * 3000, b"{" * 3000, b"- " * 2000, b"null",
+    b"~", b"2001-99-99", b"'", b'"', b"#", b"\\ud800", b"\xe2\x80\xa8",
+)  # fmt: skip
+_PLAIN = b"""site: {name: hall, fps: 25}
+cameras:
+  - id: c0
+    source: c0.mp4
+    mask: [[[0, 0], [9, 0], [9, 9]]]
+  - {id: c1, source: "rtsp://10.0.0.2/a", offset: 2}
+track: {window: {stride: 5}}
+view: {lookahead: 25, identity: {confirm: 2}}
+http: {port: 8080}
+"""
+_VARIABLE = "MYVIEW_"
+_MOST_CAMERAS = 20
+
+
+def _looked_at(config: Config) -> None:
+    """Do with a configuration what is done at once with every one."""
+    for setting in settings_of(config):
+        msgspec.json.encode(setting)
+    if len(config.cameras) <= _MOST_CAMERAS:
+        BestViewService(config)
+
+
+class Text(Target):
+    """A file."""
+
+    name = "config-text"
+    share = 0.5
+
+    def __init__(self) -> None:
+        self._folder = TemporaryDirectory()
+        self._path = Path(self._folder.name) / "site.yaml"
+
+    def make(self, rng: Random) -> bytes:
+        """Give a file."""
+        return damaged(rng, _PLAIN, WORDS) if rng.random() < 0.99 else _PLAIN
+
+    def feed(self, data: bytes) -> bool:
+        """Load it."""
+        self._path.write_bytes(data)
+        try:
+            config = load_config(self._path)
+        except UserError as error:
+            return refused(error)
+        _looked_at(config)
+        return True
+
+    def close(self) -> None:
+        """Take the folder away."""
+        self._folder.cleanup()
+
+
+class Values(Target):
+    """The sections of the reference, a few at a time, one value changed; sometimes from the environment."""
+
+    name = "config-values"
+
+    def __init__(self) -> None:
+        sections = {name: _plain(value) for name, value in site() if name != "ground"}
+        self._cameras = sections.pop("cameras")
+        self._sections: dict[str, Any] = sections
+
+    def make(self, rng: Random) -> bytes:
+        """Give sections, and variables of the environment."""
+        names = rng.sample(sorted(self._sections), 2)
+        content: Any = {name: self._sections[name] for name in names} | {"cameras": self._cameras}
+        variables: dict[str, str] = {}
+        if rng.random() < 0.1:
+            section = rng.choice(names)
+            inner = self._sections[section]
+            key = rng.choice(list(inner)) if isinstance(inner, dict) else ""
+            value = odd(rng)
+            said = as_json(value).decode() if rng.random() < 0.5 else str(value)
+            variables[f"{section}__{key}".upper() if key else section.upper()] = said.replace("\x00", "")
+        else:
+            content = otherwise(rng, content)
+        return as_json([content, variables])
+
+    def feed(self, data: bytes) -> bool:
+        """Build the configuration."""
+        content, variables = json.loads(data)
+        if not isinstance(content, dict):
+            content = {}
+        content = {str(key): value for key, value in content.items()}
+        told = {
+            _VARIABLE + name: value.encode("utf-8", "replace").decode() for name, value in variables.items()
+        }
+        os.environ.update(told)
+        try:
+            config = build_config(content, where="site.yaml", folder=Path())
+            _looked_at(config)
+        except UserError as error:
+            return refused(error)
+        finally:
+            for name in told:
+                del os.environ[name]
+        return True
+
+
+class Tried(Target):
+    """Settings that an operator tries out: what a service would choose by."""
+
+    name = "config-tried"
+    share = 0.5
+
+    def __init__(self) -> None:
+        self._service = BestViewService(site())
+        self._view = self._service.decider.view
+
+    def make(self, rng: Random) -> bytes:
+        """Give changes to some settings."""
+        changes = {
+            "switch_cost_s": 0.3,
+            "goes_on_s": 0.5,
+            "missed_s": 1.0,
+            "min_shot_s": 0.0,
+            "quality": {"relative": 1.0},
+        }
+        return as_json(otherwise(rng, changes))
+
+    def feed(self, data: bytes) -> bool:
+        """Choose by them."""
+        changes = json.loads(data)
+        if not isinstance(changes, dict):
+            return False
+        try:
+            view = changed_view(self._view, changes, "to try out")
+        except UserError as error:
+            return refused(error)
+        self._service.decider.choose_by(view)
+        return True
+
+
+def _plain(value: Any) -> Any:
+    """Give a section as YAML has it."""
+    return json.loads(TypeAdapter(Any).dump_json(value))
+
+
+TARGETS = (Text, Values, Tried)

@@ -1,0 +1,179 @@
+"""A small site whose service is handed what cameras would send, without a bus: right, or damaged."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from random import Random
+from typing import Any, Literal
+
+import msgspec
+import numpy as np
+
+from server.camera.encode import AccessUnit, Encoder
+from server.view.service import BestViewService
+from server.wire.config import Config
+from server.wire.inbox import Message
+from server.wire.loading import build_config
+from server.wire.messages import (
+    CameraStatus,
+    CameraTracks,
+    FrameHead,
+    Glimpse,
+    Keys,
+    Solve,
+    SoundHead,
+    ThumbHead,
+    Track,
+)
+from server.wire.sections import Encode, Site
+
+WIDTH, HEIGHT, FPS = 64, 48, 25
+GOP = STRIDE = 5
+CAMERAS = ("c0", "c1")
+KEYS = Keys("hall")
+_GROUND = [[0.1, 0.0, 0.0], [0.0, 0.2, 0.0], [0.0, 0.01, 0.1]]
+_SOUND_BYTES = 40
+_BINS = 8
+
+
+def site(*, codec: Literal["h264", "vp8"] = "h264", **changes: Any) -> Config:
+    """Give a site of two cameras that look at one floor; every epoch is a GOP."""
+    content: dict[str, Any] = {
+        "site": {"name": "hall", "fps": FPS, "width": WIDTH, "height": HEIGHT},
+        "encode": {"gop": GOP, "codec": codec},
+        "cameras": [{"id": it, "source": "scene:room", "ground": _GROUND} for it in CAMERAS],
+        "track": {"window": {"window": 5, "stride": STRIDE, "birth_window": 5}, "backlog_s": 0.2},
+        "view": {"lookahead": 2 * GOP, "late_after_s": 0.1, "identity": {"confirm": 1, "regroup": 1}},
+        **changes,
+    }
+    if codec == "h264":
+        content["sound"] = {"source": "c0"}
+    return build_config(content, where="hall", folder=Path())
+
+
+def pictures(seed: int, frames: int, codec: Literal["h264", "vp8"] = "h264") -> tuple[AccessUnit, ...]:
+    """Encode pictures that differ from camera to camera (by seed) and from frame to frame."""
+    encoder = Encoder(Site(width=WIDTH, height=HEIGHT, fps=FPS), Encode(gop=GOP, codec=codec))
+    rng = np.random.default_rng(seed)
+    made = rng.integers(0, 255, (frames, HEIGHT // 8, WIDTH // 8, 3), dtype=np.uint8)
+    return tuple(
+        encoder.encode(pulse, np.repeat(np.repeat(picture, 8, axis=0), 8, axis=1))
+        for pulse, picture in enumerate(made)
+    )
+
+
+def video(camera: str, unit: AccessUnit, boot: int = 1) -> Message:
+    """Give a frame as it comes from the bus."""
+    head = FrameHead(
+        pulse=unit.pulse,
+        key=unit.key,
+        boot=boot,
+        after=None if unit.key else unit.pulse - 1,
+        due=unit.pulse / FPS,
+        taken=unit.pulse / FPS,
+        encoded=unit.pulse / FPS,
+    )
+    return Message(KEYS.camera(camera, "video"), unit.data, msgspec.json.encode(head))
+
+
+def word(rng: Random, camera: str, epoch: int) -> CameraTracks:
+    """Give a camera's word on an epoch, in which up to three people walk."""
+    first = epoch * STRIDE
+    return CameraTracks(
+        camera=camera,
+        boot=1,
+        size=(WIDTH, HEIGHT),
+        epoch=epoch,
+        first=first,
+        last=first + STRIDE - 1,
+        final_to=first + STRIDE - 1,
+        ended=False,
+        shed=[first] if rng.random() < 0.1 else [],
+        alone=[],
+        tracks=[_track(rng, person, first) for person in range(1, rng.randrange(1, 5))],
+        solve=Solve(objective=1.0, bound=1.0, gap=0.0, integral=True, rounds=1),
+        solved_at=(first + STRIDE) / FPS,
+    )
+
+
+def _track(rng: Random, person: int, first: int) -> Track:
+    left, top = rng.uniform(0, WIDTH - 16), rng.uniform(0, 16)
+    boxes = [(left + step, top, left + step + 8.0, top + 24.0) for step in range(STRIDE)]
+    look = Glimpse(
+        first=first,
+        last=first + STRIDE - 1,
+        histogram=[float(place == person % _BINS) for place in range(_BINS)],
+    )
+    return Track(
+        id=person, boxes=[*boxes], confidence=1.0, looks=[look], sharpness=rng.choice((None, rng.random()))
+    )
+
+
+def tracks(message: CameraTracks) -> Message:
+    """Give a word as it comes from the bus."""
+    return Message(KEYS.camera(message.camera, "tracks"), msgspec.json.encode(message), b"")
+
+
+def thumbnail(camera: str, pulse: int) -> Message:
+    """Give a small picture as it comes from the bus."""
+    head = ThumbHead(track=1, boot=1, pulse=pulse)
+    return Message(KEYS.camera(camera, "thumbs/1"), b"\xff\xd8jpeg", msgspec.json.encode(head))
+
+
+def status(camera: str, pulse: int) -> Message:
+    """Give a status as it comes from the bus."""
+    told = CameraStatus(
+        camera=camera,
+        boot=1,
+        state="live",
+        pulse=pulse,
+        fps=25.0,
+        missed=0,
+        shed=0,
+        in_step=True,
+        clock_offset=0.0,
+        round_trip=0.001,
+    )
+    return Message(KEYS.camera(camera, "status"), msgspec.json.encode(told), b"")
+
+
+def sound(epoch: int) -> Message:
+    """Give the sound of an epoch as it comes from the bus."""
+    head = SoundHead(first=epoch * 9, sizes=[_SOUND_BYTES] * 9)
+    return Message(KEYS.sound, bytes(_SOUND_BYTES * 9), msgspec.json.encode(head))
+
+
+class Fed(BestViewService):
+    """The best-view service without a bus; ``handle`` is what the bus would call."""
+
+    def __init__(self, config: Config) -> None:
+        super().__init__(config)
+        self._handlers: Mapping[str, Callable[[Message], None]] = {
+            "video": self.intake.video,
+            "tracks": self.intake.tracks,
+            "status": self.intake.status,
+            "thumbs": self.intake.thumbnail,
+        }
+        self.come(*CAMERAS)
+
+    def come(self, *cameras: str) -> None:
+        """Let cameras be there."""
+        for camera in cameras:
+            self.intake.alive(KEYS.camera(camera, "alive"), there=True)
+
+    def handle(self, message: Message) -> None:
+        """Take a message in as the bus hands it on, by what its key ends with."""
+        if message.key == KEYS.sound:
+            self.intake.sound(message)
+        parts = message.key.split("/")
+        what = parts[4] if len(parts) > 4 else ""
+        if what == "alive":
+            self.intake.alive(message.key, there=message.payload == b"1")
+        elif what in self._handlers:
+            self._handlers[what](message)
+
+    @property
+    def dropped(self) -> int:
+        """Messages that were counted and dropped."""
+        return sum(it.bad_messages for it in self.intake.states.values()) + self.intake.bad_sounds

@@ -1,0 +1,50 @@
+"""What is fuzzed: something that makes inputs, and hands them to code that reads bytes from outside."""
+
+from __future__ import annotations
+
+from random import Random
+from typing import ClassVar
+
+_LONGEST = 2000
+"""Characters of a message that is still one that somebody reads."""
+
+
+class UnclearError(AssertionError):
+    """An input was refused, but not in one readable line."""
+
+
+class Target:
+    """One reader. Made in the process that runs it, once for many inputs.
+
+    ``share``: of the inputs that are asked for, so many are given to it; what is slow gets fewer.
+    """
+
+    name: ClassVar[str]
+    share: ClassVar[float] = 1.0
+
+    def make(self, rng: Random) -> bytes:
+        """Give an input: most are nearly right, some are right, some are anything."""
+        raise NotImplementedError
+
+    def feed(self, data: bytes) -> bool:
+        """Hand an input to the reader; say whether it was taken, or refused as it should be.
+
+        Raises:
+            Exception: anything at all, which is a crash.
+        """
+        raise NotImplementedError
+
+    def close(self) -> None:
+        """Let go of what was opened."""
+
+
+def refused(error: BaseException | str) -> bool:
+    """Say that an input was refused, having seen that a person can read why.
+
+    Raises:
+        UnclearError: it is no line, or none that can be read.
+    """
+    text = str(error)
+    if not text or len(text) > _LONGEST or len(text.splitlines()) > 1 or "Traceback" in text:
+        raise UnclearError(f"not a clear line: {text[:200]!r}")
+    return False

@@ -1,0 +1,243 @@
+"""Messages from the bus: one by one, and whole sessions of a site up to what its viewers are given."""
+
+from __future__ import annotations
+
+import asyncio
+from random import Random
+from typing import Any, cast
+
+import msgspec
+from prometheus_client import generate_latest
+
+from benchmarks.fuzz_mutate import as_json, damaged, otherwise
+from benchmarks.fuzz_site import (
+    CAMERAS,
+    FPS,
+    HEIGHT,
+    KEYS,
+    STRIDE,
+    WIDTH,
+    Fed,
+    pictures,
+    site,
+    sound,
+    status,
+    thumbnail,
+    tracks,
+    video,
+    word,
+)
+from benchmarks.fuzz_target import Target
+from server.camera.earshot import Earshot
+from server.camera.exchange import Exchange
+from server.view.agreement import Agreement
+from server.view.align import Aligner
+from server.view.footage import Footage
+from server.view.intake import Intake
+from server.view.pictures import Pictures
+from server.view.shelf import Shelf
+from server.view.sound import SoundShelf
+from server.web.metrics import registry
+from server.web.readers import Readers
+from server.web.views import cameras_info, choice_info, objects_info, site_info
+from server.wire.epochs import end_of_epoch
+from server.wire.inbox import Message
+from server.wire.messages import Found
+from server.wire.sound import SoundFormat
+
+_EPOCHS = 4
+Script = list[tuple[str, bytes, bytes]]
+"""Messages: key, payload, attachment. An empty key is the end of an epoch."""
+_script = msgspec.msgpack.Decoder(Script)
+_packed = msgspec.msgpack.encode
+
+
+def wrong(rng: Random, message: Message) -> Message:
+    """Give a message with something in it wrong: a value, a byte, its key."""
+    key, payload, head = message.key, message.payload, message.attachment
+    way = rng.random()
+    if way < 0.55:
+        json = head or payload
+        changed = as_json(otherwise(rng, msgspec.json.decode(json)))
+        return Message(key, payload, changed) if head else Message(key, changed, b"")
+    if way < 0.75:
+        return Message(key, damaged(rng, payload), head)
+    if way < 0.9:
+        return Message(key, payload, damaged(rng, head))
+    other = rng.choice(
+        (
+            key.replace("c0", "c1"),
+            key.replace("c1", "cellar"),
+            damaged(rng, key.encode()).decode("utf-8", "replace"),
+        )
+    )
+    return Message(other, payload, head)
+
+
+class Messages(Target):
+    """One message to an intake that has just begun."""
+
+    name = "zenoh-messages"
+
+    def __init__(self) -> None:
+        self._pictures = pictures(0, 10)
+        self._form = SoundFormat(48_000, 2)
+
+    def make(self, rng: Random) -> bytes:
+        """Give a message."""
+        pulse = rng.randrange(10)
+        right = rng.choice(
+            (
+                lambda: video("c0", self._pictures[pulse]),
+                lambda: tracks(word(rng, "c0", pulse)),
+                lambda: status("c0", pulse),
+                lambda: thumbnail("c0", pulse),
+                lambda: sound(pulse),
+            )
+        )()
+        it = wrong(rng, right) if rng.random() < 0.95 else right
+        return _packed([(it.key.encode("utf-8", "replace").decode(), it.payload, it.attachment)])
+
+    def feed(self, data: bytes) -> bool:
+        """Take it in, and the epoch out that it may have made."""
+        agreement = Agreement()
+        shelves = {camera: Shelf(FPS, 50, agreement) for camera in CAMERAS}
+        aligner = Aligner(CAMERAS, STRIDE, grace=5)
+        intake = Intake(shelves, aligner, lambda *_: None, SoundShelf(self._form, FPS, 10.0))
+        handlers = (intake.video, intake.tracks, intake.status, intake.thumbnail)
+        for key, payload, head in _script.decode(data):
+            message = Message(key, payload, head)
+            if key == KEYS.sound:
+                intake.sound(message)
+            for what, handle in zip(("video", "tracks", "status", "thumbs"), handlers, strict=True):
+                if f"/{what}" in key:
+                    handle(message)
+        aligner.ready(now=100)
+        intake.forget_thumbnails_before(1)
+        return not intake.bad_sounds and not any(it.bad_messages for it in intake.states.values())
+
+
+class Words(Target):
+    """What cameras tell each other of a frame."""
+
+    name = "zenoh-found"
+
+    def __init__(self) -> None:
+        self._exchange = Exchange(site(), "c0", None, 50)
+
+    def make(self, rng: Random) -> bytes:
+        """Give some words of the other camera."""
+        script: Script = []
+        for pulse in range(3):
+            boxes = [(1.0, 2.0, 9.0, 30.0, 0.9)] * rng.randrange(3)
+            told = Found(camera="c1", boot=1, size=(WIDTH, HEIGHT), pulse=pulse, boxes=boxes)
+            message = Message(KEYS.camera("c1", "found"), msgspec.json.encode(told), b"")
+            it = wrong(rng, message) if rng.random() < 0.7 else message
+            script.append((it.key, it.payload, b""))
+        return _packed(script)
+
+    def feed(self, data: bytes) -> bool:
+        """Hear them."""
+        earshot, bad = Earshot(("c1",), 50, lambda _: True), self._exchange.bad_messages
+        for pulse, (key, payload, _) in enumerate(_script.decode(data)):
+            heard = self._exchange._read(Message(key, payload, b""))
+            if heard is not None and heard.camera == "c1":
+                earshot.put(heard, 0.0)
+            earshot.ask(pulse, 1.0)
+            earshot.misses(pulse)
+            earshot.give_up(pulse)
+            earshot.heard(pulse)
+        return self._exchange.bad_messages == bad
+
+
+class Sessions(Target):
+    """A site over some epochs: messages wrong, lost, doubled and out of order; then all is asked of it."""
+
+    name = "zenoh-sessions"
+    share = 0.02
+
+    def __init__(self) -> None:
+        self._pictures = [pictures(seed, _EPOCHS * STRIDE) for seed in range(len(CAMERAS))]
+        self._config = site()
+        self._loop = asyncio.new_event_loop()
+
+    def make(self, rng: Random) -> bytes:
+        """Give some hundred messages, of which some are wrong."""
+        script: Script = []
+        share = rng.choice((0.0, 0.02, 0.02, 0.1, 0.5))
+        only_one = rng.random() < 0.5
+        for epoch in range(_EPOCHS):
+            messages = [sound(epoch)]
+            for seed, camera in enumerate(CAMERAS):
+                messages += [video(camera, it) for it in self._pictures[seed][epoch * STRIDE :][:STRIDE]]
+                messages += [
+                    tracks(word(rng, camera, epoch)),
+                    status(camera, epoch),
+                    thumbnail(camera, epoch),
+                ]
+            for message in messages:
+                if rng.random() >= share or (only_one and "c1" not in message.key):
+                    sent = [message]
+                else:
+                    sent = rng.choice(([], [message] * 2, [wrong(rng, message)], [wrong(rng, message)]))
+                script += [(_plain(it.key), it.payload, it.attachment) for it in sent]
+            if rng.random() < share:
+                at = rng.randrange(len(script) + 1)
+                alive = (KEYS.camera(rng.choice(CAMERAS), "alive"), rng.choice((b"0", b"1")), b"")
+                script.insert(at, alive)
+                rng.shuffle(script[-20:])
+            script.append(("", b"", b""))
+        return _packed(script)
+
+    def feed(self, data: bytes) -> bool:
+        """Play it."""
+        return self._loop.run_until_complete(self._session(_script.decode(data)))
+
+    async def _session(self, script: Script) -> bool:
+        service = Fed(self._config)
+        service.agreement.accept(self._pictures[0][0].data)
+        viewers = [it.join() for it in (*service.splicer.cameras.values(), *service.splicer.decided.values())]
+        epoch = 0
+        for key, payload, head in script:
+            if key:
+                service.handle(Message(key, payload, head))
+                continue
+            service.pulse = end_of_epoch(epoch, STRIDE)
+            epoch += 1
+            service.decide()
+        service.pulse += 2 * STRIDE
+        service.decide()
+        ask(service)
+        for viewer in viewers:
+            drink(viewer)
+        return service.dropped == 0
+
+    def close(self) -> None:
+        """Close the loop."""
+        self._loop.close()
+
+
+def ask(service: Fed) -> None:
+    """Ask a service everything that its API tells."""
+    for told in (site_info(service), objects_info(service), cameras_info(service)):
+        msgspec.json.encode(told)
+    for number in [*service.board.standings, 99]:
+        msgspec.json.encode(choice_info(service, number))
+    generate_latest(registry(service, Pictures(service), Readers(1.0)))
+
+
+def drink(viewer: Any) -> None:
+    """Take what waits for a viewer, in every form."""
+    for piece in list(viewer._queue):
+        if isinstance(piece, Footage):
+            assert piece.data
+            assert cast("bytes", piece.ts)
+            assert piece.with_sound
+    viewer._queue.clear()
+
+
+def _plain(key: str) -> str:
+    return key.encode("utf-8", "replace").decode()
+
+
+TARGETS = (Messages, Words, Sessions)

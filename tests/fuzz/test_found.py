@@ -1,0 +1,153 @@
+"""What fuzzing has found, each kind once: it is refused in a line, or counted and dropped."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import logging
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from benchmarks.fuzz_site import KEYS, STRIDE, Fed, pictures, site, video
+from bestview import checked_homography
+from server.camera.exchange import Exchange
+from server.run.calibrate_points import read_points
+from server.view.past.playlist import Playlist
+from server.view.skip import UnfitError, continuing
+from server.web.app import make_app, serving
+from server.wire.errors import UserError
+from server.wire.h264 import ParameterSets, nal_units, parameter_sets
+from server.wire.inbox import Message
+from server.wire.loading import build_config, changed_view, load_config
+from server.wire.sections import View
+
+CAMERA = {"id": "c0", "source": "scene:room"}
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "[" * 5000,
+        "cameras: &a [*a]",
+        "cameras: !!int ''",
+        "cameras: !!bool x",
+        "cameras: !!timestamp x",
+        "cameras: 0b_",
+        "site: {name: 2001-99-99}",
+        'http: {host: "\\ud800"}\ncameras: [{id: c0, source: x}]',
+        "a: &a [1, 1, 1, 1, 1, 1, 1, 1, 1]\n"
+        + "\n".join(
+            f"{b}: &{b} [{', '.join([f'*{a}'] * 9)}]" for a, b in zip("abcdefg", "bcdefgh", strict=True)
+        ),
+    ],
+)
+def test_a_configuration_that_cannot_be_read_is_refused_in_a_line(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "site.yaml"
+    path.write_text(text)
+    with pytest.raises(UserError) as refused:
+        load_config(path)
+    assert len(str(refused.value).splitlines()) == 1
+    assert len(str(refused.value)) < 1000
+
+
+def test_settings_to_try_out_must_be_text() -> None:
+    with pytest.raises(UserError, match="characters that are none"):
+        changed_view(View(), {"\ud800": 1}, "to try out")
+
+
+@pytest.mark.parametrize("content", ['{"homography": {"c0": [[1' + "0" * 400 + "]]}}", "[" * 100_000])
+def test_a_ground_file_that_cannot_be_read_is_refused_in_a_line(tmp_path: Path, content: str) -> None:
+    (tmp_path / "ground.json").write_text(content)
+    with pytest.raises(UserError, match="ground"):
+        build_config({"cameras": [CAMERA], "ground": "ground.json"}, where="site", folder=tmp_path)
+
+
+def test_a_homography_of_numbers_too_large_is_refused() -> None:
+    with pytest.raises(ValueError, match="not a 3x3 matrix of numbers"):
+        checked_homography([[10**400] * 3] * 3, "c0")
+
+
+@pytest.mark.parametrize("name", ["$x$\n", "\ud800", "c" * 65, ""])
+def test_points_of_a_camera_whose_name_cannot_be_written_are_refused(tmp_path: Path, name: str) -> None:
+    path = tmp_path / "points.json"
+    path.write_text(json.dumps({"cameras": {name: []}}))
+    with pytest.raises(UserError, match="no name that can be read"):
+        read_points(path)
+
+
+def test_a_number_of_many_digits_is_not_repeated_whole(tmp_path: Path) -> None:
+    path = tmp_path / "points.csv"
+    path.write_text("camera,image_x,image_y,floor_x,floor_y\nc0,1,2,3," + "9" * 5000 + "\n")
+    with pytest.raises(UserError) as refused:
+        read_points(path)
+    assert len(str(refused.value)) < 300
+
+
+@pytest.mark.parametrize("damaged", [b"", b"\x00\x00\x01", b"\x00\x00\x01\x41", b"\x00\x00\x01\x09\xf0"])
+async def test_an_access_unit_without_a_picture_is_counted_and_dropped(damaged: bytes) -> None:
+    service, units = Fed(site()), pictures(0, STRIDE)
+    service.handle(video("c0", units[0]))
+    right = video("c0", units[1])
+    service.handle(Message(right.key, damaged, right.attachment))
+    service.handle(video("c0", units[2]))
+    assert service.intake.states["c0"].bad_messages == 1
+    assert not service.shelves["c0"].has(1)
+    assert service.shelves["c0"].has(2)
+
+
+def test_parameter_sets_of_pictures_beyond_every_level_are_unfit() -> None:
+    found = parameter_sets(nal_units(pictures(0, 1)[0].data))
+    assert found is not None
+    continuing(found)
+    huge = found.sps[:4] + b"\xf6\x00\x00\x00\x80\x00\x00\x00\x80" + b"\xff" * 20
+    with pytest.raises(UnfitError):
+        continuing(ParameterSets(huge, found.pps))
+
+
+def test_parameter_sets_that_no_file_can_hold_are_none() -> None:
+    assert parameter_sets([b"\x67" + bytes([1]) * 70_000, b"\x68\x01"]) is None
+
+
+def test_a_playlist_that_names_no_place_in_a_file_is_passed_over(tmp_path: Path) -> None:
+    path = tmp_path / "c0.m3u8"
+    path.write_text(f"#EXTINF:1,p0+5\n#EXT-X-BYTERANGE:4@{'9' * 30}\n../cameras/c0/0.mp4\n")
+    playlist = Playlist(path, "", "", 25.0, None, 60.0)
+    playlist.read()
+    assert playlist.tape.all == ()
+
+
+def test_words_nested_without_end_are_counted_and_dropped() -> None:
+    exchange = Exchange(site(), "c0", None, 50)
+    payload = b'{"x":' * 100_000
+    exchange._read(Message(KEYS.camera("c1", "found"), payload, b""))
+    service = Fed(site())
+    service.handle(Message(KEYS.camera("c0", "status"), payload, b""))
+    assert exchange.bad_messages == service.intake.states["c0"].bad_messages == 1
+
+
+BAD_REQUESTS: list[bytes] = [
+    b"GET /\x00 HTTP/1.1\r\n\r\n",
+    b"GET / HTTP/1.1\r\nContent-Length: -1\r\n\r\n",
+    b"POST /api/operator/people HTTP/1.1\r\nContent-Encoding: gzip\r\nContent-Length: 4\r\n\r\nnone",
+    b"GET / HTTP/1.1\r\nTransfer-Encoding: chunked\r\n\r\nzz\r\n",
+]
+
+
+@pytest.mark.parametrize("request_bytes", BAD_REQUESTS)
+async def test_what_is_no_request_leaves_no_traceback_in_the_log(
+    request_bytes: bytes, caplog: pytest.LogCaptureFixture
+) -> None:
+    service = Fed(site())
+    settings: Any = service.config.http.model_copy(update={"port": 0})
+    with caplog.at_level(logging.DEBUG):
+        async with serving(make_app(service), settings) as port:
+            reader, writer = await asyncio.open_connection("127.0.0.1", port)
+            writer.write(request_bytes)
+            writer.write_eof()
+            answer = await reader.read()
+            writer.close()
+    assert not answer or answer.startswith(b"HTTP/1.1 4")
+    assert b"Traceback" not in answer
+    assert not [it for it in caplog.records if it.exc_info and it.levelno >= logging.INFO]

@@ -1,0 +1,95 @@
+"""Bytes that nobody meant are refused, or counted and dropped: a short run of `python -m benchmarks.fuzz`."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from random import Random
+
+import pytest
+
+from benchmarks.fuzz import PARTS, targets_of
+from benchmarks.fuzz_run import Attempt, Crash, Plan, Runner, numbered
+from benchmarks.fuzz_target import Target, UnclearError, refused
+
+SECONDS = 1.0
+INPUTS = 3000
+ALL = [target for part in PARTS for target in targets_of(part)]
+
+
+@pytest.fixture(autouse=True)
+def _no_settings_from_outside(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in [name for name in os.environ if name.startswith("MYVIEW_") and "__" in name]:
+        monkeypatch.delenv(name)
+
+
+@pytest.mark.parametrize("target", ALL, ids=[it.name for it in ALL])
+def test_no_input_makes_it_crash(target: type[Target], tmp_path: Path) -> None:
+    tally = Runner(target, target.name, Plan(INPUTS, SECONDS, seed=7, out=tmp_path)).run()
+    found = "\n\n".join(it.read_text() for it in sorted(tmp_path.glob("*.txt")))
+    assert tally.crashes == 0, found
+    assert tally.inputs > 0
+    assert tally.accepted + tally.refused == tally.inputs
+
+
+@pytest.mark.parametrize("target", ALL, ids=[it.name for it in ALL])
+def test_its_inputs_are_the_same_in_every_run(target: type[Target]) -> None:
+    one, other = target(), target()
+    try:
+        inputs = [numbered(one, 1, index) for index in range(20)]
+        assert inputs == [numbered(other, 1, index) for index in range(20)]
+        assert len(set(inputs)) > 1
+    finally:
+        one.close()
+        other.close()
+
+
+class Broken(Target):
+    """Crashes in every way there is."""
+
+    name = "broken-reader"
+
+    def make(self, rng: Random) -> bytes:
+        return rng.choice((b"right", b"wrong", b"raises", b"hangs", b"grows", b"dies"))
+
+    def feed(self, data: bytes) -> bool:
+        match data:
+            case b"right":
+                return True
+            case b"wrong":
+                return refused("it is wrong")
+            case b"raises":
+                raise KeyError(data)
+            case b"hangs":
+                while True:
+                    pass
+            case b"grows":
+                return len(bytearray(300_000_000)) > 0
+            case _:
+                os.abort()
+
+
+def test_whatever_a_reader_does_wrong_is_counted_and_saved(tmp_path: Path) -> None:
+    tally = Runner(Broken, "broken-reader", Plan(12, seed=3, out=tmp_path)).run()
+    saved = {path.read_bytes() for path in tmp_path.glob("*.bin")}
+    given = [numbered(Broken(), 3, index) for index in range(12)]
+    assert tally.inputs == 12
+    assert saved == set(given) - {b"right", b"wrong"}
+    assert tally.accepted == given.count(b"right")
+    assert tally.refused == given.count(b"wrong")
+
+
+def test_a_saved_input_says_again_what_it_did() -> None:
+    attempt = Attempt(Broken())
+    with attempt.watching():
+        assert attempt.feed(b"right") is True
+        assert attempt.feed(b"wrong") is False
+        found = attempt.feed(b"raises")
+    assert isinstance(found, Crash)
+    assert "KeyError" in found.text
+
+
+@pytest.mark.parametrize("text", ["", "two\nlines", "x" * 5000, "Traceback (most recent call last)"])
+def test_a_refusal_that_nobody_can_read_is_none(text: str) -> None:
+    with pytest.raises(UnclearError):
+        refused(ValueError(text))
