@@ -9,6 +9,7 @@ import { copy } from './tools.js';
 
 /** @type {[string, string, string][]} key, name, what it does */
 const FIELDS = [
+  ['lookahead', 'Look-ahead, frames', 'How many frames are seen before a view is chosen; all of it is delay.'],
   ['switch_cost_s', 'Cut cost λ, s', 'How many seconds of not seeing the person are worth a cut.'],
   ['goes_on_s', 'Goes on, s', 'For how long the views at the end of the look-ahead are taken to go on.'],
   ['missed_s', 'Missed, s', 'For how long somebody who is not found any more is taken to be still there.'],
@@ -79,9 +80,11 @@ export class ChoosingForm {
   }
 
   /** @param {Choosing} choosing */
-  #show({ values, file, lines }) {
+  #show({ values, file, lines, least_lookahead: least, most_lookahead: most }) {
     this.#values = values;
     if (!this.#fields.size) element('choosing-fields').append(...FIELDS.filter(([key]) => key in values).map((it) => this.#field(it)));
+    const ahead = this.#fields.get('lookahead')?.input;
+    if (ahead) Object.assign(ahead, { min: String(least), max: String(most), step: '1' });
     let tried = 0;
     for (const [key, { input, file: said }] of this.#fields) {
       const value = values[key];

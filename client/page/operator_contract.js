@@ -74,6 +74,8 @@
  * @property {Values} values in force
  * @property {Values} file what the configuration says
  * @property {string} lines for the configuration
+ * @property {number} least_lookahead frames
+ * @property {number} most_lookahead frames
  *
  * @typedef {object} ByHand /api/operator/people
  * @property {Record<string, string>} names by number

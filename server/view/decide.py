@@ -22,7 +22,7 @@ from server.wire.sections import View
 
 Floats = NDArray[np.float64]
 
-TUNED = ("switch_cost_s", "goes_on_s", "missed_s", "min_shot_s", "quality")
+TUNED = ("lookahead", "switch_cost_s", "goes_on_s", "missed_s", "min_shot_s", "quality")
 """Settings of the choice that can be changed while it runs."""
 
 _LAST = 5
@@ -84,6 +84,9 @@ class Decider:
         size = (config.site.width, config.site.height)
         lag, share = config.track.window.lag, config.view.share
         self.people = People(config.view.identity, self._cameras, homographies, size, lag, share)
+        stride, gop = config.track.window.stride, config.encode.gop
+        self._at_once = -(-stride // gop) + 1
+        """GOPs that an epoch decides at most: one more than it completes while the look-ahead stays."""
         self._sight = Sight(config, homographies, self.people.fits)
         self._shots = Shots()
         self._lately = Lately()
@@ -96,6 +99,9 @@ class Decider:
 
     def choose_by(self, view: View) -> None:
         """Choose by other settings from the next GOP on; those that `TUNED` does not name stay as they are.
+
+        A longer look-ahead is waited for first; with a shorter one there is more to decide, which is done
+        little by little: who watches is not to be overrun. Either way every GOP is decided once, in order.
 
         What is decided then cannot be had again from the recordings and the configuration alone.
         """
@@ -125,9 +131,8 @@ class Decider:
             return []
         outlook = self._outlook(self._next_gop, epoch.last)
         weight = self._weight(lookahead)
-        decided = [
-            self._decide(outlook, first, gop, weight) for first in range(self._next_gop, last + 1, gop)
-        ]
+        firsts = range(self._next_gop, last + 1, gop)[: self._at_once]
+        decided = [self._decide(outlook, first, gop, weight) for first in firsts]
         self._lately = outlook.lately(self._next_gop)
         return decided
 

@@ -26,6 +26,7 @@ from server.wire.config import Config
 from server.wire.errors import UserError
 from server.wire.inbox import Message
 from server.wire.messages import GopChoices, Keys, pulse_client
+from server.wire.sections import View
 
 log = logging.getLogger(__name__)
 
@@ -40,6 +41,8 @@ class BestViewService:
         grace, behind = round(config.view.late_after_s * fps), round(config.track.backlog_s * fps)
         # What is waited for must still be there when it is decided.
         frames = max(round(config.view.buffer_s * fps), behind + 4 * (config.view.lookahead + grace + stride))
+        self.most_lookahead = (frames - behind) // 2 - grace - stride
+        """Frames that can be looked ahead while this runs: half as many as what is kept could do for."""
         self.agreement = agreement_for(config)
         self.shelves = {camera: Shelf(config.site.fps, frames, self.agreement) for camera in cameras}
         self.aligner = Aligner(cameras, stride, grace, behind)
@@ -135,6 +138,23 @@ class BestViewService:
             return Recorder(out, self.config.camera_ids, self.decider.people.fits)
         except OSError as error:
             raise UserError(f"{out}: cannot write there: {error.strerror}") from error
+
+    def choose_by(self, view: View) -> None:
+        """Choose views by other settings from the next GOP on, as far as a running service can.
+
+        Raises:
+            UserError: the look-ahead is not long enough, or longer than what is kept.
+        """
+        try:
+            self.config.check_lookahead(view)
+        except ValueError as error:
+            raise UserError(str(error)) from error
+        if view.lookahead > self.most_lookahead:
+            raise UserError(
+                f"view.lookahead: is {view.lookahead} frames but can be at most {self.most_lookahead} while "
+                "the service runs: what it keeps reaches no further; a longer view.buffer_s and a restart do"
+            )
+        self.decider.choose_by(view)
 
     def close(self) -> None:
         """End all streams and let go of the bus and the files."""

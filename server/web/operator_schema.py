@@ -171,6 +171,10 @@ class Choosing(msgspec.Struct, frozen=True):
     """What the configuration says."""
     lines: str
     """Of the configuration, for what is in force and is not its default or not what the file says."""
+    least_lookahead: int
+    """Frames, as few as tracks allow."""
+    most_lookahead: int
+    """Frames, as many as what the service keeps allows."""
 
 
 class PeopleByHand(msgspec.Struct, frozen=True):

@@ -56,10 +56,9 @@ async def put_choosing(request: web.Request) -> web.Response:
         if key not in known:
             return problem(400, f"view.{key}: cannot be changed here; what can is {', '.join(known)}")
     try:
-        view = changed_view(service.decider.view, _nested(asked), "to try out")
+        service.choose_by(changed_view(service.decider.view, _nested(asked), "to try out"))
     except UserError as error:
         return problem(400, str(error))
-    service.decider.choose_by(view)
     return answer(_choosing(service))
 
 
@@ -67,7 +66,7 @@ async def put_choosing(request: web.Request) -> web.Response:
 async def delete_choosing(request: web.Request) -> web.Response:
     """Choose views by what the configuration says again."""
     service = request.app[SERVICE]
-    service.decider.choose_by(service.config.view)
+    service.choose_by(service.config.view)
     return answer(_choosing(service))
 
 
@@ -130,7 +129,8 @@ def _choosing(service: BestViewService) -> Choosing:
     now, file, usual = _flat(service.decider.view), _flat(service.config.view), _flat(View())
     lines = {key: value for key, value in now.items() if value != usual[key] or value != file[key]}
     written = "" if not lines else yaml.safe_dump({"view": _nested(lines)}, sort_keys=False)
-    return Choosing(values=now, file=file, lines=written)
+    least, most = service.config.least_lookahead, service.most_lookahead
+    return Choosing(values=now, file=file, lines=written, least_lookahead=least, most_lookahead=most)
 
 
 def _flat(view: View) -> dict[str, float | bool]:

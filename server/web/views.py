@@ -20,7 +20,7 @@ def site_info(service: BestViewService) -> SiteInfo:
         width=config.site.width,
         height=config.site.height,
         gop=config.encode.gop,
-        lookahead_frames=config.view.lookahead,
+        lookahead_frames=service.decider.view.lookahead,
         codec=service.agreement.codec,
         container=service.agreement.container,
         sound=None if service.sound is None else service.sound.format.codec,

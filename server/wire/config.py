@@ -66,15 +66,26 @@ class Config(BaseSettings):
 
     @model_validator(mode="after")
     def _lookahead_covers_the_tracker(self) -> Self:
-        window = self.track.window
-        least = self.encode.gop + window.window - window.stride
-        if self.view.lookahead < least:
+        self.check_lookahead(self.view)
+        return self
+
+    @property
+    def least_lookahead(self) -> int:
+        """The frames that a view must be looked ahead for at least: its tracks no longer change then."""
+        return self.encode.gop + self.track.window.window - self.track.window.stride
+
+    def check_lookahead(self, view: View) -> None:
+        """Check that these settings look far enough ahead.
+
+        Raises:
+            ValueError: they do not.
+        """
+        if view.lookahead < self.least_lookahead:
             raise ValueError(
-                f"view.lookahead: is {self.view.lookahead} frames but must be at least {least} "
+                f"view.lookahead: is {view.lookahead} frames but must be at least {self.least_lookahead} "
                 "(encode.gop + track.window.window - track.window.stride), "
                 "so that a view is chosen on tracks that no longer change"
             )
-        return self
 
     @model_validator(mode="after")
     def _nobody_is_settled_untold(self) -> Self:

@@ -329,7 +329,7 @@ async def test_a_walk_is_started_watched_and_finished_and_its_file_is_the_scenes
         async with page.expect_download() as download:
             await page.get_by_role("link", name="Download the ground file").click()
         await (await download.value).save_as(tmp_path / "ground.json")
-        found = yaml.safe_load(await page.get_by_label("Lines for the configuration, with").input_value())
+        found = yaml.safe_load(await page.get_by_label("What names the ground file").input_value())
         assert found["ground"] == (await download.value).suggested_filename == "ground.json"
         await page.get_by_role("button", name="Forget it").click()
         await expect(state).to_have_text("Nobody walks.")
@@ -349,6 +349,14 @@ async def test_what_is_tried_out_holds_and_the_file_can_be_had_back(browser: Bro
         await expect(page.locator("#choosing-state")).to_have_text("2 tried out, not as the file says.")
         assert (decider.view.switch_cost_s, decider.view.quality.central) == (2.0, 0.5)
         assert "switch_cost_s: 2.0" in await lines.input_value()
+        ahead = page.get_by_label("Look-ahead, frames")
+        await ahead.fill(str(hall.service.most_lookahead + 1))
+        await page.keyboard.press("Enter")
+        assert await ahead.evaluate("(it) => it.validity.rangeOverflow")
+        await ahead.fill("15")
+        await page.keyboard.press("Enter")
+        await expect(page.locator("#choosing-state")).to_have_text("3 tried out, not as the file says.")
+        assert decider.view.lookahead == 15
         await page.get_by_label("Size").fill("0")  # the page lets it pass, the site does not: all are 0
         for name in ("Whole", "Unhidden", "Central"):
             await page.get_by_label(name).fill("0")
