@@ -2,8 +2,19 @@
 
 from __future__ import annotations
 
+import msgspec
+
 from bestview import TrackKey
 from server.wire.messages import CameraTracks
+
+
+class Followed(msgspec.Struct, frozen=True, array_like=True):
+    """A track as the camera names it, whatever it is called here."""
+
+    camera: str
+    boot: int
+    """Which run of the camera's process."""
+    track: int
 
 
 class LocalNumbers:
@@ -30,6 +41,10 @@ class LocalNumbers:
     def known(self, camera: str, boot: int, track: int) -> TrackKey | None:
         """Say what a track that was in some message is called here."""
         return self._keys.get((camera, boot), {}).get(track)
+
+    def origin(self, key: TrackKey) -> Followed:
+        """Say what the camera calls a track that is not forgotten."""
+        return Followed(key.camera, *self._origin[key])
 
     def forget(self, key: TrackKey) -> None:
         """Let go of a track; should it come back it has a new number."""

@@ -12,6 +12,7 @@ from bestview import IdentityRegistry, IdentitySettings, Merge, Split, TrackKey
 from server.view.align import Epoch
 from server.view.by_hand import ByHand
 from server.view.history import History
+from server.view.locals import Followed
 from server.view.numbered import numbered_boxes
 from server.view.parts import NOBODY_YET, UNKNOWN, Part, numbers_over, parts_of, with_settled
 from server.view.reading import CameraWindow, Reader
@@ -158,6 +159,18 @@ class People:
         """Give the person's number behind a tracker's number in a frame."""
         key = self._reader.locals.known(camera, boot, track)
         return None if key is None else self.number(key.camera, key.local, pulse)
+
+    def heard_of(self, track: Followed) -> bool:
+        """Tell whether a camera has spoken of this track, lately."""
+        return self._reader.locals.known(track.camera, track.boot, track.track) is not None
+
+    def followed(self, numbers: Collection[int]) -> dict[int, list[Followed]]:
+        """Give the tracks by which these people are followed now, in order; who is not is left out."""
+        found: dict[int, list[Followed]] = {}
+        for key, parts in self._parts.items():
+            if parts[-1].number in numbers and self._heard.get(key) == self._now:
+                found.setdefault(parts[-1].number, []).append(self._reader.locals.origin(key))
+        return dict(sorted(found.items()))
 
     def numbers(self, keys: Sequence[TrackKey], first: int, frames: int) -> NDArray[np.int64]:
         """Give the persons' numbers behind T tracks, frame by frame, (T, frames); -1: nobody yet."""

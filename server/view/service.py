@@ -12,6 +12,7 @@ import msgspec
 from camsync import PulseClient
 from server.view.align import Aligner, Epoch
 from server.view.board import Board
+from server.view.by_hand_file import ByHandFile
 from server.view.calibrate.walking import Walking
 from server.view.codec import agreement_for
 from server.view.decide import Decider, GopDecision, homographies
@@ -55,6 +56,8 @@ class BestViewService:
         )
         self.board = Board(config.site.fps)
         self.walking = Walking(config)
+        kept = None if config.view.share.of > 1 else config.record.folder
+        self.by_hand = ByHandFile(kept, config.site.name, fps)
         self.past = Past(config, self.shelves, self.agreement, frames, self.sound)
         self.pulse = -1
         self.pulse0: float | None = None
@@ -97,6 +100,7 @@ class BestViewService:
         if self._out is not None:  # not before all ports are listened on: a failed start leaves no files
             self._recorder = self._record(self._out)
         self.past.open()
+        self.by_hand.open()
         follow = asyncio.create_task(self._follow_pulses(), name="pulses")
         follow.add_done_callback(lambda _: self._changed.set())
         try:
@@ -161,6 +165,7 @@ class BestViewService:
         self.splicer.close()
         self.walking.stop()
         self.past.close()
+        self.by_hand.close()
         if self._recorder is not None:
             self._recorder.close()
         if self._bus is not None:
@@ -186,7 +191,9 @@ class BestViewService:
     def _step(self, epoch: Epoch) -> None:
         self._note_late(epoch)
         self.walking.take(epoch)
-        for decision in self.decider.step(epoch):
+        decisions = self.decider.step(epoch)
+        self.by_hand.take(self.decider.people, epoch.last)  # names are there with the first decision
+        for decision in decisions:
             self._publish(decision)
 
     def _publish(self, decision: GopDecision) -> None:

@@ -18,7 +18,7 @@ from server.view.calibrate.plan import plan_of, plot_plan
 from server.view.calibrate.task import Done, Seen, Task
 from server.view.calibrate.walked import Walked, moment, walk_settings
 
-_NICE = 10
+_NICE = 5
 
 
 def done(task: Task) -> Done:
