@@ -18,6 +18,8 @@ from benchmarks.bestview_join import (
     tracks_by_truth,
 )
 from benchmarks.bestview_watch import Rows, Watched, followed
+from benchmarks.occupancy import occupancy_rows
+from benchmarks.occupancy_masks import CannotMapError
 from benchmarks.peer_environment import PEERS, PeerEnvironment
 from bestview import ViewScore
 from server.run.evaluate_choices import Choice
@@ -35,6 +37,7 @@ LOOKS_ALONE = {"identity": {"travel_cap": 0.0}}
 TRUE, TRUE_LARGEST = "true boxes", "true boxes, largest"
 OURS, CALIBRATED, WITHOUT = "MyView", "MyView, calibrated", "no homographies"
 PEER = "ByteTrack"
+MAP = "occupancy map"
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,9 +145,20 @@ def ways(
         ground = {camera: it for camera, it in homographies(scene.config()).items() if it is not None}
         short = "nearest feet" if scene is case else "nearest feet, calibr."
         yield Way(short, simple(by_nearest_feet(own_tracks(apart), ground)))
+        if case.detections is None and not case.apart:
+            title = MAP if scene is case else f"{MAP}, calibr."
+            yield from (Way(title, chosen(rows)) for rows in _mapped(scene, found))
         if peers is not None:
             theirs = by_nearest_feet(_peer_tracks(peers, found.boxes), ground)
             yield Way(f"{PEER}, {short}", simple(theirs))
+
+
+def _mapped(scene: Case, found: Watched) -> Iterator[Rows]:
+    """Give what the occupancy map finds; where there can be none, say why."""
+    try:
+        yield occupancy_rows(scene, found.boxes)
+    except CannotMapError as problem:
+        print(f"{scene.name}: no occupancy map: {problem}")
 
 
 def _lists(rows: Rows) -> dict[str, list[MotRow]]:

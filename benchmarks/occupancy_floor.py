@@ -1,0 +1,153 @@
+"""The places where somebody may stand, and how somebody there looks in every camera."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from bestview import person_heights, to_ground
+from bestview.ground import from_ground
+from tracking.boxes import Floats
+from tracking.detectors.heightline import HeightLine
+
+Ints = NDArray[np.int64]
+_BEYOND = 0.25
+"""Share of the picture's height by which people may stand below it, as MyView's detector has it."""
+_ASKED = 40
+"""Points along each side of a picture by which the ground that it shows is found."""
+
+
+@dataclass(frozen=True, slots=True)
+class FloorSettings:
+    """The grid on the ground. Lengths are in person heights.
+
+    Attributes:
+        step: between neighbouring places; 0.15 is a quarter of a metre, the paper's.
+        aspect: width of a person over their height in the picture.
+        least_seen: the share of somebody that has to be in some picture, and not where it is ignored.
+        gate: how far from the border of what is seen somebody may come and go.
+        most_places: the step is made longer where there would be more.
+    """
+
+    step: float = 0.15
+    aspect: float = 0.34
+    least_seen: float = 0.5
+    gate: float = 0.3
+    most_places: int = 4000
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class View:
+    """A camera.
+
+    Attributes:
+        homography: (3, 3) from its picture, pixels, to the ground.
+        size: width and height of its picture.
+        line: how tall people are where, in its pixels.
+        weight: (H, W), 1 where its picture counts, in cells of equal size.
+    """
+
+    homography: Floats
+    size: tuple[int, int]
+    line: HeightLine
+    weight: Floats
+
+    def boxes(self, ground: Floats, aspect: float) -> Floats:
+        """Give the boxes (..., 4) in pixels of people at places (..., 2), NaN where nobody can be seen."""
+        foot = from_ground(self.homography, ground)
+        x, y = foot[..., 0], foot[..., 1]
+        tall = self.line.at(y)
+        tall = np.where((tall >= self.line.smallest) & (tall > 0.0), tall, np.nan)
+        half = aspect * tall / 2.0
+        return np.stack([x - half, y - tall, x + half, y], axis=-1)
+
+    def cells(self, boxes: Floats) -> Ints:
+        """Give the cells (..., 4) that boxes cover, inside the picture; none where there is no box."""
+        rows, columns = self.weight.shape
+        scale = np.array([columns / self.size[0], rows / self.size[1]] * 2)
+        limits = np.array([columns, rows, columns, rows], dtype=np.float64)
+        known = np.clip(np.nan_to_num(boxes * scale, nan=0.0), 0.0, limits)
+        return np.asarray(np.rint(known), dtype=np.int64)
+
+    def seen(self, boxes: Floats) -> Floats:
+        """Give the share of each box (K, 4) that is in the picture and counts, (K,)."""
+        sums = cv2.integral(self.weight, sdepth=cv2.CV_64F)
+        left, top, right, bottom = self.cells(boxes).T
+        inside = sums[bottom, right] - sums[top, right] - sums[bottom, left] + sums[top, left]
+        cell = self.size[0] * self.size[1] / self.weight.size
+        area = (boxes[:, 2] - boxes[:, 0]) * (boxes[:, 3] - boxes[:, 1]) / cell
+        return np.asarray(np.nan_to_num(inside / area, nan=0.0))
+
+    def ground(self) -> Floats:
+        """Give points (K, 2) all over the ground that it shows people on."""
+        width, height = self.size
+        x, y = np.meshgrid(np.linspace(0, width, _ASKED), np.linspace(0, height * (1 + _BEYOND), _ASKED))
+        tall = self.line.at(y)
+        feet = np.stack([x, y], axis=-1)[(tall >= self.line.smallest) & (tall > 0.0)]
+        there = to_ground(self.homography, feet)
+        return np.asarray(there[np.isfinite(there).all(axis=1)])
+
+    def person(self) -> float:
+        """Give how long a person's height is in units of the ground: the median over the picture."""
+        width, height = self.size
+        x, y = np.meshgrid(np.linspace(0.2, 0.8, 7) * width, np.linspace(0.2, 1.0, 17) * height)
+        tall = self.line.at(y)
+        known = (tall >= self.line.smallest) & (tall > 0.0)
+        boxes = np.stack([x, y - tall, x, y], axis=-1)[known]
+        return float(np.nanmedian(person_heights(self.homography, boxes)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Floor:
+    """The grid.
+
+    Attributes:
+        places: (L, 2) ground units.
+        moves: (L, 9) each place and those around it; L where there is none.
+        gates: (L,) whether people may come and go there.
+        rectangles: of each camera, (L, 4) in cells of its picture.
+        person: how long a person's height is in units of the ground.
+    """
+
+    places: Floats
+    moves: Ints
+    gates: NDArray[np.bool_]
+    rectangles: tuple[Ints, ...]
+    person: float
+
+
+def lay_out(views: Sequence[View], settings: FloorSettings) -> Floor:
+    """Put a grid over all the ground on which some camera shows people."""
+    person = float(np.median([view.person() for view in views]))
+    shown = np.concatenate([view.ground() for view in views])
+    step = settings.step * person
+    while True:
+        mesh, inside = _mesh(views, shown, step, settings)
+        if np.count_nonzero(inside) <= settings.most_places:
+            break
+        step *= 1.1
+    number = np.full((inside.shape[0] + 2, inside.shape[1] + 2), np.count_nonzero(inside), dtype=np.int64)
+    number[1:-1, 1:-1][inside] = np.arange(np.count_nonzero(inside))
+    rows, columns = np.nonzero(np.pad(inside, 1))
+    moves = [number[rows + down, columns + right] for down in (-1, 0, 1) for right in (-1, 0, 1)]
+    reach = max(round(settings.gate * person / step), 1)
+    inner = cv2.erode(np.pad(inside, 1).astype(np.uint8), np.ones((2 * reach + 1,) * 2, dtype=np.uint8))
+    places = mesh[inside]
+    rectangles = tuple(view.cells(view.boxes(places, settings.aspect)) for view in views)
+    return Floor(places, np.stack(moves, axis=1), inner[rows, columns] == 0, rectangles, person)
+
+
+def _mesh(
+    views: Sequence[View], shown: Floats, step: float, settings: FloorSettings
+) -> tuple[Floats, NDArray[np.bool_]]:
+    """Give the places (R, C, 2) of a grid around what is shown, and which of them are."""
+    (left, top), (right, bottom) = shown.min(axis=0), shown.max(axis=0)
+    x, y = np.meshgrid(np.arange(left, right + step, step), np.arange(top, bottom + step, step))
+    mesh = np.stack([x, y], axis=-1)
+    flat = mesh.reshape(-1, 2)
+    seen = np.max([view.seen(view.boxes(flat, settings.aspect)) for view in views], axis=0)
+    return mesh, (seen >= settings.least_seen).reshape(x.shape)
