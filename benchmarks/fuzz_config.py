@@ -32,7 +32,7 @@ _PLAIN = b"""site: {name: hall, fps: 25}
 cameras:
   - id: c0
     source: c0.mp4
-    mask: [[[0, 0], [9, 0], [9, 9]]]
+    ignore: [[[0, 0], [9, 0], [9, 9]]]
   - {id: c1, source: "rtsp://10.0.0.2/a", offset: 2}
 track: {window: {stride: 5}}
 view: {lookahead: 25, identity: {confirm: 2}}

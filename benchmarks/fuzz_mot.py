@@ -43,9 +43,18 @@ def _rows(rng: Random, least_id: int) -> bytes:
 class _Files(Target):
     """Files in a folder of their own."""
 
+    least_id = -1
+
     def __init__(self) -> None:
         self._folder = TemporaryDirectory()
         self._path = Path(self._folder.name)
+        rng = Random(1)
+        self._right = [_rows(rng, self.least_id) for _ in range(200)]
+
+    def file(self, rng: Random) -> bytes:
+        """Give a file that is nearly right."""
+        data = rng.choice(self._right)
+        return damaged(rng, data, WORDS) if rng.random() < 0.9 else data
 
     def written(self, data: bytes) -> Path:
         """Write a file; what begins as packed files do is named like one."""
@@ -65,8 +74,7 @@ class Text(_Files):
 
     def make(self, rng: Random) -> bytes:
         """Give a file."""
-        data = _rows(rng, -1)
-        data = damaged(rng, data, WORDS) if rng.random() < 0.9 else data
+        data = self.file(rng)
         if rng.random() < 0.05:
             data = gzip.compress(data, 1)
             data = damaged(rng, data) if rng.random() < 0.8 else data
@@ -79,8 +87,9 @@ class Text(_Files):
         except ValueError as error:
             return refused(error)
         assert np.isfinite([row.box for row in rows]).all(), "a box without end"
-        text = format_rows(rows)
-        assert format_rows(parse_rows(_readable(text), "again")) == text
+        written = _readable(format_rows(rows))
+        again = format_rows(parse_rows(written, "again")).splitlines()
+        assert sorted(again) == sorted(written)
         return True
 
 
@@ -101,8 +110,7 @@ class Detections(_Files):
 
     def make(self, rng: Random) -> bytes:
         """Give a file."""
-        data = _rows(rng, -1)
-        return damaged(rng, data, WORDS) if rng.random() < 0.9 else data
+        return self.file(rng)
 
     def feed(self, data: bytes) -> bool:
         """Ask for its first frames."""
@@ -121,12 +129,12 @@ class Walks(_Files):
     """As the tracks of a walk, from which cameras are calibrated."""
 
     name = "mot-walks"
+    least_id = 1
     share = 0.2
 
     def make(self, rng: Random) -> bytes:
         """Give a file of tracks."""
-        data = _rows(rng, 1)
-        return damaged(rng, data, WORDS) if rng.random() < 0.9 else data
+        return self.file(rng)
 
     def feed(self, data: bytes) -> bool:
         """Take it for a walk."""

@@ -6,6 +6,7 @@ import gc
 import logging
 import mmap
 import multiprocessing
+import multiprocessing.queues
 import re
 import resource
 import signal
@@ -32,7 +33,8 @@ DEAD, MOST_MB = "died", 4096
 _KEPT = 3
 """Inputs that are saved of each kind of crash."""
 _ROOM = 1 << 20
-_HEAD = struct.Struct("<6Q")
+_HEAD = struct.Struct("<5Q")
+"""The number of the input, how many were refused, accepted and crashed, and the bytes that follow."""
 
 
 class HangError(BaseException):
@@ -79,10 +81,10 @@ class _Tracebacks(logging.Handler):
 class Attempt:
     """Feeds inputs one by one, and tells what is wrong: what is raised, logged, too slow or too large."""
 
-    def __init__(self, target: Target) -> None:
-        self.target = target
+    def __init__(self, target: Target, hang_s: float = HANG_S) -> None:
+        self.target, self._hang_s = target, hang_s
         self._log = _Tracebacks()
-        self._most = 0
+        self._most = _most_mb()
 
     @contextmanager
     def watching(self) -> Iterator[None]:
@@ -102,7 +104,7 @@ class Attempt:
     def feed(self, data: bytes) -> bool | Crash:
         """Give whether an input was taken; a crash where there was one."""
         self._log.last = None
-        signal.setitimer(signal.ITIMER_PROF, HANG_S)
+        signal.setitimer(signal.ITIMER_PROF, self._hang_s)
         try:
             taken = self.target.feed(data)
             signal.setitimer(signal.ITIMER_PROF, 0)
@@ -111,18 +113,24 @@ class Attempt:
             self._weigh()
         except (Exception, HangError) as error:  # noqa: BLE001 — whatever it is, it is a crash
             signal.setitimer(signal.ITIMER_PROF, 0)
+            self._most = _most_mb()
             return Crash(_kind(error), "".join(traceback.format_exception(error)))
         return taken
 
     def _weigh(self) -> None:
-        most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
+        most = _most_mb()
         grown, self._most = most - self._most, most
-        if self._most != grown > GROWTH_MB:  # the first input brings libraries with it
+        if grown > GROWTH_MB:
             raise GrowthError(f"{grown} MB more")
 
 
+def _most_mb() -> int:
+    """Give the most megabytes that the process has had."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
+
+
 def _hung(_: int, __: FrameType | None) -> None:
-    raise HangError(f"took more than {HANG_S:g} s")
+    raise HangError("took too long")
 
 
 def _kind(error: BaseException) -> str:
@@ -150,6 +158,7 @@ class Plan:
     seed: int = 1
     out: Path | None = None
     """Where crashes are saved; None: nowhere."""
+    hang_s: float = HANG_S
 
 
 def numbered(target: Target, seed: int, index: int) -> bytes:
@@ -165,24 +174,27 @@ class Runner:
         self._kinds: dict[str, int] = {}
 
     def run(self) -> Tally:
-        """Run it in processes of its own; one that dies is followed by another."""
-        tally, began = Tally(), time.monotonic()
-        shared = mmap.mmap(-1, _HEAD.size + _ROOM)
+        """Run it in processes of its own; one that dies or grows is followed by another."""
+        began = time.monotonic()
+        shared, fork = mmap.mmap(-1, _HEAD.size + _ROOM), multiprocessing.get_context("fork")
         until = None if self._plan.seconds is None else began + self._plan.seconds
-        kinds = 0
-        while True:
-            child = multiprocessing.get_context("fork").Process(target=self._child, args=(shared, until))
+        index, refused, accepted, crashes = 0, 0, 0, 0
+        while index < self._plan.inputs and (index == 0 or until is None or time.monotonic() < until):
+            kinds = fork.SimpleQueue()
+            child = fork.Process(target=self._child, args=(shared, until, kinds))
             child.start()
             died = self._wait(child, shared)
-            index, refused, accepted, crashes, kinds, size = _HEAD.unpack_from(shared)
-            if died is None:
+            while not kinds.empty():
+                self._count(kinds.get())
+            index, refused, accepted, crashes, size = _HEAD.unpack_from(shared)
+            if died is not None:
+                crash = Crash(f"{DEAD}-{died}", f"the process {died}")
+                self._save(crash, shared[_HEAD.size : _HEAD.size + size])
+                index, crashes = index + 1, crashes + 1
+                _HEAD.pack_into(shared, 0, index, refused, accepted, crashes, 0)
+            elif not size:
                 break
-            data = shared[_HEAD.size : _HEAD.size + size]
-            self._save(Crash(f"{DEAD}-{died}", f"the process {died}"), data)
-            _HEAD.pack_into(shared, 0, index + 1, refused, accepted, crashes + 1, kinds + 1, 0)
-        tally.inputs, tally.refused, tally.accepted, tally.crashes = index, refused, accepted, crashes
-        tally.kinds, tally.seconds = kinds, time.monotonic() - began
-        return tally
+        return Tally(index, refused, accepted, crashes, time.monotonic() - began, len(self._kinds))
 
     def _wait(self, child: multiprocessing.process.BaseProcess, shared: mmap.mmap) -> str | None:
         """Wait for a process; say how it died, None where it did not."""
@@ -202,35 +214,45 @@ class Runner:
             raise RuntimeError(f"{self._name}: the fuzzing itself failed; see above")
         return None
 
-    def _child(self, shared: mmap.mmap, until: float | None) -> None:
-        index, refused, accepted, crashes, kinds, _ = _HEAD.unpack_from(shared)
+    def _child(
+        self, shared: mmap.mmap, until: float | None, kinds: multiprocessing.queues.SimpleQueue[str]
+    ) -> None:
+        index, refused, accepted, crashes, _ = _HEAD.unpack_from(shared)
         resource.setrlimit(resource.RLIMIT_AS, (MOST_MB << 20, MOST_MB << 20))
         target = self._make()
-        attempt = Attempt(target)
+        attempt, begun, grown = Attempt(target, self._plan.hang_s), index, 0
         gc.freeze()
         with attempt.watching():
-            while index < self._plan.inputs and (until is None or time.monotonic() < until):
+            while not grown and index < self._plan.inputs:
+                if until is not None and time.monotonic() > until and index > begun:
+                    break
                 data = numbered(target, self._plan.seed, index)[:_ROOM]
                 shared[_HEAD.size : _HEAD.size + len(data)] = data
-                _HEAD.pack_into(shared, 0, index, refused, accepted, crashes, kinds, len(data))
+                _HEAD.pack_into(shared, 0, index, refused, accepted, crashes, len(data))
                 match attempt.feed(data):
                     case Crash() as crash:
                         crashes += 1
-                        kinds += self._save(crash, data)
+                        self._save(crash, data)
+                        if self._kinds[crash.kind] <= _KEPT:
+                            kinds.put(crash.kind)
+                        grown = int(crash.kind.startswith(GrowthError.__name__))  # what it had it keeps
                     case True:
                         accepted += 1
                     case _:
                         refused += 1
                 index += 1
-        _HEAD.pack_into(shared, 0, index, refused, accepted, crashes, kinds, 0)
+        _HEAD.pack_into(shared, 0, index, refused, accepted, crashes, grown)
         target.close()
 
-    def _save(self, crash: Crash, data: bytes) -> int:
-        """Save what crashed, some of each kind; give 1 where the kind is new."""
-        count = self._kinds[crash.kind] = self._kinds.get(crash.kind, 0) + 1
+    def _count(self, kind: str) -> int:
+        count = self._kinds[kind] = self._kinds.get(kind, 0) + 1
+        return count
+
+    def _save(self, crash: Crash, data: bytes) -> None:
+        """Save what crashed, some of each kind."""
+        count = self._count(crash.kind)
         if self._plan.out is not None and count <= _KEPT:
             self._plan.out.mkdir(parents=True, exist_ok=True)
             stem = f"{self._name}.{crash.kind}.{count}"
             (self._plan.out / f"{stem}.bin").write_bytes(data)
             (self._plan.out / f"{stem}.txt").write_text(crash.text, encoding="utf-8", errors="replace")
-        return int(count == 1)

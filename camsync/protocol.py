@@ -50,7 +50,7 @@ _CODE = re.compile(r"[a-z]{1,20}")
 _FPS = re.compile(r"\d{1,6}(\.\d{1,20})?")  # pulses per second; no exponent: people read it
 _UNNAMED = "-"  # stands for a client without a name, which no name can be
 _SHOWN = 40  # characters of a wrong word that an error repeats
-MAX_FPS = 10_000.0  # pulses per second that a server may have as its rate
+MIN_FPS, MAX_FPS = 1e-6, 10_000.0  # pulses per second that a server may have as its rate
 
 
 class ProtocolError(ValueError):
@@ -140,8 +140,8 @@ def _greeting(words: list[str]) -> Greeting:
     if version != VERSION:  # only the version itself is sure to mean the same in all versions
         return Greeting(version, 1.0, 0.0, None)
     fps = float(_match(_FPS, keys["fps"], "rate"))
-    if not 0.0 < fps <= MAX_FPS:
-        raise ProtocolError("malformed", f"the rate is not above 0 and at most {MAX_FPS:.0f}")
+    if not MIN_FPS <= fps <= MAX_FPS:
+        raise ProtocolError("malformed", f"the rate is not between {MIN_FPS:g} and {MAX_FPS:g}")
     pulse = None if keys["pulse"] == "-" else _number(keys["pulse"])
     return Greeting(version, fps, _time(keys["now"]), pulse)
 

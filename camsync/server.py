@@ -14,7 +14,7 @@ from camsync.hub import Hub
 from camsync.limits import ServerLimits
 from camsync.messages import Beat, Greeting, Hello, Wait
 from camsync.peer import ClientInfo
-from camsync.protocol import MAX_FPS, VERSION, encode, is_name
+from camsync.protocol import MAX_FPS, MIN_FPS, VERSION, encode, is_name
 
 _log = logging.getLogger(__name__)
 _FARTHEST = 2**39  # pulses that a client may claim to have counted: centuries at any camera's rate
@@ -49,8 +49,8 @@ class PulseServer:
         limits: ServerLimits | None = None,
         clock: Clock | None = None,
     ) -> None:
-        if not 0.0 < fps <= MAX_FPS:
-            raise ValueError(f"fps must be above 0 and at most {MAX_FPS:.0f}, not {fps}")
+        if not MIN_FPS <= fps <= MAX_FPS:
+            raise ValueError(f"fps must be between {MIN_FPS:g} and {MAX_FPS:g}, not {fps}")
         wrong = sorted(name for name in expect if not is_name(name))
         if wrong:
             raise ValueError(f"{wrong[0]!r} cannot be a client's name: letters, digits, '.', '_', '-'")

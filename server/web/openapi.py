@@ -111,6 +111,7 @@ def _operation(path: str, summary: str) -> dict[str, Any]:
     if path in OVERLAY | PAST | HELD | _SPANS or path.endswith("/choice"):
         responses["400"] = {"description": "The query asks for what there is not.", "content": error}
     if path in OPERATOR.keys() | OPERATOR_FILES.keys() | OPERATOR_RESULTS.keys():
+        responses["400"] = {"description": "It asks for what there is not.", "content": error}
         responses["401"] = {"description": "The operator's token is needed.", "content": error}
         responses["403"] = {"description": "Only the operator may.", "content": error}
         responses["429"] = {"description": "Too many wrong tokens; try again later.", "content": error}

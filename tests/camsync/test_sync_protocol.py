@@ -114,7 +114,7 @@ def test_a_wrong_line_is_refused_with_a_code(line: bytes, code: str) -> None:
     assert caught.value.code == code
 
 
-@pytest.mark.parametrize("fps", [b"0", b"10000.5", b"999999"])
+@pytest.mark.parametrize("fps", [b"0", b"0.0000000000000001", b"10000.5", b"999999"])
 def test_a_rate_at_which_nobody_could_count_is_refused(fps: bytes) -> None:
     with pytest.raises(ProtocolError):
         parse_server_line(b"MYVIEW-SYNC 1 fps=" + fps + b" now=0 pulse=-")

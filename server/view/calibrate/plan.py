@@ -60,8 +60,8 @@ def plot_plan(views: Sequence[PlanView], unit: str, out: Path | BinaryIO) -> Non
         axis.set_aspect("equal")
         axis.margins(_MARGIN)
         axis.autoscale_view()
-        axis.set_xlabel(unit)
-        axis.set_ylabel(unit)
+        axis.set_xlabel(_plain(unit))
+        axis.set_ylabel(_plain(unit))
         axis.legend(title="camera", markerscale=3)
     figure.suptitle("Floor plan: what was covered, foot points, and how far they are off", fontsize="medium")
     figure.savefig(out, dpi=100, format="png", bbox_inches="tight", metadata={"Software": None})
@@ -73,7 +73,12 @@ def _draw(axis: Axes, view: PlanView, colour: str) -> None:
     axis.fill(*_area(view).T, facecolor=to_rgba(colour, 0.12), edgecolor=colour, linewidth=1)
     lines = np.stack([seen, view.place[::step]], axis=1)
     axis.add_collection(LineCollection(list(lines), colors=colour, linewidths=0.6, alpha=0.6))
-    axis.plot(*seen.T, ".", markersize=3, color=colour, label=view.camera)
+    axis.plot(*seen.T, ".", markersize=3, color=colour, label=_plain(view.camera))
+
+
+def _plain(text: str) -> str:
+    """Give a text as it is to be read: between dollars Matplotlib reads formulas, and may fail to."""
+    return text.replace("$", r"\$")
 
 
 def _area(view: PlanView) -> Floats:

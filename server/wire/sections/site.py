@@ -13,7 +13,7 @@ class Site(Section):
     """What all cameras share. Every camera's picture is scaled to one size, so that any can follow any."""
 
     name: Name = "site"
-    fps: Annotated[float, Field(gt=0, le=1000, allow_inf_nan=False)] = 25.0
+    fps: Annotated[float, Field(ge=0.001, le=1000, allow_inf_nan=False)] = 25.0
     width: Side = 640
     height: Side = 360
 

@@ -1,0 +1,106 @@
+"""What the API says of itself is true: schemathesis asks by the description, and holds answers against it."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import threading
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import pytest
+import requests
+import schemathesis
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from hypothesis.errors import Unsatisfiable
+from schemathesis import GenerationMode
+from schemathesis.checks import (
+    content_type_conformance,
+    response_schema_conformance,
+    status_code_conformance,
+)
+
+from benchmarks.fuzz_http import Requests
+
+CASES = 4
+"""Of each operation and mode; endless streams are only begun."""
+PATIENCE = 20.0
+CHECKS = [content_type_conformance, response_schema_conformance, status_code_conformance]
+"""A 500 is described nowhere; a 400 may be, though a schema cannot say what is a moment."""
+ENDLESS = ("video/", "multipart/", "text/event-stream")
+DECODED = (".mjpeg", ".jpg")
+"""What starts a process that decodes, for which other tests are."""
+
+
+@dataclass
+class Site:
+    """A served site, and how it describes itself."""
+
+    url: str
+    operations: dict[str, Any]
+
+
+@pytest.fixture(scope="module")
+def described() -> Iterator[Site]:
+    """Serve a site in a thread of its own: schemathesis waits for answers."""
+    target = Requests()
+    loop = target._loop
+    thread = threading.Thread(target=loop.run_forever)
+    thread.start()
+    try:
+        url = f"http://127.0.0.1:{target._port}"
+        schema = schemathesis.openapi.from_url(f"{url}/api/openapi.json")
+        found = [it.ok() for it in schema.get_all_operations()]
+        yield Site(url, {it.label: it for it in found})
+    finally:
+        loop.call_soon_threadsafe(loop.stop)
+        thread.join()
+        target.close()
+
+
+def endless(operation: Any) -> bool:
+    """Tell whether an answer has no end."""
+    content = operation.definition.raw["responses"]["200"].get("content", {})
+    return any(kind.startswith(ENDLESS) for kind in content)
+
+
+@pytest.mark.timeout(300)
+@pytest.mark.parametrize("mode", list(GenerationMode))
+def test_every_answer_is_one_that_is_described(
+    described: Site, mode: GenerationMode, caplog: pytest.LogCaptureFixture
+) -> None:
+    for label, operation in described.operations.items():
+        if label.endswith(DECODED):
+            continue
+
+        @settings(
+            max_examples=CASES,
+            derandomize=True,
+            database=None,
+            deadline=None,
+            suppress_health_check=list(HealthCheck),
+        )
+        @given(case=operation.as_strategy(generation_mode=mode) if _has(operation, mode) else st.none())
+        def ask(case: Any) -> None:
+            if case is not None:
+                _ask(described, case)
+
+        with contextlib.suppress(Unsatisfiable):  # nothing that could be asked of it is wrong
+            ask()
+    assert not [it for it in caplog.records if it.exc_info and it.levelno >= logging.WARNING]
+
+
+def _has(operation: Any, mode: GenerationMode) -> bool:
+    return mode is GenerationMode.POSITIVE or bool(operation.definition.raw["parameters"])
+
+
+def _ask(site: Site, case: Any) -> None:
+    if endless(case.operation):
+        kwargs = case.as_transport_kwargs(base_url=site.url)
+        with requests.request(**kwargs, stream=True, timeout=PATIENCE) as answer:
+            told = case.operation.definition.raw["responses"]
+            assert str(answer.status_code) in told, f"{case.as_curl_command()}: {answer.status_code}"
+    else:
+        case.call_and_validate(base_url=site.url, timeout=PATIENCE, checks=CHECKS)
