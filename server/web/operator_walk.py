@@ -91,16 +91,18 @@ def _file(body: bytes, content_type: str, name: str) -> web.Response:
 def _told(service: BestViewService) -> OperatorWalk:
     walking = service.walking
     done = walking.done or Done()
-    cameras, pairs = walking.cameras(), walking.pairs()
+    covered = walking.covered()
     lacking = [
-        it.words for seen in cameras for it in missed(seen.camera, seen.thirds, seen.deep or float("inf"))
+        it.words
+        for seen in covered.cameras
+        for it in missed(seen.camera, seen.thirds, seen.deep or float("inf"))
     ]
     return OperatorWalk(
         state=walking.state.value,
         seconds=walking.seconds,
         most=MOST_S,
-        cameras=[WalkCamera(it.camera, it.feet, list(it.thirds), it.deep) for it in cameras],
-        pairs=[WalkPair(it.one, it.other, it.seconds) for it in pairs],
+        cameras=[WalkCamera(it.camera, it.feet, list(it.thirds), it.deep) for it in covered.cameras],
+        pairs=[WalkPair(it.one, it.other, it.seconds) for it in covered.pairs],
         lacking=lacking,
         error=done.error,
         lines=done.lines,

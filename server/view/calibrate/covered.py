@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from server.view.calibrate.trail import Trail
+from server.view.calibrate.trail import Samples, Trail
 
 _FEW = 10
 """Feet below which nothing is said of shares."""
@@ -40,23 +41,36 @@ class PairCovered:
     seconds: float
 
 
-def camera_covered(trail: Trail, others: Sequence[Trail]) -> CameraCovered:
-    """Say what a camera has seen of the walk while another did."""
-    moments, third, tall = trail.samples
-    elsewhere = np.concatenate([np.zeros(0, dtype=np.int64), *(it.samples[0] for it in others)])
-    both = np.isin(moments, elsewhere)
-    third, tall = third[both], tall[both]
-    left, middle, right = (float(it) for it in np.bincount(third, minlength=3) / max(1, len(third)))
-    deep = float(np.quantile(tall, 0.95) / np.quantile(tall, 0.05)) if len(tall) >= _FEW else None
-    return CameraCovered(trail.camera, len(third), (left, middle, right), deep)
+@dataclass(frozen=True, slots=True)
+class Covered:
+    """What all of them have seen of it."""
+
+    cameras: tuple[CameraCovered, ...] = ()
+    pairs: tuple[PairCovered, ...] = ()
 
 
-def pairs_covered(trails: Sequence[Trail], seconds: float) -> list[PairCovered]:
-    """Say for how long every two cameras saw somebody at once; moments are so many seconds apart."""
-    moments = {it.camera: np.unique(it.samples[0]) for it in trails}
-    return [
-        PairCovered(
-            one, other, seconds * len(np.intersect1d(moments[one], moments[other], assume_unique=True))
-        )
-        for one, other in combinations(moments, 2)
+def covered(trails: Sequence[Trail], seconds: float) -> Covered:
+    """Say what was covered; the moments that are compared are so many seconds apart."""
+    samples = [it.samples for it in trails]
+    moments = 1 + max((int(it.moment.max()) for it in samples if it.moment.size), default=-1)
+    there = np.zeros((len(samples), moments), dtype=np.bool_)
+    for row, it in zip(there, samples, strict=True):
+        row[it.moment] = True
+    count = there.sum(axis=0)
+    cameras = [_camera(trail.camera, it, count) for trail, it in zip(trails, samples, strict=True)]
+    both = there.astype(np.int64) @ there.T.astype(np.int64)
+    pairs = [
+        PairCovered(trails[one].camera, trails[other].camera, seconds * int(both[one, other]))
+        for one, other in combinations(range(len(trails)), 2)
     ]
+    return Covered(tuple(cameras), tuple(pairs))
+
+
+def _camera(name: str, samples: Samples, count: NDArray[np.int64]) -> CameraCovered:
+    """Say what one camera has seen; ``count`` is how many cameras saw anybody at each moment, (M,)."""
+    shared = count[samples.moment] > 1
+    third, tall = samples.third[shared], samples.tall[shared]
+    left, middle, right = (float(it) for it in np.bincount(third, minlength=3) / max(1, len(third)))
+    small, large = np.quantile(tall, (0.05, 0.95)) if len(tall) >= _FEW else (0.0, 0.0)
+    deep = float(large / small) if small > 0 else None
+    return CameraCovered(name, len(third), (left, middle, right), deep)

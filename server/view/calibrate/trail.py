@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,6 +19,21 @@ Ints = NDArray[np.int64]
 _THIRDS = 3
 
 
+@dataclass(frozen=True, slots=True)
+class Samples:
+    """S whole boxes.
+
+    Attributes:
+        moment: (S,) when, counted in moments.
+        third: (S,) in which third of the picture they stand, 0 to 2 from the left.
+        tall: (S,) pixels.
+    """
+
+    moment: Ints
+    third: Ints
+    tall: Floats
+
+
 class Trail:
     """Collects one camera's words; ``site`` is the size of the site's picture, which boxes come in."""
 
@@ -30,9 +47,9 @@ class Trail:
         self._frames: list[Ints] = []
         self._who: list[Ints] = []
         self._boxes: list[Floats] = []
-        self._moments: list[Ints] = []
-        self._third: list[Ints] = []
-        self._tall: list[Floats] = []
+        self._moments: list[Ints] = [np.zeros(0, dtype=np.int64)]
+        self._third: list[Ints] = [np.zeros(0, dtype=np.int64)]
+        self._tall: list[Floats] = [np.zeros(0)]
 
     def add(self, message: CameraTracks, start: int) -> None:
         """Take in what is final of a word and was not before; ``start`` is the pulse that is frame 0."""
@@ -70,16 +87,17 @@ class Trail:
         )
 
     @property
-    def samples(self) -> tuple[Ints, Ints, Floats]:
-        """Whole boxes at the moments that are compared: the frame, the third, how tall; (S,) each."""
-        if not self._moments:
-            return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros(0)
-        return np.concatenate(self._moments), np.concatenate(self._third), np.concatenate(self._tall)
+    def samples(self) -> Samples:
+        """The whole boxes at the moments at which cameras are compared."""
+        # Asked for every second: what was put together once is not put together again.
+        self._moments, self._third = [np.concatenate(self._moments)], [np.concatenate(self._third)]
+        self._tall = [np.concatenate(self._tall)]
+        return Samples(self._moments[0], self._third[0], self._tall[0])
 
     def _sample(self, frames: Ints, boxes: Floats, size: tuple[int, int]) -> None:
         taken = (frames % self._step == 0) & ~cut_off(boxes, size)
         whole = boxes[taken]
-        self._moments.append(frames[taken])
+        self._moments.append(frames[taken] // self._step)
         across = _THIRDS * feet(whole)[:, 0] / size[0]
         self._third.append(np.clip(across.astype(np.int64), 0, _THIRDS - 1))
         self._tall.append(whole[:, 3] - whole[:, 1])

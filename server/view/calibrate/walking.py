@@ -8,7 +8,7 @@ from enum import Enum
 from typing import Any
 
 from server.view.align import Epoch
-from server.view.calibrate.covered import CameraCovered, PairCovered, camera_covered, pairs_covered
+from server.view.calibrate.covered import Covered, covered
 from server.view.calibrate.process import calibrated
 from server.view.calibrate.task import Done, Task
 from server.view.calibrate.trail import Trail
@@ -100,14 +100,9 @@ class Walking:
         """For how long was walked."""
         return self._epochs * self._config.track.window.stride / self._fps
 
-    def cameras(self) -> list[CameraCovered]:
-        """Say what each camera has seen of it so far."""
-        trails = list(self._trails.values())
-        return [camera_covered(it, [other for other in trails if other is not it]) for it in trails]
-
-    def pairs(self) -> list[PairCovered]:
-        """Say for how long every two cameras saw somebody at once."""
-        return pairs_covered(list(self._trails.values()), moment(self._fps) / self._fps)
+    def covered(self) -> Covered:
+        """Say what was covered of it so far."""
+        return covered(list(self._trails.values()), moment(self._fps) / self._fps)
 
     async def _calibrate(self, task: Task) -> None:
         self.done = await self._work(task)
