@@ -164,7 +164,7 @@ def main() -> None:
     options = parser(__doc__, "page")
     options.add_argument("--part", choices=("visit", "hours"), default="visit")
     options.add_argument("--hours", type=float, default=8.0, help="that are played, of --part hours")
-    options.add_argument("--speed", type=float, default=33.0, help="how many times as fast")
+    options.add_argument("--speed", type=float, default=16.0, help="how many times as fast")
     options.add_argument(
         "--fps", type=float, default=25.0, help="of the demo; less where there is other work"
     )

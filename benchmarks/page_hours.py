@@ -53,6 +53,8 @@ _STATE = """() => ({
   ranges: video.buffered.length,
   buffered: video.buffered.end(video.buffered.length - 1) - video.buffered.start(0),
 })"""
+# Who came last stays for an hour: the picture goes on until the next reading.
+_NEWEST = "document.querySelector('#people li:last-child button').click()"
 _WATCHED = """() => { window.shown = 0;
   const count = () => { shown += 1; video.requestVideoFrameCallback(count); };
   video.requestVideoFrameCallback(count); }"""
@@ -88,7 +90,7 @@ class Reading:
 
 
 async def play(hours: float, speed: float) -> list[Reading]:
-    """Play so many hours; switch person now and then, as a viewer does."""
+    """Play so many hours; switch to who came last now and then, as a viewer does."""
     clock = Clock(speed, time.time())
     async with serving(clock) as url, chromium() as browser:
         page = await browser.new_page(viewport={"width": 1280, "height": 800})
@@ -98,12 +100,15 @@ async def play(hours: float, speed: float) -> list[Reading]:
         await page.goto(url)
         await page.wait_for_function("myview.state === 'playing'", timeout=_PLAYING_MS)
         await page.evaluate(_WATCHED)
+        await page.evaluate(_NEWEST)
         tools = await page.context.new_cdp_session(page)
         await tools.send("Performance.enable")
         begun, readings = clock.now(), []
         for number in range(1, _READINGS + 1):
             await clock.until(begun + 3600 * hours * number / _READINGS)
-            await page.keyboard.press("ArrowRight")
+            await page.evaluate(
+                _NEWEST
+            )  # who is known for an hour yet: the picture goes on until the next reading
             await page.keyboard.press("w")
             readings.append(await _read(page, tools, (clock.now() - begun) / 3600))
     return readings
@@ -147,7 +152,7 @@ def describe(report: Report, readings: list[Reading], speed: float) -> None:
         ],
         [
             [
-                *(f"{it.hours:.1f}", f"{it.heap:.2f}", str(it.nodes), str(it.listeners), str(it.ranges)),
+                *(f"{it.hours:.2f}", f"{it.heap:.2f}", str(it.nodes), str(it.listeners), str(it.ranges)),
                 *(f"{it.buffered:.0f}", f"{it.behind / 1000:.1f}", f"{it.stood:.1f}"),
                 *(str(it.shown), f"{it.load:.0f}"),
             ]
