@@ -24,7 +24,6 @@ from server.wire.sections import Camera, View
 from server.wire.sources import resolved
 from server.wire.values import check_values
 
-
 _SHOWN = 300
 """Characters of what a library says that a line of ours repeats."""
 
