@@ -14,6 +14,7 @@ from server.view.gauge import Gauge
 from server.view.sense import makes_sense
 from server.view.shelf import NoPictureError, Shelf, Shelved
 from server.view.sound import SoundShelf
+from server.wire.epochs import end_of_epoch
 from server.wire.inbox import Message
 from server.wire.messages import (
     UNREADABLE,
@@ -26,6 +27,9 @@ from server.wire.messages import (
 )
 
 log = logging.getLogger(__name__)
+
+_THUMBNAILS_MOST = 1000
+"""Small pictures that are kept; there are as many as tracks were seen lately."""
 
 
 @dataclass(slots=True)
@@ -84,7 +88,11 @@ class Thumbnail:
 
 
 class Intake:
-    """Takes the cameras' messages in. What cannot be understood is counted and dropped."""
+    """Takes the cameras' messages in. What cannot be understood is counted and dropped.
+
+    So is what is of pulses more than ``ahead`` after the newest, which ``now`` gives (below 0: none):
+    it would be waited for as long as that takes.
+    """
 
     def __init__(
         self,
@@ -92,7 +100,11 @@ class Intake:
         aligner: Aligner,
         on_frame: Callable[[str, Shelved], None],
         sound: SoundShelf | None = None,
+        *,
+        now: Callable[[], int] = lambda: -1,
+        ahead: int = 0,
     ) -> None:
+        self._now, self._ahead = now, ahead
         self._shelves, self._aligner, self._on_frame = shelves, aligner, on_frame
         self._sound = sound
         self.bad_sounds = 0
@@ -131,7 +143,7 @@ class Intake:
             return
         try:
             head = self._frame_head.decode(message.attachment)
-            if state.refused:
+            if state.refused or self._is_far_ahead(state, head.pulse):
                 return
             shelf = self._shelves[camera]
             frame = shelf.put(head.pulse, head.boot, message.payload, key=head.key, after=head.after)
@@ -169,6 +181,8 @@ class Intake:
         if tracks.camera != camera or not makes_sense(tracks, self._aligner.stride):
             state.bad("its tracks make no sense; is it run with this configuration?")
             return
+        if self._is_far_ahead(state, end_of_epoch(tracks.epoch, self._aligner.stride)):
+            return
         state.gauge.window(tracks)
         state.ended = tracks.ended
         self._aligner.tracks(tracks)
@@ -197,12 +211,26 @@ class Intake:
         except UNREADABLE as error:
             state.bad(error)
             return
-        self.thumbnails[camera, head.boot, head.track] = Thumbnail(message.payload, head.pulse)
+        if self._is_far_ahead(state, head.pulse):
+            return
+        key = camera, head.boot, head.track
+        self.thumbnails.pop(key, None)  # what comes anew is the newest
+        self.thumbnails[key] = Thumbnail(message.payload, head.pulse)
+        if len(self.thumbnails) > _THUMBNAILS_MOST:
+            del self.thumbnails[next(iter(self.thumbnails))]
 
     def forget_thumbnails_before(self, pulse: int) -> None:
         """Let go of the small pictures of tracks that were not seen since."""
         for key in [key for key, thumbnail in self.thumbnails.items() if thumbnail.pulse < pulse]:
             del self.thumbnails[key]
+
+    def _is_far_ahead(self, state: CameraState, pulse: int) -> bool:
+        """Tell whether a pulse is one that nobody can have counted to, and count that."""
+        newest = self._now()
+        if newest < 0 or pulse <= newest + self._ahead:
+            return False
+        state.bad(f"of pulse {pulse}, while the site is at {newest}")
+        return True
 
     def _state_of(self, message: Message) -> tuple[CameraState | None, str]:
         camera = camera_of(message.key)

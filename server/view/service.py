@@ -31,6 +31,9 @@ from server.wire.sections import View
 
 log = logging.getLogger(__name__)
 
+_AHEAD_S = 60.0
+"""How far a camera may have counted ahead of this service, which may have been held up."""
+
 
 class BestViewService:
     """Everything of the best-view process but HTTP. ``out`` is a folder for tracks and choices."""
@@ -50,7 +53,14 @@ class BestViewService:
         form = config.sound.format
         self.sound = None if form is None else SoundShelf(form, config.site.fps, frames / config.site.fps)
         self.splicer = Splicer(self.shelves, self.agreement, config, self.sound)
-        self.intake = Intake(self.shelves, self.aligner, self.splicer.frame, self.sound)
+        self.intake = Intake(
+            self.shelves,
+            self.aligner,
+            self.splicer.frame,
+            self.sound,
+            now=lambda: self.pulse,
+            ahead=round(_AHEAD_S * fps),
+        )
         self.decider = Decider(
             config, homographies(config), lambda camera, pulse: self.shelves[camera].has(pulse)
         )

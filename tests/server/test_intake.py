@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from typing import Any
 
@@ -216,6 +217,30 @@ def test_small_pictures_are_kept_by_run_and_track_until_they_are_old_or_the_came
     assert [kept.jpeg for kept in hall.intake.thumbnails.values()] == [b"new", b"other"]
     hall.intake.alive(KEYS.camera("c1", "alive"), there=False)
     assert list(hall.intake.thumbnails) == [("c0", 1, 2)]
+
+
+def test_what_is_of_pulses_that_nobody_can_have_counted_to_is_counted_and_dropped() -> None:
+    hall = Hall()
+    hall.intake = Intake(hall.shelves, hall.aligner, lambda *_: None, now=lambda: 20, ahead=50)
+    far = 2**40
+    unit = dataclasses.replace(encoded(0)[0], pulse=far)
+    hall.handle("video", video("c0", unit))
+    hall.handle("tracks", tracks(word("c0", far // STRIDE, {})))
+    hall.handle("thumbs", thumbnail("c0", 1, b"jpeg", pulse=far))
+    assert hall.bad() == 3
+    assert hall.shelves["c0"].newest == -1
+    assert not hall.intake.thumbnails
+    hall.handle("tracks", tracks(word("c0", 0, {})))
+    hall.handle("tracks", tracks(word("c1", 0, {})))
+    assert [epoch.number for epoch in hall.aligner.ready(now=4)] == [0]
+
+
+def test_small_pictures_are_so_many_at_most() -> None:
+    hall = Hall()
+    for track in range(1200):
+        hall.intake.thumbnail(thumbnail("c0", track, b"jpeg"))
+    assert len(hall.intake.thumbnails) == 1000
+    assert ("c0", 1, 1199) in hall.intake.thumbnails
 
 
 def test_a_status_is_kept() -> None:
