@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TypeVar
 
 import aiohttp
@@ -50,6 +50,8 @@ class HttpSettings:
     """Seconds before the first further attempt; doubled each time."""
     backoff_most: float = 5.0
     """Seconds between attempts at most."""
+    token: str | None = field(default=None, repr=False)
+    """What lets in, where the server asks for it."""
 
     def backoff(self, failures: int) -> float:
         """Give the seconds to wait after so many failures in a row (1 or more)."""
@@ -84,7 +86,7 @@ async def get(url: URL, settings: HttpSettings, accept: str) -> AsyncIterator[ai
     try:
         async with (
             aiohttp.ClientSession(timeout=timeout) as session,
-            session.get(url, headers={"Accept": accept}) as answer,
+            session.get(url, headers=_headers(settings, accept)) as answer,
         ):
             await _check(answer)
             yield answer
@@ -106,6 +108,11 @@ async def get_json(url: URL, kind: type[_ANSWER], settings: HttpSettings) -> _AN
         return msgspec.json.decode(body, type=kind)
     except msgspec.DecodeError as error:
         raise ContractError(f"{url} does not answer like MyView: {error}") from error
+
+
+def _headers(settings: HttpSettings, accept: str) -> dict[str, str]:
+    heads = {"Accept": accept}
+    return heads if settings.token is None else {**heads, "Authorization": f"Bearer {settings.token}"}
 
 
 async def _check(answer: aiohttp.ClientResponse) -> None:

@@ -17,6 +17,13 @@
  * @property {number} now unix seconds of the server's clock
  * @property {string[]} cameras
  *
+ * @typedef {object} Session what whoever looks at the page may
+ * @property {boolean} by_token by a token; else there are none, and nothing to sign in to
+ * @property {string | null} name of the token
+ * @property {'watch' | 'operate'} role
+ * @property {number | null} object this person's views alone
+ * @property {string | null} camera this camera alone
+ *
  * @typedef {object} Person an entry of /api/objects
  * @property {number} object
  * @property {string | null} [name] what the operator calls them

@@ -6,7 +6,7 @@ const SCROLLS = new Set(['ArrowLeft', 'ArrowRight']); // what has the focus, if 
 /** @param {Record<string, () => void>} keys what each does, by KeyboardEvent.key in lower case */
 export function listenToKeys(keys) {
   document.addEventListener('keydown', (event) => {
-    if (event.ctrlKey || event.metaKey || event.altKey || event.target instanceof HTMLSelectElement) return;
+    if (event.ctrlKey || event.metaKey || event.altKey || isIn(event.target, 'select, form')) return;
     const name = event.key.length === 1 ? event.key.toLowerCase() : event.key;
     const action = keys[name];
     if (!action || (PRESSES.has(event.key) && isIn(event.target, 'button, summary, a'))) return;

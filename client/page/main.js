@@ -10,6 +10,7 @@ import { Overlay } from './overlay.js';
 import { Painter } from './painter.js';
 import { People } from './people.js';
 import { Reason } from './reason.js';
+import { SignIn } from './sign_in.js';
 import { Span } from './span.js';
 import { Strip } from './strip.js';
 import { Tiles } from './tiles.js';
@@ -118,13 +119,30 @@ function markCamera(camera) {
   if (viewer.probe.pulse !== null) readOut();
 }
 
+const signIn = new SignIn(() => location.reload(), tellSignIn);
+
+/** @param {unknown} error why nobody could be signed in; null: they were */
+function tellSignIn(error) {
+  write(element('sign-in-trouble'), error instanceof Error ? error.message : '');
+}
+
+/** A server that needs a token looks like one that is away, to whom has none; one that is away says nothing. */
+function lookWhoMay() {
+  void signIn.look().catch(() => null);
+}
+
 listenToControls({ video, viewer, painter, overlay, strip, explaining });
+await signIn.begin();
 new ServerEvents({
   opened: () => {
     viewer.setConnected(true);
     void timekeeper.begin();
+    lookWhoMay();
   },
-  lost: () => viewer.setConnected(false),
+  lost: () => {
+    viewer.setConnected(false);
+    lookWhoMay();
+  },
   heard: (name, data) => {
     if (name === 'gop') viewer.addGop(data);
     else if (name === 'site') viewer.setSite(data);

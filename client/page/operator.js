@@ -14,20 +14,17 @@ import { Marks } from './operator_marks.js';
 import { KnownPeople } from './operator_people.js';
 import { CalibrationWalk } from './operator_walk.js';
 import { Palette } from './palette.js';
+import { SignIn } from './sign_in.js';
 
-/** @import {Site} from './contract.js' */
+/** @import {Session, Site} from './contract.js' */
 /** @import {Section} from './operator_parts.js' */
 
-const SIGN_IN_CODES = [401, 429];
-
-/** @type {HTMLFormElement} */
-const form = element('sign-in');
-/** @type {HTMLInputElement} */
-const token = element('token');
 /** @type {Map<string, Section>} */
 const sections = new Map();
 /** @type {string | null} */
 let opened = null;
+
+const signIn = new SignIn(() => void enter(), tell);
 
 /** @param {unknown} error what went wrong; null: nothing */
 function tell(error) {
@@ -38,24 +35,28 @@ function tell(error) {
 }
 
 function askForToken() {
-  form.hidden = false;
   show(null);
-  token.focus();
+  signIn.ask();
 }
 
 async function enter() {
   try {
-    const session = await ask('session');
+    const session = await signIn.look();
+    if (!session) return show(null);
+    if (session.role !== 'operate') return await refused(session);
     const site = await getJson('api/site');
-    form.hidden = true;
-    element('sign-out').hidden = !session.by_token;
     tell(null);
     if (!sections.size) build(site);
     show(location.hash.slice(1));
   } catch (error) {
-    if (error instanceof Refused && SIGN_IN_CODES.includes(error.status)) askForToken();
-    else tell(error);
+    tell(error);
   }
+}
+
+/** @param {Session} session of somebody who may not operate: the server says what it takes */
+async function refused({ by_token: byToken }) {
+  if (byToken) askForToken();
+  await ask('config').catch(tell);
 }
 
 /** @param {Site} site */
@@ -104,24 +105,7 @@ function show(wanted) {
   opened = next;
 }
 
-form.addEventListener('submit', async (event) => {
-  event.preventDefault();
-  try {
-    await ask('session', 'POST', { token: token.value });
-    token.value = '';
-    await enter();
-  } catch (error) {
-    tell(error);
-    token.select();
-  }
-});
-
-element('sign-out').addEventListener('click', async () => {
-  await ask('session', 'DELETE').catch(tell);
-  location.reload(); // nothing that was shown stays
-});
-
 addEventListener('hashchange', () => {
   if (opened !== null) show(location.hash.slice(1));
 });
-void enter();
+void signIn.begin().then(enter);

@@ -1,4 +1,4 @@
-/** Requests to the operator's addresses. What goes wrong is an Error whose message is one line for people. */
+/** Requests to the operator's addresses, and others that answer as they do: errors are one line for people. */
 
 const PATIENCE_MS = 8000;
 
@@ -21,24 +21,36 @@ export class Refused extends Error {
  * @throws {Refused} the server says no
  * @throws {Error} it says nothing
  */
-export async function ask(what, method = 'GET', content) {
-  const response = await send(what, method, content);
+export function ask(what, method = 'GET', content) {
+  return askAt(`api/operator/${what}`, method, content);
+}
+
+/**
+ * @param {string} path relative to the page
+ * @param {'GET' | 'POST' | 'PUT' | 'DELETE'} [method]
+ * @param {object} [content] becomes the request's JSON
+ * @returns {Promise<any>}
+ * @throws {Refused} the server says no
+ * @throws {Error} it says nothing
+ */
+export async function askAt(path, method = 'GET', content) {
+  const response = await send(path, method, content);
   const answer = await response.json().catch(() => ({}));
   if (!response.ok) throw new Refused(answer.error ?? `The server answers ${response.status}.`, response.status);
   return answer;
 }
 
 /**
- * @param {string} what
+ * @param {string} path
  * @param {string} method
  * @param {object} [content]
  */
-async function send(what, method, content) {
+async function send(path, method, content) {
   try {
-    return await fetch(`api/operator/${what}`, {
+    return await fetch(path, {
       method,
       cache: 'no-store',
-      headers: method === 'GET' ? {} : { 'X-MyView-Operator': '1', 'Content-Type': 'application/json' },
+      headers: method === 'GET' ? {} : { 'X-MyView-Changes': '1', 'Content-Type': 'application/json' },
       body: content && JSON.stringify(content),
       signal: AbortSignal.timeout(PATIENCE_MS),
     });

@@ -6,6 +6,7 @@ import logging
 from pathlib import Path
 
 from camsync import SyncError
+from server.run.exposed import check_bus, check_viewers
 from server.run.scene_ground import with_scene_ground
 from server.view.service import BestViewService
 from server.web.app import make_app, serving
@@ -19,14 +20,18 @@ async def bestview_process(config: Config, out: Path | None = None) -> None:
     """Run the best-view service with its page, streams and API.
 
     Raises:
-        UserError: a port cannot be listened on, or the output folder cannot be written.
+        UserError: a port or the output folder cannot be had, or strangers could come in.
         AwayError: it lost the pulses for good.
     """
+    check_viewers(config)
+    if config.view.share.index == 0:
+        check_bus(config)  # the others are no router
     service = BestViewService(with_scene_ground(config), out)
     try:
         service.open()
         async with serving(make_app(service), config.http) as port:
-            log.info("page, streams and API on http://%s:%d/", config.http.host, port)
+            scheme = "http" if config.http.tls.key is None else "https"
+            log.info("page, streams and API on %s://%s:%d/", scheme, config.http.host, port)
             await service.run()
     except SyncError as error:
         raise AwayError(f"bestview: {error}") from error

@@ -8,7 +8,7 @@ import sys
 
 import typer
 
-from server.run import calibrate_commands, file_commands, operator_commands, site_commands, viewer_commands
+from server.run import calibrate_commands, file_commands, site_commands, token_commands, viewer_commands
 from server.run.ending import end_with_parent
 from server.run.several import one_value_per_flag
 from server.wire.errors import UserError
@@ -31,7 +31,7 @@ for command in (
     file_commands.scene,
     calibrate_commands.calibrate,
     viewer_commands.watch,
-    operator_commands.operator_token,
+    token_commands.token,
 ):
     app.command()(command)
 

@@ -68,6 +68,7 @@ def up(
 ) -> None:
     """Run a whole site on this machine: every process, watched and restarted."""
     from server.run.checks import check_ports, check_recordings
+    from server.run.exposed import check_bus, check_pulses, check_viewers
     from server.run.supervise import Supervisor
 
     log_to_stderr("up")
@@ -76,6 +77,8 @@ def up(
     loaded = load_config(config)
     if out is not None:
         check_new_folder(out)
+    for check in (check_viewers, check_pulses, check_bus):
+        check(loaded)
     check_ports(loaded)
     check_recordings(loaded)
     supervisor = Supervisor(config, loaded, environment, out)

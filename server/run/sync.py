@@ -7,6 +7,7 @@ import errno
 import logging
 
 from camsync import PulseServer
+from server.run.exposed import check_pulses
 from server.wire.config import Config
 from server.wire.errors import UserError
 from server.wire.messages import pulse_client
@@ -18,8 +19,9 @@ async def sync_process(config: Config) -> None:
     """Send pulses; pulse 0 waits for all cameras and best-view services.
 
     Raises:
-        UserError: the port cannot be listened on.
+        UserError: the port cannot be listened on, or strangers could listen.
     """
+    check_pulses(config)
     sync = config.sync
     server = PulseServer(
         config.site.fps,

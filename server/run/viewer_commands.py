@@ -28,8 +28,14 @@ def watch(
         ),
     ] = None,
     end: Annotated[str | None, typer.Option("--to", help="Until when, likewise.")] = None,
+    token: Annotated[
+        str | None,
+        typer.Option(
+            envvar="MYVIEW_TOKEN", show_envvar=True, help="What lets in, if the server asks for it."
+        ),
+    ] = None,
 ) -> None:
     """List who is there, or watch or record somebody's best view."""
     from server.run.watch import run_watch
 
-    asyncio.run(run_until_told(lambda: run_watch(url, number, out, seconds, start, end)))
+    asyncio.run(run_until_told(lambda: run_watch(url, number, out, seconds, start, end, token)))

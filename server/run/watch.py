@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from client import ClientError, Progress, objects, watch
+from client import ClientError, HttpSettings, Progress, objects, watch
 from server.wire.errors import UserError
 
 _TELL_EVERY_S = 1.0
@@ -23,17 +23,20 @@ async def run_watch(
     seconds: float | None,
     start: str | None = None,
     end: str | None = None,
+    token: str | None = None,
 ) -> None:
     """List who is there, or follow somebody.
 
     Raises:
         UserError: the server cannot be reached, does not know them, or the file cannot be written.
     """
+    settings = HttpSettings(token=token)
     try:
         if number is None:
-            await _list(url)
+            await _list(url, settings)
             return
-        watched = await watch(url, number, out, seconds, _Teller(), start=start, end=end)
+        teller = _Teller()
+        watched = await watch(url, number, out, seconds, teller, start=start, end=end, settings=settings)
     except (ClientError, ValueError) as error:
         raise UserError(f"watch: {error}") from error
     except OSError as error:
@@ -44,9 +47,9 @@ async def run_watch(
         raise UserError("watch: the server went away before the end")
 
 
-async def _list(url: str) -> None:
+async def _list(url: str, settings: HttpSettings) -> None:
     table = Table("object", "visible", "shown by", "seen by", box=None)
-    for it in await objects(url):
+    for it in await objects(url, settings):
         who = escape(f"{it.object} {it.name}") if it.name else str(it.object)
         table.add_row(who, "yes" if it.visible else "no", it.camera or "-", " ".join(it.cameras))
     Console().print(table)

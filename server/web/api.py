@@ -1,4 +1,4 @@
-"""The API: JSON about the site, its cameras, the people, and why each view was chosen."""
+"""The API: JSON about people, why each view was chosen, and how the server is."""
 
 from __future__ import annotations
 
@@ -10,11 +10,9 @@ from prometheus_client import CollectorRegistry, generate_latest
 
 from server.view.past.moment import MomentError, pulse_at
 from server.view.service import BestViewService
-from server.web.events import Events
-from server.web.keys import EVENTS, METRICS, SERVICE
+from server.web.keys import METRICS, SERVICE
 from server.web.schema import Problem
-from server.web.streams import send_viewer
-from server.web.views import cameras_info, choice_info, objects_info, site_info, thumbnail_of
+from server.web.views import choice_info, thumbnail_of
 
 routes = web.RouteTableDef()
 
@@ -57,24 +55,6 @@ def _service(request: web.Request) -> BestViewService:
     return request.app[SERVICE]
 
 
-@routes.get("/api/site")
-async def get_site(request: web.Request) -> web.Response:
-    """Describe the site."""
-    return answer(site_info(_service(request)))
-
-
-@routes.get("/api/objects")
-async def get_objects(request: web.Request) -> web.Response:
-    """List everybody who is known."""
-    return answer(objects_info(_service(request)))
-
-
-@routes.get("/api/cameras")
-async def get_cameras(request: web.Request) -> web.Response:
-    """List the cameras and how they are."""
-    return answer(cameras_info(_service(request)))
-
-
 @routes.get("/api/objects/{object:[0-9]{1,9}}/choice")
 async def get_choice(request: web.Request) -> web.Response:
     """Say which camera shows this person, or did at a moment of the last minute, since when, and why."""
@@ -108,17 +88,6 @@ async def get_thumbnail(request: web.Request) -> web.Response:
     return web.Response(
         body=thumbnail.jpeg, content_type="image/jpeg", headers={"Cache-Control": "private, max-age=60"}
     )
-
-
-@routes.get("/api/events")
-async def get_events(request: web.Request) -> web.StreamResponse:
-    """Tell what happens as it happens: server-sent events."""
-    events: Events = request.app[EVENTS]
-    viewer = events.join()
-    try:
-        return await send_viewer(request, viewer, b"", {"Content-Type": "text/event-stream"})
-    finally:
-        events.leave(viewer)
 
 
 @routes.get("/healthz")

@@ -11,18 +11,20 @@ from aiohttp import web
 
 from server.view.pictures import Pictures
 from server.view.service import BestViewService
-from server.web import api, hls, openapi, operator_routes, page, past, pictures, video
+from server.web import api, hls, openapi, operator_routes, page, past, pictures, session, site, video
+from server.web.access import ACCESS, Access, keep_no_copies, only_who_may
 from server.web.api import problem
 from server.web.containers import refuse_other_containers
 from server.web.cors import preflight
 from server.web.events import Events
 from server.web.keys import EVENTS, METRICS, PICTURES, READERS, SERVICE
 from server.web.metrics import registry
-from server.web.operator_permission import PERMISSION, Permission, operators_only, tell_no_other_origin
+from server.web.operator_permission import tell_no_other_origin
 from server.web.queries import refuse_what_is_not_there
 from server.web.readers import Readers
 from server.web.share import to_the_right_service
 from server.web.strangers import REQUESTS
+from server.web.tls import Certificate
 from server.wire.errors import UserError
 from server.wire.sections import Http
 
@@ -57,11 +59,15 @@ async def one_line_errors(
 
 
 def make_app(service: BestViewService) -> web.Application:
-    """Give the application on top of a service."""
+    """Give the application on top of a service.
+
+    Raises:
+        UserError: the file of tokens cannot be read, or something in it is wrong.
+    """
     app = web.Application(
         middlewares=[
             one_line_errors,
-            operators_only,
+            only_who_may,
             preflight,
             refuse_what_is_not_there,
             refuse_other_containers,
@@ -72,10 +78,10 @@ def make_app(service: BestViewService) -> web.Application:
     app[READERS] = Readers(service.splicer.plan.target_s)
     app[METRICS] = registry(service, app[PICTURES], app[READERS])
     what = f"{service.config.site.name}_{service.config.view.share.index}"
-    app[PERMISSION] = Permission(service.config.http.operator_token, what=what)
-    for module in (api, video, past, hls, pictures, openapi, page, operator_routes):
+    app[ACCESS] = Access(service.config.access.tokens, service.board.resolve, what)
+    for module in (api, session, site, video, past, hls, pictures, openapi, page, operator_routes):
         app.add_routes(module.routes)
-    app.on_response_prepare.append(tell_no_other_origin)
+    app.on_response_prepare.extend((tell_no_other_origin, keep_no_copies))
     app.cleanup_ctx.append(_telling)
     app.on_shutdown.append(_end_streams)
     return app
@@ -86,14 +92,17 @@ async def serving(app: web.Application, settings: Http) -> AsyncIterator[int]:
     """Serve the application; give the port.
 
     Raises:
-        UserError: the port cannot be listened on.
+        UserError: the port cannot be listened on, or the certificate cannot be read.
     """
+    certificate = Certificate.of(settings.tls)
+    context = None if certificate is None else certificate.context
     runner = web.AppRunner(
         app, access_log=None, logger=REQUESTS, shutdown_timeout=_CLOSE_S, handler_cancellation=True
     )
     await runner.setup()
+    looking = None if certificate is None else asyncio.create_task(certificate.run(), name="certificate")
     try:
-        site = web.TCPSite(runner, settings.host, settings.port)
+        site = web.TCPSite(runner, settings.host, settings.port, ssl_context=context)
         try:
             await site.start()
         except OSError as error:
@@ -103,14 +112,20 @@ async def serving(app: web.Application, settings: Http) -> AsyncIterator[int]:
             ) from error
         yield runner.addresses[0][1]
     finally:
+        if looking is not None:
+            looking.cancel()
         await runner.cleanup()
 
 
 async def _telling(app: web.Application) -> AsyncIterator[None]:
-    task = asyncio.create_task(app[EVENTS].run(), name="events")
+    tasks = [
+        asyncio.create_task(app[EVENTS].run(), name="events"),
+        asyncio.create_task(app[ACCESS].run(), name="access"),
+    ]
     yield
-    task.cancel()
-    await asyncio.gather(task, return_exceptions=True)
+    for task in tasks:
+        task.cancel()
+    await asyncio.gather(*tasks, return_exceptions=True)
 
 
 async def _end_streams(app: web.Application) -> None:

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from collections import deque
+from dataclasses import dataclass, field
 from typing import Any
 
 import msgspec
 
 from server.view.channel import Channel, Chunk, Viewer
 from server.view.service import BestViewService
+from server.web.access_grant import Scope
+from server.web.narrow import cameras_for, choices_for, objects_for, site_for
 from server.web.views import cameras_info, objects_info, site_info
 from server.wire.messages import GopChoices
 
@@ -28,50 +32,86 @@ def event(name: str, content: Any, event_id: int | None = None) -> bytes:
     return head.encode() + b"data: " + msgspec.json.encode(content) + b"\n\n"
 
 
+@dataclass(slots=True)
+class _Line:
+    """What readers are told who may see the same."""
+
+    channel: Channel
+    told: dict[str, bytes] = field(default_factory=dict)
+
+
 class Events:
-    """Tells all readers about GOPs at once, and about people and cameras when something has changed."""
+    """Tells all readers about GOPs at once, and about people and cameras when something has changed.
+
+    Each is told what they may see: whoever may see the same hears the same bytes, written once.
+    """
 
     def __init__(self, service: BestViewService) -> None:
         self._service = service
-        self._channel = Channel(starts_kept=_GOPS_KEPT, queue_starts=_QUEUE)
-        self._told: dict[str, bytes] = {}
+        self._lines: dict[Scope, _Line] = {}
+        self._recent: deque[GopChoices] = deque(maxlen=_GOPS_KEPT)
+        self._closed = False
         service.on_decision.append(self._on_decision)
 
-    def join(self) -> Viewer:
+    def join(self, sees: Scope) -> Viewer:
         """Let a reader in; what it should know first comes first."""
-        viewer = self._channel.join()
-        for name, content in self._lists().items():
+        line = self._lines.get(sees) or self._new_line(sees)
+        viewer = line.channel.join()
+        for name, content in self._lists(sees).items():
             viewer.put_first(Chunk(event(name, content), start=True))
         return viewer
 
-    def leave(self, viewer: Viewer) -> None:
+    def leave(self, sees: Scope, viewer: Viewer) -> None:
         """Let a reader go."""
-        self._channel.leave(viewer)
+        line = self._lines[sees]
+        line.channel.leave(viewer)
+        if not line.channel.viewers:
+            del self._lines[sees]
 
     async def run(self) -> None:
         """Tell about people and cameras, and keep silent connections alive."""
         while True:
             await asyncio.sleep(_LIST_EVERY_S)
-            for name, content in self._lists().items():
-                if name == "site":
-                    continue  # it carries the time of day and so always differs; it is for newcomers
-                data = event(name, content)
-                if self._told.get(name) != data:
-                    self._told[name] = data
-                    self._channel.tell(Chunk(data, start=True))
-            self._channel.tell(Chunk(b": here\n\n", start=False))
+            for sees, line in self._lines.items():
+                self._tell(sees, line)
 
     def close(self) -> None:
         """End all readers' streams."""
-        self._channel.close()
+        self._closed = True
+        for line in self._lines.values():
+            line.channel.close()
 
-    def _lists(self) -> dict[str, Any]:
+    def _new_line(self, sees: Scope) -> _Line:
+        line = self._lines[sees] = _Line(Channel(starts_kept=_GOPS_KEPT, queue_starts=_QUEUE))
+        for choices in self._recent:
+            line.channel.publish(self._gop(sees, choices))
+        if self._closed:
+            line.channel.close()
+        return line
+
+    def _tell(self, sees: Scope, line: _Line) -> None:
+        for name, content in self._lists(sees).items():
+            if name == "site":
+                continue  # it carries the time of day and so always differs; it is for newcomers
+            data = event(name, content)
+            if line.told.get(name) != data:
+                line.told[name] = data
+                line.channel.tell(Chunk(data, start=True))
+        line.channel.tell(Chunk(b": here\n\n", start=False))
+
+    def _lists(self, sees: Scope) -> dict[str, Any]:
         service = self._service
         return {
-            "cameras": cameras_info(service),
-            "objects": objects_info(service),
-            "site": site_info(service),
+            "cameras": cameras_for(cameras_info(service), sees),
+            "objects": objects_for(objects_info(service), sees, service.board.resolve),
+            "site": site_for(site_info(service), sees),
         }
 
+    def _gop(self, sees: Scope, choices: GopChoices) -> Chunk:
+        content = choices_for(choices, sees, self._service.board.resolve)
+        return Chunk(event("gop", content, choices.first), start=True)
+
     def _on_decision(self, choices: GopChoices) -> None:
-        self._channel.publish(Chunk(event("gop", choices, choices.first), start=True))
+        self._recent.append(choices)
+        for sees, line in self._lines.items():
+            line.channel.publish(self._gop(sees, choices))

@@ -12,6 +12,7 @@ from server.web.api import no_camera, no_object, not_now, problem
 from server.web.forms import mp4_head
 from server.web.hls_live import coming_part, newest
 from server.web.hls_past import Stream, playlist_of_the_past, segment_of_the_past
+from server.web.hls_token import with_token
 from server.web.keys import READERS, SERVICE
 from server.web.limits import no_place
 from server.web.past import asks_for_the_past, object_past
@@ -61,10 +62,10 @@ def _counted(awaits: str | None = None) -> Callable[[_OfStream], _Handler]:
 async def get_playlist(request: web.Request, stream: Stream) -> web.Response:
     """List the newest segments of a stream (HLS), or from a moment on."""
     if asks_for_the_past(request):
-        return playlist_of_the_past(request, stream)
+        return with_token(request, playlist_of_the_past(request, stream))
     if stream.reel is None:
         return _nobody(request)
-    return await newest(request, stream.reel, request.app[SERVICE].pulse0)
+    return with_token(request, await newest(request, stream.reel, request.app[SERVICE].pulse0))
 
 
 @routes.get(_OBJECT + "/init.mp4")

@@ -11,14 +11,16 @@ from typing import Any
 import msgspec
 from aiohttp import web
 
+from server.web.access_grant import Need, need_of
 from server.web.operator_schema import OPERATOR, OPERATOR_FILES, OPERATOR_RESULTS
 from server.web.queries import HELD, OVERLAY, PAST
-from server.web.schema import Cameras, Choice, Objects, Past, Problem, SiteInfo
+from server.web.schema import Cameras, Choice, Objects, Past, Problem, SessionInfo, SiteInfo
 
 routes = web.RouteTableDef()
 
 _JSON: dict[str, type[msgspec.Struct]] = {
     "/api/site": SiteInfo,
+    "/api/session": SessionInfo,
     "/api/objects": Objects,
     "/api/cameras": Cameras,
     "/api/objects/{object}/choice": Choice,
@@ -112,8 +114,12 @@ def _operation(path: str, summary: str) -> dict[str, Any]:
         responses["400"] = {"description": "The query asks for what there is not.", "content": error}
     if path in OPERATOR.keys() | OPERATOR_FILES.keys() | OPERATOR_RESULTS.keys():
         responses["400"] = {"description": "It asks for what there is not.", "content": error}
-        responses["401"] = {"description": "The operator's token is needed.", "content": error}
-        responses["403"] = {"description": "Only the operator may.", "content": error}
+    if need_of("GET", path) is not Need.NOTHING:
+        responses["401"] = {
+            "description": "Where there are tokens: none was given, or a wrong one.",
+            "content": error,
+        }
+        responses["403"] = {"description": "The token is not for this.", "content": error}
         responses["429"] = {"description": "Too many wrong tokens; try again later.", "content": error}
     if path in PAST - {"/api/past"}:
         responses["416"] = {"description": "Nothing is kept of that time.", "content": error}

@@ -7,13 +7,6 @@ import msgspec
 from server.view.gauge import Spread, Trouble
 
 
-class OperatorSession(msgspec.Struct, frozen=True):
-    """That somebody may operate."""
-
-    by_token: bool
-    """By a token; else because they are at the server's own machine."""
-
-
 class OwnPicture(msgspec.Struct, frozen=True):
     """A camera's own picture, and how it lies in the site's: site = own · scale + (left, top), in pixels."""
 
@@ -190,7 +183,6 @@ class PeopleByHand(msgspec.Struct, frozen=True):
 
 
 OPERATOR: dict[str, type[msgspec.Struct]] = {
-    "/api/operator/session": OperatorSession,
     "/api/operator/cameras": OperatorCameras,
     "/api/operator/pulses": Pulses,
     "/api/operator/floor": Floor,

@@ -94,8 +94,8 @@ def _setting(key: str, value: Any, usual: Any) -> Iterator[Setting]:
     if isinstance(value, BaseModel) or dataclasses.is_dataclass(value):
         yield from _settings(key, value, usual)
     else:
-        default = None if usual is PydanticUndefined else _written(key, usual)
-        yield Setting(key, _written(key, value), default, usual is not PydanticUndefined and value != usual)
+        default = None if usual is PydanticUndefined else _written(usual)
+        yield Setting(key, _written(value), default, usual is not PydanticUndefined and value != usual)
 
 
 def _names(section: Any) -> list[str]:
@@ -104,11 +104,8 @@ def _names(section: Any) -> list[str]:
     return [field.name for field in dataclasses.fields(section)]
 
 
-def _written(key: str, value: Any) -> str:
+def _written(value: Any) -> str:
     """Write a value as a configuration does, without what is nobody's business."""
-    name = key.rpartition(".")[2]
-    if name == "operator_token" and value is not None:
-        return HIDDEN
     if isinstance(value, Mapping):
         value = {it: HIDDEN if _SECRET.search(it) else _shown(inner) for it, inner in value.items()}
     value = _shown(value)

@@ -16,6 +16,7 @@ _HEADERS = {
     "Cache-Control": "no-cache",  # ask again each time: an upgraded server must not meet an old page
     "Content-Security-Policy": "default-src 'self'; media-src 'self' blob:; img-src 'self' data: blob:",
     "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "same-origin",  # an address may say who is watched
 }
 
 

@@ -17,10 +17,12 @@ from server.view.past.stream import PastStream, Wish
 from server.view.past.told import told
 from server.view.service import BestViewService
 from server.view.timeline import Timeline
+from server.web.access import ACCESS
 from server.web.api import answer, no_camera, no_object, not_now, problem
 from server.web.forms import Form
 from server.web.keys import SERVICE
 from server.web.limits import no_place
+from server.web.narrow import told_for
 from server.web.schema import Past, PastSpan, PastView
 from server.web.streams import send_bytes
 
@@ -87,7 +89,8 @@ async def get_told(request: web.Request) -> web.StreamResponse:
     except MomentError as error:
         return problem(400, str(error))
     end = service.past.recent.end if wish.end is None else wish.end
-    lines = told(service.past, wish.start, end)
+    sees = request.app[ACCESS].grant(request).sees
+    lines = told_for(told(service.past, wish.start, end), sees, service.board.resolve)
     return await send_bytes(request, lines, b"", {"Content-Type": "application/x-ndjson"})
 
 

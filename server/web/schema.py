@@ -152,6 +152,21 @@ class Past(msgspec.Struct, frozen=True):
     """By which camera, in order."""
 
 
+class SessionInfo(msgspec.Struct, frozen=True):
+    """What somebody may."""
+
+    by_token: bool
+    """By a token; else anybody may watch, and who is at the server's own machine may operate."""
+    name: str | None
+    """Of the token; null: there are none."""
+    role: str
+    """watch or operate."""
+    object: int | None
+    """This person's views alone; null: everybody's."""
+    camera: str | None
+    """This camera alone; null: all."""
+
+
 class Problem(msgspec.Struct, frozen=True):
     """Why there is no answer."""
 

@@ -15,7 +15,7 @@ from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, Settings
 
 from server.wire.detect import DetectSettings
 from server.wire.library import validated
-from server.wire.sections import Camera, Encode, Http, Record, Site, Sound, Sync, Track, View, Zenoh
+from server.wire.sections import Access, Camera, Encode, Http, Record, Site, Sound, Sync, Track, View, Zenoh
 
 
 class Config(BaseSettings):
@@ -41,6 +41,7 @@ class Config(BaseSettings):
     track: Track = Track()
     view: View = View()
     http: Http = Http()
+    access: Access = Access()
     record: Record = Record()
 
     @classmethod

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 from pydantic_settings import SettingsError
@@ -23,6 +22,7 @@ from server.wire.ground_unit import checked_unit
 from server.wire.sections import Camera, View
 from server.wire.sources import resolved
 from server.wire.values import check_values
+from server.wire.yaml_file import read_yaml
 
 _SHOWN = 300
 """Characters of what a library says that a line of ours repeats."""
@@ -43,18 +43,7 @@ def read_content(path: Path) -> dict[str, Any]:
     Raises:
         UserError: it cannot be read, or is no mapping of sections.
     """
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise UserError(f"{path}: cannot read the configuration: {_reason(error)}") from error
-    try:
-        content = yaml.safe_load(text)
-    except yaml.YAMLError as error:
-        raise UserError(f"{path}: is not valid YAML: {' '.join(str(error).split())[:_SHOWN]}") from error
-    except RecursionError as error:
-        raise UserError(f"{path}: is not valid YAML: brackets within brackets without end") from error
-    except (ValueError, LookupError, TypeError, AttributeError) as error:  # how PyYAML says `!!int x` is none
-        raise UserError(f"{path}: is not valid YAML: a date, a number or a tag that cannot be one") from error
+    content = read_yaml(path, "the configuration")
     if not isinstance(content, dict) or not all(isinstance(section, str) for section in content):
         raise UserError(f"{path}: a configuration is a mapping of sections, such as 'cameras:'")
     return content
@@ -88,7 +77,19 @@ def build_config(content: Mapping[str, Any], *, where: str, folder: Path) -> Con
     record = config.record
     if record.folder is not None:
         record = record.model_copy(update={"folder": folder / record.folder})
-    return config.model_copy(update={"cameras": cameras, "detect": detect, "sound": sound, "record": record})
+    update = {"cameras": cameras, "detect": detect, "sound": sound, "record": record}
+    return config.model_copy(update={**update, **_who_may(config, folder)})
+
+
+def _who_may(config: Config, folder: Path) -> dict[str, Any]:
+    """Resolve the paths of the files of tokens and certificates."""
+    access, tls = config.access, config.http.tls
+    if access.tokens is not None:
+        access = access.model_copy(update={"tokens": folder / access.tokens})
+    if tls.certificate is not None and tls.key is not None:
+        files = {"certificate": folder / tls.certificate, "key": folder / tls.key}
+        tls = tls.model_copy(update=files)
+    return {"access": access, "http": config.http.model_copy(update={"tls": tls})}
 
 
 def changed_view(view: View, changes: Mapping[str, Any], where: str) -> View:

@@ -78,7 +78,7 @@ async def test_pages_of_other_origins_may_ask(busy: Hall, path: str) -> None:
         assert answer.status == 204
         assert answer.headers["Access-Control-Allow-Origin"] == "*"
         assert "GET" in answer.headers["Access-Control-Allow-Methods"]
-        assert answer.headers["Access-Control-Allow-Headers"] == "*"
+        assert answer.headers["Access-Control-Allow-Headers"] == "*, Authorization"
     assert busy.service.splicer.viewers == 0
     async with busy.session.options("/nothing", headers=asking) as answer:
         assert answer.status == 404

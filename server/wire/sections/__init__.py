@@ -1,14 +1,16 @@
 """The sections of the configuration, one idea per file."""
 
+from server.wire.sections.access import Access
 from server.wire.sections.base import Endpoint, Name, Polygon, Port, Section, Side
 from server.wire.sections.camera import Camera, Track
 from server.wire.sections.encode import Encode
-from server.wire.sections.serve import Http, Record
+from server.wire.sections.serve import Http, Record, Tls
 from server.wire.sections.site import Site, Sync, Zenoh
 from server.wire.sections.sound import Sound
 from server.wire.sections.view import Share, View
 
 __all__ = [
+    "Access",
     "Camera",
     "Encode",
     "Endpoint",
@@ -23,6 +25,7 @@ __all__ = [
     "Site",
     "Sound",
     "Sync",
+    "Tls",
     "Track",
     "View",
     "Zenoh",

@@ -3,11 +3,26 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Self
 
-from pydantic import Field, PositiveFloat, PositiveInt
+from pydantic import Field, PositiveFloat, PositiveInt, model_validator
 
 from server.wire.sections.base import Section
+
+
+class Tls(Section):
+    """HTTPS: both files or none."""
+
+    certificate: Path | None = None
+    """PEM: the certificate, and after it those that lead to its authority."""
+    key: Path | None = None
+    """PEM: the private key, without a password."""
+
+    @model_validator(mode="after")
+    def _is_whole(self) -> Self:
+        if (self.certificate is None) != (self.key is None):
+            raise ValueError("certificate, key: HTTPS takes both files; one of them is not named")
+        return self
 
 
 class Http(Section):
@@ -28,8 +43,7 @@ class Http(Section):
     pictures_max: PositiveInt = 8
     """People and cameras whose pictures are decoded at once: JPEG, and boxes burnt in. One more gets 503."""
     jpeg_quality: Annotated[int, Field(ge=1, le=100)] = 80
-    operator_token: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")] | None = None
-    """SHA-256 of the token that lets somebody operate the site; none: only from the server's own machine."""
+    tls: Tls = Tls()
 
 
 class Record(Section):

@@ -1,0 +1,66 @@
+"""A site that other machines can reach is so because the configuration says so, and not by accident."""
+
+from __future__ import annotations
+
+import ipaddress
+import re
+
+from server.wire.config import Config
+from server.wire.errors import UserError
+from server.wire.tokens import read_tokens
+
+_AUTHORITY = re.compile(r"[a-z]+/(?P<host>[^\s?#]+):[0-9]+")
+
+
+def check_viewers(config: Config) -> None:
+    """Refuse to serve other machines without tokens, unless the site is said to be open to all.
+
+    Raises:
+        UserError: `http.host` is not of this machine alone; or the file of tokens cannot be read.
+    """
+    if config.access.tokens is not None:
+        read_tokens(config.access.tokens)
+    elif not (is_loopback(config.http.host) or config.access.open_to_all):
+        raise UserError(
+            f"http.host: {config.http.host} lets other machines watch, and there are no tokens: name a file "
+            "of them in access.tokens (`myview token NAME` makes one), or say access.open_to_all: true"
+        )
+
+
+def check_pulses(config: Config) -> None:
+    """Refuse to send pulses to other machines, unless their network is trusted.
+
+    Raises:
+        UserError: `sync.bind` is not of this machine alone.
+    """
+    if not is_loopback(config.sync.bind):
+        _check_network(config, f"sync.bind: {config.sync.bind} lets other machines listen to the pulses")
+
+
+def check_bus(config: Config) -> None:
+    """Refuse to be other machines' router, unless their network is trusted.
+
+    Raises:
+        UserError: `zenoh.listen` is not of this machine alone.
+    """
+    found = _AUTHORITY.match(config.zenoh.listen)
+    if found is None or not is_loopback(found["host"].strip("[]")):
+        _check_network(
+            config, f"zenoh.listen: {config.zenoh.listen} lets other machines send frames and tracks"
+        )
+
+
+def is_loopback(host: str) -> bool:
+    """Tell whether nobody but this machine can reach a host that is listened on."""
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
+
+
+def _check_network(config: Config, what: str) -> None:
+    if not config.access.trusted_network:
+        raise UserError(
+            f"{what}, and whoever does is believed: bind it to 127.0.0.1, or, where nobody else reaches it, "
+            "say access.trusted_network: true"
+        )

@@ -1,0 +1,46 @@
+"""What is known of the whole site: to each as much of it as they may see."""
+
+from __future__ import annotations
+
+from aiohttp import web
+
+from server.web.access import ACCESS
+from server.web.api import answer
+from server.web.events import Events
+from server.web.keys import EVENTS, SERVICE
+from server.web.narrow import cameras_for, objects_for, site_for
+from server.web.streams import send_viewer
+from server.web.views import cameras_info, objects_info, site_info
+
+routes = web.RouteTableDef()
+
+
+@routes.get("/api/site")
+async def get_site(request: web.Request) -> web.Response:
+    """Describe the site."""
+    return answer(site_for(site_info(request.app[SERVICE]), request.app[ACCESS].grant(request).sees))
+
+
+@routes.get("/api/objects")
+async def get_objects(request: web.Request) -> web.Response:
+    """List everybody who is known."""
+    service, sees = request.app[SERVICE], request.app[ACCESS].grant(request).sees
+    return answer(objects_for(objects_info(service), sees, service.board.resolve))
+
+
+@routes.get("/api/cameras")
+async def get_cameras(request: web.Request) -> web.Response:
+    """List the cameras and how they are."""
+    return answer(cameras_for(cameras_info(request.app[SERVICE]), request.app[ACCESS].grant(request).sees))
+
+
+@routes.get("/api/events")
+async def get_events(request: web.Request) -> web.StreamResponse:
+    """Tell what happens as it happens: server-sent events."""
+    events: Events = request.app[EVENTS]
+    sees = request.app[ACCESS].grant(request).sees
+    viewer = events.join(sees)
+    try:
+        return await send_viewer(request, viewer, b"", {"Content-Type": "text/event-stream"})
+    finally:
+        events.leave(sees, viewer)

@@ -1,0 +1,82 @@
+"""HTTPS from certificate files, which are read again when they change."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import ssl
+from pathlib import Path
+
+from server.wire.changed import State, state_of
+from server.wire.errors import UserError
+from server.wire.sections import Tls
+
+log = logging.getLogger(__name__)
+
+_LOOK_EVERY_S = 5.0
+
+
+class Certificate:
+    """What the server proves itself by. New connections get the newest that could be read."""
+
+    def __init__(self, certificate: Path, key: Path) -> None:
+        """Read both files.
+
+        Raises:
+            UserError: they cannot be read, or do not belong together.
+        """
+        self._certificate, self._key = certificate, key
+        self._seen = self._state()
+        self.context = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH)
+        self._load(self.context)
+
+    @classmethod
+    def of(cls, settings: Tls) -> Certificate | None:
+        """Read what a configuration names; None: it names nothing.
+
+        Raises:
+            UserError: it cannot be read.
+        """
+        if settings.certificate is None or settings.key is None:
+            return None
+        return cls(settings.certificate, settings.key)
+
+    def look(self) -> None:
+        """Read the files again if they have changed; what cannot be read leaves the old one in force."""
+        before, self._seen = self._seen, self._state()
+        if self._seen == before:
+            return
+        try:
+            self._load(ssl.create_default_context(ssl.Purpose.CLIENT_AUTH))  # or half of it would be in force
+            self._load(self.context)
+        except UserError as error:
+            log.warning("%s; the certificate as it was stays in force", error)
+        else:
+            log.info("%s: is in force for new connections", self._certificate)
+
+    async def run(self) -> None:
+        """Look again and again."""
+        while True:
+            await asyncio.sleep(_LOOK_EVERY_S)
+            self.look()
+
+    def _load(self, context: ssl.SSLContext) -> None:
+        for what, path in (("certificate", self._certificate), ("key", self._key)):
+            try:
+                path.read_bytes()
+            except OSError as error:
+                raise UserError(f"http.tls.{what}: cannot read {path}: {error.strerror}") from error
+        try:
+            context.load_cert_chain(self._certificate, self._key, password=_no_password)
+        except (ssl.SSLError, ValueError) as error:
+            reason = getattr(error, "reason", None) or str(error)
+            raise UserError(
+                f"http.tls: {self._certificate} and {self._key} are no certificate and its key: {reason}"
+            ) from error
+
+    def _state(self) -> tuple[State | None, ...]:
+        return tuple(state_of(it) for it in (self._certificate, self._key))
+
+
+def _no_password() -> str:
+    raise ValueError("the key has a password; write it without one")

@@ -1,0 +1,16 @@
+"""Whether a file has changed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+State = tuple[int, int, int]
+
+
+def state_of(path: Path) -> State | None:
+    """Give what changes when a file does, or is replaced by another; None: there is none."""
+    try:
+        now = path.stat()
+    except OSError:
+        return None
+    return now.st_mtime_ns, now.st_size, now.st_ino

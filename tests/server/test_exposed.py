@@ -1,0 +1,89 @@
+"""A site is not open to other machines by accident."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from cameras_by_hand import small_config
+from command_line import Run, refusal
+from tokens_by_hand import line_of, write_tokens
+
+from server.run.exposed import check_bus, check_pulses, check_viewers, is_loopback
+from server.run.setup import DEMO
+from server.wire.errors import UserError
+
+OUTSIDE = "0.0.0.0"  # noqa: S104 — what the tests are about
+
+
+@pytest.mark.parametrize(
+    ("host", "here"),
+    [
+        ("127.0.0.1", True),
+        ("127.3.2.1", True),
+        ("::1", True),
+        ("localhost", True),
+        (OUTSIDE, False),
+        ("::", False),
+        ("", False),
+        ("10.0.0.5", False),
+        ("server.example", False),
+    ],
+)
+def test_what_only_this_machine_reaches(host: str, here: bool) -> None:
+    assert is_loopback(host) == here
+
+
+def test_the_defaults_are_for_this_machine_alone() -> None:
+    for check in (check_viewers, check_pulses, check_bus):
+        check(small_config())
+
+
+def test_viewers_from_elsewhere_take_tokens_or_a_word(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match=r"http\.host: .* access\.tokens .* access\.open_to_all: true"):
+        check_viewers(small_config(http={"host": OUTSIDE}))
+    check_viewers(small_config(http={"host": OUTSIDE}, access={"open_to_all": True}))
+    tokens = tmp_path / "tokens.yaml"
+    settings = {"http": {"host": OUTSIDE}, "access": {"tokens": str(tokens)}}
+    with pytest.raises(UserError, match="cannot read the tokens"):
+        check_viewers(small_config(**settings))
+    write_tokens(tokens, line_of("lead"))
+    check_viewers(small_config(**settings))
+
+
+@pytest.mark.parametrize(
+    ("check", "section", "setting"),
+    [
+        (check_pulses, "sync", {"bind": OUTSIDE}),
+        (check_bus, "zenoh", {"listen": f"tcp/{OUTSIDE}:7447"}),
+        (check_bus, "zenoh", {"listen": "tcp/[::]:7447"}),
+        (check_bus, "zenoh", {"listen": "udp/10.0.0.5:7447"}),
+    ],
+)
+def test_what_has_no_password_takes_a_network_that_is_trusted(check: Any, section: str, setting: Any) -> None:
+    with pytest.raises(UserError, match=rf"{section}\.\w+: .* access\.trusted_network: true"):
+        check(small_config(**{section: setting}))
+    check(small_config(**{section: setting, "access": {"trusted_network": True}}))
+    with pytest.raises(UserError):
+        check(small_config(**{section: setting, "access": {"open_to_all": True}}))
+
+
+@pytest.mark.parametrize(
+    ("command", "changes", "setting"),
+    [
+        ("up", {"http": {"host": OUTSIDE}}, "http.host"),
+        ("up", {"sync": {"bind": OUTSIDE}}, "sync.bind"),
+        ("up", {"zenoh": {"listen": f"tcp/{OUTSIDE}:7447"}}, "zenoh.listen"),
+        ("bestview", {"http": {"host": OUTSIDE}}, "http.host"),
+        ("bestview", {"zenoh": {"listen": f"tcp/{OUTSIDE}:7447"}}, "zenoh.listen"),
+        ("sync", {"sync": {"bind": OUTSIDE}}, "sync.bind"),
+    ],
+)
+def test_every_command_that_listens_refuses_with_one_line(
+    myview: Run, tmp_path: Path, command: str, changes: dict[str, Any], setting: str
+) -> None:
+    path = tmp_path / "site.yaml"
+    path.write_text(yaml.safe_dump({**DEMO, **changes}), encoding="utf-8")
+    assert refusal(myview(command, str(path))).startswith(f"myview: {setting}: ")
