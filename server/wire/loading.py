@@ -24,9 +24,6 @@ from server.wire.sources import resolved
 from server.wire.values import check_values
 from server.wire.yaml_file import read_yaml
 
-_SHOWN = 300
-"""Characters of what a library says that a line of ours repeats."""
-
 
 def load_config(path: Path) -> Config:
     """Read a site's configuration; paths in it are relative to the file.
