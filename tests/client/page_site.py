@@ -229,6 +229,7 @@ class SiteServer:
         app.router.add_get("/", _file)
         app.router.add_get("/page/{name}", _file)
         app.router.add_get("/api/site", self._site)
+        app.router.add_get("/api/session", _session)
         app.router.add_get("/api/events", self._events)
         app.router.add_get("/api/objects/{k}/choice", self._choice)
         app.router.add_get("/api/objects/{k}/past", self._past)
@@ -352,6 +353,13 @@ class SiteServer:
 
 def _event(name: str, data: dict[str, Any]) -> bytes:
     return f"event: {name}\ndata: {json.dumps(data)}\n\n".encode()
+
+
+async def _session(_: web.Request) -> web.Response:
+    """Say that anybody may watch."""
+    return web.json_response(
+        {"by_token": False, "name": None, "role": "watch", "object": None, "camera": None}
+    )
 
 
 async def _file(request: web.Request) -> web.StreamResponse:

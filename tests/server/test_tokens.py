@@ -52,6 +52,11 @@ def test_a_file_without_tokens_lets_nobody_in(tmp_path: Path) -> None:
         ),
         ([{"name": "a", "sha256": SUM, "role": "watch"}] * 2, "two tokens have the name a"),
         (["a"], "tokens.0: Input should be a valid dictionary"),
+        (
+            [{"name": "a", "sha256": SUM, "role": "watch", "made": "2026-11-22"}],
+            "tokens.0.made: Input should",
+        ),
+        ([{"name": "a\nb", "sha256": SUM, "role": "watch"}], "tokens.0.name: String should match pattern"),
     ],
 )
 def test_what_is_wrong_in_the_file_is_said_in_one_line(tmp_path: Path, lines: list[Any], error: str) -> None:
@@ -63,7 +68,20 @@ def test_what_is_wrong_in_the_file_is_said_in_one_line(tmp_path: Path, lines: li
 
 
 @pytest.mark.parametrize(
-    "text", ["", "[]", "tokens: 3", "{tokens: [], more: 1}", "a: {", "\x00", "2026-99-99"]
+    "text",
+    [
+        "",
+        "[]",
+        "tokens: 3",
+        "{tokens: [], more: 1}",
+        "a: {",
+        "\x00",
+        "2026-99-99",
+        "[" * 5000,
+        "tokens: &a [*a]",
+        "tokens: !!int x",
+        "tokens: [{1: 2}]",
+    ],
 )
 def test_what_is_no_file_of_tokens_is_said_in_one_line(tmp_path: Path, text: str) -> None:
     path = tmp_path / "tokens.yaml"
