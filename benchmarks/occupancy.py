@@ -1,8 +1,8 @@
 """A reference for several cameras: an occupancy map of the ground in each frame, and shortest paths over it.
 
 Beside MyView, which tracks in each camera and joins, everybody is found on the ground at once, from the same
-foreground; see `occupancy_map` and `occupancy_paths`. Nothing of it is live: heights and all frames are known
-before the first path is found.
+foreground: `occupancy_map`, then `occupancy_paths`, then `occupancy_colours`. Nothing of it is live: heights
+and all frames are known before the first path is found.
 """
 
 from __future__ import annotations
@@ -14,12 +14,16 @@ import numpy as np
 
 from benchmarks.bestview_cases import Case
 from benchmarks.bestview_watch import Rows
-from benchmarks.occupancy_floor import Floor, FloorSettings, View, lay_out
+from benchmarks.occupancy_colours import ColourSettings, Walker, numbers_of
+from benchmarks.occupancy_floor import Floor, FloorSettings, Ints, View, lay_out
 from benchmarks.occupancy_level import levelled
+from benchmarks.occupancy_looks import looks_of
 from benchmarks.occupancy_map import OccupancyMap, OccupancySettings, Sight
 from benchmarks.occupancy_masks import Masks, masks_of
-from benchmarks.occupancy_paths import NOWHERE, Lattice, Path, shortest_paths
+from benchmarks.occupancy_paths import Lattice, shortest_paths
+from benchmarks.occupancy_walks import Walk, WalkSettings, rows_of_walks, walk_of
 from server.view.decide import homographies
+from server.wire.config import Config
 from tracking.boxes import Floats
 from tracking.motchallenge import MotRow
 
@@ -35,15 +39,11 @@ class PathSettings:
         doubt: no probability is taken to be nearer to 0 or 1: it is what a frame can say at most.
         gate_cost: of coming, and of going, where what is seen ends.
         inside_cost: the same anywhere else; the paper allows it nowhere.
-        smooth_s: seconds over which places are averaged, on either side.
-        least_seen: the share of somebody that has to be in a picture for a box there.
     """
 
     doubt: float = 0.001
     gate_cost: float = 40.0
     inside_cost: float = 100.0
-    smooth_s: float = 0.2
-    least_seen: float = 0.3
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,46 +53,38 @@ class Settings:
     floor: FloorSettings = field(default_factory=FloorSettings)
     map: OccupancySettings = field(default_factory=OccupancySettings)
     paths: PathSettings = field(default_factory=PathSettings)
-    level: bool = True
-    """Shift the homographies first until the cameras' feet agree."""
+    colours: ColourSettings = field(default_factory=ColourSettings)
+    walks: WalkSettings = field(default_factory=WalkSettings)
 
 
 def occupancy_rows(case: Case, boxes: Rows, settings: Settings | None = None) -> dict[str, list[MotRow]]:
-    """Give everybody's boxes in every camera by their path's number.
+    """Give everybody's boxes in every camera by their number.
 
     Args:
         case: a scene with pictures and homographies.
         boxes: the cameras' sure detections, by which the homographies are made to agree.
-        settings: of the map and the paths.
+        settings: of all stages.
 
     Raises:
         CannotMapError: there is no foreground to explain.
     """
-    config = case.config()
+    settings, config = settings or Settings(), case.config()
     masks = {camera: masks_of(config, camera) for camera in case.gt}
     ground = {camera: it for camera, it in homographies(config).items() if it is not None}
-    return mapped(masks, ground, boxes, config.site.fps, settings or Settings())
-
-
-def mapped(
-    masks: Mapping[str, Masks], ground: Mapping[str, Floats], boxes: Rows, fps: float, settings: Settings
-) -> dict[str, list[MotRow]]:
-    """Find everybody in the cameras' foreground, `fps` frames a second."""
-    views = views_of(masks, ground, boxes, settings)
+    views = views_of(masks, ground, boxes)
     floor = lay_out(list(views.values()), settings.floor)
     q = occupancy(floor, list(masks.values()), settings.map)
+    reach = round(settings.walks.smooth_s * config.site.fps)
     paths = shortest_paths(lattice_of(floor, q, settings.paths))
-    walks = [_smoothed(_places(floor, q, path), round(settings.paths.smooth_s * fps)) for path in paths]
-    return {camera: list(_boxes(view, paths, walks, settings)) for camera, view in views.items()}
+    walks = [walk_of(floor, q, path, reach) for path in paths]
+    walkers = walkers_of(config, masks, views, walks, settings.floor.aspect)
+    numbers = numbers_of(walkers, floor.person, settings.colours)
+    return {camera: rows_of_walks(view, walks, numbers, settings.walks) for camera, view in views.items()}
 
 
-def views_of(
-    masks: Mapping[str, Masks], ground: Mapping[str, Floats], boxes: Rows, settings: Settings
-) -> dict[str, View]:
-    """Give the cameras."""
+def views_of(masks: Mapping[str, Masks], ground: Mapping[str, Floats], boxes: Rows) -> dict[str, View]:
+    """Give the cameras, their homographies shifted until their feet agree."""
     views = {camera: View(ground[camera], it.size, it.line, it.weight) for camera, it in masks.items()}
-    if not settings.level:
-        return views
     person = float(np.median([view.person() for view in views.values()]))
     level = levelled(boxes, ground, {camera: it.size[1] for camera, it in views.items()}, person)
     return {camera: replace(view, homography=level[camera]) for camera, view in views.items()}
@@ -111,10 +103,32 @@ def occupancy(floor: Floor, masks: Sequence[Masks], settings: OccupancySettings)
 def lattice_of(floor: Floor, q: Floats, settings: PathSettings) -> Lattice:
     """Give the paper's network: being at a place costs `-log(q / (1 - q))`."""
     sure = np.clip(q, settings.doubt, 1.0 - settings.doubt)
-    costs = np.rint(-_UNIT * np.log(sure / (1.0 - sure))).astype(np.int64)
     gates = np.where(floor.gates, settings.gate_cost, settings.inside_cost)
-    priced = np.where(np.isfinite(gates), np.rint(_UNIT * np.nan_to_num(gates, posinf=0.0)), float(NOWHERE))
-    return Lattice(costs, floor.moves, priced.astype(np.int64))
+    return Lattice(_whole(-np.log(sure / (1.0 - sure))), floor.moves, _whole(gates))
+
+
+def walkers_of(
+    config: Config,
+    masks: Mapping[str, Masks],
+    views: Mapping[str, View],
+    walks: Sequence[Walk],
+    aspect: float,
+) -> list[Walker]:
+    """Give what everybody looks like in all cameras, along their walks."""
+    firsts = [walk.first for walk in walks]
+    seen = []
+    for camera, view in views.items():
+        boxes = [view.boxes(walk.places, aspect) for walk in walks]
+        seen.append(looks_of(config, camera, masks[camera], firsts, boxes))
+    return [
+        Walker(
+            walk.first,
+            walk.places,
+            np.stack([looks[place] for looks, _ in seen], axis=1),
+            np.stack([pixels[place] for _, pixels in seen], axis=1),
+        )
+        for place, walk in enumerate(walks)
+    ]
 
 
 def _sight(masks: Masks, frame: int) -> Sight:
@@ -126,35 +140,5 @@ def _sight(masks: Masks, frame: int) -> Sight:
     return Sight(one / 255.0, masks.weight * (1.0 - other / 255.0))
 
 
-def _places(floor: Floor, q: Floats, path: Path) -> Floats:
-    """Give where somebody is (F, 2): the mean of their place and those around it, by how likely they are."""
-    frames = path.first + np.arange(len(path.places))
-    around = floor.moves[path.places]
-    there = around < len(floor.places)
-    near = np.where(there, around, 0)
-    weight = np.where(there, q[frames[:, None], near], 0.0) + 1e-9 * (near == path.places[:, None])
-    return np.asarray((weight[..., None] * floor.places[near]).sum(axis=1) / weight.sum(axis=1)[:, None])
-
-
-def _smoothed(places: Floats, reach: int) -> Floats:
-    """Give the mean of the places (F, 2) so many frames around each, fewer towards the ends."""
-    sums = np.concatenate([np.zeros((1, 2)), np.cumsum(places, axis=0)])
-    here = np.arange(len(places))
-    near = np.minimum(reach, np.minimum(here, len(places) - 1 - here))
-    return np.asarray((sums[here + near + 1] - sums[here - near]) / (2 * near + 1)[:, None])
-
-
-def _boxes(view: View, paths: Sequence[Path], walks: Sequence[Floats], settings: Settings) -> list[MotRow]:
-    """Give everybody's boxes in a camera, cut at the borders of its picture."""
-    width, height = view.size
-    rows = []
-    for number, (path, walk) in enumerate(zip(paths, walks, strict=True), start=1):
-        boxes = view.boxes(walk, settings.floor.aspect)
-        whole = np.clip(np.nan_to_num(boxes), 0.0, [width, height, width, height])
-        area = (boxes[:, 2] - boxes[:, 0]) * (boxes[:, 3] - boxes[:, 1])
-        inside = (whole[:, 2] - whole[:, 0]) * (whole[:, 3] - whole[:, 1])
-        shown = np.isfinite(area) & (inside >= settings.paths.least_seen * np.nan_to_num(area, nan=1.0))
-        for place in np.flatnonzero(shown & (inside > 0.0)):
-            left, top, right, bottom = whole[place].tolist()
-            rows.append(MotRow(path.first + int(place) + 1, number, left, top, right - left, bottom - top))
-    return sorted(rows, key=lambda row: (row.frame, row.id))
+def _whole(costs: Floats) -> Ints:
+    return np.asarray(np.rint(_UNIT * costs), dtype=np.int64)
