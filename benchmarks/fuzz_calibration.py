@@ -5,13 +5,12 @@ from __future__ import annotations
 import json
 from pathlib import Path
 from random import Random
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 
 from benchmarks.fuzz_mutate import as_json, damaged, otherwise
-from benchmarks.fuzz_target import Target, refused
+from benchmarks.fuzz_target import Target, folder, refused
 from bestview.calibrate import CalibrationError, fit_cameras
 from server.run.calibrate import calibrate_points
 from server.run.calibrate_points import COLUMNS, read_points
@@ -59,7 +58,7 @@ class _Files(Target):
     """Files in a folder of their own."""
 
     def __init__(self) -> None:
-        self._folder = TemporaryDirectory()
+        self._folder = folder()
         self._path = Path(self._folder.name)
 
     def written(self, data: bytes) -> Path:

@@ -6,7 +6,6 @@ import asyncio
 import struct
 from pathlib import Path
 from random import Random
-from tempfile import TemporaryDirectory
 from typing import Literal
 
 import av
@@ -27,7 +26,7 @@ from benchmarks.fuzz_site import (
     video,
     word,
 )
-from benchmarks.fuzz_target import Target, refused
+from benchmarks.fuzz_target import Target, folder, refused
 from benchmarks.fuzz_zenoh import ask, drink
 from client.fmp4 import BoxReader, Mp4Error
 from client.plain import write_plain
@@ -170,7 +169,7 @@ class ClientMp4(Target):
 
     def __init__(self) -> None:
         self._stream = _stream("h264")
-        self._folder = TemporaryDirectory()
+        self._folder = folder()
         self._path = Path(self._folder.name)
 
     def make(self, rng: Random) -> bytes:
@@ -206,7 +205,7 @@ class ClientWebm(Target):
 
     def __init__(self) -> None:
         self._stream = _stream("vp8")
-        self._folder = TemporaryDirectory()
+        self._folder = folder()
         self._path = Path(self._folder.name)
 
     def make(self, rng: Random) -> bytes:
@@ -325,7 +324,7 @@ class Files(Target):
     share = 0.005
 
     def __init__(self) -> None:
-        self._folder = TemporaryDirectory()
+        self._folder = folder()
         self._path = Path(self._folder.name) / "c0.mp4"
         with av.open(str(self._path), "w") as out:
             stream = out.add_stream("libx264", rate=FPS, options={"preset": "ultrafast", "g": "5", "bf": "0"})
@@ -386,7 +385,7 @@ class Kept(Target):
 
     def __init__(self) -> None:
         self._stream = _stream("h264")
-        self._folder = TemporaryDirectory()
+        self._folder = folder()
         self._path = Path(self._folder.name)
         self._form = SoundFormat(48_000, 2)
 

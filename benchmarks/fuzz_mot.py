@@ -5,12 +5,11 @@ from __future__ import annotations
 import gzip
 from pathlib import Path
 from random import Random
-from tempfile import TemporaryDirectory
 
 import numpy as np
 
 from benchmarks.fuzz_mutate import damaged
-from benchmarks.fuzz_target import Target, refused
+from benchmarks.fuzz_target import Target, folder, refused
 from server.run.calibrate_tracks import Picture, walks_from_tracks
 from server.wire.errors import UserError
 from tracking.detectors.motfile import MotFileDetector
@@ -46,7 +45,7 @@ class _Files(Target):
     least_id = -1
 
     def __init__(self) -> None:
-        self._folder = TemporaryDirectory()
+        self._folder = folder()
         self._path = Path(self._folder.name)
         rng = Random(1)
         self._right = [_rows(rng, self.least_id) for _ in range(200)]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
+from functools import cache
 from typing import Any, get_type_hints
 
 from pydantic import BeforeValidator
@@ -20,10 +21,15 @@ def validated(settings: type) -> BeforeValidator:
     return BeforeValidator(check)
 
 
+@cache
+def _types(settings: type) -> dict[str, Any]:
+    return get_type_hints(settings)
+
+
 def _check(settings: type, value: Any, place: str) -> None:
     if not isinstance(value, dict):
         return
-    types = get_type_hints(settings)
+    types = _types(settings)
     names = [field.name for field in dataclasses.fields(settings)]
     for key, inner in value.items():
         if key not in names:

@@ -172,7 +172,7 @@ def _reason(error: Exception) -> str:
 def _one_line(where: str, error: ValidationError, within: tuple[str, ...] = ()) -> str:
     errors = error.errors()
     more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
-    return f"{where}: {_plain(errors[0], within)}{more}"
+    return " ".join(f"{where}: {_plain(errors[0], within)}{more}".split())
 
 
 def _plain(detail: ErrorDetails, within: tuple[str, ...]) -> str:

@@ -52,6 +52,12 @@ def test_a_configuration_that_cannot_be_read_is_refused_in_a_line(tmp_path: Path
     assert len(str(refused.value)) < 1000
 
 
+def test_a_key_that_breaks_lines_is_named_in_one(tmp_path: Path) -> None:
+    with pytest.raises(UserError) as refused:
+        build_config({"cameras": [CAMERA], "site": {"name\u2028hall": 1, "a\nb": 2}}, where="x", folder=tmp_path)
+    assert len(str(refused.value).splitlines()) == 1
+
+
 def test_settings_to_try_out_must_be_text() -> None:
     with pytest.raises(UserError, match="characters that are none"):
         changed_view(View(), {"\ud800": 1}, "to try out")
