@@ -53,8 +53,9 @@ def test_a_configuration_that_cannot_be_read_is_refused_in_a_line(tmp_path: Path
 
 
 def test_a_key_that_breaks_lines_is_named_in_one(tmp_path: Path) -> None:
+    content = {"cameras": [CAMERA], "site": {"name\u2028hall": 1, "a\nb": 2}}
     with pytest.raises(UserError) as refused:
-        build_config({"cameras": [CAMERA], "site": {"name\u2028hall": 1, "a\nb": 2}}, where="x", folder=tmp_path)
+        build_config(content, where="x", folder=tmp_path)
     assert len(str(refused.value).splitlines()) == 1
 
 
