@@ -19,6 +19,7 @@ from server.web.operator_settings import settings_of
 from server.wire.config import Config
 from server.wire.errors import UserError
 from server.wire.loading import build_config, changed_view, load_config
+from server.wire.tokens import read_tokens
 
 WORDS = (
     b":", b": ", b"- ", b"\n", b"\n  ", b"\t", b"\x00", b"\xff", b"&a ", b"*a", b"!!int ''", b"!!float ''",
@@ -37,6 +38,12 @@ track: {window: {stride: 5}}
 view: {lookahead: 25, identity: {confirm: 2}}
 http: {port: 8080}
 """
+_TOKENS = b"""tokens:
+  - {name: hall, sha256: %b, role: watch, object: 3, made: 2026-11-21T16:13:36Z}
+  - name: Ada
+    sha256: "%b"
+    role: operate
+""" % (b"a1" * 32, b"0f" * 32)
 _VARIABLE = "MYVIEW_"
 _MOST_CAMERAS = 20
 _SELDOM = 16
@@ -74,6 +81,34 @@ class Text(Target):
         except UserError as error:
             return refused(error)
         _looked_at(config, seldom=len(data) % _SELDOM == 0)
+        return True
+
+    def close(self) -> None:
+        """Take the folder away."""
+        self._folder.cleanup()
+
+
+class Tokens(Target):
+    """The file that says who may come."""
+
+    name = "config-tokens"
+    share = 0.5
+
+    def __init__(self) -> None:
+        self._folder = folder()
+        self._path = Path(self._folder.name) / "tokens.yaml"
+
+    def make(self, rng: Random) -> bytes:
+        """Give a file."""
+        return damaged(rng, _TOKENS, WORDS) if rng.random() < 0.99 else _TOKENS
+
+    def feed(self, data: bytes) -> bool:
+        """Read it."""
+        self._path.write_bytes(data)
+        try:
+            read_tokens(self._path)
+        except UserError as error:
+            return refused(error)
         return True
 
     def close(self) -> None:
@@ -167,4 +202,4 @@ def _plain(value: Any) -> Any:
     return json.loads(TypeAdapter(Any).dump_json(value))
 
 
-TARGETS = (Text, Values, Tried)
+TARGETS = (Text, Tokens, Values, Tried)

@@ -280,7 +280,7 @@ class Sockets(Target):
 
     async def _to_client(self, data: bytes) -> bool:
         async def serve(_: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-            with contextlib.suppress(ConnectionError):
+            with contextlib.suppress(OSError):
                 writer.write(data)
                 await writer.drain()
                 writer.write_eof()

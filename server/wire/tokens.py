@@ -14,6 +14,7 @@ from pydantic import AwareDatetime, Field, ValidationError, model_validator
 
 from server.wire.errors import UserError
 from server.wire.sections.base import Name, Section
+from server.wire.values import check_values
 from server.wire.yaml_file import read_yaml
 
 Role = Literal["watch", "operate"]
@@ -59,6 +60,7 @@ def read_tokens(path: Path) -> tuple[Token, ...]:
         UserError: it cannot be read, or something in it is wrong.
     """
     content = read_yaml(path, "the tokens")
+    check_values(content, str(path))
     listed = content.get("tokens") if isinstance(content, dict) and len(content) == 1 else None
     if not isinstance(listed, list):
         raise UserError(
@@ -80,4 +82,5 @@ def _token(path: Path, number: int, content: Any) -> Token:
         first = error.errors()[0]
         place = ".".join(["tokens", str(number), *map(str, first["loc"])])
         said = "unknown key" if first["type"] == "extra_forbidden" else first["msg"]
-        raise UserError(f"{path}: {place}: {said.removeprefix('Value error, ')}") from error
+        line = f"{path}: {place}: {said.removeprefix('Value error, ')}"
+        raise UserError(" ".join(line.split())) from error

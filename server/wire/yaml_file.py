@@ -11,6 +11,23 @@ from server.wire.errors import UserError
 
 _SHOWN = 300
 """Characters of what a library says that a line of ours repeats."""
+_MOST_MERGED = 100_000
+"""Keys that merges (``<<``) bring into mappings; each may refer to all of one before."""
+
+
+class _Loader(yaml.SafeLoader):
+    """The safe loader, in which a few lines cannot stand for keys without end."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(text)
+        self._merged = 0
+
+    def flatten_mapping(self, node: yaml.MappingNode) -> None:
+        """Merge, and count."""
+        super().flatten_mapping(node)
+        self._merged += len(node.value)
+        if self._merged > _MOST_MERGED:
+            raise yaml.YAMLError("merges (<<) that stand for more keys than any file of ours has")
 
 
 def read_yaml(path: Path, what: str) -> Any:
@@ -25,7 +42,7 @@ def read_yaml(path: Path, what: str) -> Any:
         reason = getattr(error, "strerror", None) or " ".join(str(error).split())
         raise UserError(f"{path}: cannot read {what}: {reason}") from error
     try:
-        return yaml.safe_load(text)
+        return yaml.load(text, Loader=_Loader)  # noqa: S506 — the safe loader, made safer
     except yaml.YAMLError as error:
         raise UserError(f"{path}: is not valid YAML: {' '.join(str(error).split())[:_SHOWN]}") from error
     except RecursionError as error:

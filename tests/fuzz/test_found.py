@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import itertools
 import json
 import logging
 from pathlib import Path
@@ -29,7 +30,7 @@ CAMERA = {"id": "c0", "source": "scene:room"}
 @pytest.mark.parametrize(
     "text",
     [
-        "[" * 5000,
+        "[" * 1200,
         "cameras: &a [*a]",
         "cameras: !!int ''",
         "cameras: !!bool x",
@@ -37,6 +38,10 @@ CAMERA = {"id": "c0", "source": "scene:room"}
         "cameras: 0b_",
         "site: {name: 2001-99-99}",
         'http: {host: "\\ud800"}\ncameras: [{id: c0, source: x}]',
+        "a: &a {x: 1}\n"
+        + "\n".join(
+            f"{b}: &{b} {{<<: [{', '.join([f'*{a}'] * 9)}]}}" for a, b in itertools.pairwise("abcdefghij")
+        ),
         "a: &a [1, 1, 1, 1, 1, 1, 1, 1, 1]\n"
         + "\n".join(
             f"{b}: &{b} [{', '.join([f'*{a}'] * 9)}]" for a, b in zip("abcdefg", "bcdefgh", strict=True)
