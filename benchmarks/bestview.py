@@ -18,7 +18,9 @@ Recordings are looked at ahead, as MyView does with recordings; `--as-live` has 
 *No evidence* is without what the cameras tell each other about each frame. *Calibrated* has the homographies
 that `myview calibrate` makes of the cameras' own tracks. *Largest* chooses frame by frame the camera with the
 largest box. *Nearest feet* joins whole tracks of our cameras, each by itself (or of ByteTrack, on the same
-boxes), by the median distance of their feet, and chooses so, too. The sweeps are on true boxes.
+boxes), by the median distance of their feet, and chooses so, too. *Occupancy map* finds everybody on the
+ground from all cameras' foreground and joins places by the flow of least cost; its views are chosen by
+MyView's program. The sweeps are on true boxes.
 """
 
 from __future__ import annotations
