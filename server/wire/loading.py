@@ -21,7 +21,7 @@ from server.wire.errors import UserError
 from server.wire.ground_unit import checked_unit
 from server.wire.sections import Camera, View
 from server.wire.sources import resolved
-from server.wire.values import check_values
+from server.wire.values import check_numbers, check_values
 from server.wire.yaml_file import read_yaml
 
 
@@ -60,6 +60,7 @@ def build_config(content: Mapping[str, Any], *, where: str, folder: Path) -> Con
         raise UserError(_one_line(where, error)) from error
     except SettingsError as error:
         raise UserError(f"{where}: environment: {error}; a section's whole value must be JSON") from error
+    check_numbers(config.model_dump(), where)
     homographies, unit = _homographies(folder / config.ground, where) if config.ground else ({}, None)
     try:
         cameras = [_resolved(camera, homographies, unit, folder) for camera in config.cameras]

@@ -1,7 +1,8 @@
-"""Values as YAML and JSON have them, before anybody looks at what they mean."""
+"""Values as YAML and JSON have them, before and after somebody has looked at what they mean."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 from server.wire.errors import UserError
@@ -9,6 +10,7 @@ from server.wire.errors import UserError
 _DEEPEST = 32
 _MOST = 1_000_000
 """Values; an alias that YAML refers to again counts again, as it does for whoever reads it."""
+_LARGEST = 1e15
 _SHOWN = 40
 
 
@@ -18,23 +20,39 @@ def check_values(content: Any, where: str) -> None:
     Raises:
         UserError: they do not, or are not; the text begins with ``where``.
     """
-    left: list[tuple[Any, int]] = [(content, 0)]
+    for _, value in _inside(content, where):
+        if isinstance(value, str):
+            try:
+                value.encode()
+            except UnicodeEncodeError:
+                raise UserError(f"{where}: {value[:_SHOWN]!a}: has characters that are none") from None
+
+
+def check_numbers(content: Any, where: str) -> None:
+    """Look that sums and products of numbers are still numbers.
+
+    Raises:
+        UserError: one is too large for that; the text begins with ``where`` and names it.
+    """
+    for place, value in _inside(content, where):
+        if isinstance(value, int | float) and not abs(value) <= _LARGEST:
+            named = ".".join(map(str, place))
+            raise UserError(f"{where}: {named}: {str(value)[:_SHOWN]} is a number beyond all measure")
+
+
+def _inside(content: Any, where: str) -> Iterator[tuple[tuple[Any, ...], Any]]:
+    """Give all values, keys too, and by what keys they are reached."""
+    left: list[tuple[tuple[Any, ...], Any]] = [((), content)]
     seen = 0
     while left:
-        value, depth = left.pop()
+        place, value = left.pop()
         seen += 1
-        if depth > _DEEPEST or seen > _MOST:
+        if len(place) > _DEEPEST or seen > _MOST:
             raise UserError(f"{where}: is nested without end, or larger than any configuration")
-        if isinstance(value, str):
-            _check_text(value, where)
-        elif isinstance(value, dict):
-            left += ((it, depth + 1) for pair in value.items() for it in pair)
+        if isinstance(value, dict):
+            left += ((place, key) for key in value)
+            left += (((*place, key), it) for key, it in value.items())
         elif isinstance(value, list | tuple | set):
-            left += ((it, depth + 1) for it in value)
-
-
-def _check_text(text: str, where: str) -> None:
-    try:
-        text.encode()
-    except UnicodeEncodeError:
-        raise UserError(f"{where}: {text[:_SHOWN]!a}: has characters that are none") from None
+            left += (((*place, number), it) for number, it in enumerate(value))
+        else:
+            yield place, value

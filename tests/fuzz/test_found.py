@@ -64,6 +64,22 @@ def test_a_key_that_breaks_lines_is_named_in_one(tmp_path: Path) -> None:
     assert len(str(refused.value).splitlines()) == 1
 
 
+@pytest.mark.parametrize("value", [float("inf"), 1e300, 10**400])
+def test_a_number_beyond_all_measure_is_refused_and_named(tmp_path: Path, value: float) -> None:
+    content: dict[str, Any] = {"cameras": [CAMERA], "http": {"hls_segment_s": value}}
+    with pytest.raises(UserError, match=r"http\.hls_segment_s") as refused:
+        build_config(content, where="x", folder=tmp_path)
+    assert len(str(refused.value)) < 200
+
+
+def test_a_number_beyond_all_measure_is_none_in_the_environment_either(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MYVIEW_HTTP__HLS_SEGMENT_S", "Infinity")
+    with pytest.raises(UserError, match=r"http\.hls_segment_s"):
+        build_config({"cameras": [CAMERA]}, where="x", folder=tmp_path)
+
+
 def test_settings_to_try_out_must_be_text() -> None:
     with pytest.raises(UserError, match="characters that are none"):
         changed_view(View(), {"\ud800": 1}, "to try out")
