@@ -66,7 +66,9 @@ class Exchange:
 
     async def _join(self) -> None:
         while True:
-            self._opening = asyncio.create_task(asyncio.to_thread(Bus.hearing, self._config.zenoh))
+            self._opening = asyncio.create_task(
+                asyncio.to_thread(Bus.hearing, self._config.zenoh, self._camera)
+            )
             try:
                 # Shielded: a session that nobody knows of could not be closed, and the process not end.
                 bus = await asyncio.shield(self._opening)

@@ -66,7 +66,7 @@ class CameraProcess:
 
     async def run(self) -> None:
         """Serve until the recording is over (a camera's never is)."""
-        self._bus = bus = Bus.client(self._config.zenoh)
+        self._bus = bus = Bus.client(self._config.zenoh, self._id)
         try:
             await self._wait_for_bestview(bus)
             bus.declare_alive(self._keys.camera(self._id, "alive"))

@@ -23,6 +23,7 @@ from server.view.shelf import Shelf
 from server.view.sound import SoundShelf
 from server.view.splice import Splicer
 from server.wire.bus import Bus
+from server.wire.bus_users import access_of
 from server.wire.config import Config
 from server.wire.errors import UserError
 from server.wire.inbox import Message
@@ -86,8 +87,11 @@ class BestViewService:
         Raises:
             UserError: its address is in use.
         """
-        index = self.config.view.share.index
-        self._bus = bus = Bus.second(self.config.zenoh) if index else Bus.router(self.config.zenoh)
+        index, zenoh = self.config.view.share.index, self.config.zenoh
+        if index:
+            self._bus = bus = Bus.second(zenoh, pulse_client(index))
+        else:
+            self._bus = bus = Bus.router(zenoh, access_of(self.config))
         handlers = {
             "video": self.intake.video,
             "tracks": self._tracks,

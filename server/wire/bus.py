@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
-from typing import Self
+from collections.abc import Callable, Mapping
+from typing import Any, Self
 
 import zenoh
 
+from server.wire.bus_users import password_of
 from server.wire.errors import UserError
 from server.wire.inbox import Inbox, Message
 from server.wire.sections import Zenoh
@@ -30,45 +31,56 @@ class Bus:
         self._undeclare: list[Callable[[], None]] = []
 
     @classmethod
-    def router(cls, settings: Zenoh) -> Self:
+    def router(cls, settings: Zenoh, access: Mapping[str, Any] | None = None) -> Self:
         """Open the session that all others connect to (the best-view service's).
+
+        ``access`` is zenoh's access control: what each user of ``settings.users`` may.
 
         Raises:
             UserError: the address cannot be listened on.
         """
-        config = _config(settings, "router")
+        config = _config(settings, "router", None)
+        if settings.users is not None:
+            config.insert_json5("transport/auth/usrpwd/dictionary_file", json.dumps(str(settings.users)))
+        for key, file in (("certificate", settings.tls.certificate), ("private_key", settings.tls.key)):
+            if file is not None:
+                config.insert_json5(f"transport/link/tls/listen_{key}", json.dumps(str(file)))
+        if access is not None:
+            config.insert_json5("access_control", json.dumps(access))
         try:
             config.insert_json5("listen/endpoints", json.dumps([settings.listen]))
             return cls(zenoh.open(config))
         except zenoh.ZError as error:
             raise UserError(
                 f"zenoh.listen: cannot listen on {settings.listen}; is the port in use?"
+                + (" Are zenoh.tls.certificate and key a pair?" if settings.tls.key is not None else "")
             ) from error
 
     @classmethod
-    def client(cls, settings: Zenoh) -> Self:
+    def client(cls, settings: Zenoh, user: str | None = None) -> Self:
         """Open a session of the site's router; it need not be there yet, and may go and come back.
 
         It hears the router's process, which is the best-view service, and is heard by it; not other clients.
+        ``user`` is who it comes as, where the router asks.
 
         Raises:
-            UserError: the address is not one that zenoh understands.
+            UserError: the address is not one that zenoh understands, or there is no such user.
         """
         # A peer, not a client: a client's session cannot be opened while the router is away.
-        return cls._connected(settings, "peer")
+        return cls._connected(settings, "peer", user)
 
     @classmethod
-    def second(cls, settings: Zenoh) -> Self:
+    def second(cls, settings: Zenoh, user: str | None = None) -> Self:
         """Open the like for a further best-view service, which hears all of the router's clients.
 
         Raises:
             UserError: the address is not one that zenoh understands.
         """
         # A router tells routers what it hears from peers, but no peer what it hears from another.
-        return cls._connected(settings, "router")
+        return cls._connected(settings, "router", user)
 
     @classmethod
-    def hearing(cls, settings: Zenoh) -> Self:
+    def hearing(cls, settings: Zenoh, user: str | None = None) -> Self:
         """Open a session that hears the router's other clients, too.
 
         The router must be there; later it may go and come back. Blocks for some seconds at most.
@@ -76,17 +88,18 @@ class Bus:
         Raises:
             UserError: the router is not there.
         """
-        config = _config(settings, "client")
+        config = _config(settings, "client", user)
         try:
             config.insert_json5("connect/timeout_ms", str(_OPEN_WITHIN_MS))
             config.insert_json5("connect/endpoints", json.dumps([settings.connect]))
             return cls(zenoh.open(config))
         except zenoh.ZError as error:
-            raise UserError(f"zenoh.connect: nobody is at {settings.connect}") from error
+            refused = "" if settings.users is None else ", or who is there refuses this user"
+            raise UserError(f"zenoh.connect: nobody is at {settings.connect}{refused}") from error
 
     @classmethod
-    def _connected(cls, settings: Zenoh, mode: str) -> Self:
-        config = _config(settings, mode)
+    def _connected(cls, settings: Zenoh, mode: str, user: str | None) -> Self:
+        config = _config(settings, mode, user)
         config.insert_json5("connect/timeout_ms", "-1")  # keep trying in the background
         config.insert_json5("connect/exit_on_failure", "false")
         config.insert_json5("listen/endpoints", "[]")
@@ -164,7 +177,7 @@ class Bus:
         self._session.close()  # type: ignore[no-untyped-call]
 
 
-def _config(settings: Zenoh, mode: str) -> zenoh.Config:
+def _config(settings: Zenoh, mode: str, user: str | None) -> zenoh.Config:
     config = zenoh.Config()
     for key, value in {
         "mode": mode,
@@ -176,4 +189,9 @@ def _config(settings: Zenoh, mode: str) -> zenoh.Config:
         "transport/shared_memory/enabled": False,
     }.items():
         config.insert_json5(key, json.dumps(value))
+    if settings.users is not None and user is not None:
+        config.insert_json5("transport/auth/usrpwd/user", json.dumps(user))
+        config.insert_json5("transport/auth/usrpwd/password", json.dumps(password_of(settings.users, user)))
+    if settings.tls.authority is not None:
+        config.insert_json5("transport/link/tls/root_ca_certificate", json.dumps(str(settings.tls.authority)))
     return config

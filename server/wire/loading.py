@@ -19,7 +19,7 @@ from bestview import checked_homography, turns
 from server.wire.config import Config
 from server.wire.errors import UserError
 from server.wire.ground_unit import checked_unit
-from server.wire.sections import Camera, View
+from server.wire.sections import Camera, View, Zenoh, ZenohTls
 from server.wire.sources import resolved
 from server.wire.values import check_numbers, check_values
 from server.wire.yaml_file import read_yaml
@@ -87,7 +87,18 @@ def _who_may(config: Config, folder: Path) -> dict[str, Any]:
     if tls.certificate is not None and tls.key is not None:
         files = {"certificate": folder / tls.certificate, "key": folder / tls.key}
         tls = tls.model_copy(update=files)
-    return {"access": access, "http": config.http.model_copy(update={"tls": tls})}
+    return {
+        "access": access,
+        "http": config.http.model_copy(update={"tls": tls}),
+        "zenoh": _bus_files(config.zenoh, folder),
+    }
+
+
+def _bus_files(zenoh: Zenoh, folder: Path) -> Zenoh:
+    named = {name: getattr(zenoh.tls, name) for name in ZenohTls.model_fields}
+    tls = ZenohTls(**{name: None if it is None else (folder / it).absolute() for name, it in named.items()})
+    users = None if zenoh.users is None else (folder / zenoh.users).absolute()
+    return zenoh.model_copy(update={"tls": tls, "users": users})
 
 
 def changed_view(view: View, changes: Mapping[str, Any], where: str) -> View:

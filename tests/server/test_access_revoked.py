@@ -20,6 +20,11 @@ from server.web.operator_permission import CHANGES
 from server.wire.tokens import digest_of
 
 
+@pytest.fixture(autouse=True)
+def _looks_often(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("server.web.access._LOOK_EVERY_S", 0.02)
+
+
 @pytest.fixture
 async def site(tmp_path: Path) -> AsyncIterator[Hall]:
     async with locked(tmp_path) as hall:

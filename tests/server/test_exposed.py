@@ -14,7 +14,10 @@ from tokens_by_hand import line_of, write_tokens
 from server.run.exposed import check_bus, check_pulses, check_viewers, is_loopback
 from server.run.setup import DEMO
 from server.wire.errors import UserError
+from server.wire.loading import load_config
+from server.wire.sections import Access
 
+CONFIGS = Path(__file__).parents[2] / "configs"
 OUTSIDE = "0.0.0.0"  # noqa: S104 — what the tests are about
 
 
@@ -87,3 +90,25 @@ def test_every_command_that_listens_refuses_with_one_line(
     path = tmp_path / "site.yaml"
     path.write_text(yaml.safe_dump({**DEMO, **changes}), encoding="utf-8")
     assert refusal(myview(command, str(path))).startswith(f"myview: {setting}: ")
+
+
+def test_a_bus_that_asks_who_comes_may_be_anywhere_if_it_is_encrypted() -> None:
+    listen = f"{OUTSIDE}:7447"
+    check_bus(small_config(zenoh={"listen": f"tls/{listen}", "users": "zenoh.users"}))
+    for zenoh in ({"listen": f"tcp/{listen}", "users": "zenoh.users"}, {"listen": f"tls/{listen}"}):
+        with pytest.raises(UserError, match=r"zenoh\.listen"):
+            check_bus(small_config(zenoh=zenoh))
+
+
+def test_the_secure_example_is_open_to_nobody_without_a_token_or_a_password() -> None:
+    config = load_config(CONFIGS / "secure.yaml")
+    assert not is_loopback(config.http.host)
+    assert not config.access.open_to_all
+    assert config.access.tokens == CONFIGS / "secret" / "tokens.yaml"
+    assert config.http.tls.key == CONFIGS / "secret" / "https.key"
+    assert config.zenoh.connect.startswith("tls/")
+    assert config.zenoh.tls.authority == CONFIGS / "secret" / "authority.pem"
+    check_pulses(config)
+    check_bus(config.model_copy(update={"access": Access()}))
+    with pytest.raises(UserError, match="cannot read the tokens"):
+        check_viewers(config)

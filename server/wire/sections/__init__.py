@@ -5,7 +5,7 @@ from server.wire.sections.base import Endpoint, Name, Polygon, Port, Section, Si
 from server.wire.sections.camera import Camera, Track
 from server.wire.sections.encode import Encode
 from server.wire.sections.serve import Http, Record, Tls
-from server.wire.sections.site import Site, Sync, Zenoh
+from server.wire.sections.site import Site, Sync, Zenoh, ZenohTls
 from server.wire.sections.sound import Sound
 from server.wire.sections.view import Share, View
 
@@ -29,4 +29,5 @@ __all__ = [
     "Track",
     "View",
     "Zenoh",
+    "ZenohTls",
 ]

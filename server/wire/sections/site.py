@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat
@@ -30,6 +31,17 @@ class Sync(Section):
     """How long pulse 0 waits for all cameras to be there, so that recordings start at their first frame."""
 
 
+class ZenohTls(Section):
+    """Encryption of the bus, where its addresses begin with tls/."""
+
+    authority: Path | None = None
+    """PEM: the authority that has signed the router's certificate; whoever connects goes by it."""
+    certificate: Path | None = None
+    """PEM: the router's certificate; it names the host of `zenoh.connect`."""
+    key: Path | None = None
+    """PEM: its private key."""
+
+
 class Zenoh(Section):
     """The message bus. The best-view service is its router: no separate daemon is needed."""
 
@@ -39,3 +51,9 @@ class Zenoh(Section):
     """Where the best-view service's router listens."""
     lease_s: PositiveFloat = 1.0
     """A process that is silent this long counts as gone."""
+    users: Path | None = None
+    """A file of `name:password`, one a line; none: whoever reaches the router is believed.
+
+    A camera comes as its id, and sends under its own key alone. The router needs all lines, others their own.
+    """
+    tls: ZenohTls = ZenohTls()

@@ -1,0 +1,110 @@
+"""Who is who on the bus, and what each may send and hear there: zenoh's users and its access control."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from server.wire.config import Config
+from server.wire.errors import UserError
+from server.wire.messages import Keys, pulse_client
+
+_SENDS = ["put", "delete", "liveliness_token"]
+_ASKS = ["declare_subscriber", "declare_liveliness_subscriber", "liveliness_query"]
+_PASSES = [*_SENDS, "declare_subscriber"]
+"""What the router tells others: messages, who is there, and what somebody wants to hear."""
+_SERVICES = 64
+"""Best-view services that a site may have, beside the first."""
+
+
+def read_users(path: Path) -> dict[str, str]:
+    """Read the users' passwords by name: a line ``name:password`` for each.
+
+    Raises:
+        UserError: it cannot be read, or a line is none.
+    """
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "it is no text"
+        raise UserError(f"zenoh.users: cannot read {path}: {reason}") from error
+    users: dict[str, str] = {}
+    for number, line in enumerate(lines, start=1):
+        name, colon, password = line.partition(":")
+        if not (name and colon and password) or name in users or line != line.strip():
+            raise UserError(
+                f"zenoh.users: {path}: line {number} is no name:password, or a name is there twice"
+            )
+        users[name] = password
+    return users
+
+
+def password_of(path: Path, name: str) -> str:
+    """Give a user's password.
+
+    Raises:
+        UserError: it cannot be read, or there is none.
+    """
+    password = read_users(path).get(name)
+    if password is None:
+        raise UserError(f"zenoh.users: {path} has no line for {name!r}, as which this process comes")
+    return password
+
+
+def access_of(config: Config) -> dict[str, Any] | None:
+    """Give what each user of a site's bus may; None: whoever reaches it may everything.
+
+    Raises:
+        UserError: the users cannot be read.
+    """
+    if config.zenoh.users is None:
+        return None
+    users = list(read_users(config.zenoh.users))
+    return access_rules(config.site.name, config.camera_ids, config.sounding, users)
+
+
+def access_rules(
+    site: str, cameras: Sequence[str], sounding: str | None, users: Sequence[str]
+) -> dict[str, Any]:
+    """Give what each user may, as zenoh's ``access_control``: what is not said is denied.
+
+    A camera sends under its own key, and the site's sound if it is the one, and hears what the others found.
+    Further best-view services may everything. Any other user may hear everything, and send nothing.
+    """
+    keys = Keys(site)
+    everything = f"myview/{site}/**"
+    found, hears, services = keys.camera("*", "found"), keys.camera("*", "hears"), keys.bestview("**")
+    rules = [
+        _rule("services", "both", [*_SENDS, *_ASKS], [everything]),
+        _rule("all is asked for", "ingress", _ASKS, [everything]),
+        _rule("all is told", "egress", _PASSES, [everything]),
+        _rule("others are asked for", "ingress", _ASKS, [found, hears, services]),
+        _rule("others are told", "egress", _SENDS, [found, hears, services]),
+        _rule("is asked for", "egress", ["declare_subscriber"], [everything]),
+    ]
+    further = [pulse_client(index) for index in range(1, _SERVICES)]
+    listeners = [it for it in users if it not in {*cameras, *further, pulse_client(0)}]
+    subjects = [{"id": "services", "usernames": further}]
+    policies = [{"rules": ["services"], "subjects": ["services"]}]
+    if listeners:
+        subjects.append({"id": "listeners", "usernames": listeners})
+        policies.append({"rules": ["all is asked for", "all is told"], "subjects": ["listeners"]})
+    for camera in cameras:
+        own = [keys.camera(camera, "**"), *([keys.sound] if camera == sounding else [])]
+        rules.append(_rule(f"camera {camera}", "ingress", _SENDS, own))
+        subjects.append({"id": f"camera {camera}", "usernames": [camera]})
+        theirs = [f"camera {camera}", "others are asked for", "others are told", "is asked for"]
+        policies.append({"rules": theirs, "subjects": [f"camera {camera}"]})
+    return {
+        "enabled": True,
+        "default_permission": "deny",
+        "rules": rules,
+        "subjects": subjects,
+        "policies": policies,
+    }
+
+
+def _rule(name: str, way: str, messages: Sequence[str], keys: Sequence[str]) -> dict[str, Any]:
+    flows = ["ingress", "egress"] if way == "both" else [way]
+    return {"id": name, "permission": "allow", "flows": flows, "messages": messages, "key_exprs": keys}
