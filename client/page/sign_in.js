@@ -6,7 +6,7 @@ import { askAt, Refused } from './operator_http.js';
 /** @import {Session} from './contract.js' */
 
 const SESSION = 'api/session';
-const NEEDS_TOKEN = [401, 429];
+const NEEDS_TOKEN = [401, 403, 429]; // none, one that is void, too many wrong ones
 const IN_LINK = /^#token=([\w-]+)$/;
 
 export class SignIn {
@@ -58,6 +58,7 @@ export class SignIn {
       return session;
     } catch (error) {
       if (!(error instanceof Refused) || !NEEDS_TOKEN.includes(error.status)) throw error;
+      if (error.status === 403) this.tell(error);
       this.ask();
       return null;
     }

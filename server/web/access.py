@@ -8,7 +8,6 @@ a sign-in, which is a cookie. What a token that has just been taken away holds o
 from __future__ import annotations
 
 import asyncio
-import logging
 import math
 import time
 from collections import OrderedDict
@@ -26,8 +25,6 @@ from server.web.access_sessions import Sessions
 from server.web.api import problem
 from server.web.operator_permission import path_of, refused_to_other_sites
 from server.wire.tokens import Token, digest_of
-
-log = logging.getLogger(__name__)
 
 COOKIE = "myview"
 """What the cookie's name begins with."""
@@ -88,6 +85,8 @@ class Access:
         self._failures = Failures(now)
         self._right: OrderedDict[tuple[str, str], None] = OrderedDict()
         self._asking: dict[int, _Asking] = {}
+        self.wrong_tokens = 0
+        """Since the start. They are counted and not logged: strangers could fill a disk with that."""
 
     @property
     def by_token(self) -> bool:
@@ -138,8 +137,7 @@ class Access:
             return Holder(digest)
         self._right.pop((address, digest), None)
         self._failures.add(address)
-        if self._failures.wait(address) > 0:
-            log.warning("%s sends wrong tokens and has to wait", address)
+        self.wrong_tokens += 1
         return problem(401, "there is no such token, or not any more")
 
     def session_of(self, request: web.Request) -> str:

@@ -76,9 +76,9 @@ def make_app(service: BestViewService) -> web.Application:
     )
     app[SERVICE], app[EVENTS], app[PICTURES] = service, Events(service), Pictures(service)
     app[READERS] = Readers(service.splicer.plan.target_s)
-    app[METRICS] = registry(service, app[PICTURES], app[READERS])
     what = f"{service.config.site.name}_{service.config.view.share.index}"
     app[ACCESS] = Access(service.config.access.tokens, service.board.resolve, what)
+    app[METRICS] = registry(service, app[PICTURES], app[READERS], app[ACCESS])
     for module in (api, session, site, video, past, hls, pictures, openapi, page, operator_routes):
         app.add_routes(module.routes)
     app.on_response_prepare.extend((tell_no_other_origin, keep_no_copies))

@@ -10,14 +10,15 @@ from prometheus_client.registry import Collector
 
 from server.view.pictures import Pictures
 from server.view.service import BestViewService
+from server.web.access import Access
 from server.web.readers import Readers
 
 
 class ServiceCollector(Collector):
     """Gives the service's numbers."""
 
-    def __init__(self, service: BestViewService, readers: Readers) -> None:
-        self._service, self._readers = service, readers
+    def __init__(self, service: BestViewService, readers: Readers, access: Access) -> None:
+        self._service, self._readers, self._access = service, readers, access
 
     def collect(self) -> Iterable[Metric]:
         """Give all metrics as they are now."""
@@ -31,6 +32,11 @@ class ServiceCollector(Collector):
             "myview_late_epochs",
             "Windows decided without a camera that was there.",
             value=service.late_epochs,
+        )
+        yield CounterMetricFamily(
+            "myview_wrong_tokens",
+            "Tokens that there is not, or not any more.",
+            value=self._access.wrong_tokens,
         )
         yield from self._recording()
         yield from self._cameras()
@@ -102,10 +108,12 @@ class PicturesCollector(Collector):
         )
 
 
-def registry(service: BestViewService, pictures: Pictures, readers: Readers) -> CollectorRegistry:
+def registry(
+    service: BestViewService, pictures: Pictures, readers: Readers, access: Access
+) -> CollectorRegistry:
     """Give the metrics of a service and its process."""
     metrics = CollectorRegistry()
-    metrics.register(ServiceCollector(service, readers))
+    metrics.register(ServiceCollector(service, readers, access))
     metrics.register(PicturesCollector(pictures))
     ProcessCollector(registry=metrics)
     return metrics

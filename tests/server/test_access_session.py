@@ -232,6 +232,8 @@ async def test_wrong_tokens_are_limited_in_rate_and_a_right_one_waits_too_unless
         assert 1 <= seconds <= 12
         assert (await answer.json())["error"] == f"too many wrong tokens; try again in {seconds} s"
     assert (await asked(site, **bearer("desk")))[0] == 200, "behind one address there may be others"
+    async with site.session.get("/metrics", headers=bearer("desk")) as answer:
+        assert "myview_wrong_tokens_total 5.0" in (await answer.text()).splitlines()
 
 
 def test_nobody_is_told_to_wait_for_no_time(tmp_path: Path) -> None:
