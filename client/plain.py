@@ -44,11 +44,14 @@ def write_plain(fragmented: Path, out: Path) -> None:
         OSError: it cannot be read, or ``out`` not written.
     """
     with fragmented.open("rb") as source, out.open("wb") as target:
-        film, media = _scan(source)
-        head = box("ftyp", b"isom" + struct.pack(">I", 512) + b"isomiso2avc1mp41")
-        size = sum(length for _, length in media)
-        moov_bytes = len(moov(film, 0))
-        target.write(head + moov(film, len(head) + moov_bytes + 2 * _HEADER))
+        try:
+            film, media = _scan(source)
+            head = box("ftyp", b"isom" + struct.pack(">I", 512) + b"isomiso2avc1mp41")
+            size = sum(length for _, length in media)
+            moov_bytes = len(moov(film, 0))
+            target.write(head + moov(film, len(head) + moov_bytes + 2 * _HEADER))
+        except (struct.error, ArithmeticError, IndexError) as error:
+            raise Mp4Error("it says times and sizes that no film has") from error
         target.write(struct.pack(">I4sQ", 1, b"mdat", 2 * _HEADER + size))
         for offset, length in media:
             source.seek(offset)

@@ -58,7 +58,7 @@ def cluster_time(cluster: Element) -> int:
         WebmError: it does not say.
     """
     for element in ElementReader().feed(cluster.content):
-        if element.name == _TIMESTAMP:
+        if element.name == _TIMESTAMP and len(element.content) <= _LONGEST_NUMBER:
             return int.from_bytes(element.content, "big")
     raise WebmError("a cluster without a time")
 

@@ -13,8 +13,13 @@ import pytest
 
 from benchmarks.fuzz_site import KEYS, STRIDE, Fed, pictures, site, video
 from bestview import checked_homography
+from client.fmp4 import Mp4Error
+from client.plain import write_plain
+from client.webm import ElementReader, WebmError, cluster_time
 from server.camera.exchange import Exchange
 from server.run.calibrate_points import read_points
+from server.view.agreement import Agreement
+from server.view.mp4_sound import sound_fragment
 from server.view.past.playlist import Playlist
 from server.view.skip import UnfitError, continuing
 from server.web.app import make_app, serving
@@ -23,6 +28,7 @@ from server.wire.h264 import ParameterSets, nal_units, parameter_sets
 from server.wire.inbox import Message
 from server.wire.loading import build_config, changed_view, load_config
 from server.wire.sections import View
+from server.wire.sound import SoundFormat
 
 CAMERA = {"id": "c0", "source": "scene:room"}
 
@@ -144,6 +150,27 @@ def test_a_playlist_that_names_no_place_in_a_file_is_passed_over(tmp_path: Path)
     playlist = Playlist(path, "", "", 25.0, None, 60.0)
     playlist.read()
     assert playlist.tape.all == ()
+
+
+def test_a_recording_of_times_that_no_film_has_is_left_as_it_is(tmp_path: Path) -> None:
+    agreement, (unit, *_) = Agreement(), pictures(0, 1)
+    agreement.accept(unit.data)
+    head = agreement.head(site().site, SoundFormat(48_000, 2)) or b""
+    form = SoundFormat(48_000, 2)
+    sound = sound_fragment(form, [form.silence] * 3, 0)
+    picture = bytearray(agreement.pack(unit.data, 0, 25.0, key=True))
+    at = picture.index(b"tfdt") + 8
+    picture[at : at + 8] = (1 << 60).to_bytes(8, "big")
+    part = tmp_path / "film.part"
+    part.write_bytes(head + sound + picture)
+    with pytest.raises(Mp4Error, match="no film has"):
+        write_plain(part, tmp_path / "film.mp4")
+
+
+def test_a_cluster_whose_time_is_no_number_has_none() -> None:
+    (cluster,) = ElementReader().feed(b"\x1f\x43\xb6\x75\x8c\xe7\x8a" + b"\x01" * 10)
+    with pytest.raises(WebmError, match="without a time"):
+        cluster_time(cluster)
 
 
 def test_words_nested_without_end_are_counted_and_dropped() -> None:
