@@ -34,11 +34,10 @@ from server.view.agreement import Agreement
 from server.view.align import Aligner
 from server.view.footage import Footage
 from server.view.intake import Intake
-from server.view.pictures import Pictures
 from server.view.shelf import Shelf
 from server.view.sound import SoundShelf
-from server.web.metrics import registry
-from server.web.readers import Readers
+from server.web.app import make_app
+from server.web.keys import METRICS
 from server.web.views import cameras_info, choice_info, objects_info, site_info
 from server.wire.epochs import end_of_epoch
 from server.wire.inbox import Message
@@ -223,7 +222,7 @@ def ask(service: Fed) -> None:
         msgspec.json.encode(told)
     for number in [*service.board.standings, 99]:
         msgspec.json.encode(choice_info(service, number))
-    generate_latest(registry(service, Pictures(service), Readers(1.0)))
+    generate_latest(make_app(service)[METRICS])
 
 
 def drink(viewer: Any) -> None:
