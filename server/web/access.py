@@ -174,7 +174,7 @@ class Access:
         """Give what somebody may now; None: it is not in force any more; or say why it is void."""
         if holder.session is not None and self.sessions.token(holder.session) is None:
             return None
-        token = None if self._file is None else self._file.find(holder.token)
+        token = None if self._file is None else self._file.still(holder.token)
         if token is None:
             return None
         return self._void(token) or Grant.of(token)

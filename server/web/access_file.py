@@ -24,7 +24,7 @@ class TokenFile:
         """
         self._path = path
         self._read = self._seen = state_of(path)
-        self._tokens = read_tokens(path)
+        self._tokens = _by_digest(path)
 
     def look(self) -> None:
         """Read the file again if it has changed, once it is still: it may be half-written."""
@@ -33,7 +33,7 @@ class TokenFile:
             return
         self._read = self._seen
         try:
-            self._tokens = read_tokens(self._path)
+            self._tokens = _by_digest(self._path)
         except UserError as error:
             log.warning("%s; the %d tokens as they were stay in force", error, len(self._tokens))
         else:
@@ -42,7 +42,15 @@ class TokenFile:
     def find(self, digest: str) -> Token | None:
         """Give the token of a SHA-256; all are compared, each in the same time: that tells nothing."""
         found = None
-        for token in self._tokens:
+        for token in self._tokens.values():
             if hmac.compare_digest(token.sha256, digest):
                 found = token
         return found
+
+    def still(self, digest: str) -> Token | None:
+        """Give the token of a SHA-256 that was found before, if it is in force now."""
+        return self._tokens.get(digest)
+
+
+def _by_digest(path: Path) -> dict[str, Token]:
+    return {it.sha256: it for it in read_tokens(path)}
