@@ -69,9 +69,9 @@ _LEAST_SLOPE, _MOST_SLOPE = 0.03, 1.5
 
 
 def _floor(config: Config, camera: Camera, fit: Fit) -> Floor | None:
-    """Give what metres of ground say about people's heights in the site's picture; None: nothing."""
+    """Give what the ground says about people's heights in the site's picture; None: nothing."""
     per_metre = METRES.get(camera.ground_unit or "")
-    if camera.ground is None or per_metre is None:
+    if camera.ground is None:
         return None
     homography = np.array(camera.ground, dtype=np.float64)
     width, height = config.site.width, config.site.height
@@ -83,6 +83,9 @@ def _floor(config: Config, camera: Camera, fit: Fit) -> Floor | None:
     # Below the middle of the picture it says where people do not stand rather than how tall they are.
     if seen > height / 2.0:
         return None
+    if per_metre is None:
+        # Far above the picture it is known badly, and there is no camera's height to check it by.
+        return Floor(seen, None) if seen >= -height else None
     above = camera_height(homography, middle)
     slope = _PERSON_M * per_metre / above if above else 0.0
     return Floor(seen, slope) if _LEAST_SLOPE <= slope <= _MOST_SLOPE else None

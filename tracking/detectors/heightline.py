@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tracking.boxes import Floats
+from tracking.detectors.anew import SeenAnew
 from tracking.detectors.base import Mask
 from tracking.detectors.isolated import isolated_people
 
@@ -24,7 +25,7 @@ class HeightLineSettings:
     """Learning the height line `h = slope * y + offset` from people who stand alone."""
 
     use: bool = True  # off: every height everywhere (the paper's box filters)
-    least_samples: int = 10  # isolated people seen before the line is trusted
+    least_samples: int = 3  # times that somebody is seen alone in a new place before the line is trusted
     most_samples: int = 1000  # the newest that are kept
     sample_every: int = 1  # frames between two looks for isolated people
     usual_slope: float = 0.65  # person's height over the camera's: what the slope is without evidence
@@ -37,15 +38,16 @@ class HeightLineSettings:
 
 @dataclass(frozen=True, slots=True)
 class Floor:
-    """What measuring the floor in metres says of people's heights.
+    """What measuring the floor says of people's heights.
 
     Attributes:
         horizon: the row of the picture in which the floor ends: people there would be without height.
-        slope: rows of a person's height for each row that their feet are below.
+        slope: rows of a person's height for each row that their feet are below; None: it was not measured in
+            metres.
     """
 
     horizon: float
-    slope: float
+    slope: float | None
 
     def in_rows(self, scale: float) -> Floor:
         """Give the same in a picture that is so many times as large."""
@@ -99,9 +101,11 @@ class HeightLineLearner:
         self._settings = settings
         self._prior = prior_of(settings, floor, rows)
         self._samples: deque[tuple[float, float]] = deque(maxlen=settings.most_samples)
+        self._anew = SeenAnew()
         self._frames = 0
         self._fitted_on = 0
         self._seen = 0
+        self._together = 1
         self.line: HeightLine | None = None
         if settings.use:
             self.line = self._prior.line
@@ -122,20 +126,26 @@ class HeightLineLearner:
         self._frames += 1
         if not self._settings.use or self._frames % self._settings.sample_every:
             return
-        for foot, height in isolated_people(foreground, visible):
-            self._samples.extend([(foot, height)] * frames)
-            self._seen += frames
+        people = isolated_people(foreground, visible)
+        self._together = max(self._together, len(people))
+        worth = max(round(frames / _FRAMES), 1)
+        for person in self._anew.of(people, frames * self._settings.sample_every):
+            self._samples.extend([(person.foot, person.height)] * worth)
+            self._seen += worth
         # Refit when the samples have grown by a tenth: early often, later seldom.
         if len(self._samples) >= self._settings.least_samples and self._seen >= 1.1 * self._fitted_on:
             self._fitted_on = self._seen
             samples = np.asarray(self._samples, dtype=np.float64)
-            self.line = fit_line(samples, self._settings, self._prior)
+            self.line = fit_line(samples, self._settings, self._prior, self._together)
 
 
-# One person gives a sample in every frame: so many of them are worth one independent one.
-_ALIKE = 25.0
-# Standard deviation of a sample, in heights: strides, tall and small people.
-_NOISE = 0.08
+# Who walks gives a sample in so many frames, and so many samples are worth one independent one.
+_FRAMES = 4
+_ALIKE = 6.0
+# Standard deviation of a sample, in heights: strides, what is missing of the outline.
+_NOISE = 0.06
+# Standard deviation of a person's own height, in heights: it is the same in all samples of theirs.
+_STATURE = 0.04
 # Deviation, in heights, from which a sample counts as no whole person, or two.
 _WILD = 0.16
 _ROUNDS = 5
@@ -147,7 +157,7 @@ _SAMPLES_A_SLOPE = 40
 # where a camera looks steeply down, and homographies not exact.
 _HORIZON = 0.02
 # Standard deviation of a line, in heights, up to which it is sure.
-_SURE = 0.05
+_SURE = 0.06
 # Standard deviation of a measured slope, in slopes.
 _MEASURED = 0.06
 
@@ -171,13 +181,21 @@ def prior_of(settings: HeightLineSettings, floor: Floor | None = None, rows: flo
     """Give what is known before anybody was seen in a picture of so many rows."""
     if floor is None:
         return Prior(settings.usual_slope, settings.slope_spread)
-    spread, off = _MEASURED * floor.slope, _HORIZON * rows
+    off = _HORIZON * rows
+    if floor.slope is None:
+        return Prior(settings.usual_slope, settings.slope_spread, floor.horizon, off)
+    spread = _MEASURED * floor.slope
     line = HeightLine(floor.slope, -floor.slope * floor.horizon, floor.horizon, off, spread)
     return Prior(floor.slope, spread, floor.horizon, off, line)
 
 
-def fit_line(samples: Floats, settings: HeightLineSettings, prior: Prior | None = None) -> HeightLine | None:
+def fit_line(
+    samples: Floats, settings: HeightLineSettings, prior: Prior | None = None, people: int = 1
+) -> HeightLine | None:
     """Fit the line to samples `(N, 2)` of foot and height; where they fit none, give what is known before.
+
+    They are of at least so many different `people`: all of them may be tall by a share that is found along
+    with the line, and leaves it the more in doubt the fewer they are.
 
     The most likely line under Tukey's biweight and the prior: the best of a grid of slopes first, so that
     no share of wild samples below a half leads astray, then a few rounds of reweighted least squares.
@@ -185,28 +203,30 @@ def fit_line(samples: Floats, settings: HeightLineSettings, prior: Prior | None 
     prior = prior or prior_of(settings)
     foot, height = samples.T
     slope, offset = _best_of_grid(foot, height, prior)
-    precision = np.diag([1e-9, prior.slope_spread**-2])
-    centre = float(foot.mean())
+    precision = np.diag([1e-9, prior.slope_spread**-2, people / _STATURE**2])
+    centre, taller = float(foot.mean()), 0.0
     for _ in range(_ROUNDS):
-        deviation = (height - slope * foot - offset) / height
+        expected = slope * foot + offset
+        deviation = (height - (1.0 + taller) * expected) / height
         weight = np.maximum(1.0 - (deviation / _WILD) ** 2, 0.0) ** 2
         if not weight.any():
             return prior.line
         centre = float(np.average(foot, weights=weight))
         weight = weight / (_ALIKE * (_NOISE * height) ** 2)
-        terms = np.stack([np.ones_like(foot), foot - centre])
+        terms = np.stack([np.ones_like(foot), foot - centre, expected])
         evidence = (terms * weight) @ terms.T + precision
-        pull = (terms * weight) @ height + precision @ [0.0, prior.slope]
+        pull = (terms * weight) @ height + precision @ [0.0, prior.slope, 0.0]
         if prior.horizon is not None:
-            there = np.array([1.0, prior.horizon - centre])
+            there = np.array([1.0, prior.horizon - centre, 0.0])
             evidence += np.outer(there, there) / prior.spread**2
-        level, slope = (float(value) for value in np.linalg.solve(evidence, pull))
+        level, slope, taller = (float(value) for value in np.linalg.solve(evidence, pull))
         offset = level - slope * centre
-    scatter = _median(np.abs(height - slope * foot - offset) / height, _says(height))
+    seen = (1.0 + taller) * (slope * foot + offset)
+    scatter = _median(np.abs(height - seen) / height, _says(height))
     # Upright cameras see people grow towards the bottom of the picture; anything else is a misfit.
     if slope <= 0.0 or scatter > settings.most_scatter:
         return prior.line
-    (level, mixed), (_, steep) = np.linalg.inv(evidence)
+    (level, mixed), (_, steep) = np.linalg.inv(evidence)[:2, :2]
     smallest = _SMALLER * float(np.quantile(height[weight > 0.0], _LOW))
     # Level and slope are uncorrelated, and the line known best, a little off the mean of the feet.
     spread = float(np.sqrt(max(level - mixed**2 / steep, 0.0)))

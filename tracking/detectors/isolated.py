@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import cv2
@@ -19,13 +20,22 @@ _MARGIN = 3
 _MERGED_AREA = 0.05
 
 
-def isolated_people(foreground: Mask, visible: Mask) -> list[tuple[float, float]]:
-    """Give foot row and height of every blob that looks like one whole standing person alone."""
+@dataclass(frozen=True, slots=True)
+class Alone:
+    """Somebody who stands alone, in pixels: the column of their middle, the row of their foot, and height."""
+
+    middle: float
+    foot: float
+    height: float
+
+
+def isolated_people(foreground: Mask, visible: Mask) -> list[Alone]:
+    """Give every blob that looks like one whole standing person alone."""
     rows, columns = foreground.shape
     # Outlines instead of labelled pixels: a twentieth of the time.
     outlines, _ = cv2.findContours(foreground, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
     blobs = np.array([_blob(np.asarray(outline)) for outline in outlines], dtype=np.int64).reshape(-1, 5)
-    found: list[tuple[float, float]] = []
+    found: list[Alone] = []
     for label, (left, top, width, height, area) in enumerate(blobs.tolist()):
         upright = _THINNEST * height <= width <= _WIDEST * height and area >= _LEAST_FILL * width * height
         inside = left >= _MARGIN and left + width <= columns - _MARGIN
@@ -34,7 +44,7 @@ def isolated_people(foreground: Mask, visible: Mask) -> list[tuple[float, float]
             continue
         around = visible[top - _MARGIN : top + height + _MARGIN, left - _MARGIN : left + width + _MARGIN]
         if around.all() and not _crowded(blobs, label):
-            found.append((float(top + height), float(height)))
+            found.append(Alone(left + width / 2.0, float(top + height), float(height)))
     return found
 
 
