@@ -6,6 +6,7 @@ import asyncio
 import struct
 from pathlib import Path
 from random import Random
+from tempfile import TemporaryDirectory
 from typing import Literal
 
 import av
@@ -324,10 +325,12 @@ class Files(Target):
     share = 0.005
 
     def __init__(self) -> None:
-        self._folder = folder()
+        self._folder = TemporaryDirectory()  # what is below /dev would be taken for a camera
         self._path = Path(self._folder.name) / "c0.mp4"
         with av.open(str(self._path), "w") as out:
-            stream = out.add_stream("libx264", rate=FPS, options={"preset": "ultrafast", "g": "5", "bf": "0"})
+            stream = out.add_stream(
+                "libx264", rate=FPS, options={"preset": "ultrafast", "g": "5", "bf": "0", "sc_threshold": "0"}
+            )
             stream.width, stream.height, stream.pix_fmt = WIDTH, HEIGHT, "yuv420p"
             rng = np.random.default_rng(1)
             for _ in range(10):

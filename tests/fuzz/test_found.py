@@ -21,6 +21,7 @@ from server.run.calibrate_points import read_points
 from server.view.agreement import Agreement
 from server.view.mp4_sound import sound_fragment
 from server.view.past.playlist import Playlist
+from server.view.past.sounds import frames_in
 from server.view.skip import UnfitError, continuing
 from server.web.app import make_app, serving
 from server.wire.errors import UserError
@@ -165,6 +166,16 @@ def test_a_recording_of_times_that_no_film_has_is_left_as_it_is(tmp_path: Path) 
     part.write_bytes(head + sound + picture)
     with pytest.raises(Mp4Error, match="no film has"):
         write_plain(part, tmp_path / "film.mp4")
+
+
+def test_recorded_sound_that_says_it_is_longer_than_its_file_is_passed_over(tmp_path: Path) -> None:
+    form, path = SoundFormat(48_000, 2), tmp_path / "0.mp4"
+    right = sound_fragment(form, [form.silence] * 3, 0)
+    path.write_bytes(right)
+    assert len(frames_in(path, 0, len(right), 0, 9, form)) == 3
+    at = right.index(b"trun") + 16
+    path.write_bytes(right[:at] + b"\xff" * 4 + right[at + 4 :])
+    assert frames_in(path, 0, len(right), 0, 9, form) == {}
 
 
 def test_a_cluster_whose_time_is_no_number_has_none() -> None:

@@ -57,7 +57,7 @@ def _fragments(file: BufferedReader, at: int, end: int) -> Iterator[tuple[int, t
             return
         if kind == b"moof":
             moof = file.read(size - _HEAD)
-        elif kind == b"mdat" and (told := _told(moof)) is not None:
+        elif kind == b"mdat" and (told := _told(moof)) is not None and sum(told[1]) <= size - _HEAD:
             yield *told, at + _HEAD
         at += size
 
