@@ -15,6 +15,7 @@ from tokens_by_hand import line_of, locked, token_of, write_tokens
 
 from benchmarks.browser import CHROMIUM, chromium
 
+AXE = Path(__file__).parents[2] / "node_modules/axe-core/axe.min.js"
 PATIENCE_MS = 60_000  # a slow core with much other work
 
 pytestmark = [
@@ -41,6 +42,7 @@ async def watching(
             hall.service.feed(epoch, {A: {1: SMALL, 2: SMALL}, B: {1: LARGE}})
         page = await browser.new_page(viewport={"width": 1000, "height": 800})
         page.set_default_timeout(PATIENCE_MS)
+        await page.add_init_script(AXE.read_text(encoding="utf-8") if AXE.exists() else "")
         complaints: list[str] = []
         addresses: list[str] = []
         page.on("pageerror", lambda error: complaints.append(str(error)))
@@ -57,7 +59,7 @@ async def test_who_signs_in_watches_until_they_sign_out(browser: Browser, tmp_pa
         await field.fill("wrong")
         await page.get_by_role("button", name="Sign in").click()
         await expect(page.locator("#sign-in-trouble")).to_have_text("there is no such token, or not any more")
-        await expect(page.locator("main")).to_be_hidden()
+        await expect(page.locator("#stage")).to_be_hidden()
         await field.fill(token_of("desk"))
         await page.keyboard.press("Enter")
         await expect(page.locator("#people li")).to_have_count(2)
@@ -90,3 +92,12 @@ async def test_who_is_not_let_in_any_more_is_asked_for_a_token(browser: Browser,
         await expect(page.locator("#people li")).to_have_count(2)
         write_tokens(tmp_path / "tokens.yaml", line_of("lead"))
         await expect(field).to_be_visible()
+
+
+async def test_axe_finds_no_fault_in_signing_in(browser: Browser, tmp_path: Path) -> None:
+    if not AXE.exists():
+        pytest.skip("axe-core is not there: make node_modules/.installed")
+    async with watching(browser, tmp_path) as (_, page, _):
+        await expect(page.get_by_label("Watching needs a token")).to_be_visible()
+        found = await page.evaluate("axe.run()")
+        assert [it["id"] for it in found["violations"]] == []
