@@ -30,7 +30,7 @@ class ColourSettings:
         most_frames: of how many frames after a meeting looks are taken.
     """
 
-    near: float = 0.6
+    near: float = 0.4
     margin: float = 0.02
     least_pixels: float = 500.0
     most_frames: int = 250
