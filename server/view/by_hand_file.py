@@ -11,6 +11,7 @@ import msgspec
 from server.view.followed import LONGEST_S, Returning, SaidByHand, said_by_hand
 from server.view.people import People
 from server.wire.errors import UserError
+from server.wire.messages import UNREADABLE
 from server.wire.output import whole_file
 
 log = logging.getLogger(__name__)
@@ -26,7 +27,7 @@ def read(path: Path) -> SaidByHand | None:
         return msgspec.json.decode(path.read_bytes(), type=SaidByHand)
     except FileNotFoundError:
         return None
-    except (OSError, msgspec.DecodeError, UnicodeDecodeError) as error:
+    except (OSError, *UNREADABLE) as error:
         aside = path.with_name(f"{path.name}.damaged")
         log.warning(
             "%s: cannot be read (%s): put aside as %s", path, " ".join(str(error).split()), aside.name
@@ -44,8 +45,11 @@ def write(path: Path, said: SaidByHand) -> None:
     Raises:
         UserError: it cannot be written.
     """
-    with whole_file(path) as draft:
-        draft.write_bytes(msgspec.json.encode(said))
+    try:
+        with whole_file(path) as draft:
+            draft.write_bytes(msgspec.json.encode(said))
+    except OSError as error:  # the disk is full
+        raise UserError(f"{path}: cannot write there: {error.strerror}") from error
 
 
 class ByHandFile:

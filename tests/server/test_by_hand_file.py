@@ -146,7 +146,12 @@ def test_without_a_folder_and_of_several_services_nothing_is_kept(tmp_path: Path
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("damage", [b"", b"\xff", b"[]", b'{"site": "hall", "pulse": 1}', b"{" * 100_000])
+NESTED = b'{"more": ' + b"[" * 100_000 + b"]" * 100_000 + b"}"
+
+
+@pytest.mark.parametrize(
+    "damage", [b"", b"\xff", b"[]", b'{"site": "hall", "pulse": 1}', b"{" * 100_000, NESTED]
+)
 def test_a_damaged_file_is_put_aside_and_it_is_said_in_one_line(
     tmp_path: Path, damage: bytes, caplog: pytest.LogCaptureFixture
 ) -> None:

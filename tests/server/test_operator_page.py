@@ -50,11 +50,11 @@ async def browser() -> AsyncIterator[Browser]:
 
 @asynccontextmanager
 async def operating(
-    browser: Browser, place: str = "", axe: str = "", **changes: Any
+    browser: Browser, place: str = "", axe: str = "", *, patience: float = 60, **changes: Any
 ) -> AsyncIterator[tuple[Hall, Page]]:
     """Open the operator's page of a site; an exception or a refused resource in the page fails the test."""
     complaints: list[str] = []
-    async with aclosing(opened(patience=60, **changes)) as halls:
+    async with aclosing(opened(patience=patience, **changes)) as halls:
         hall = await anext(halls)
         page = await browser.new_page(viewport={"width": 1000, "height": 800})
         await page.add_init_script(axe)  # where the site's policy does not hold
@@ -312,10 +312,11 @@ async def test_places_on_the_floor_become_a_file_that_calibrate_takes(
     np.testing.assert_allclose(camera.image / (64, 48), np.abs(camera.floor) / 10, atol=0.01)
 
 
+@pytest.mark.timeout(300)
 async def test_a_walk_is_started_watched_and_finished_and_its_file_is_the_scenes_floor(
     browser: Browser, tmp_path: Path
 ) -> None:
-    async with operating(browser, "#walk", **SITE) as (hall, page):
+    async with operating(browser, "#walk", patience=280, **SITE) as (hall, page):
         walking, state = hall.service.walking, page.locator("#walk-state")
         await expect(state).to_have_text("Nobody walks.")
         await expect(page.get_by_role("button", name="Finish")).to_be_disabled()
@@ -328,7 +329,9 @@ async def test_a_walk_is_started_watched_and_finished_and_its_file_is_the_scenes
         await expect(page.locator("#walk-pairs li")).to_have_text(re.compile(rf"{A} and {B}: \d+ s"))
         await expect(page.locator("#walk-cameras tr")).to_have_text([re.compile(r"(\d+ %){3}")] * 2)
         await page.get_by_role("button", name="Finish").click()
-        await expect(page.locator("#walk-lines li").first).to_contain_text("feet that two cameras see are")
+        # A process of its own calibrates, with less right to the machine than all else has.
+        first = page.locator("#walk-lines li").first
+        await expect(first).to_contain_text("feet that two cameras see are", timeout=200_000)
         plan = await page.locator("#walk-plan").element_handle()
         await page.wait_for_function("(it) => it.naturalWidth > 0", arg=plan)
         async with page.expect_download() as download:

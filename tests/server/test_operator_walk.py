@@ -177,6 +177,18 @@ async def test_a_camera_that_comes_again_has_other_tracks() -> None:
     assert set(who.tolist()) == {0, 1}
 
 
+async def test_a_walk_that_is_started_before_any_camera_speaks_counts_from_the_first_word() -> None:
+    config = walk_config()
+
+    def late(walking: Walking) -> None:
+        for said in words(config, curved(50), epoch=10_000_000):
+            walking.take(said)
+
+    task = await told_to([], config, late)
+    frames = np.frombuffer(task.seen[0].frames, dtype=np.int64)
+    assert 0 <= frames.min() <= frames.max() <= 49
+
+
 async def test_offsets_of_recordings_are_told_and_of_live_cameras_none() -> None:
     cameras = [{"id": "c0", "source": "c0.mp4", "offset": 7}, {"id": "c1", "source": "rtsp://10.0.0.1/a"}]
     config = walk_config(cameras=cameras)

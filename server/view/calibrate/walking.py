@@ -56,6 +56,9 @@ class Walking:
             return
         if self.seconds >= MOST_S:
             return
+        if not self._epochs:
+            # Before the first word nobody knew how far pulses are; frames are counted from the walk on.
+            self._start = max(self._start, epoch.last + 1 - self._config.track.window.stride)
         self._epochs += 1
         for camera, message in epoch.tracks.items():
             self._trails[camera].add(message, self._start)
