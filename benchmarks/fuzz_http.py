@@ -27,6 +27,7 @@ from benchmarks.fuzz_site import (
 from benchmarks.fuzz_target import Target
 from server.web.app import make_app, serving
 from server.web.openapi import describe
+from server.web.operator_permission import CHANGES
 from server.wire.epochs import end_of_epoch
 
 WORDS = (
@@ -36,6 +37,7 @@ WORDS = (
     b"Expect: 100-continue\r\n", b"Range: bytes=9-1\r\n", b"HTTP/9.9", b"HTTP/1.0", b"CONNECT ",
     b"A" * 9000, b"0" * 5000, b"Cookie: a=b; =\x01\r\n", b"Host: \r\n",
 )  # fmt: skip
+_CHANGES_SHARE = 0.8
 _EPOCHS = 6
 _WAIT_S = 0.3
 """Then an answer is not waited for: a playlist waits until what it was asked for is there."""
@@ -128,6 +130,8 @@ class Requests(Target):
         lines = [f"{method} {path}{'?' + '&'.join(asked) if asked else ''} HTTP/1.1", "Host: 127.0.0.1"]
         if rng.random() < 0.1:
             lines.append(rng.choice(_HEADERS))
+        if rng.random() < _CHANGES_SHARE:
+            lines.append(f"{CHANGES}: 1")  # without it what changes something is refused before it is read
         if body:
             lines += [f"Content-Length: {len(body)}", "Content-Type: application/json"]
         request = "\r\n".join([*lines, "Connection: close", "", ""]).encode("utf-8", "replace") + body

@@ -148,7 +148,7 @@ class Access:
         """Look at the file again and again, and end what nobody may have any more."""
         while self._file is not None:
             await asyncio.sleep(_LOOK_EVERY_S)
-            self._file.look()
+            await asyncio.to_thread(self._file.look)  # a long file takes longer to read than a frame
             self.end_what_is_over()
 
     def end_what_is_over(self) -> None:

@@ -97,7 +97,12 @@ async def serving(app: web.Application, settings: Http) -> AsyncIterator[int]:
     certificate = Certificate.of(settings.tls)
     context = None if certificate is None else certificate.context
     runner = web.AppRunner(
-        app, access_log=None, logger=REQUESTS, shutdown_timeout=_CLOSE_S, handler_cancellation=True
+        app,
+        access_log=None,
+        logger=REQUESTS,
+        shutdown_timeout=_CLOSE_S,
+        handler_cancellation=True,
+        auto_decompress=False,  # a little that unpacks to much would keep all streams waiting
     )
     await runner.setup()
     looking = None if certificate is None else asyncio.create_task(certificate.run(), name="certificate")

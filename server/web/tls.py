@@ -27,8 +27,10 @@ class Certificate:
         """
         self._certificate, self._key = certificate, key
         self._seen = self._state()
-        self.context = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH)
-        self._load(self.context)
+        self._newest = self._load()
+        self.context = self._newest
+        # A context keeps what it has loaded beside a later key of another kind: each pair has its own.
+        self.context.sni_callback = self._hand_over
 
     @classmethod
     def of(cls, settings: Tls) -> Certificate | None:
@@ -47,8 +49,7 @@ class Certificate:
         if self._seen == before:
             return
         try:
-            self._load(ssl.create_default_context(ssl.Purpose.CLIENT_AUTH))  # or half of it would be in force
-            self._load(self.context)
+            self._newest = self._load()
         except UserError as error:
             log.warning("%s; the certificate as it was stays in force", error)
         else:
@@ -60,7 +61,11 @@ class Certificate:
             await asyncio.sleep(_LOOK_EVERY_S)
             self.look()
 
-    def _load(self, context: ssl.SSLContext) -> None:
+    def _hand_over(self, connection: ssl.SSLObject, _: str | None, __: ssl.SSLContext) -> None:
+        connection.context = self._newest
+
+    def _load(self) -> ssl.SSLContext:
+        context = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH)
         for what, path in (("certificate", self._certificate), ("key", self._key)):
             try:
                 path.read_bytes()
@@ -73,6 +78,7 @@ class Certificate:
             raise UserError(
                 f"http.tls: {self._certificate} and {self._key} are no certificate and its key: {reason}"
             ) from error
+        return context
 
     def _state(self) -> tuple[State | None, ...]:
         return tuple(state_of(it) for it in (self._certificate, self._key))

@@ -10,6 +10,8 @@ from typing import Any, get_type_hints
 from pydantic import BeforeValidator
 from pydantic_core import PydanticCustomError
 
+from server.wire.values import shortened
+
 
 def validated(settings: type) -> BeforeValidator:
     """Refuse keys that the dataclass does not have: pydantic would ignore them in a plain dataclass."""
@@ -38,7 +40,7 @@ def _check(settings: type, value: Any, place: str) -> None:
             raise PydanticCustomError(
                 "unknown_key",
                 "{place}unknown key '{key}'; {hint}",
-                {"place": place, "key": str(key), "hint": hint},
+                {"place": place, "key": shortened(str(key)), "hint": hint},
             )
         if dataclasses.is_dataclass(types[key]):
             _check(types[key], inner, f"{place}{key}: ")

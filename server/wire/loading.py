@@ -21,7 +21,7 @@ from server.wire.errors import UserError
 from server.wire.ground_unit import checked_unit
 from server.wire.sections import Camera, View, Zenoh, ZenohTls
 from server.wire.sources import resolved
-from server.wire.values import check_numbers, check_values
+from server.wire.values import check_numbers, check_values, shortened
 from server.wire.yaml_file import read_yaml
 
 
@@ -189,7 +189,7 @@ def _one_line(where: str, error: ValidationError, within: tuple[str, ...] = ()) 
 
 def _plain(detail: ErrorDetails, within: tuple[str, ...]) -> str:
     loc = (*within, *detail["loc"])
-    place = ".".join(str(part) for part in loc)
+    place = ".".join(shortened(str(part)) for part in loc)
     message = detail["msg"].removeprefix("Value error, ")
     if detail["type"] == "extra_forbidden":
         close = difflib.get_close_matches(str(loc[-1]), _known_keys(loc[:-1]), n=1)

@@ -27,7 +27,7 @@ class Token(Section):
     """Whose it is, for people: it is not secret."""
     sha256: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
     role: Role
-    object: Annotated[int, Field(ge=1)] | None = None
+    object: Annotated[int, Field(ge=1, le=999_999_999)] | None = None
     """Nobody but this person's views."""
     camera: Name | None = None
     """Nothing but this camera."""

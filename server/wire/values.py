@@ -14,6 +14,11 @@ _LARGEST = 1e15
 _SHOWN = 40
 
 
+def shortened(key: str) -> str:
+    """Give a key as a line can name it: it may be as long as its file."""
+    return key if len(key) <= _SHOWN else f"{key[:_SHOWN]}…"
+
+
 def check_values(content: Any, where: str) -> None:
     """Look that values end somewhere, and that their texts are texts.
 
@@ -36,8 +41,10 @@ def check_numbers(content: Any, where: str) -> None:
     """
     for place, value in _inside(content, where):
         if isinstance(value, int | float) and not abs(value) <= _LARGEST:
-            named = ".".join(map(str, place))
-            raise UserError(f"{where}: {named}: {str(value)[:_SHOWN]} is a number beyond all measure")
+            named = ".".join(shortened(str(it)) for it in place)
+            # Python writes no number of thousands of digits, but in hexadecimal it does.
+            written = str(value) if isinstance(value, float) else hex(value)
+            raise UserError(f"{where}: {named}: {written[:_SHOWN]} is a number beyond all measure")
 
 
 def _inside(content: Any, where: str) -> Iterator[tuple[tuple[Any, ...], Any]]:

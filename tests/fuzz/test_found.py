@@ -71,7 +71,19 @@ def test_a_key_that_breaks_lines_is_named_in_one(tmp_path: Path) -> None:
     assert len(str(refused.value).splitlines()) == 1
 
 
-@pytest.mark.parametrize("value", [float("inf"), 1e300, 10**400])
+@pytest.mark.parametrize("place", ["site", "track.window"])
+def test_a_key_as_long_as_its_file_is_named_by_its_beginning(tmp_path: Path, place: str) -> None:
+    inner: dict[str, Any] = {"stride" + 5000 * "9": 1}
+    for name in reversed(place.split(".")):
+        inner = {name: inner}
+    with pytest.raises(UserError, match="stride99") as refused:
+        build_config({"cameras": [CAMERA], **inner}, where="x", folder=tmp_path)
+    assert len(str(refused.value)) < 1000
+
+
+@pytest.mark.parametrize(
+    "value", [float("inf"), 1e300, 10**400, 10**5000], ids=["inf", "1e300", "long", "longer"]
+)
 def test_a_number_beyond_all_measure_is_refused_and_named(tmp_path: Path, value: float) -> None:
     content: dict[str, Any] = {"cameras": [CAMERA], "http": {"hls_segment_s": value}}
     with pytest.raises(UserError, match=r"http\.hls_segment_s") as refused:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncIterator
 from contextlib import aclosing
+from gzip import compress
 from json import loads
 from pathlib import Path
 
@@ -279,6 +280,14 @@ async def test_what_is_no_sign_in_is_said_in_one_line(site: Hall, body: str) -> 
         error = (await answer.json())["error"]
     assert error.startswith("the request's JSON: ")
     assert "\n" not in error
+
+
+@pytest.mark.parametrize("packing", ["gzip", "deflate"])
+async def test_nothing_is_unpacked_for_who_has_not_shown_a_token(site: Hall, packing: str) -> None:
+    heads = {**MINE, "Content-Encoding": packing}
+    packed = compress(b'{"token": "x"}') if packing == "gzip" else b"nothing packed"
+    async with site.session.post(SESSION, headers=heads, data=packed) as answer:
+        assert answer.status == 400
 
 
 async def test_there_is_nothing_to_sign_in_to_without_tokens(hall: Hall) -> None:

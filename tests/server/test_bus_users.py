@@ -182,6 +182,7 @@ async def test_cameras_hear_what_others_found_and_not_what_they_see(settings: Ze
             c0.publish(SITE.camera("c0", "found"), b"found")
 
         await heard.until("c0/found found", all_of_it)
+        await everything.until("c0/video seen", all_of_it)  # it may come in mid-round
         await everything.until("c0/found found", all_of_it)
         assert set(heard.texts) == {"c0/found found"}
         assert set(everything.texts) == {"c0/video seen", "c0/found found"}, "who listens sends nothing"
