@@ -1,4 +1,4 @@
-"""Takes the documents' pictures of the page in each of its states, on the demo, in three widths.
+"""Takes the documents' pictures of both pages in each of their states, on the demo, in three widths.
 
     python -m benchmarks.picture_states --out docs/pictures
 
@@ -57,6 +57,10 @@ _LEFT = """async () => {
   const { objects } = await (await fetch('api/objects')).json();
   return objects.filter((it) => !it.visible && it.thumbnail).map((it) => it.object);
 }"""
+_SECTIONS = ("cameras", "floor", "known", "marks", "walk", "choosing")
+"""Of the operator's page."""
+_MEASURED_MS = 8_000
+"""Until a section has its pictures, and what is measured over some seconds."""
 _PLAYS = "myview.state === 'playing' && myview.camera !== null"
 _TABLE = "document.querySelector('#why table')"
 _AWAY = "document.querySelector('#cameras .away')"
@@ -121,8 +125,20 @@ class Sitting:
         raise RuntimeError("nobody was in view, or had left, for long enough")
 
 
-async def take(out: Path, fps: float) -> None:
-    """Run the demo and take all pictures."""
+async def take_operating(out: Path, fps: float) -> None:
+    """Run the demo and take the pictures of the operator's page."""
+    async with chromium() as browser, demo_at(fps) as url:
+        async with _sitting(browser, url, out) as sitting:
+            await sitting.page.wait_for_function(_PLAYS, timeout=_LONG_MS)
+        for section in _SECTIONS:
+            async with _sitting(browser, f"{url}operator#{section}", out) as sitting:
+                await sitting.page.wait_for_timeout(_MEASURED_MS)
+                there = f"document.querySelector('#{section}').hidden === false"
+                await sitting.shoot(f"operator-{section}", sitting.as_it_is, there)
+
+
+async def take_watching(out: Path, fps: float) -> None:
+    """Run the demo and take the pictures of the viewer's page."""
     async with chromium() as browser, contextlib.AsyncExitStack() as stack:
         url = await stack.enter_async_context(demo_at(fps))
         async with _sitting(browser, url, out, _NOBODY) as sitting:
@@ -199,11 +215,15 @@ def main() -> None:
     )
     options.add_argument("--out", type=Path, default=ROOT / "docs" / "pictures", help="folder to write into")
     options.add_argument("--fps", type=float, default=25.0, help="frame rate; less on a machine that is busy")
+    options.add_argument("--page", choices=("viewer", "operator"), help="only this one's")
     chosen = options.parse_args()
     try:
         check_chromium()
         chosen.out.mkdir(parents=True, exist_ok=True)
-        asyncio.run(take(chosen.out, chosen.fps))
+        if chosen.page != "operator":
+            asyncio.run(take_watching(chosen.out, chosen.fps))
+        if chosen.page != "viewer":
+            asyncio.run(take_operating(chosen.out, chosen.fps))
         made = sorted(chosen.out.glob("*.webp"))
         print(f"{len(made)} pictures, {sum(it.stat().st_size for it in made) / 1000:.0f} kB")
     except CannotRunError as problem:
