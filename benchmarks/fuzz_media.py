@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import struct
+from collections.abc import Iterable
 from pathlib import Path
 from random import Random
 from tempfile import TemporaryDirectory
-from typing import Literal
+from typing import BinaryIO, ClassVar, Literal
 
 import av
 import msgspec
@@ -163,76 +164,84 @@ def _stream(codec: Literal["h264", "vp8"]) -> bytes:
     return head + b"".join(agreement.pack(it.data, it.pulse, FPS, key=it.key) for it in units)
 
 
-class ClientMp4(Target):
+class _Film(Target):
+    """A stream that a client reads in pieces, and makes a file of."""
+
+    codec: ClassVar[Literal["h264", "vp8"]]
+    error: ClassVar[type[Exception]]
+
+    def __init__(self) -> None:
+        self._stream = _stream(self.codec)
+        self._folder = folder()
+        self._path = Path(self._folder.name)
+
+    def make(self, rng: Random) -> bytes:
+        """Give a stream."""
+        return _wrong(rng, self._stream)
+
+    def feed(self, data: bytes) -> bool:
+        """Read it in pieces, and record it."""
+        part = self._path / "film.part"
+        try:
+            with part.open("wb") as file:
+                self.record((data[at : at + 1500] for at in range(0, len(data), 1500)), file)
+        except self.error as error:
+            refused(error)
+        try:
+            self.finish(part)
+        except self.error as error:
+            return refused(error)
+        return True
+
+    def record(self, pieces: Iterable[bytes], file: BinaryIO) -> None:
+        """Write what comes as it comes."""
+        raise NotImplementedError
+
+    def finish(self, part: Path) -> None:
+        """Make the file that plays everywhere of it."""
+        raise NotImplementedError
+
+    def close(self) -> None:
+        """Take the folder away."""
+        self._folder.cleanup()
+
+
+class ClientMp4(_Film):
     """What `myview watch` is sent, and makes a file of."""
 
     name = "media-mp4"
+    codec = "h264"
+    error = Mp4Error
 
-    def __init__(self) -> None:
-        self._stream = _stream("h264")
-        self._folder = folder()
-        self._path = Path(self._folder.name)
+    def record(self, pieces: Iterable[bytes], file: BinaryIO) -> None:
+        """Write what comes as it comes."""
+        reader, taken = BoxReader(), ClientRecording(file, 10.0)
+        for piece in pieces:
+            for box in reader.feed(piece):
+                taken.take(box)
 
-    def make(self, rng: Random) -> bytes:
-        """Give a stream."""
-        return _wrong(rng, self._stream)
-
-    def feed(self, data: bytes) -> bool:
-        """Read it in pieces, and record it."""
-        part = self._path / "film.part"
-        try:
-            with part.open("wb") as file:
-                reader, taken = BoxReader(), ClientRecording(file, 10.0)
-                for at in range(0, len(data), 1500):
-                    for box in reader.feed(data[at : at + 1500]):
-                        taken.take(box)
-        except Mp4Error as error:
-            refused(error)
-        try:
-            write_plain(part, self._path / "film.mp4")
-        except Mp4Error as error:
-            return refused(error)
-        return True
-
-    def close(self) -> None:
-        """Take the folder away."""
-        self._folder.cleanup()
+    def finish(self, part: Path) -> None:
+        """Make the file that plays everywhere of it."""
+        write_plain(part, part.with_suffix(".mp4"))
 
 
-class ClientWebm(Target):
+class ClientWebm(_Film):
     """The same of WebM."""
 
     name = "media-webm"
+    codec = "vp8"
+    error = WebmError
 
-    def __init__(self) -> None:
-        self._stream = _stream("vp8")
-        self._folder = folder()
-        self._path = Path(self._folder.name)
+    def record(self, pieces: Iterable[bytes], file: BinaryIO) -> None:
+        """Write what comes as it comes."""
+        reader, taken = ElementReader(), WebmRecording(file, 10.0)
+        for piece in pieces:
+            for element in reader.feed(piece):
+                taken.take(element)
 
-    def make(self, rng: Random) -> bytes:
-        """Give a stream."""
-        return _wrong(rng, self._stream)
-
-    def feed(self, data: bytes) -> bool:
-        """Read it in pieces, and record it."""
-        part = self._path / "film.part"
-        try:
-            with part.open("wb") as file:
-                reader, taken = ElementReader(), WebmRecording(file, 10.0)
-                for at in range(0, len(data), 1500):
-                    for element in reader.feed(data[at : at + 1500]):
-                        taken.take(element)
-        except WebmError as error:
-            refused(error)
-        try:
-            write_indexed(part, self._path / "film.webm")
-        except WebmError as error:
-            return refused(error)
-        return True
-
-    def close(self) -> None:
-        """Take the folder away."""
-        self._folder.cleanup()
+    def finish(self, part: Path) -> None:
+        """Make the file that can be looked through of it."""
+        write_indexed(part, part.with_suffix(".webm"))
 
 
 class Events(Target):

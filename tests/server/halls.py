@@ -45,6 +45,13 @@ async def opened(*, patience: float = PATIENCE, **changes: Any) -> AsyncIterator
     service.close()
 
 
+def see(hall: Hall) -> None:
+    """Let object 1 be in both cameras, larger in c1, and object 2 in c0 alone, until two GOPs are decided."""
+    hall.service.come(*CAMERAS)
+    for epoch in range(3):
+        hall.service.feed(epoch, {A: {1: SMALL, 2: SMALL}, B: {1: LARGE}})
+
+
 @pytest.fixture
 async def hall() -> AsyncIterator[Hall]:
     async for it in opened():
@@ -53,8 +60,6 @@ async def hall() -> AsyncIterator[Hall]:
 
 @pytest.fixture
 async def busy(hall: Hall) -> Hall:
-    """Object 1 in both cameras, larger in c1; object 2 in c0 alone; two GOPs decided."""
-    hall.service.come(*CAMERAS)
-    for epoch in range(3):
-        hall.service.feed(epoch, {A: {1: SMALL, 2: SMALL}, B: {1: LARGE}})
+    """Give a hall with people in it."""
+    see(hall)
     return hall

@@ -10,17 +10,15 @@ from typing import Any
 
 import aiohttp
 import pytest
-from cameras_by_hand import CAMERAS, LARGE, SMALL
-from halls import A, B, Hall
+from cameras_by_hand import LARGE, SMALL
+from halls import A, B, Hall, see
 from tokens_by_hand import bearer, locked, token_of
 
 
 @pytest.fixture
 async def site(tmp_path: Path) -> AsyncIterator[Hall]:
     async with locked(tmp_path) as hall:
-        hall.service.come(*CAMERAS)
-        for epoch in range(3):
-            hall.service.feed(epoch, {A: {1: SMALL, 2: SMALL}, B: {1: LARGE}})
+        see(hall)
         yield hall
 
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from aiohttp import ClientTimeout, web
 from aiohttp.test_utils import TestClient, TestServer
-from cameras_by_hand import CAMERAS, LARGE, SMALL
-from halls import A, B, Hall
+from cameras_by_hand import LARGE, SMALL
+from halls import A, B, Hall, see
 from tokens_by_hand import EVERYBODY, bearer, locked
 
 from server.web.access import ACCESS, Access, only_who_may
@@ -88,9 +88,7 @@ def who_may(method: str, path: str) -> frozenset[str]:
 @pytest.fixture
 async def site(tmp_path: Path) -> AsyncIterator[Hall]:
     async with locked(tmp_path) as hall:
-        hall.service.come(*CAMERAS)
-        for epoch in range(3):
-            hall.service.feed(epoch, {A: {1: SMALL, 2: SMALL}, B: {1: LARGE}})
+        see(hall)
         yield hall
 
 

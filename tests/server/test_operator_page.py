@@ -17,7 +17,7 @@ import pytest
 import pytest_asyncio
 import yaml
 from cameras_by_hand import CAMERAS, LARGE, SMALL, small_config, status
-from halls import A, B, Hall, opened
+from halls import A, B, Hall, opened, see
 from playwright.async_api import Browser, Page, Route, expect
 from tokens_by_hand import line_of, token_of, write_tokens
 from walk_by_hand import SITE, curved, errors_on_floor, words
@@ -68,13 +68,6 @@ async def operating(
         yield hall, page
         await page.close()
     assert complaints == []
-
-
-def see(hall: Hall) -> None:
-    """Let person 1 be in both cameras, larger in c1, and person 2 in c0 alone."""
-    hall.service.come(*CAMERAS)
-    for epoch in range(3):
-        hall.service.feed(epoch, {A: {1: SMALL, 2: SMALL}, B: {1: LARGE}})
 
 
 async def test_who_has_a_token_signs_in_and_out(browser: Browser, tmp_path: Path) -> None:

@@ -8,8 +8,7 @@ from pathlib import Path
 
 import pytest
 import pytest_asyncio
-from cameras_by_hand import CAMERAS, LARGE, SMALL
-from halls import A, B, Hall
+from halls import Hall, see
 from playwright.async_api import Browser, Page, expect
 from tokens_by_hand import line_of, locked, token_of, write_tokens
 
@@ -37,9 +36,7 @@ async def watching(
 ) -> AsyncIterator[tuple[Hall, Page, list[str]]]:
     """Open the page of a site that takes tokens and has two people; give what was asked of it, too."""
     async with locked(folder) as hall:
-        hall.service.come(*CAMERAS)
-        for epoch in range(3):
-            hall.service.feed(epoch, {A: {1: SMALL, 2: SMALL}, B: {1: LARGE}})
+        see(hall)
         page = await browser.new_page(viewport={"width": 1000, "height": 800})
         page.set_default_timeout(PATIENCE_MS)
         await page.add_init_script(AXE.read_text(encoding="utf-8") if AXE.exists() else "")
