@@ -25,7 +25,7 @@ WORDS = (
     b":", b": ", b"- ", b"\n", b"\n  ", b"\t", b"\x00", b"\xff", b"&a ", b"*a", b"!!int ''", b"!!float ''",
     b"!!bool x", b"!!timestamp x", b"!!set ", b"!!binary =", b"!!python/object:os.system x", b"<<: *a\n",
     b"? ", b"| ", b"> ", b"%YAML 9.9\n", b"---\n", b"...\n", b"0b_", b"0x", b"1:2", b"190:20:30", b".inf",
-    b"-.inf", b".nan", b"1e999", b"9" * 40, b"9" * 5000, b"[" * 3000, b"{" * 3000, b"- " * 2000, b"null",
+    b"-.inf", b".nan", b"1e999", b"9" * 40, b"9" * 5000, b"[" * 500, b"{" * 500, b"- " * 500, b"null",
     b"~", b"2001-99-99", b"'", b'"', b"#", b"\\ud800", b"\xe2\x80\xa8",
 )  # fmt: skip
 _PLAIN = b"""site: {name: hall, fps: 25}
@@ -63,7 +63,6 @@ class Text(Target):
     """A file."""
 
     name = "config-text"
-    share = 0.5
 
     def __init__(self) -> None:
         self._folder = folder()
@@ -92,7 +91,6 @@ class Tokens(Target):
     """The file that says who may come."""
 
     name = "config-tokens"
-    share = 0.5
 
     def __init__(self) -> None:
         self._folder = folder()
@@ -167,7 +165,6 @@ class Tried(Target):
     """Settings that an operator tries out: what a service would choose by."""
 
     name = "config-tried"
-    share = 0.5
 
     def __init__(self) -> None:
         self._service = BestViewService(site())

@@ -39,7 +39,7 @@ WORDS = (
 )  # fmt: skip
 _CHANGES_SHARE = 0.8
 _EPOCHS = 6
-_WAIT_S = 0.3
+_WAIT_S = 0.03
 """Then an answer is not waited for: a playlist waits until what it was asked for is there."""
 _MOMENTS = (
     "-60", "p5", "p0", "p9999999999999", "-0", "-999999999", "2026-11-21T16:13:36Z",
@@ -62,7 +62,6 @@ class Requests(Target):
     """One request on a connection of its own."""
 
     name = "http-requests"
-    share = 0.1
 
     def __init__(self) -> None:
         self._folder = TemporaryDirectory()

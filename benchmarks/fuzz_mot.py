@@ -101,7 +101,6 @@ class Detections(_Files):
     """As the detections of a camera, frame by frame."""
 
     name = "mot-detections"
-    share = 0.2
 
     def __init__(self) -> None:
         super().__init__()
@@ -129,7 +128,6 @@ class Walks(_Files):
 
     name = "mot-walks"
     least_id = 1
-    share = 0.2
 
     def make(self, rng: Random) -> bytes:
         """Give a file of tracks."""
