@@ -1,0 +1,69 @@
+#!/bin/sh
+# Makes the files that docker-compose.secure.yml hands to its services, in the folder secrets/ (or MYVIEW_SECRETS).
+#
+#   sh configs/secrets.sh NAME CAMERA...
+#
+# NAME is the name or address at which browsers, and cameras on other machines, reach this host. What is there
+# already stays as it is, so that a camera can be added: run it again with that camera's name. It needs openssl.
+#
+#   authority.key            makes the certificates below; keep it elsewhere, no process needs it
+#   public/                  certificates: the authority's, the router's, and https.pem, which yours may replace
+#   web/                     tokens.yaml, who may watch and operate, and https.key
+#   router.key, bus          the router's key, and who may come to the bus: name:password
+#   cameras/ID/bus, token    a camera's own password of the bus, and a token to see whether it is well
+set -eu
+[ $# -ge 2 ] || { sed -n '2,7s/^# \{0,1\}//p' "$0" >&2; exit 2; }
+name=$1
+shift
+case $name in
+    *[!0-9.]*) also=DNS:$name ;;
+    *) also=IP:$name ;;
+esac
+
+# Nobody else of this host may look in; inside, the containers' user may read what is handed to it.
+umask 022
+folder=${MYVIEW_SECRETS:-secrets}
+mkdir -p "$folder"
+chmod 700 "$folder"
+cd "$folder"
+mkdir -p public web cameras
+
+# pair FILE KEY NAMES: a certificate of our authority
+pair() {
+    [ ! -e "$1" ] || return 0
+    openssl req -newkey ec -pkeyopt ec_paramgen_curve:P-256 -nodes -subj "/CN=$name" -out request -keyout "$2" 2> log
+    printf 'subjectAltName=%s\nextendedKeyUsage=serverAuth\n' "$3" > names
+    openssl x509 -req -in request -CA public/authority.pem -CAkey authority.key -CAcreateserial -CAserial serial \
+        -days 825 -extfile names -out "$1" 2> log
+    rm request names log
+    chmod 444 "$2"
+}
+
+# token NAME ROLE: a line of tokens.yaml, in place; the token itself is printed
+token() {
+    made=$(openssl rand -base64 32 | tr '+/' '-_' | tr -d '=\n')
+    hash=$(printf %s "$made" | openssl dgst -sha256 -r | cut -d ' ' -f 1)
+    printf '  - {name: "%s", sha256: "%s", %s, made: "%s"}\n' \
+        "$1" "$hash" "$2" "$(date -u +%Y-%m-%dT%H:%M:%SZ)" >> web/tokens.yaml
+    printf '%s\n' "$made"
+}
+
+if [ ! -e public/authority.pem ]; then
+    openssl req -x509 -newkey ec -pkeyopt ec_paramgen_curve:P-256 -nodes -days 3650 -subj "/CN=MyView authority" \
+        -out public/authority.pem -keyout authority.key 2> log
+    rm log
+    chmod 400 authority.key
+fi
+pair public/router.pem router.key "$also,DNS:bestview"
+pair public/https.pem web/https.key "$also"
+[ -e bus ] || : > bus
+if [ ! -e web/tokens.yaml ]; then
+    echo 'tokens:' > web/tokens.yaml
+    echo "A token to operate, which is not kept anywhere: $(token operator 'role: operate')"
+fi
+for camera in "$@"; do
+    [ ! -e "cameras/$camera" ] || continue
+    mkdir "cameras/$camera"
+    printf '%s:%s\n' "$camera" "$(openssl rand -hex 32)" | tee -a bus > "cameras/$camera/bus"
+    token "health of $camera" "role: watch, camera: $camera" > "cameras/$camera/token"
+done

@@ -1,0 +1,176 @@
+"""The containers' health checks tell who is well from who is not, by HTTPS and with a token, too."""
+
+from __future__ import annotations
+
+import asyncio
+import http.server
+import json
+import os
+import shutil
+import ssl
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from camsync import PulseServer
+from server.run.healthy import main
+from server.run.setup import free_port
+from server.wire.bus_users import read_users
+from server.wire.tokens import digest_of, read_tokens
+
+ROOT = Path(__file__).resolve().parents[2]
+NEEDS_OPENSSL = pytest.mark.skipif(
+    shutil.which("openssl") is None, reason="needs openssl, to make certificates"
+)
+LIVE = {"camera": "c0", "state": "live", "fps": 25.0, "message": ""}
+
+
+class Service(http.server.ThreadingHTTPServer):
+    """What a best-view service answers to health checks."""
+
+    def __init__(self, secrets: Path | None = None) -> None:
+        super().__init__(("127.0.0.1", 0), _Answer)
+        self.cameras: list[dict[str, Any]] = [LIVE]
+        self.token = "" if secrets is None else (secrets / "cameras/c0/token").read_text("ascii").strip()
+        if secrets is not None:
+            context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+            context.load_cert_chain(secrets / "public" / "https.pem", secrets / "web" / "https.key")
+            self.socket = context.wrap_socket(self.socket, server_side=True)
+
+    def handle_error(self, *_: object) -> None:
+        """Say nothing of who hangs up."""
+
+
+class _Answer(http.server.BaseHTTPRequestHandler):
+    server: Service
+
+    def do_GET(self) -> None:
+        allowed = not self.server.token or self.headers["Authorization"] == f"Bearer {self.server.token}"
+        self.send_response(200 if allowed or self.path == "/healthz" else 401)
+        self.end_headers()
+        self.wfile.write(json.dumps({"cameras": self.server.cameras}).encode())
+
+    def log_message(self, *_: object) -> None:
+        """Say nothing."""
+
+
+def serving(service: Service) -> Iterator[Service]:
+    running = threading.Thread(target=partial(service.serve_forever, 0.01))
+    running.start()
+    yield service
+    service.shutdown()
+    running.join()
+    service.server_close()
+
+
+@pytest.fixture
+def plain(monkeypatch: pytest.MonkeyPatch) -> Iterator[Service]:
+    service = Service()
+    monkeypatch.setenv("MYVIEW_HEALTH_URL", f"http://127.0.0.1:{service.server_port}")
+    yield from serving(service)
+
+
+@pytest.fixture(scope="module")
+def secrets(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Make all files as an operator does."""
+    folder = tmp_path_factory.mktemp("made") / "secrets"
+    words = ["sh", str(ROOT / "configs" / "secrets.sh"), "cameras.example", "c0"]
+    subprocess.run(words, env={**os.environ, "MYVIEW_SECRETS": str(folder)}, check=True, capture_output=True)
+    return folder
+
+
+@pytest.fixture
+def secure(secrets: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Service]:
+    service = Service(secrets)
+    monkeypatch.setenv("MYVIEW_HEALTH_URL", f"https://127.0.0.1:{service.server_port}/")
+    monkeypatch.setenv("MYVIEW_HEALTH_CERTIFICATE", str(secrets / "public" / "https.pem"))
+    monkeypatch.setenv("MYVIEW_HEALTH_TOKEN", str(secrets / "cameras" / "c0" / "token"))
+    yield from serving(service)
+
+
+async def test_pulses_are_well_while_somebody_greets(monkeypatch: pytest.MonkeyPatch) -> None:
+    async with PulseServer(25.0) as server:
+        monkeypatch.setenv("MYVIEW_SYNC__PORT", str(server.port))
+        assert await _apart("sync") == 0
+    monkeypatch.setenv("MYVIEW_SYNC__PORT", str(free_port()))
+    assert await _apart("sync") == 1
+
+
+async def _apart(*words: str) -> int:
+    """Check as the engine does: in a process of its own."""
+    process = await asyncio.create_subprocess_exec(
+        sys.executable, "-m", "server.run.healthy", *words, cwd=ROOT, stdout=asyncio.subprocess.DEVNULL
+    )
+    return await process.wait()
+
+
+def test_a_camera_is_well_when_its_frames_arrive(plain: Service, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["camera", "c0"]) == 0
+    assert main(["bestview"]) == 0
+    for state in (
+        {"fps": 0.0},
+        {"state": "gone", "message": "its source gives no pictures"},
+        {"camera": "c1"},
+    ):
+        plain.cameras = [{**LIVE, **state}]
+        assert main(["camera", "c0"]) == 1
+        assert capsys.readouterr().out.count("\n") == 1
+
+
+def test_what_cannot_be_asked_is_not_well(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("MYVIEW_HEALTH_URL", f"http://127.0.0.1:{free_port()}")
+    for words in (["bestview"], ["camera", "c0"], ["camera"], []):
+        assert main(words) == 1
+        assert capsys.readouterr().out.count("\n") == 1
+
+
+def test_an_answer_that_is_no_service_s_is_not_well(plain: Service) -> None:
+    plain.cameras = [{"camera": "c0"}]
+    assert main(["camera", "c0"]) == 1
+
+
+@NEEDS_OPENSSL
+@pytest.mark.usefixtures("secure")
+def test_by_https_the_certificate_and_the_token_count(
+    secrets: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert main(["camera", "c0"]) == 0
+    assert main(["bestview"]) == 0
+    with monkeypatch.context() as patch:
+        patch.setenv("MYVIEW_HEALTH_CERTIFICATE", str(secrets / "public" / "router.pem"))
+        assert main(["bestview"]) == 1, "another certificate is another service: no token is for it"
+    (tmp_path / "token").write_text("wrong", encoding="ascii")
+    monkeypatch.setenv("MYVIEW_HEALTH_TOKEN", str(tmp_path / "token"))
+    assert main(["camera", "c0"]) == 1
+
+
+@NEEDS_OPENSSL
+def test_what_is_made_for_a_secure_site_fits_together(secrets: Path) -> None:
+    assert (secrets.stat().st_mode & 0o777) == 0o700, "nobody else of the host looks in"
+    operator, health = read_tokens(secrets / "web" / "tokens.yaml")
+    assert (operator.role, operator.camera) == ("operate", None)
+    assert (health.role, health.camera) == ("watch", "c0")
+    token = (secrets / "cameras" / "c0" / "token").read_text("ascii").strip()
+    assert health.sha256 == digest_of(token)
+    assert read_users(secrets / "bus") == read_users(secrets / "cameras" / "c0" / "bus")
+
+
+@NEEDS_OPENSSL
+def test_a_camera_is_added_to_a_secure_site_that_stays_as_it_is(secrets: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "secrets"
+    shutil.copytree(secrets, folder)
+    before = {it: it.read_bytes() for it in folder.rglob("*") if it.is_file()}
+    words = ["sh", str(ROOT / "configs" / "secrets.sh"), "cameras.example", "c0", "yard"]
+    subprocess.run(words, env={**os.environ, "MYVIEW_SECRETS": str(folder)}, check=True, capture_output=True)
+    assert all(it.read_bytes().startswith(content) for it, content in before.items())
+    new = {str(it.relative_to(folder)) for it in folder.rglob("*") if it.is_file()}
+    new -= {str(it.relative_to(folder)) for it in before}
+    assert new == {"cameras/yard/bus", "cameras/yard/token"}
