@@ -41,8 +41,8 @@ class Meter:
         """Count a frame that nobody is looked for in."""
         self._shed += 1
 
-    def status(self, camera: str, boot: int, state: str) -> CameraStatus:
-        """Give the camera's status."""
+    def status(self, camera: str, boot: int, state: str, waiting: int = 0) -> CameraStatus:
+        """Give the camera's status; ``waiting`` frames are still to be searched."""
         sync = self._client.status() if self._client is not None else None
         since = time.monotonic() - _SPAN_S
         return CameraStatus(
@@ -53,6 +53,7 @@ class Meter:
             fps=sum(moment >= since for moment in self._times) / _SPAN_S,
             missed=self._missed,
             shed=self._shed,
+            waiting=waiting,
             in_step=sync is not None and sync.connected,
             clock_offset=(sync.offset if sync is not None else None) or 0.0,
             round_trip=(sync.round_trip if sync is not None else None) or 0.0,

@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
+from statistics import fmean
 from typing import TypeVar
 
 import msgspec
@@ -172,14 +173,21 @@ class CameraProcess:
     async def _track(self) -> None:
         """Follow everybody, frame by frame, behind the video."""
         thumbs_every = round(self._config.site.fps)
+        took: list[float] = []
         while (item := await self._backlog.get()) is not None:
             pulse, image, taken = item
+            began = time.perf_counter()
             searched = await self._in(self._tracking, partial(self._pipeline.search, pulse, image))
+            if image is not None:
+                took.append(time.perf_counter() - began)
             heard = await self._exchange.of(pulse, searched.word, taken, needed=searched.asks)
+            began = time.perf_counter()
             tracks = await self._in(self._tracking, partial(self._pipeline.follow, searched, heard))
             if tracks is None:
                 continue
-            self._send_tracks(tracks)
+            search_s, solve_s = fmean(took) if took else None, time.perf_counter() - began
+            took.clear()
+            self._send_tracks(msgspec.structs.replace(tracks, search_s=search_s, solve_s=solve_s))
             if image is not None and tracks.epoch * self._config.track.window.stride % thumbs_every < (
                 self._config.track.window.stride
             ):
@@ -202,7 +210,8 @@ class CameraProcess:
             await asyncio.sleep(_STATUS_EVERY_S)
 
     def _send_status(self) -> None:
-        status: CameraStatus = self._meter.status(self._id, self._boot, self._state)
+        waiting = self._backlog.qsize()
+        status: CameraStatus = self._meter.status(self._id, self._boot, self._state, waiting)
         self._publish("status", msgspec.json.encode(status))
 
     def _publish(self, what: str, payload: bytes, attachment: bytes | None = None) -> None:

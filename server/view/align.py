@@ -84,6 +84,11 @@ class Aligner:
         place.trusted = True
 
     @property
+    def waiting(self) -> int:
+        """How many windows wait for others of their epoch."""
+        return sum(len(place.waiting) for place in self._places.values())
+
+    @property
     def all_ended(self) -> bool:
         """Whether every camera's recording is over and was taken out."""
         return all(place.ended and not place.waiting for place in self._places.values())

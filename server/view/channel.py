@@ -48,6 +48,11 @@ class Viewer:
         self.lost = 0
         """GOPs lost because the viewer fell behind."""
 
+    @property
+    def waiting(self) -> int:
+        """How many pieces wait."""
+        return len(self._queue)
+
     def put(self, piece: Piece) -> None:
         """Queue a piece; whoever is too far behind loses all that waits and goes on with the next start.
 

@@ -8,6 +8,7 @@ from collections import OrderedDict, deque
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
+from server.view.totals import Totals
 from server.wire.messages import CameraTracks, FrameHead
 
 _FRAMES = 250
@@ -46,6 +47,8 @@ class Gauge:
         self._due: OrderedDict[int, float] = OrderedDict()
         self._delays: deque[float] = deque(maxlen=_WINDOWS)
         self._proven: deque[bool] = deque(maxlen=_WINDOWS)
+        self.totals = Totals()
+        """Since the service began: another run of the camera is added."""
         self.last_trouble: Trouble | None = None
         """Stays when the camera is well again."""
         self.size: tuple[int, int] | None = None
@@ -58,6 +61,7 @@ class Gauge:
 
     def frame(self, head: FrameHead) -> None:
         """Take in a frame that came."""
+        self.totals.frame(head)
         self._errors.append(head.taken - head.due)
         self._due[head.pulse] = head.due
         while len(self._due) > _FRAMES:
@@ -66,9 +70,11 @@ class Gauge:
     def window(self, tracks: CameraTracks) -> None:
         """Take in a window that was solved."""
         self.size = tracks.size
+        proven = tracks.solve is not None and tracks.solve.gap <= _PROVEN
         if tracks.solve is not None:
-            self._proven.append(tracks.solve.gap <= _PROVEN)
+            self._proven.append(proven)
         due = self._due.get(tracks.last)
+        self.totals.window(tracks, due, proven=proven)
         if due is not None and tracks.solved_at > 0:
             self._delays.append(tracks.solved_at - due)
 

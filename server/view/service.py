@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -22,11 +23,12 @@ from server.view.record import Recorder
 from server.view.shelf import Shelf
 from server.view.sound import SoundShelf
 from server.view.splice import Splicer
+from server.view.stages import Stages
 from server.wire.bus import Bus
 from server.wire.bus_users import access_of
 from server.wire.config import Config
 from server.wire.errors import UserError
-from server.wire.inbox import Message
+from server.wire.inbox import Inbox, Message
 from server.wire.messages import GopChoices, Keys, pulse_client
 from server.wire.sections import View
 
@@ -73,7 +75,13 @@ class BestViewService:
         self.pulse = -1
         self.pulse0: float | None = None
         """When pulse 0 was due, unix seconds; None before the first pulse."""
+        self._pulsed_at: float | None = None
         self.late_epochs = 0
+        self.lost_pictures = dict.fromkeys(cameras, 0)
+        """By camera: pictures of decided GOPs that did not come though it was delivering."""
+        self.stages = Stages()
+        self.inboxes: list[Inbox[Message]] = []
+        """Where the bus's messages wait for the event loop."""
         self.on_decision: list[Callable[[GopChoices], None]] = []
         self._out = out
         self._recorder: Recorder | None = None
@@ -99,9 +107,9 @@ class BestViewService:
             "thumbs/*": self.intake.thumbnail,
         }
         for what, handler in handlers.items():
-            bus.subscribe(self._keys.camera("*", what), handler)
+            self.inboxes.append(bus.subscribe(self._keys.camera("*", what), handler))
         if self.sound is not None:
-            bus.subscribe(self._keys.sound, self.intake.sound)
+            self.inboxes.append(bus.subscribe(self._keys.sound, self.intake.sound))
         bus.watch_alive(self._keys.camera("*", "alive"), self._alive)
         bus.declare_alive(self._keys.bestview("alive", index))
 
@@ -192,7 +200,13 @@ class BestViewService:
             async for pulse in pulses:
                 self.pulse = pulse.number
                 self.pulse0 = pulse.due - pulse.number / fps
+                self._pulsed_at = time.monotonic()
                 self._changed.set()
+
+    @property
+    def silent_s(self) -> float | None:
+        """Seconds since the newest pulse; None before the first."""
+        return None if self._pulsed_at is None else time.monotonic() - self._pulsed_at
 
     def _tracks(self, message: Message) -> None:
         self.intake.tracks(message)
@@ -205,13 +219,20 @@ class BestViewService:
     def _step(self, epoch: Epoch) -> None:
         self._note_late(epoch)
         self.walking.take(epoch)
-        decisions = self.decider.step(epoch)
+        with self.stages.deciding():
+            decisions = self.decider.step(epoch)
         self.by_hand.take(self.decider.people, epoch.last)  # names are there with the first decision
         for decision in decisions:
             self._publish(decision)
 
     def _publish(self, decision: GopDecision) -> None:
         """Say which boxes go with the frames before the frames are sent."""
+        pulse0 = self.pulse0
+        due = None if pulse0 is None else pulse0 + decision.first / self.config.site.fps
+        with self.stages.sending(due):
+            self._send(decision)
+
+    def _send(self, decision: GopDecision) -> None:
         choices = self.board.put(decision)
         self.past.put(choices, self.pulse0)
         for tell in self.on_decision:
@@ -223,13 +244,16 @@ class BestViewService:
             self._bus.publish(key, msgspec.json.encode(choices))
         if self._recorder is not None:
             self._recorder.write(decision)
-            self._note_lost(self._recorder, decision)
+        self._note_lost(decision)
         self.intake.forget_thumbnails_before(decision.first - self.config.view.identity.forget_after)
 
-    def _note_lost(self, recorder: Recorder, decision: GopDecision) -> None:
+    def _note_lost(self, decision: GopDecision) -> None:
         """Note the pictures of a GOP that did not come, of cameras that were delivering."""
         for camera, shelf in self.shelves.items():
-            recorder.late(camera, shelf.lost(decision.first, decision.frames), "no picture")
+            lost = shelf.lost(decision.first, decision.frames)
+            self.lost_pictures[camera] += len(lost)
+            if self._recorder is not None:
+                self._recorder.late(camera, lost, "no picture")
 
     def _note_late(self, epoch: Epoch) -> None:
         stride = self.config.track.window.stride

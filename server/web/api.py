@@ -9,6 +9,7 @@ from aiohttp import web
 from prometheus_client import CollectorRegistry, generate_latest
 
 from server.view.past.moment import MomentError, pulse_at
+from server.view.ready import why_not_ready
 from server.view.service import BestViewService
 from server.web.keys import METRICS, SERVICE
 from server.web.schema import Problem
@@ -99,11 +100,12 @@ async def get_health(request: web.Request) -> web.Response:
 
 @routes.get("/readyz")
 async def get_ready(request: web.Request) -> web.Response:
-    """Say whether there is anything to show: a camera whose frames come in."""
+    """Say whether a best view can be served now: pulses and frames come, decisions keep up; or why not."""
     service = _service(request)
+    reasons = why_not_ready(service)
+    if reasons:
+        return web.Response(text=f"{'; '.join(reasons)}\n", status=503)
     live = [camera for camera, state in service.intake.states.items() if state.word == "live"]
-    if not live:
-        return web.Response(text="no camera delivers frames\n", status=503)
     return web.Response(text=f"{len(live)} of {len(service.intake.states)} cameras\n")
 
 

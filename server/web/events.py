@@ -53,6 +53,11 @@ class Events:
         self._closed = False
         service.on_decision.append(self._on_decision)
 
+    @property
+    def viewers(self) -> int:
+        """How many are told."""
+        return sum(line.channel.viewers for line in self._lines.values())
+
     def join(self, sees: Scope) -> Viewer:
         """Let a reader in; what it should know first comes first."""
         line = self._lines.get(sees) or self._new_line(sees)

@@ -11,6 +11,7 @@ from functools import lru_cache
 from aiohttp import web
 
 from server.view.channel import Channel, Piece, Viewer
+from server.web.sent import SENT, Sent
 
 log = logging.getLogger(__name__)
 
@@ -51,16 +52,21 @@ async def send_viewer(
     def ready(response: web.StreamResponse) -> None:
         if request.transport is not None:
             chunked = response.headers.get("Transfer-Encoding") == "chunked"
-            viewer.at_once = _at_once(request.transport, form, chunked=chunked)
+            viewer.at_once = _at_once(request.transport, form, sent, chunked=chunked)
 
+    sent = request.app[SENT]
+    sent.join(viewer)
     pieces = (form(piece) async for piece in viewer.pieces())
     try:
         return await send_bytes(request, pieces, head, headers, ready)
     finally:
         viewer.at_once = None
+        sent.leave(viewer)
 
 
-def _at_once(transport: asyncio.Transport, form: Form, *, chunked: bool) -> Callable[[Piece], bool]:
+def _at_once(
+    transport: asyncio.Transport, form: Form, sent: Sent, *, chunked: bool
+) -> Callable[[Piece], bool]:
     """Give what writes a piece where nothing of the one before waits; what the system leaves follows.
 
     It is called for every viewer of every GOP: what it would look up, the last of them waits for.
@@ -70,7 +76,9 @@ def _at_once(transport: asyncio.Transport, form: Form, *, chunked: bool) -> Call
     def take(piece: Piece) -> bool:
         if waiting() or is_closing():
             return False
-        write(_chunk(form(piece)) if chunked else form(piece))
+        data = form(piece)
+        write(_chunk(data) if chunked else data)
+        sent.streams += len(data)
         return True
 
     return take
@@ -95,12 +103,15 @@ async def send_bytes(
     if request.method == "HEAD":
         return response
     _keep_little_waiting(request)
+    sent = request.app[SENT]
     try:
         if head:
             await response.write(head)
+            sent.streams += len(head)
         ready(response)
         async for some in data:
             await response.write(some)
+            sent.streams += len(some)
         await response.write_eof()
     except (ConnectionError, TimeoutError) as error:
         log.debug("a viewer has gone: %s", error)

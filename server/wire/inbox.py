@@ -40,6 +40,11 @@ class Inbox(Generic[Item]):
         self._woken = False
         self.lost = 0
 
+    @property
+    def waiting(self) -> int:
+        """How many items wait."""
+        return len(self._pending)
+
     def put(self, item: Item) -> None:
         """Take an item, in any thread."""
         if len(self._pending) == self._pending.maxlen:

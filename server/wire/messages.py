@@ -39,6 +39,9 @@ Pixels = Annotated[int, msgspec.Meta(ge=1, le=2**16)]
 
 Number = Annotated[int, msgspec.Meta(ge=0, le=2**62)]
 
+Duration = Annotated[float, msgspec.Meta(ge=0, le=1e6)]
+"""Seconds."""
+
 Box = tuple[float, float, float, float]
 """Left, top, right, bottom in pixels of the site's picture."""
 
@@ -130,6 +133,10 @@ class CameraTracks(msgspec.Struct, frozen=True, kw_only=True):
     solve: Solve | None
     solved_at: float = 0.0
     """When the window was solved, unix seconds by the camera's clock; 0 offline."""
+    search_s: Duration | None = None
+    """Seconds that it took to look for people in a frame, the mean of this epoch's; null offline."""
+    solve_s: Duration | None = None
+    """Seconds that it took to follow everybody to the end of the window; null offline."""
 
 
 Coordinate = Annotated[float, msgspec.Meta(ge=-1e6, le=1e6)]
@@ -169,6 +176,8 @@ class CameraStatus(msgspec.Struct, frozen=True, kw_only=True):
     """Pulses without a frame since the start."""
     shed: Number
     """Frames not searched for people since the start."""
+    waiting: Number = 0
+    """Frames that wait to be searched."""
     in_step: bool
     """Pulses come from the server; otherwise the camera goes on at its own rate."""
     clock_offset: float

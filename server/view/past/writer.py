@@ -44,6 +44,11 @@ class Writer:
         self.trouble = ""
         """Why nothing is being recorded; empty when all is well."""
 
+    @property
+    def waiting(self) -> int:
+        """How many pieces wait for the disk."""
+        return len(self._waiting)
+
     def start(self) -> None:
         """Begin."""
         self._thread.start()
