@@ -148,7 +148,7 @@ def _row(line: str) -> MotRow:
 def _whole(text: str, name: str) -> int:
     number = _number(text, name)
     if not number.is_integer():
-        raise ValueError(f"{name} is a whole number, not {text!r}")
+        raise ValueError(f"{name} is a whole number, not {text[:40]!r}")
     return int(number)
 
 

@@ -57,6 +57,14 @@ def _refusal(lines: list[str]) -> str:
     return ""
 
 
+@pytest.mark.parametrize("field", range(7))
+def test_a_field_without_end_is_named_by_its_beginning(field: int) -> None:
+    fields = ["1", "1", "0", "0", "5", "5", "1"]
+    for text in ("x" * 5000, "9" * 5000, *([".3" + "9" * 500, "9" * 300] if field < 2 else [])):
+        fields[field] = text
+        assert 0 < len(_refusal([",".join(fields)])) < 400
+
+
 _FIELDS = ["1", "-1", "2.5", "nan", "inf", "", " 3 ", "1e999", "x", "1e400"]
 
 
