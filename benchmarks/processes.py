@@ -75,6 +75,8 @@ def _name(pid: int) -> str:
         words = (_PROC / str(pid) / "cmdline").read_bytes().decode(errors="replace").split("\0")
     except OSError:
         return "browser"
+    if "server.draw" in words:
+        return "drawing"
     if "server.run.cli" not in words:
         return "browser"
     command, *rest = words[words.index("server.run.cli") + 1 :]

@@ -1,0 +1,87 @@
+"""Faults, injected into real processes while viewers watch: against each promise, what was measured.
+
+    python -m benchmarks.faults --out out/bench
+    python -m benchmarks.faults --fault "kill camera" --fault "freeze camera"
+
+The site is `myview up` on three views of the synthetic room. On every picture stands which camera it is of
+and which frame, and in every box in which frame it was found, so that a picture of the wrong camera or
+moment and a box on another picture than its own are counted, not assumed. Columns:
+
+* *opened again*: how often the viewers' streams broke and were opened again;
+* *fresh*: the longest time in which a viewer got no fresh picture, less the rhythm of GOPs (a GOP comes in
+  one piece), and in brackets the same over the seconds before the fault; the look-ahead is in neither, since
+  all that viewers see is later by it. Where the viewers' own server dies: from when it says that it is ready
+  to the next picture, and in brackets all the time without;
+* *wrong pictures*: of another camera than the events named, of another frame than the pulse, or not legible;
+* *wrong boxes*: drawn on a picture of another frame;
+* *recorded*: GOPs that were shown and are not on the disk; files that do not play;
+* *ended*: of processes that were told to end, the slowest and its exit code.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+import sys
+import tempfile
+from pathlib import Path
+
+from benchmarks import faults_processes
+from benchmarks.faults_film import Views, make
+from benchmarks.faults_run import Outcome, run
+from benchmarks.faults_site import Fault
+from benchmarks.faults_table import describe
+from benchmarks.report import Report
+from benchmarks.surroundings import CannotRunError, finish, parser
+
+FAULTS: tuple[Fault, ...] = (*faults_processes.FAULTS,)
+_PULSES = 15_000
+"""Detections for so many: ten minutes."""
+
+
+async def measure(faults: list[Fault], folder: Path, report: Report) -> list[Outcome]:
+    """Inject these faults one after the other."""
+    views = await asyncio.to_thread(make, folder, _PULSES)
+    outcomes: list[Outcome] = []
+    groups = itertools.groupby(faults, key=lambda fault: fault.setup)
+    for number, (_, some) in enumerate(groups):
+        outcomes += await _group(list(some), views, folder / f"site-{number}", report)
+    return outcomes
+
+
+async def _group(faults: list[Fault], views: Views, folder: Path, report: Report) -> list[Outcome]:
+    await asyncio.to_thread(folder.mkdir)
+    outcomes: list[Outcome] = []
+    try:
+        async with faults[0].setup(views, folder) as stand:
+            for fault in faults:
+                outcomes.append(await run(fault, stand))
+                print(f"{fault.name}: done", file=sys.stderr, flush=True)
+    except RuntimeError as error:
+        report.say(f"{faults[0].name} and what follows it: {error}")
+    return outcomes
+
+
+def main() -> None:
+    """Read the command line, run, print and draw."""
+    options = parser(__doc__ or "", "faults")
+    names = [fault.name for fault in FAULTS]
+    options.add_argument("--fault", action="append", choices=names, help="only this one; may be repeated")
+    options.add_argument("--list", action="store_true", help="only list them")
+    chosen = options.parse_args()
+    if chosen.list:
+        print("\n".join(names))
+        return
+    faults = [fault for fault in FAULTS if not chosen.fault or fault.name in chosen.fault]
+    report = Report()
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            outcomes = asyncio.run(measure(faults, Path(folder), report))
+    except CannotRunError as problem:
+        finish(problem, "faults")
+    describe(report, outcomes)
+    report.save(chosen.out / "faults.txt")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,145 @@
+"""Views of the synthetic room that say on every picture, and in every box, whose they are and of which frame.
+
+A strip at the bottom of each picture has its camera and its number in black and white blocks, which survive
+encoding. Detections are the scene's truth, and the thousandths of a box's left and top are the number of the
+frame it was found in. So a viewer can tell a picture of the wrong camera or moment from the right one, and a
+box that belongs to another picture from one that belongs to this.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import av
+import numpy as np
+from av.video.frame import VideoFrame
+from numpy.typing import NDArray
+
+from client import Box
+from server.camera.scene import Scene
+
+FPS = 25
+WIDTH, HEIGHT = 256, 144
+CAMERAS = ("c0", "c1", "c2")
+FRAMES = 1000
+"""Of a film, which then begins again; numbers of frames have three digits."""
+_PEOPLE, _SEED = 3, 1
+_START, _DRAWN = 300, 50
+"""All are in sight. What is drawn is played forwards and backwards, so that nobody jumps."""
+_BLOCK = 8
+"""Pixels of one bit; there are 32 of them: 4 of the camera, 12 of the number, and the same inverted."""
+_CAMERA_BITS, _BITS = 4, 16
+_DARK, _BRIGHT, _MIDDLE = 40, 215, 128
+_SHOWS = 0.3
+"""Share of a person that must show to be found."""
+_TIME_BASE = Fraction(1, 90_000)
+
+
+@dataclass(frozen=True, slots=True)
+class Stamp:
+    """What a picture says of itself."""
+
+    camera: str
+    frame: int
+    """Below :data:`FRAMES`."""
+
+
+@dataclass(frozen=True, slots=True)
+class Views:
+    """What is played: `benchmarks.delay_site.Played`."""
+
+    cameras: list[dict[str, Any]]
+    site: dict[str, Any]
+    ground: Path | None
+
+
+def stamped(image: NDArray[np.uint8], camera: int, frame: int) -> NDArray[np.uint8]:
+    """Give a picture ``(H, W, 3)`` with its strip: a copy."""
+    value = camera << (_BITS - _CAMERA_BITS) | frame
+    bits = [value >> place & 1 for place in range(_BITS)]
+    bits += [1 - bit for bit in bits]
+    strip = np.repeat(np.where(np.array(bits) > 0, _BRIGHT, _DARK).astype(np.uint8), _BLOCK)
+    marked = image.copy()
+    marked[-_BLOCK:, : len(strip)] = strip[None, :, None]
+    return marked
+
+
+def read_stamp(grey: NDArray[np.uint8]) -> Stamp | None:
+    """Read the strip of a picture ``(H, W)``; None where it cannot be read."""
+    edge = _BLOCK // 4
+    rows = grey[-_BLOCK + edge : grey.shape[0] - edge, : 2 * _BITS * _BLOCK].astype(np.float64)
+    blocks = rows.reshape(len(rows), 2 * _BITS, _BLOCK)[:, :, edge:-edge].mean(axis=(0, 2)) > _MIDDLE
+    bits, inverse = blocks[:_BITS], blocks[_BITS:]
+    if (bits == inverse).any():
+        return None
+    value = sum(1 << place for place in np.flatnonzero(bits).tolist())
+    camera, frame = divmod(value, 1 << (_BITS - _CAMERA_BITS))
+    return Stamp(f"c{camera}", frame)
+
+
+def frame_of(box: Box) -> int | None:
+    """Say in which frame a box was found; None where it is a mean of several and says nothing."""
+    left, top = (round(value % 1.0 * FRAMES) % FRAMES for value in (box.left, box.top))
+    return left if left == top else None
+
+
+def make(folder: Path, pulses: int) -> Views:
+    """Write films, detections for so many pulses, and the homographies into a folder."""
+    scene = Scene("room", len(CAMERAS), _PEOPLE, _SEED, WIDTH, HEIGHT, FPS)
+    places = _places()
+    truths = {place: scene.truth(place) for place in sorted(set(places))}
+    cameras = []
+    for number, name in enumerate(CAMERAS):
+        drawn = {place: scene.image(number, place) for place in truths}
+        pictures = [stamped(drawn[place], number, frame) for frame, place in enumerate(places)]
+        write_film(pictures, folder / f"{name}.mp4")
+        boxes = [_boxes(truths[place][number]) for place in places]
+        _write_detections(boxes, pulses, folder / f"{name}.txt")
+        source, found = str(folder / f"{name}.mp4"), str(folder / f"{name}.txt")
+        cameras.append({"id": name, "source": source, "at_end": "loop", "detections": found})
+    ground = {name: scene.homography(number).tolist() for number, name in enumerate(CAMERAS)}
+    (folder / "ground.json").write_text(json.dumps({"unit": "m", "homography": ground}), encoding="ascii")
+    site = {"name": "faults", "fps": FPS, "width": WIDTH, "height": HEIGHT}
+    return Views(cameras, site, folder / "ground.json")
+
+
+def write_film(pictures: Sequence[NDArray[np.uint8]], path: Path) -> None:
+    """Encode pictures with a key picture every ten."""
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("libx264", rate=FPS, options={"crf": "18", "preset": "ultrafast"})
+        stream.height, stream.width = pictures[0].shape[:2]
+        stream.pix_fmt, stream.gop_size, stream.codec_context.max_b_frames = "yuv420p", 10, 0
+        stream.codec_context.thread_count = 1
+        for number, picture in enumerate(pictures):
+            frame = VideoFrame.from_ndarray(picture, format="bgr24")
+            frame.pts, frame.time_base = round(number / FPS / _TIME_BASE), _TIME_BASE
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode(None))
+
+
+def _places() -> list[int]:
+    """Give the scene's frame that each frame of a film shows."""
+    there = list(range(_START, _START + _DRAWN))
+    both = [*there, *reversed(there)]
+    return [both[frame % len(both)] for frame in range(FRAMES)]
+
+
+def _boxes(truth: Any) -> NDArray[np.float64]:
+    """Give the boxes ``(N, 4)`` that are whole and to be seen, left, top, width, height in whole pixels."""
+    boxes = np.floor(truth.boxes[truth.visible >= _SHOWS]).reshape(-1, 4)
+    inside = (boxes[:, :2] >= 1).all(axis=1) & (boxes[:, 2] < WIDTH - 1) & (boxes[:, 3] < HEIGHT - 1)
+    kept = boxes[inside]
+    return np.hstack([kept[:, :2], kept[:, 2:] - kept[:, :2]])
+
+
+def _write_detections(boxes: Sequence[NDArray[np.float64]], pulses: int, path: Path) -> None:
+    with path.open("w", encoding="ascii") as file:
+        for pulse in range(pulses):
+            mark = f".{pulse % FRAMES:03d}"
+            for left, top, width, height in boxes[pulse % FRAMES].astype(int).tolist():
+                file.write(f"{pulse + 1},-1,{left}{mark},{top}{mark},{width},{height},1,-1,-1,-1\n")

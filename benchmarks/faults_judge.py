@@ -1,0 +1,96 @@
+"""What a viewer received, held against what the events said of it and what the pictures say of themselves."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+from benchmarks.faults_film import FPS, FRAMES, frame_of
+from benchmarks.faults_viewer import Picture, Told
+from client import Box, Gop
+
+
+@dataclass(frozen=True, slots=True)
+class Received:
+    """One viewer's pictures in the time of a fault.
+
+    Attributes:
+        frames: how many came.
+        wrong: of another camera than the events named, of another moment, or not to be read.
+        repeated: the picture before, shown again because there was none.
+        boxes: drawn on these pictures.
+        wrong_boxes: found in another frame than the picture shows.
+        blurred: means of several boxes, which do not say what they were found in.
+        fresh: when each fresh picture came, and which camera it is of.
+    """
+
+    frames: int
+    wrong: int
+    repeated: int
+    boxes: int
+    wrong_boxes: int
+    blurred: int
+    fresh: tuple[tuple[float, str], ...]
+    notes: tuple[str, ...]
+    """What was wrong, in words."""
+
+    def without(self, since: float, until: float) -> float:
+        """Give the longest time without a fresh picture, seconds, that ends or begins within a span.
+
+        A GOP comes in one piece, so the rhythm of GOPs is in it.
+        """
+        moments = [at for at, _ in self.fresh]
+        before = max((at for at in moments if at <= since), default=since)
+        inside = [at for at in moments if since < at <= until]
+        return max((b - a for a, b in pairwise([before, *inside, until])), default=0.0)
+
+
+def judge(pictures: Sequence[Picture], told: Told, number: int, live: Iterable[str] = ()) -> Received:
+    """Judge every picture; a picture of a camera of ``live`` has no number that is known beforehand."""
+    said = dict(_said(told, number))
+    live = frozenset(live)
+    fresh, notes = [], []
+    wrong = repeated = boxes = wrong_boxes = blurred = 0
+    before: Picture | None = None
+    for picture in pictures:
+        stamp, last = picture.stamp, before
+        before = picture
+        camera, found = said.get(picture.pulse, (None, ()))
+        if last is not None and stamp is not None and stamp == last.stamp:
+            repeated += 1
+        elif stamp is None or (camera is not None and stamp.camera != camera):
+            wrong += 1
+            notes.append(f"pulse {picture.pulse}: {stamp}, not {camera}")
+        elif stamp.camera not in live and stamp.frame != picture.pulse % FRAMES:
+            wrong += 1
+            notes.append(f"pulse {picture.pulse}: {stamp}")
+        else:
+            fresh.append((picture.at, stamp.camera))
+        if camera in live or stamp is None:
+            continue
+        for box in found:
+            frame = frame_of(box)
+            boxes += 1
+            blurred += frame is None
+            if frame is not None and frame != stamp.frame:
+                wrong_boxes += 1
+                notes.append(f"pulse {picture.pulse} of {camera}: a box of frame {frame} on {stamp}")
+    return Received(len(pictures), wrong, repeated, boxes, wrong_boxes, blurred, tuple(fresh), tuple(notes))
+
+
+def _said(told: Told, number: int) -> Iterator[tuple[int, tuple[str | None, tuple[Box, ...]]]]:
+    """Give for every pulse the camera that was chosen and the boxes in its picture."""
+    for _, gop in told.gops:
+        camera = told.choice(gop, number)
+        for place in range(gop.frames):
+            yield gop.first + place, (camera, _boxes(gop, camera, place))
+
+
+def _boxes(gop: Gop, camera: str | None, place: int) -> tuple[Box, ...]:
+    frames = gop.boxes.get(camera, ()) if camera is not None else ()
+    return frames[place] if place < len(frames) else ()
+
+
+RHYTHM_S = 10 / FPS
+"""A GOP comes in one piece; so long nothing comes in between."""

@@ -1,0 +1,82 @@
+"""The table of faults and promises."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from benchmarks.faults_run import Outcome
+from benchmarks.report import Report
+
+_BACK_S = 2.0
+"""Promised: from the server's return to the next picture."""
+_NOTES = 3
+
+
+def describe(report: Report, outcomes: Sequence[Outcome]) -> None:
+    """Print what was measured."""
+    columns = [
+        "fault",
+        "opened again",
+        "fresh, s",
+        "promised",
+        "wrong pictures",
+        "wrong boxes",
+        "recorded",
+        "ended",
+    ]
+    report.table("faults", [*columns, "kept"], [_row(it) for it in outcomes])
+    for outcome in outcomes:
+        for note in [outcome.failed, *(note for it in outcome.received for note in it.notes)][:_NOTES]:
+            if note:
+                report.say(f"{outcome.fault.name}: {note}")
+    broken = [it.fault.name for it in outcomes if not kept(it)]
+    report.say(f"{len(outcomes) - len(broken)} of {len(outcomes)} keep all promises" + _list(broken))
+
+
+def kept(outcome: Outcome) -> bool:
+    """Whether every promise was kept."""
+    fault = outcome.fault
+    if outcome.failed or any(it.wrong or it.wrong_boxes for it in outcome.received):
+        return False
+    if fault.breaks and (outcome.back is None or outcome.back > _BACK_S):
+        return False
+    if not fault.breaks and outcome.reconnections:
+        return False
+    if fault.within is not None and outcome.without > fault.within:
+        return False
+    if outcome.lost is not None and outcome.lost > (1 if fault.breaks else 0):
+        return False
+    return not outcome.broken_files and all(it.well for it in outcome.ended)
+
+
+def _row(it: Outcome) -> list[str]:
+    frames, boxes = sum(r.frames for r in it.received), sum(r.boxes for r in it.received)
+    wrong, wrong_boxes = sum(r.wrong for r in it.received), sum(r.wrong_boxes for r in it.received)
+    slowest = max(it.ended, key=lambda one: one.seconds, default=None)
+    return [
+        it.fault.name,
+        str(it.reconnections),
+        _fresh(it),
+        _promised(it),
+        f"{wrong} of {frames}",
+        f"{wrong_boxes} of {boxes}",
+        "" if it.lost is None else f"{it.lost} lost, {it.broken_files} broken",
+        "" if slowest is None else f"{slowest.seconds:.2f} s, {slowest.code}",
+        "yes" if kept(it) else "NO",
+    ]
+
+
+def _fresh(it: Outcome) -> str:
+    if not it.fault.breaks:
+        return f"{it.without:.2f} ({it.ordinary:.2f})"
+    return f"{'never' if it.back is None else f'{it.back:.2f}'} ({it.without:.2f})"
+
+
+def _promised(it: Outcome) -> str:
+    if it.fault.breaks:
+        return f"{_BACK_S:g}"
+    return "" if it.fault.within is None else f"{it.fault.within:g}"
+
+
+def _list(names: Sequence[str]) -> str:
+    return f"; not: {', '.join(names)}" if names else ""
