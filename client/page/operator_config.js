@@ -3,7 +3,7 @@
 import { ask } from './operator_http.js';
 import { element, make, put } from './operator_parts.js';
 
-/** @import {Setting} from './operator_contract.js' */
+/** @import {Setting, Settings} from './operator_contract.js' */
 /** @import {Section, Tell} from './operator_parts.js' */
 
 /** @implements {Section} */
@@ -25,8 +25,9 @@ export class Configuration {
   }
 
   open() {
-    void ask('config').then(({ settings }) => {
+    void ask('config').then((/** @type {Settings} */ { settings, error, waiting }) => {
       this.#settings = settings;
+      put(element('config-on-disk'), onDisk(error, waiting));
       this.#show();
     }, this.tell);
   }
@@ -45,6 +46,15 @@ export class Configuration {
     element('settings').replaceChildren(...shown.map(row));
     put(element('settings-none'), shown.length || !this.#settings.length ? '' : 'No setting is like that.');
   }
+}
+
+/**
+ * @param {string} error
+ * @param {string[]} waiting
+ */
+function onDisk(error, waiting) {
+  if (error) return `The file is not in force: ${error}`;
+  return waiting.length ? `The file says something else, which is not in force: ${waiting.join(', ')}` : '';
 }
 
 /** @param {Setting} setting */

@@ -68,6 +68,11 @@
  * @property {string | null} default
  * @property {boolean} differs
  *
+ * @typedef {object} Settings /api/operator/config
+ * @property {Setting[]} settings
+ * @property {string} error why the file on the disk cannot be in force; empty: it can
+ * @property {string[]} waiting keys in which it differs from what is in force
+ *
  * @typedef {Record<string, number | boolean>} Values
  *
  * @typedef {object} Choosing /api/operator/choosing

@@ -47,6 +47,15 @@ def check_recordings(config: Config) -> None:
     """
     if config.sounding is not None:
         open_sound(config, config.sounding)
-    for it in config.cameras:
-        if kind_of(it.source) is not SourceKind.STREAM:
-            CameraPipeline(config, it.id).close()
+    for camera in config.camera_ids:
+        check_recording(config, camera)
+
+
+def check_recording(config: Config, camera: str) -> None:
+    """Refuse a recorded view that its process could not open.
+
+    Raises:
+        UserError: it cannot be opened, or its file of detections.
+    """
+    if kind_of(config.camera(camera).source) is not SourceKind.STREAM:
+        CameraPipeline(config, camera).close()

@@ -14,11 +14,11 @@ _PR_SET_PDEATHSIG = 1
 _ENDING = (signal.SIGINT, signal.SIGTERM)
 
 
-async def run_until_told(main: Callable[[], Coroutine[Any, Any, None]]) -> None:
-    """Run a coroutine until it is over or a signal asks to end."""
+async def run_until_told(main: Callable[[], Coroutine[Any, Any, None]], *, hang_up: bool = True) -> None:
+    """Run a coroutine until it is over or a signal asks to end; ``hang_up``: SIGHUP does so, too."""
     task = asyncio.create_task(main())
     loop = asyncio.get_running_loop()
-    for number in _ENDING:
+    for number in (*_ENDING, signal.SIGHUP) if hang_up else _ENDING:
         loop.add_signal_handler(number, task.cancel)
     with contextlib.suppress(asyncio.CancelledError):
         await task
@@ -31,8 +31,8 @@ def end_with_parent() -> None:
 
 
 def run_process(main: Callable[[], Coroutine[Any, Any, None]]) -> None:
-    """Run a process's coroutine until it is over, or SIGTERM or SIGINT comes."""
-    asyncio.run(run_until_told(main))
+    """Run a process's coroutine until it is over, or SIGTERM or SIGINT comes; it looks after SIGHUP itself."""
+    asyncio.run(run_until_told(main, hang_up=False))
 
 
 @contextmanager

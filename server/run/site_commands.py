@@ -15,8 +15,8 @@ import typer
 from server.run.ending import run_process, run_until_told
 from server.run.logs import log_to_stderr
 from server.wire.errors import UserError
-from server.wire.loading import load_config
 from server.wire.output import check_new_folder
+from server.wire.running import Running
 
 ConfigPath = Annotated[Path, typer.Argument(metavar="CONFIG", help="The site's configuration, a YAML file.")]
 LogFolder = Annotated[
@@ -29,8 +29,8 @@ def sync(config: ConfigPath) -> None:
     from server.run.sync import sync_process
 
     log_to_stderr("sync")
-    loaded = load_config(config)
-    run_process(lambda: sync_process(loaded))
+    running = Running(config)
+    run_process(lambda: sync_process(running))
 
 
 def camera(
@@ -40,12 +40,12 @@ def camera(
     from server.run.camera import camera_process
 
     log_to_stderr(camera_id)
-    loaded = load_config(config)
-    if camera_id not in loaded.camera_ids:
+    running = Running(config)
+    if camera_id not in running.now.camera_ids:
         raise UserError(
-            f"{config}: there is no camera {camera_id!r}; there are {', '.join(loaded.camera_ids)}"
+            f"{config}: there is no camera {camera_id!r}; there are {', '.join(running.now.camera_ids)}"
         )
-    run_process(lambda: camera_process(loaded, camera_id))
+    run_process(lambda: camera_process(running, camera_id))
 
 
 def bestview(config: ConfigPath, out: LogFolder = None) -> None:
@@ -53,10 +53,10 @@ def bestview(config: ConfigPath, out: LogFolder = None) -> None:
     from server.run.bestview import bestview_process
 
     log_to_stderr("bestview")
-    loaded = load_config(config)
+    running = Running(config)
     if out is not None:
         check_new_folder(out)
-    run_process(lambda: bestview_process(loaded, out))
+    run_process(lambda: bestview_process(running, out))
 
 
 def up(
@@ -68,21 +68,18 @@ def up(
 ) -> None:
     """Run a whole site on this machine: every process, watched and restarted."""
     from server.run.checks import check_ports, check_recordings
-    from server.run.exposed import check_bus, check_pulses, check_viewers
-    from server.run.supervise import Supervisor
+    from server.run.up import check_exposed, run_up
 
     log_to_stderr("up")
     environment = {} if port is None else {"MYVIEW_HTTP__PORT": str(port)}
     os.environ.update(environment)
-    loaded = load_config(config)
+    running = Running(config)
     if out is not None:
         check_new_folder(out)
-    for check in (check_viewers, check_pulses, check_bus):
-        check(loaded)
-    check_ports(loaded)
-    check_recordings(loaded)
-    supervisor = Supervisor(config, loaded, environment, out)
-    asyncio.run(run_until_told(supervisor.run))
+    check_exposed(running.now)
+    check_ports(running.now)
+    check_recordings(running.now)
+    run_process(lambda: run_up(running, environment, out))
 
 
 def demo(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import os
+import signal
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -70,6 +71,12 @@ class Supervisor:
                 finished, _ = await asyncio.wait([over, *pending], return_when=asyncio.FIRST_COMPLETED)
         finally:
             await self._end(watchers)
+
+    def hang_up(self, name: str) -> None:
+        """Tell a process that its configuration is another; one that is to be started again will read it."""
+        for child in self.children:
+            if child.name == name and child.process is not None and child.process.returncode is None:
+                child.process.send_signal(signal.SIGHUP)
 
     async def _watch(self, child: Child) -> None:
         pause = _RETRY_FIRST_S

@@ -2,25 +2,28 @@
 
 from __future__ import annotations
 
-import asyncio
 import errno
 import logging
 
 from camsync import PulseServer
 from server.run.exposed import check_pulses
-from server.wire.config import Config
+from server.run.hang_up import reloads
 from server.wire.errors import UserError
 from server.wire.messages import pulse_client
+from server.wire.running import Running
 
 log = logging.getLogger(__name__)
 
 
-async def sync_process(config: Config) -> None:
+async def sync_process(running: Running) -> None:
     """Send pulses; pulse 0 waits for all cameras and best-view services.
+
+    Nothing that it goes by can change while it runs: of a configuration that is read again it says so.
 
     Raises:
         UserError: the port cannot be listened on, or strangers could listen.
     """
+    config = running.now
     check_pulses(config)
     sync = config.sync
     server = PulseServer(
@@ -38,6 +41,7 @@ async def sync_process(config: Config) -> None:
         raise UserError(f"sync.port: cannot listen on {sync.bind}:{sync.port}: {reason}") from error
     log.info("pulses at %g a second on %s:%d", config.site.fps, sync.bind, server.port)
     try:
-        await asyncio.Event().wait()
+        async for reload in reloads(running):
+            log.info("%s", reload.line)
     finally:
         await server.stop()

@@ -18,12 +18,9 @@ from server.view.sight import Sight
 from server.view.why import Why
 from server.wire.config import Config
 from server.wire.messages import NumberedBox
-from server.wire.sections import View
+from server.wire.sections import TUNED, View
 
 Floats = NDArray[np.float64]
-
-TUNED = ("lookahead", "switch_cost_s", "goes_on_s", "missed_s", "min_shot_s", "quality")
-"""Settings of the choice that can be changed while it runs."""
 
 _LAST = 5
 """How the look-ahead ends is read from its last fifth: a single frame would be too uncertain."""

@@ -182,6 +182,20 @@ class BestViewService:
             )
         self.decider.choose_by(view)
 
+    def go_by(self, config: Config) -> None:
+        """Go by a configuration that differs in what a running service can do, and in what only cameras do.
+
+        What was tried out meanwhile ends where the configuration says something else about the choice.
+
+        Raises:
+            UserError: the look-ahead is not long enough, or longer than what is kept.
+        """
+        if config.view != self.config.view:
+            self.choose_by(config.view)
+        ground = {it.id: {"ground": it.ground} for it in self.config.cameras}  # the scene's is in no file
+        cameras = [it.model_copy(update=ground[it.id]) for it in config.cameras]
+        self.config = config.model_copy(update={"cameras": cameras})
+
     def close(self) -> None:
         """End all streams and let go of the bus and the files."""
         self.splicer.close()

@@ -17,9 +17,8 @@ from server.web.api import problem
 from server.web.containers import refuse_other_containers
 from server.web.cors import preflight
 from server.web.events import Events
-from server.web.keys import EVENTS, METRICS, PICTURES, READERS, SERVICE
+from server.web.keys import EVENTS, METRICS, ON_DISK, PICTURES, READERS, SERVICE
 from server.web.metrics import registry
-from server.web.metrics_stages import measure
 from server.web.operator_permission import tell_no_other_origin
 from server.web.queries import refuse_what_is_not_there
 from server.web.readers import Readers
@@ -27,6 +26,7 @@ from server.web.share import to_the_right_service
 from server.web.strangers import REQUESTS
 from server.web.tls import Certificate
 from server.wire.errors import UserError
+from server.wire.running import OnDisk
 from server.wire.sections import Http
 
 log = logging.getLogger(__name__)
@@ -59,8 +59,10 @@ async def one_line_errors(
         return problem(500, "the server made a mistake; its log says more")
 
 
-def make_app(service: BestViewService) -> web.Application:
-    """Give the application on top of a service.
+def make_app(
+    service: BestViewService, on_disk: Callable[[], OnDisk] = lambda: OnDisk("", ())
+) -> web.Application:
+    """Give the application on top of a service; `on_disk` says how the configuration's file differs.
 
     Raises:
         UserError: the file of tokens cannot be read, or something in it is wrong.
@@ -76,11 +78,11 @@ def make_app(service: BestViewService) -> web.Application:
         ]
     )
     app[SERVICE], app[EVENTS], app[PICTURES] = service, Events(service), Pictures(service)
+    app[ON_DISK] = on_disk
     app[READERS] = Readers(service.splicer.plan.target_s)
     what = f"{service.config.site.name}_{service.config.view.share.index}"
     app[ACCESS] = Access(service.config.access.tokens, service.board.resolve, what)
-    app[METRICS] = registry(service, app[PICTURES], app[READERS], app[ACCESS])
-    measure(app)
+    app[METRICS] = registry(service, app[PICTURES], app[READERS], app[ACCESS], on_disk)
     for module in (api, session, site, video, past, hls, pictures, openapi, page, operator_routes):
         app.add_routes(module.routes)
     app.on_response_prepare.extend((tell_no_other_origin, keep_no_copies))

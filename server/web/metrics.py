@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 from prometheus_client import CollectorRegistry, Metric, ProcessCollector
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily
@@ -12,13 +12,17 @@ from server.view.pictures import Pictures
 from server.view.service import BestViewService
 from server.web.access import Access
 from server.web.readers import Readers
+from server.wire.running import OnDisk
 
 
 class ServiceCollector(Collector):
     """Gives the service's numbers."""
 
-    def __init__(self, service: BestViewService, readers: Readers, access: Access) -> None:
+    def __init__(
+        self, service: BestViewService, readers: Readers, access: Access, on_disk: Callable[[], OnDisk]
+    ) -> None:
         self._service, self._readers, self._access = service, readers, access
+        self._on_disk = on_disk
 
     def collect(self) -> Iterable[Metric]:
         """Give all metrics as they are now."""
@@ -37,6 +41,11 @@ class ServiceCollector(Collector):
             "myview_wrong_tokens",
             "Tokens that there is not, or not any more.",
             value=self._access.wrong_tokens,
+        )
+        yield GaugeMetricFamily(
+            "myview_config_differs",
+            "The configuration's file is not what runs: wrong, not read again, or waiting for a restart.",
+            value=float(self._on_disk().differs),
         )
         yield from self._recording()
         yield from self._cameras()
@@ -109,11 +118,15 @@ class PicturesCollector(Collector):
 
 
 def registry(
-    service: BestViewService, pictures: Pictures, readers: Readers, access: Access
+    service: BestViewService,
+    pictures: Pictures,
+    readers: Readers,
+    access: Access,
+    on_disk: Callable[[], OnDisk],
 ) -> CollectorRegistry:
     """Give the metrics of a service and its process."""
     metrics = CollectorRegistry()
-    metrics.register(ServiceCollector(service, readers, access))
+    metrics.register(ServiceCollector(service, readers, access, on_disk))
     metrics.register(PicturesCollector(pictures))
     ProcessCollector(registry=metrics)
     return metrics

@@ -153,6 +153,10 @@ class Settings(msgspec.Struct, frozen=True):
     """The configuration that is in force."""
 
     settings: list[Setting]
+    error: str
+    """Why the file, as it is on the disk now, cannot be in force; empty: it can."""
+    waiting: list[str]
+    """Keys in which the file differs from what is in force."""
 
 
 class Choosing(msgspec.Struct, frozen=True):

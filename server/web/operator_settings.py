@@ -12,17 +12,16 @@ from aiohttp import web
 from pydantic import BaseModel
 from pydantic_core import PydanticUndefined
 
-from server.view.decide import TUNED
 from server.view.service import BestViewService
 from server.web.api import answer, problem
-from server.web.keys import SERVICE
+from server.web.keys import ON_DISK, SERVICE
 from server.web.operator_permission import PREFIX
 from server.web.operator_schema import Choosing, Setting, Settings
 from server.web.operator_session import asked_for
 from server.wire.config import Config
 from server.wire.errors import UserError
 from server.wire.loading import changed_view
-from server.wire.sections import View
+from server.wire.sections import TUNED, View
 
 routes = web.RouteTableDef()
 
@@ -37,7 +36,9 @@ _QUERY = re.compile(rf"((?:{_WORDS})[^=&?/#]*=)[^&#]*", re.IGNORECASE)
 @routes.get(f"{PREFIX}/config")
 async def get_config(request: web.Request) -> web.Response:
     """Give the configuration in force, with what differs from the defaults; passwords are not shown."""
-    return answer(Settings(list(settings_of(request.app[SERVICE].config))))
+    found = request.app[ON_DISK]()
+    settings = list(settings_of(request.app[SERVICE].config))
+    return answer(Settings(settings, found.error, list(found.waiting)))
 
 
 @routes.get(f"{PREFIX}/choosing")

@@ -7,9 +7,10 @@ from server.wire.sections.encode import Encode
 from server.wire.sections.serve import Http, Record, Tls
 from server.wire.sections.site import Site, Sync, Zenoh, ZenohTls
 from server.wire.sections.sound import Sound
-from server.wire.sections.view import Share, View
+from server.wire.sections.view import TUNED, Share, View
 
 __all__ = [
+    "TUNED",
     "Access",
     "Camera",
     "Encode",

@@ -11,6 +11,9 @@ from bestview import IdentitySettings, QualitySettings
 from server.wire.library import validated
 from server.wire.sections.base import Section
 
+TUNED = ("lookahead", "switch_cost_s", "goes_on_s", "missed_s", "min_shot_s", "quality")
+"""Settings of the choice that can be changed while it runs."""
+
 Seconds = Annotated[float, Field(ge=0, le=3600)]
 
 

@@ -1,0 +1,71 @@
+"""SIGHUP: the configuration is to be read again, or the terminal is gone."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import os
+import signal
+import sys
+import termios
+from collections.abc import AsyncIterator, Callable
+
+from server.run.reload import Reload, reloaded
+from server.wire.config import Config
+from server.wire.errors import UserError
+from server.wire.running import Running
+
+log = logging.getLogger(__name__)
+
+Check = Callable[[Config, Reload], None]
+"""Looks whether what is wanted can be; raises UserError where it cannot."""
+
+
+async def hang_ups() -> AsyncIterator[None]:
+    """Give a turn for each time that SIGHUP has come; those that come meanwhile are one.
+
+    When it came because the terminal was closed, the process is told to end instead.
+    """
+    came = asyncio.Event()
+    at_terminal = _has_terminal()
+    asyncio.get_running_loop().add_signal_handler(signal.SIGHUP, came.set)
+    while True:
+        await came.wait()
+        came.clear()
+        if at_terminal and not _has_terminal():
+            os.kill(os.getpid(), signal.SIGTERM)
+        else:
+            yield
+
+
+async def reloads(running: Running, check: Check = lambda *_: None) -> AsyncIterator[Reload]:
+    """Read the configuration again whenever SIGHUP comes, and give what it changes.
+
+    What is wrong is said in one line, and leaves in force what is. Whoever is given a change sets
+    ``running.now`` once it is in force.
+    """
+    async for _ in hang_ups():
+        try:
+            reload = await asyncio.to_thread(_read, running, check)
+        except UserError as error:
+            log.warning("%s; the configuration as it was stays in force", error)
+        except Exception:
+            log.exception("reading the configuration again failed; as it was, it stays in force")
+        else:
+            yield reload
+
+
+def _read(running: Running, check: Check) -> Reload:
+    wanted = running.wanted()
+    reload = reloaded(running.now, wanted)
+    check(wanted, reload)
+    return reload
+
+
+def _has_terminal() -> bool:
+    """Tell whether what is said goes to a terminal that is there."""
+    try:
+        termios.tcgetattr(sys.stderr.fileno())
+    except (termios.error, OSError, ValueError):
+        return False
+    return True

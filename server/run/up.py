@@ -1,0 +1,94 @@
+"""A whole site on one machine, and what its supervisor makes of a configuration that is read again."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+
+from server.run.checks import check_recording
+from server.run.exposed import check_bus, check_pulses, check_viewers
+from server.run.hang_up import reloads
+from server.run.reload import Reload
+from server.run.supervise import Supervisor
+from server.wire.config import Config
+from server.wire.errors import UserError
+from server.wire.running import IN_FORCE, Running, written
+
+log = logging.getLogger(__name__)
+
+_APART_S = 4.0
+"""Between two cameras that begin anew, so that the others show whom the first one showed."""
+
+
+async def run_up(running: Running, environment: Mapping[str, str], out: Path | None) -> None:
+    """Run a site until the best-view service has nothing left to do, or this task is cancelled.
+
+    Raises:
+        UserError: a process refused its input.
+    """
+    with _folder() as folder:
+        kept = Path(folder) / "site.yaml"
+        _keep(running, kept)
+        supervisor = Supervisor(running.path, running.now, {**environment, IN_FORCE: str(kept)}, out)
+        following = asyncio.create_task(_follow(running, supervisor, kept), name="reload")
+        try:
+            await supervisor.run()
+        finally:
+            following.cancel()
+            await asyncio.gather(following, return_exceptions=True)
+
+
+def check_exposed(config: Config) -> None:
+    """Refuse a site that is open to others by accident.
+
+    Raises:
+        UserError: it is.
+    """
+    for check in (check_viewers, check_pulses, check_bus):
+        check(config)
+
+
+async def _follow(running: Running, supervisor: Supervisor, kept: Path) -> None:
+    """Tell those processes whose settings have changed, whenever the configuration is read again."""
+    async for reload in reloads(running, _check):
+        log.info("%s", reload.line)
+        running.now = reload.now
+        try:
+            _keep(running, kept)
+        except OSError as error:
+            log.warning("%s: cannot write what is in force: %s", kept, error.strerror)
+            continue
+        supervisor.hang_up("bestview")
+        for number, camera in enumerate(reload.cameras):
+            if number:
+                await asyncio.sleep(_APART_S)
+            supervisor.hang_up(camera)
+
+
+def _folder() -> tempfile.TemporaryDirectory[str]:
+    """Make a folder that nobody else can look into: cameras have passwords.
+
+    Raises:
+        UserError: it cannot be made.
+    """
+    try:
+        return tempfile.TemporaryDirectory(prefix="myview-up-")
+    except OSError as error:
+        reason = error.strerror or error
+        raise UserError(f"cannot make a temporary folder (TMPDIR names where): {reason}") from error
+
+
+def _check(wanted: Config, reload: Reload) -> None:
+    check_exposed(wanted)
+    for camera in reload.cameras:
+        check_recording(reload.now, camera)
+
+
+def _keep(running: Running, kept: Path) -> None:
+    """Write down what the site runs by, for processes that begin: all of it or nothing."""
+    new = kept.with_suffix(".new")
+    new.write_text(written(running.now, running.path.parent), encoding="utf-8")
+    new.replace(kept)
