@@ -19,6 +19,7 @@ from server.web.cors import preflight
 from server.web.events import Events
 from server.web.keys import EVENTS, METRICS, ON_DISK, PICTURES, READERS, SERVICE
 from server.web.metrics import registry
+from server.web.metrics_stages import measure
 from server.web.operator_permission import tell_no_other_origin
 from server.web.queries import refuse_what_is_not_there
 from server.web.readers import Readers
@@ -83,6 +84,7 @@ def make_app(
     what = f"{service.config.site.name}_{service.config.view.share.index}"
     app[ACCESS] = Access(service.config.access.tokens, service.board.resolve, what)
     app[METRICS] = registry(service, app[PICTURES], app[READERS], app[ACCESS], on_disk)
+    measure(app)
     for module in (api, session, site, video, past, hls, pictures, openapi, page, operator_routes):
         app.add_routes(module.routes)
     app.on_response_prepare.extend((tell_no_other_origin, keep_no_copies))
