@@ -15,6 +15,7 @@ import msgspec
 
 from server.draw.studio import Studio
 from server.wire.drawing import LENGTH_BYTES, Canvas, Draw, framed
+from server.wire.log_lines import formatter
 
 
 def serve(requests: BinaryIO, answers: BinaryIO) -> None:
@@ -40,9 +41,9 @@ def _message(requests: BinaryIO) -> bytes | None:
 
 def main() -> None:
     """Serve the process that started this one."""
-    logging.basicConfig(
-        format="%(asctime)s %(levelname)-7s draw: %(message)s", datefmt="%H:%M:%S", level=logging.WARNING
-    )
+    handler = logging.StreamHandler()
+    handler.setFormatter(formatter("draw"))
+    logging.basicConfig(handlers=[handler], level=logging.WARNING)
     cv2.setNumThreads(1)
     try:
         serve(sys.stdin.buffer, sys.stdout.buffer)

@@ -10,6 +10,7 @@ import typer
 
 from server.run import calibrate_commands, file_commands, site_commands, token_commands, viewer_commands
 from server.run.ending import end_with_parent
+from server.run.logs import say_failure
 from server.run.several import one_value_per_flag
 from server.wire.errors import UserError
 
@@ -49,12 +50,12 @@ def main() -> None:
     try:
         app(args=one_value_per_flag(sys.argv[1:], file_commands.SEVERAL))
     except UserError as error:
-        typer.echo(f"myview: {error}", err=True)
+        say_failure(str(error))
         sys.exit(error.code)
     except PermissionError as error:  # of a folder on the way, wherever it is first looked into
         if error.filename is None:
             raise
-        typer.echo(f"myview: {error.filename}: {error.strerror}", err=True)
+        say_failure(f"{error.filename}: {error.strerror}")
         sys.exit(_BAD_INPUT)
     except KeyboardInterrupt:
         sys.exit(_INTERRUPTED)

@@ -5,24 +5,53 @@ from __future__ import annotations
 import logging
 import os
 import sys
+import threading
+from types import TracebackType
+
+import typer
 
 from server.wire.errors import UserError
+from server.wire.log_lines import JsonLines, formatter
 
-_FORMAT = "%(asctime)s %(levelname)-7s %(name)s: %(message)s"
+log = logging.getLogger("myview")
 
 
 def log_to_stderr(name: str) -> None:
-    """Log under the name of this process; MYVIEW_LOG=DEBUG shows more.
+    """Log under the name of this process; MYVIEW_LOG=DEBUG shows more, MYVIEW_LOG_FORMAT=json is for programs.
 
     Raises:
-        UserError: MYVIEW_LOG is no level.
+        UserError: MYVIEW_LOG is no level, or MYVIEW_LOG_FORMAT no format.
     """
     level = os.environ.get("MYVIEW_LOG", "INFO").upper()
     if level not in logging.getLevelNamesMapping():
         raise UserError(f"environment: MYVIEW_LOG: is {level!r}, not DEBUG, INFO, WARNING or ERROR")
-    logging.basicConfig(
-        stream=sys.stderr,
-        level=level,
-        format=_FORMAT.replace("%(name)s", name),
-        datefmt="%H:%M:%S",
-    )
+    handler = logging.StreamHandler(sys.stderr)
+    handler.setFormatter(formatter(name))
+    logging.basicConfig(level=level, handlers=[handler])
+    if _logs_json():  # then nothing else may stand between the lines
+        logging.captureWarnings(capture=True)
+        sys.excepthook = _uncaught
+        threading.excepthook = _uncaught_in_thread
+
+
+def say_failure(text: str) -> None:
+    """Say in one line why a command ends: as the log's last line where programs read it."""
+    if _logs_json():
+        log.error("%s", text)
+    else:
+        typer.echo(f"myview: {text}", err=True)
+
+
+def _logs_json() -> bool:
+    """Tell whether this process logs, and for programs."""
+    return any(isinstance(it.formatter, JsonLines) for it in logging.getLogger().handlers)
+
+
+def _uncaught(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+    if not issubclass(kind, KeyboardInterrupt):
+        log.critical("a mistake in MyView", exc_info=(kind, error, trace))
+
+
+def _uncaught_in_thread(failed: threading.ExceptHookArgs) -> None:
+    if failed.exc_value is not None:
+        _uncaught(failed.exc_type, failed.exc_value, failed.exc_traceback)

@@ -1,0 +1,86 @@
+"""How a log line is written: for people, or as an object of JSON for programs.
+
+    04:31:03 INFO    bestview: camera c1 is gone
+    {"time":"2026-11-22T04:31:03.120Z","level":"INFO","process":"bestview","event":"camera c1 is gone",
+     "camera":"c1"}
+
+Which camera or object a line is about is taken from its template: ``log.info("camera %s is gone", camera)``.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import re
+from datetime import UTC, datetime
+
+import msgspec
+
+from server.wire.errors import UserError
+
+VARIABLE = "MYVIEW_LOG_FORMAT"
+_FORMATS = ("text", "json")
+_PLACE = re.compile(r"(?:\b(camera|object) )?%[-#0 +]*[0-9]*(?:\.[0-9]+)?([a-zA-Z%])")
+
+
+class JsonLines(logging.Formatter):
+    """Writes each record as one line of JSON, with its traceback inside, if there is one."""
+
+    def __init__(self, process: str) -> None:
+        super().__init__()
+        self._process = process
+
+    def format(self, record: logging.LogRecord) -> str:
+        """Give the line, without its end."""
+        time = datetime.fromtimestamp(record.created, UTC).isoformat(timespec="milliseconds")
+        line: dict[str, object] = {
+            "time": time.replace("+00:00", "Z"),
+            "level": record.levelname,
+            "process": self._process,
+            "logger": record.name,
+            "event": record.getMessage(),
+            **_subjects(record),
+        }
+        if record.exc_info:
+            line["traceback"] = self.formatException(record.exc_info)
+        return msgspec.json.encode(line, enc_hook=str).decode()
+
+
+def formatter(process: str) -> logging.Formatter:
+    """Give what writes the lines of a process, as MYVIEW_LOG_FORMAT says.
+
+    Raises:
+        UserError: it is no format.
+    """
+    if is_json():
+        return JsonLines(process)
+    name = process.replace("%", "%%")
+    return logging.Formatter(f"%(asctime)s %(levelname)-7s {name}: %(message)s", datefmt="%H:%M:%S")
+
+
+def is_json() -> bool:
+    """Tell whether lines are for programs.
+
+    Raises:
+        UserError: MYVIEW_LOG_FORMAT is no format.
+    """
+    wanted = os.environ.get(VARIABLE) or "text"
+    if wanted not in _FORMATS:
+        raise UserError(f"environment: {VARIABLE}: is {wanted!r}, not {' or '.join(_FORMATS)}")
+    return wanted == "json"
+
+
+def _subjects(record: logging.LogRecord) -> dict[str, object]:
+    """Give whom a record is about: what its template names, and what was put there."""
+    if not isinstance(record.args, tuple) or not isinstance(record.msg, str):
+        return {}
+    values = iter(record.args)
+    subjects: dict[str, object] = {}
+    for place in _PLACE.finditer(record.msg):
+        what, kind = place.groups()
+        if kind == "%":
+            continue
+        value = next(values, None)
+        if what is not None and value is not None:
+            subjects.setdefault(what, value)
+    return subjects
