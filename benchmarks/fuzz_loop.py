@@ -1,7 +1,8 @@
 """An event loop that waits for nobody: where nothing is ready, its clock is put forward to what comes next.
 
 A reader that waits two seconds before it gives somebody up is seen to do so at once, over real sockets,
-and as it would on any machine however busy. What threads and child processes do is waited for as ever.
+and as it would on any machine however busy. What threads do is waited for as ever,
+and what child processes do for a while.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import struct
 from collections.abc import Callable
 from typing import Any
 
+_AWHILE_S = 1.0
 _AT_ONCE = struct.pack("ii", 1, 0)
 
 
@@ -22,8 +24,10 @@ class _Impatient(selectors.DefaultSelector):
     def __init__(self) -> None:
         super().__init__()
         self.skipped = 0.0
-        self.others = 0
-        """Threads and processes that are at work."""
+        self.threads = 0
+        """That are at work: they are waited for."""
+        self.processes = 0
+        """That have not ended: they are waited for a while, since they may have nothing to do."""
 
     def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
         """Give what is ready now; where nothing is, the time until something is due has passed.
@@ -33,8 +37,10 @@ class _Impatient(selectors.DefaultSelector):
         ready = super().select(0)
         if ready or timeout == 0:
             return ready
-        if timeout is None or self.others:
+        if timeout is None or self.threads:
             return super().select(timeout)
+        if self.processes and (ready := super().select(min(timeout, _AWHILE_S))):
+            return ready
         self.skipped += timeout
         return []
 
@@ -59,22 +65,23 @@ class HurryingLoop(asyncio.SelectorEventLoop):
     ) -> asyncio.Future[Any]:
         """Do something in a thread, which is waited for."""
         future = super().run_in_executor(executor, func, *args)
-        self._wait_for(future)
+        self._impatient.threads += 1
+        future.add_done_callback(self._thread_done)
         return future
 
     async def subprocess_exec(self, *args: Any, **kwargs: Any) -> Any:
-        """Start a process, which is waited for until it has ended."""
+        """Start a process."""
         transport, protocol = await super().subprocess_exec(*args, **kwargs)
-        ended: Any = transport
-        self._wait_for(asyncio.ensure_future(ended._wait(), loop=self))
+        started: Any = transport
+        self._impatient.processes += 1
+        asyncio.ensure_future(started._wait(), loop=self).add_done_callback(self._process_done)
         return transport, protocol
 
-    def _wait_for(self, future: asyncio.Future[Any]) -> None:
-        self._impatient.others += 1
-        future.add_done_callback(self._done)
+    def _thread_done(self, _: object) -> None:
+        self._impatient.threads -= 1
 
-    def _done(self, _: object) -> None:
-        self._impatient.others -= 1
+    def _process_done(self, _: object) -> None:
+        self._impatient.processes -= 1
 
 
 def leaves_no_trace(writer: asyncio.StreamWriter) -> None:

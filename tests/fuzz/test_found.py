@@ -210,6 +210,8 @@ BAD_REQUESTS: list[bytes] = [
     b"GET / HTTP/1.1\r\nContent-Length: -1\r\n\r\n",
     b"POST /api/operator/people HTTP/1.1\r\nContent-Encoding: gzip\r\nContent-Length: 4\r\n\r\nnone",
     b"GET / HTTP/1.1\r\nTransfer-Encoding: chunked\r\n\r\nzz\r\n",
+    b"GET / HTTP/1.1\r\nHost: x\r\nExpect: \xff\r\nConnection: close\r\n\r\n",
+    b"GET /nowhere HTTP/1.1\r\nHost: x\r\nExpect: \xff\r\nConnection: close\r\n\r\n",
 ]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import logging
 import threading
@@ -22,7 +23,7 @@ from schemathesis.checks import (
     status_code_conformance,
 )
 
-from benchmarks.fuzz_http import Requests
+from benchmarks.fuzz_http_site import Served
 
 CASES = 4
 """Of each operation and mode; endless streams are only begun."""
@@ -45,19 +46,19 @@ class Site:
 @pytest.fixture(scope="module")
 def described() -> Iterator[Site]:
     """Serve a site in a thread of its own: schemathesis waits for answers."""
-    target = Requests()
-    loop = target._loop
+    served = Served(loop=asyncio.new_event_loop())
+    loop = served.loop
     thread = threading.Thread(target=loop.run_forever)
     thread.start()
     try:
-        url = f"http://127.0.0.1:{target._port}"
+        url = f"http://127.0.0.1:{served.port}"
         schema = schemathesis.openapi.from_url(f"{url}/api/openapi.json")
         found = [it.ok() for it in schema.get_all_operations()]
         yield Site(url, {it.label: it for it in found})
     finally:
         loop.call_soon_threadsafe(loop.stop)
         thread.join()
-        target.close()
+        served.close()
 
 
 def endless(operation: Any) -> bool:

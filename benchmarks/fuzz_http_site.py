@@ -1,0 +1,135 @@
+"""A small site that is served, and somebody who sends it bytes."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from asyncio import AbstractEventLoop
+from collections.abc import Callable, Mapping
+from contextlib import AsyncExitStack
+from pathlib import Path
+from random import Random
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from benchmarks.fuzz_loop import HurryingLoop, leaves_no_trace
+from benchmarks.fuzz_site import (
+    CAMERAS,
+    STRIDE,
+    Fed,
+    pictures,
+    site,
+    sound,
+    status,
+    thumbnail,
+    tracks,
+    video,
+    word,
+)
+from server.web.app import make_app, serving
+from server.web.openapi import describe
+from server.wire.epochs import end_of_epoch
+from server.wire.messages import CameraTracks
+
+EPOCHS = 6
+_WAIT_S = 10.0
+"""Then an answer is not waited for; by a clock that hurries."""
+_MOST = 65_536
+_HEALTH = b"GET /healthz HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n"
+
+Word = Callable[[Random, str, int], CameraTracks]
+"""What a camera says of an epoch."""
+
+
+class Served:
+    """A site that has run for some epochs, and stands still. ``sections`` are its configuration's."""
+
+    def __init__(
+        self,
+        sections: Mapping[str, Any] | None = None,
+        word: Word = word,
+        loop: AbstractEventLoop | None = None,
+    ) -> None:
+        self.loop = loop or HurryingLoop()
+        self._folder = TemporaryDirectory()
+        self._stack = AsyncExitStack()
+        self._word = word
+        self.loop.run_until_complete(self._serve(dict(sections or {})))
+
+    async def _serve(self, sections: dict[str, Any]) -> None:
+        config = site(record={"folder": str(Path(self._folder.name) / "kept")}, **sections)
+        self.service, rng = Fed(config), Random(1)
+        self.service.past.open()
+        self._stack.callback(self.service.close)
+        self.service.pulse0 = 1_700_000_000.0
+        for epoch in range(EPOCHS):
+            self._feed_epoch(rng, epoch)
+        self.app = make_app(self.service)
+        self.port = await self._stack.enter_async_context(
+            serving(self.app, config.http.model_copy(update={"port": 0}))
+        )
+
+    def _feed_epoch(self, rng: Random, epoch: int) -> None:
+        service = self.service
+        for seed, camera in enumerate(CAMERAS):
+            for unit in pictures(seed, EPOCHS * STRIDE)[epoch * STRIDE :][:STRIDE]:
+                service.handle(video(camera, unit))
+            service.handle(tracks(self._word(rng, camera, epoch)))
+            service.handle(status(camera, epoch))
+            service.handle(thumbnail(camera, epoch))
+        service.handle(sound(epoch))
+        service.pulse = end_of_epoch(epoch, STRIDE)
+        service.decide()
+
+    @property
+    def described(self) -> list[tuple[str, tuple[str, ...]]]:
+        """Give the addresses that the application tells of, each with what can be asked for."""
+        found = [("/", ("object",)), ("/operator", ()), ("/api", ()), ("/api/openapi.json", ())]
+        for path, item in describe(self.app)["paths"].items():
+            for operation in item.values():
+                named = tuple(it["name"] for it in operation["parameters"] if it["in"] == "query")
+                found.append((path, named))
+        return found
+
+    def ask(self, data: bytes, address: str = "127.0.0.1") -> bytes:
+        """Send bytes on a connection of their own; give what is answered, of streams the beginning."""
+        return self.loop.run_until_complete(self._ask(data, address))
+
+    async def _ask(self, data: bytes, address: str) -> bytes:
+        reader, writer = await asyncio.open_connection("127.0.0.1", self.port, local_addr=(address, 0))
+        leaves_no_trace(writer)
+        answer = b""
+        try:
+            writer.write(data)
+            async with asyncio.timeout(_WAIT_S):
+                while len(answer) < _MOST and (more := await reader.read(_MOST)):
+                    answer += more
+        except (TimeoutError, ConnectionError):
+            pass
+        finally:
+            writer.transport.abort()
+            with contextlib.suppress(ConnectionError):
+                await writer.wait_closed()
+        return answer
+
+    def is_well(self) -> bool:
+        """Tell whether it still answers others."""
+        return self.ask(_HEALTH).startswith(b"HTTP/1.1 200")
+
+    def close(self) -> None:
+        """End the server."""
+        self.loop.run_until_complete(self._stack.aclose())
+        self.loop.close()
+        self._folder.cleanup()
+
+
+def judged(data: bytes, answer: bytes) -> bool:
+    """Say whether a request was granted; an answer is one line of JSON where it was not."""
+    assert b"Traceback" not in answer, answer[:2000].decode("utf-8", "replace")
+    code = answer[9:12]
+    assert code != b"500", answer[:2000].decode("utf-8", "replace")
+    if code.startswith(b"4") and answer.startswith(b"HTTP/1.1"):
+        head, _, body = answer.partition(b"\r\n\r\n")
+        if b"application/json" in head and not data.startswith(b"HEAD"):
+            assert body.startswith(b'{"error":'), body[:300]
+    return code.startswith((b"2", b"3"))
