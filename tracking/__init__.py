@@ -1,6 +1,7 @@
 """Frames or detections in, tracks out: detectors, the network model, its solvers, the online window."""
 
 from tracking.appearance import histograms
+from tracking.between import between
 from tracking.costs import CostSettings
 from tracking.detections import Detections
 from tracking.network import Network, build_network
@@ -16,7 +17,7 @@ from tracking.solvers.base import (
 from tracking.template import Template
 from tracking.template_tracker import TemplateTracker
 from tracking.tracker import OnlineTracker
-from tracking.window import Glimpse, WindowResult, WindowSettings, WindowTrack
+from tracking.window import Glimpse, WindowResult, WindowSettings, WindowTrack, joined
 
 __all__ = [
     "DEFAULT_SOLVER",
@@ -34,8 +35,10 @@ __all__ = [
     "WindowResult",
     "WindowSettings",
     "WindowTrack",
+    "between",
     "build_network",
     "histograms",
+    "joined",
     "solver_named",
     "solver_names",
 ]

@@ -40,7 +40,8 @@ export class Cameras {
       if (!item) continue;
       item.classList.toggle('away', state !== 'live');
       item.title = message;
-      /** @type {HTMLElement} */ (item.lastElementChild).textContent = WORDS[state] ?? state;
+      const [said] = message.split(':'); // why stands in the title
+      /** @type {HTMLElement} */ (item.lastElementChild).textContent = WORDS[state] || (state === 'live' ? said : state);
     }
   }
 

@@ -6,6 +6,7 @@ import time
 from collections import deque
 
 from camsync import PulseClient
+from server.camera.load import Load
 from server.wire.messages import CameraStatus
 
 _SPAN_S = 2.0
@@ -41,8 +42,8 @@ class Meter:
         """Count a frame that nobody is looked for in."""
         self._shed += 1
 
-    def status(self, camera: str, boot: int, state: str, waiting: int = 0) -> CameraStatus:
-        """Give the camera's status; ``waiting`` frames are still to be searched."""
+    def status(self, camera: str, boot: int, state: str, waiting: int, load: Load) -> CameraStatus:
+        """Give the camera's status; ``waiting`` frames are to be searched, ``load`` is what is left out."""
         sync = self._client.status() if self._client is not None else None
         since = time.monotonic() - _SPAN_S
         return CameraStatus(
@@ -54,6 +55,8 @@ class Meter:
             missed=self._missed,
             shed=self._shed,
             waiting=waiting,
+            load_level=load.level,
+            load=load.words,
             in_step=sync is not None and sync.connected,
             clock_offset=(sync.offset if sync is not None else None) or 0.0,
             round_trip=(sync.round_trip if sync is not None else None) or 0.0,

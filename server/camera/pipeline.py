@@ -12,6 +12,7 @@ from server.camera.report import Reporter
 from server.camera.sharpness import Sharpness
 from server.camera.sound import LiveSound
 from server.camera.sources import Image, Source, open_source
+from server.camera.stepping import Stepping
 from server.camera.witness import Heard, Witness
 from server.wire.config import Config
 from server.wire.fit import Fit
@@ -31,6 +32,7 @@ class Searched:
         detections: what was found.
         looked: whether it could be searched; otherwise it says nothing that nobody was found.
         word: that, for the other cameras; None where nobody goes by it.
+        left_out: it was left out on purpose.
     """
 
     pulse: int
@@ -38,6 +40,7 @@ class Searched:
     detections: Detections
     looked: bool
     word: Found | None
+    left_out: bool = False
 
     @property
     def asks(self) -> bool:
@@ -73,7 +76,8 @@ class CameraPipeline:
         self._encoder = Passing(own.source) if own.source else Encoder(site, config.encode)
         self._detector = ready_detector(config, camera, self.source, self._fit)
         window = config.track.window
-        self._tracker = OnlineTracker(window, config.track.costs, solver_named(config.track.solver))
+        tracker = OnlineTracker(window, config.track.costs, solver_named(config.track.solver))
+        self._tracker = Stepping(tracker, self._detector.bins, window.stride)
         self._reporter = Reporter(camera_id, boot, self.source.size, window.stride)
         self._sharpness = Sharpness() if config.view.quality.sharp > 0 else None
         self.witness = (
@@ -112,10 +116,10 @@ class CameraPipeline:
         """Search a frame and follow everybody into it by what this camera sees itself."""
         return self.follow(self.search(pulse, image))
 
-    def search(self, pulse: int, image: Image | None) -> Searched:
+    def search(self, pulse: int, image: Image | None, *, left_out: bool = False) -> Searched:
         """Look for people in a frame, which has no image where it was not taken, or has to be left out.
 
-        Pulses must grow.
+        ``left_out``: on purpose, so that the frames around it tell who was there. Pulses must grow.
         """
         if image is None:
             detections, looked = Detections.empty(self._detector.bins), False
@@ -123,12 +127,12 @@ class CameraPipeline:
             detections = self._detector.detect(image, pulse)
             looked = not self._detector.blind
         word = self.witness.word(pulse, detections if looked else None) if self.witness else None
-        return Searched(pulse, image, detections, looked, word)
+        return Searched(pulse, image, detections, looked, word, left_out=left_out)
 
     def follow(self, searched: Searched, heard: Heard = _BY_ITSELF) -> CameraTracks | None:
         """Follow everybody into a frame; give the tracks when a window has ended.
 
-        A pulse that is left out, or has no image, is a frame in which nobody was seen; the camera's report
+        A pulse that does not come, or has no image, is a frame in which nobody was seen; the camera's report
         says which those were, but for the time before a recording begins. It also says in which frames
         some other camera's word was not there.
         """
@@ -142,7 +146,9 @@ class CameraPipeline:
             detections = self.witness.scored(detections, heard.words)
             if heard.alone:
                 self._reporter.alone(pulse)
-        result = self._tracker.push(pulse, detections)
+        result = (
+            self._tracker.leave_out(pulse) if searched.left_out else self._tracker.push(pulse, detections)
+        )
         return None if result is None else self._measured(self._reporter.regular(result), searched.image)
 
     def last_word(self, end: int) -> Found | None:

@@ -7,6 +7,7 @@ import logging
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from functools import partial
 from statistics import fmean
 from typing import TypeVar
@@ -15,6 +16,7 @@ import msgspec
 
 from camsync import ClientSettings, Pulse, PulseClient
 from server.camera.exchange import Exchange
+from server.camera.load import Load
 from server.camera.meter import Meter
 from server.camera.pipeline import CameraPipeline
 from server.camera.sound import LiveSound, open_sound, runs
@@ -31,6 +33,25 @@ T = TypeVar("T")
 _STATUS_EVERY_S = 1.0
 _MARKS_PER_PICTURE = 10
 """Frame numbers that may wait for each picture that may; more are left out, as if missed."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Waiting:
+    """A frame on its way to the tracker.
+
+    Attributes:
+        pulse: its pulse.
+        image: the picture; None: there is none, or it waits no more.
+        taken: when it was taken, by the loop's clock.
+        due: when its pulse was due, likewise.
+        left_out: it was not taken, on purpose.
+    """
+
+    pulse: int
+    image: Image | None
+    taken: float
+    due: float
+    left_out: bool = False
 
 
 class CameraProcess:
@@ -55,9 +76,12 @@ class CameraProcess:
         self._tracking = ThreadPoolExecutor(1, "tracking")
         fps = config.site.fps
         self._backlog_pictures = max(1, round(config.track.backlog_s * fps))
-        self._backlog: asyncio.Queue[tuple[int, Image | None, float] | None] = asyncio.Queue(
+        self._backlog: asyncio.Queue[_Waiting | None] = asyncio.Queue(
             maxsize=_MARKS_PER_PICTURE * self._backlog_pictures
         )
+        # What passes through is decoded from picture to picture, and a recording is shown whole.
+        live = not (self._pipeline.source.recorded or self._pipeline.passes)
+        self._load = Load(config, camera_id, live=live)
         self._exchange = Exchange(config, camera_id, self._pipeline.witness, self._backlog.maxsize)
         self._meter = Meter(fps)
         self._state = "starting"
@@ -118,21 +142,26 @@ class CameraProcess:
             self._meter.watch(pulses)
             async for pulse in pulses:
                 try:
-                    await self._on_pulse(pulse)
+                    await self._on_pulse(pulse, pulses.now() - pulse.due)
                 except SourceEnded:
                     log.info("camera %s: the recording is over", self._id)
                     self._state, self._end = "ended", pulse.number
                     await self._backlog.put(None)
                     return
 
-    async def _on_pulse(self, pulse: Pulse) -> None:
+    async def _on_pulse(self, pulse: Pulse, late: float) -> None:
+        due = asyncio.get_running_loop().time() - late
         await self._send_sound(pulse.number)
+        if not self._load.takes(pulse.number):
+            self._meter.missed(pulse.number, 1 + pulse.missed)
+            self._queue_for_tracking(pulse.number, None, due, left_out=True)
+            return
         image = await self._in(self._video, lambda: self._pipeline.take(pulse.number))
         if image is None:
             if self._pipeline.away:
                 self._state = "away"
             self._meter.missed(pulse.number, 1 + pulse.missed)
-            self._queue_for_tracking(pulse.number, None)
+            self._queue_for_tracking(pulse.number, None, due)
             return
         self._state = "live"
         taken = time.time()
@@ -148,7 +177,7 @@ class CameraProcess:
         )
         self._publish("video", unit.data, msgspec.json.encode(head))
         self._meter.frame(pulse.number, pulse.missed)
-        self._queue_for_tracking(pulse.number, image)
+        self._queue_for_tracking(pulse.number, image, due)
 
     async def _send_sound(self, pulse: int) -> None:
         """Send what sounds about this pulse, if this is the process to do so."""
@@ -161,26 +190,34 @@ class CameraProcess:
                 data = b"".join(frame.data for frame in run)
                 self._bus.publish(self._keys.sound, data, msgspec.json.encode(head))
 
-    def _queue_for_tracking(self, pulse: int, image: Image | None) -> None:
+    def _queue_for_tracking(
+        self, pulse: int, image: Image | None, due: float, *, left_out: bool = False
+    ) -> None:
         """Hand a frame to the tracker; when it is far behind, only the frame's number."""
         shed = image is not None and self._backlog.qsize() >= self._backlog_pictures
         if shed:
             self._meter.shed()
         if not self._backlog.full():
             now = asyncio.get_running_loop().time()
-            self._backlog.put_nowait((pulse, None if shed else image, now))
+            self._backlog.put_nowait(_Waiting(pulse, None if shed else image, now, due, left_out))
 
     async def _track(self) -> None:
         """Follow everybody, frame by frame, behind the video."""
         thumbs_every = round(self._config.site.fps)
         took: list[float] = []
         while (item := await self._backlog.get()) is not None:
-            pulse, image, taken = item
+            pulse, image, left_out = item.pulse, item.image, item.left_out
+            if image is not None and not self._load.searches(pulse):
+                image, left_out = None, True
+                self._meter.shed()
             began = time.perf_counter()
-            searched = await self._in(self._tracking, partial(self._pipeline.search, pulse, image))
+            search = partial(self._pipeline.search, pulse, image, left_out=left_out)
+            searched = await self._in(self._tracking, search)
             if image is not None:
                 took.append(time.perf_counter() - began)
-            heard = await self._exchange.of(pulse, searched.word, taken, needed=searched.asks)
+            now = asyncio.get_running_loop().time()
+            self._load.measured(now - item.due, now)
+            heard = await self._exchange.of(pulse, searched.word, item.taken, needed=searched.asks)
             began = time.perf_counter()
             tracks = await self._in(self._tracking, partial(self._pipeline.follow, searched, heard))
             if tracks is None:
@@ -210,8 +247,9 @@ class CameraProcess:
             await asyncio.sleep(_STATUS_EVERY_S)
 
     def _send_status(self) -> None:
-        waiting = self._backlog.qsize()
-        status: CameraStatus = self._meter.status(self._id, self._boot, self._state, waiting)
+        status: CameraStatus = self._meter.status(
+            self._id, self._boot, self._state, self._backlog.qsize(), self._load
+        )
         self._publish("status", msgspec.json.encode(status))
 
     def _publish(self, what: str, payload: bytes, attachment: bytes | None = None) -> None:

@@ -71,7 +71,7 @@ class CameraState:
             return self.refused
         if self.alive and self.away:
             return "its source gives no pictures; it is tried again"
-        return ""
+        return self.status.load if self.alive and self.status is not None else ""
 
     def bad(self, why: Exception | str) -> None:
         """Count a message that cannot be used."""

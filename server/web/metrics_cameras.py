@@ -35,6 +35,11 @@ class CameraStages(Collector):
         yield self._gauge(
             "waiting_frames", "Frames that wait to be searched.", _of_status(lambda it: it.waiting)
         )
+        yield self._gauge(
+            "load_level",
+            "How much is left out because the machine has too much to do; 0: nothing.",
+            _of_status(lambda it: it.load_level),
+        )
         for what, words, spread in _SPREADS:
             yield self._spread(what, words, spread)
         late, lost = self._service.aligner.late_messages, self._service.lost_pictures

@@ -78,6 +78,8 @@ class CameraInfo(msgspec.Struct, frozen=True):
     fps: float
     missed: int
     shed: int
+    load_level: int
+    """How much is left out because the machine has too much to do; 0: nothing."""
     in_step: bool
     """Pulses come from the server; otherwise the camera goes on at its own rate."""
     message: str

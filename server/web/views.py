@@ -67,6 +67,7 @@ def cameras_info(service: BestViewService) -> Cameras:
                 fps=status.fps if status else 0.0,
                 missed=status.missed if status else 0,
                 shed=status.shed if status else 0,
+                load_level=status.load_level if status else 0,
                 in_step=status.in_step if status else False,
                 message=state.message,
             )

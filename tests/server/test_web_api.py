@@ -54,7 +54,7 @@ async def test_everybody_is_listed_with_who_shows_and_who_sees_them(busy: Hall) 
 
 
 async def test_the_cameras_are_listed_with_how_they_are(busy: Hall) -> None:
-    busy.service.intake.status(status(A, fps=24.5, missed=3, shed=2))
+    busy.service.intake.status(status(A, fps=24.5, missed=3, shed=2, load_level=2))
     c0, c1 = (await busy.get_json("/api/cameras"))["cameras"]
     assert c0 == {
         "camera": A,
@@ -64,6 +64,7 @@ async def test_the_cameras_are_listed_with_how_they_are(busy: Hall) -> None:
         "fps": 24.5,
         "missed": 3,
         "shed": 2,
+        "load_level": 2,
         "in_step": True,
         "message": "",
     }

@@ -53,6 +53,8 @@ class Track(Section):
     solver: str = DEFAULT_SOLVER
     backlog_s: PositiveFloat = 2.0
     """Seconds of frames that may wait on a busy machine; a camera's older ones are left out, and said so."""
+    shed_load: bool = True
+    """On a machine with too much to do search every 2nd frame, every 3rd and so on, before much is late."""
     window: Annotated[WindowSettings, validated(WindowSettings)] = WindowSettings()
     costs: Annotated[CostSettings, validated(CostSettings)] = CostSettings()
     witness: Annotated[WitnessSettings, validated(WitnessSettings)] = WitnessSettings()

@@ -1,0 +1,94 @@
+"""Frames that are left out on purpose cost nobody their track: what was probably there stands in for them."""
+
+from __future__ import annotations
+
+from itertools import islice
+
+import numpy as np
+import pytest
+
+from benchmarks.endurance_crowd import crowd
+from server.camera.ladder import Rung, rungs
+from server.camera.stepping import Stepping
+from tracking import CostSettings, Detections, OnlineTracker, WindowResult, WindowSettings, solver_named
+
+WINDOW = WindowSettings()
+FRAMES = 80
+
+
+def stepping(bins: int) -> Stepping:
+    tracker = OnlineTracker(WINDOW, CostSettings(), solver_named("columns"))
+    return Stepping(tracker, bins, WINDOW.stride)
+
+
+def walker(frame: int) -> Detections:
+    """Somebody who walks to the right, two pixels a frame, among what is found elsewhere."""
+    noise = np.random.default_rng(frame)
+    left = 20.0 + 2.0 * frame + noise.normal(0.0, 0.3)
+    looks = np.full((2, 4), 0.25)
+    looks[0] = (0.7, 0.1, 0.1, 0.1)
+    stray = noise.uniform(0.0, 300.0)
+    boxes = np.array([[left, 50.0, left + 24.0, 114.0], [stray, 10.0, stray + 10.0, 40.0]])
+    return Detections(boxes, np.array([0.9, 0.35]), looks)
+
+
+def followed(rung: Rung) -> list[WindowResult]:
+    steps = stepping(4)
+    results = []
+    for frame in range(FRAMES):
+        searched = rung.searches(frame, WINDOW.stride)
+        results.append(steps.push(frame, walker(frame)) if searched else steps.leave_out(frame))
+    return [it for it in (*results, steps.flush()) if it is not None]
+
+
+@pytest.mark.parametrize("rung", rungs(WINDOW.stride, live=False), ids=lambda it: f"every {it.searched}")
+def test_somebody_is_one_person_however_few_frames_are_searched(rung: Rung) -> None:
+    results = followed(rung)
+    assert [it.last for it in results] == [
+        it.last for it in followed(Rung())
+    ]  # windows end when they do, and none is late
+    final = {
+        result.first + place: (track.id, track.bridged[place])
+        for result in results
+        for track in result.tracks
+        for place in range(result.final_to - result.first + 1)
+    }
+    assert {number for number, _ in final.values()} == {1}
+    assert len(final) >= FRAMES - WINDOW.stride
+    for frame in range(WINDOW.stride, FRAMES):  # before the first sighting nobody knows
+        assert abs(final[frame][1][0] - (20.0 + 2.0 * frame)) < 3.0
+
+
+def test_where_every_frame_is_searched_nothing_is_different() -> None:
+    scene = list(islice(crowd(3, seed=2), 60))
+    tracker = OnlineTracker(WINDOW, CostSettings(), solver_named("columns"))
+    steps = stepping(scene[0].histograms.shape[1])
+    for frame, seen in enumerate(scene):
+        one, other = tracker.push(frame, seen), steps.push(frame, seen)
+        assert (one is None) == (other is None)
+        if one is not None and other is not None:
+            assert [it.id for it in one.tracks] == [it.id for it in other.tracks]
+            assert all(
+                np.array_equal(a.boxes, b.boxes, equal_nan=True)
+                for a, b in zip(one.tracks, other.tracks, strict=True)
+            )
+
+
+def test_windows_of_frames_that_are_all_left_out_end_as_well() -> None:
+    steps = stepping(4)
+    ends = [frame for frame in range(40) if (it := steps.leave_out(frame)) is not None and it.last == frame]
+    assert ends == list(range(4, 40, 5))
+
+
+def test_a_window_end_that_never_came_is_in_the_next_result() -> None:
+    steps = stepping(4)
+    for frame in range(4):
+        assert steps.push(frame, walker(frame)) is None
+    steps.leave_out(6)  # 4 and 5 were missed
+    steps.leave_out(7)
+    result = steps.push(8, walker(8))
+    assert result is not None
+    assert (result.first, result.last) == (0, 4)
+    following = steps.push(9, walker(9))
+    assert following is not None
+    assert following.last == 9
