@@ -50,16 +50,21 @@ class Site:
 
 @contextlib.asynccontextmanager
 async def running_site(
-    views: Played, folder: Path, environment: Mapping[str, str] | None = None
+    views: Played,
+    folder: Path,
+    environment: Mapping[str, str] | None = None,
+    settings: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> AsyncIterator[Site]:
-    """Run `myview up` on the views; its log goes into the folder. `environment` is set besides.
+    """Run `myview up` on the views; its log goes into the folder.
+
+    `environment` and `settings`, by section, are set besides.
 
     Raises:
         RuntimeError: it did not start; why stands in the log.
     """
     sync, bus, http = (free_port() for _ in range(3))
     address = f"tcp/127.0.0.1:{bus}"
-    content = {
+    content: dict[str, Any] = {
         "site": views.site,
         "cameras": views.cameras,
         "sync": {"port": sync},
@@ -68,6 +73,8 @@ async def running_site(
     }
     if views.ground is not None:
         content["ground"] = str(views.ground.absolute())
+    for section, values in (settings or {}).items():
+        content[section] = {**content.get(section, {}), **values}
     config = folder / "site.yaml"
     config.write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
     with (folder / LOG).open("w", encoding="utf-8") as log:

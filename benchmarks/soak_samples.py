@@ -1,0 +1,120 @@
+"""What is sampled during a soak, and the judgement: is the last quarter of the time like the second?"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+_MEGABYTE = 1e6
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """A process at one moment.
+
+    Attributes:
+        hours: of the site's time.
+        resident: megabytes.
+        descriptors: open.
+        threads: of the process.
+        tasks: of its event loop.
+        blocks: Python's own memory blocks.
+    """
+
+    hours: float
+    resident: float
+    descriptors: int
+    threads: int
+    tasks: int
+    blocks: int
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """How much a quantity may grow from the second quarter to the fourth.
+
+    Attributes:
+        name: of the quantity.
+        share: of what it was.
+        besides: in its own unit.
+        quantile: of a quarter's samples, that stands for it.
+    """
+
+    name: str
+    share: float
+    besides: float
+    quantile: float = 0.5
+
+    def judge(self, hours: Sequence[float], values: Sequence[float]) -> Verdict:
+        """Compare the two quarters of the time; the first one is warming up."""
+        quarters = np.minimum(3, (4 * np.asarray(hours) / hours[-1]).astype(int))
+        numbers: NDArray[np.float64] = np.asarray(values, dtype=np.float64)
+        second, fourth = (float(np.quantile(numbers[quarters == it], self.quantile)) for it in (1, 3))
+        return Verdict(self, second, fourth)
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """One quantity, judged."""
+
+    rule: Rule
+    second: float
+    fourth: float
+
+    @property
+    def flat(self) -> bool:
+        """Whether it did not grow."""
+        return self.fourth <= self.second * (1.0 + self.rule.share) + self.rule.besides
+
+
+RESIDENT = Rule("memory, MB", 0.05, 0.0)
+DESCRIPTORS = Rule("descriptors", 0.0, 2.0)
+THREADS = Rule("threads", 0.0, 1.0)
+"""The bus has threads that come and go."""
+TASKS = Rule("tasks", 0.0, 2.0)
+DELAY = Rule("delay, ms", 0.10, 50.0, 0.1)
+"""Machines have other work, now more, now less: the delay is judged by the tenth of the time that is best."""
+
+
+def resident_of(pid: int) -> float:
+    """Give how much memory of a process is resident, megabytes (Linux).
+
+    Raises:
+        OSError: there is no such process.
+    """
+    pages = int((Path("/proc") / str(pid) / "statm").read_text(encoding="ascii").split()[1])
+    return pages * os.sysconf("SC_PAGE_SIZE") / _MEGABYTE
+
+
+def descriptors_of(pid: int) -> int:
+    """Give how many files and sockets a process has open.
+
+    Raises:
+        OSError: there is no such process.
+    """
+    return len(os.listdir(f"/proc/{pid}/fd"))  # noqa: PTH208 — names are only counted
+
+
+def threads_of(pid: int) -> int:
+    """Give how many threads a process has.
+
+    Raises:
+        OSError: there is no such process.
+    """
+    return len(os.listdir(f"/proc/{pid}/task"))  # noqa: PTH208 — likewise
+
+
+def judge(samples: Sequence[Sample]) -> list[Verdict]:
+    """Judge a process."""
+    hours = [it.hours for it in samples]
+    return [
+        RESIDENT.judge(hours, [it.resident for it in samples]),
+        DESCRIPTORS.judge(hours, [it.descriptors for it in samples]),
+        THREADS.judge(hours, [it.threads for it in samples]),
+        TASKS.judge(hours, [it.tasks for it in samples]),
+    ]

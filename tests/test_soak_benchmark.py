@@ -1,0 +1,96 @@
+"""The soak's judgement: what grows is found, what trembles is not; and the site that it runs."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.soak_samples import (
+    DELAY,
+    DESCRIPTORS,
+    RESIDENT,
+    Sample,
+    descriptors_of,
+    judge,
+    resident_of,
+    threads_of,
+)
+from benchmarks.soak_site import CAMERAS, HEIGHT, WIDTH, Filmed, Tempo
+from benchmarks.soak_tasks import FOLDER_VARIABLE, hooked_environment, note_tasks, read_held
+from server.wire.loading import build_config
+
+HOURS = np.linspace(0.1, 24.0, 200)
+
+
+def test_what_warms_up_and_then_stays_is_flat() -> None:
+    noise = np.random.default_rng(1).normal(0.0, 2.0, len(HOURS))
+    assert RESIDENT.judge(HOURS, 200.0 - 100.0 * np.exp(-HOURS) + noise).flat
+
+
+def test_a_slow_leak_is_found() -> None:
+    assert not RESIDENT.judge(HOURS, 200.0 + HOURS).flat
+    assert not DESCRIPTORS.judge(HOURS, 40.0 + np.floor(HOURS / 3.0)).flat
+
+
+def test_the_delay_of_a_machine_with_other_work_is_judged_by_its_best_times() -> None:
+    busy = np.where((HOURS > 14.0) & (np.arange(len(HOURS)) % 3 > 0), 2000.0, 0.0)
+    assert DELAY.judge(HOURS, 300.0 + busy).flat
+    assert not DELAY.judge(HOURS, 300.0 + 10.0 * HOURS).flat
+
+
+def test_every_quantity_of_a_process_is_judged_by_itself() -> None:
+    samples = [
+        Sample(it, 100.0, 10, 5 + (it > 16.0) * 2, 7, 1000) for it in map(float, np.linspace(0.1, 24.0, 40))
+    ]
+    assert [it.rule.name for it in judge(samples) if not it.flat] == ["threads"]
+
+
+def test_a_process_is_read_as_it_is() -> None:
+    before, pid = descriptors_of(os.getpid()), os.getpid()
+    with Path(__file__).open(encoding="utf-8"):
+        assert descriptors_of(pid) == before + 1
+    assert resident_of(pid) > 10.0
+    assert threads_of(pid) >= 1
+    with pytest.raises(OSError, match="No such"):
+        resident_of(2**22 + 1)
+
+
+def test_a_process_counts_its_own_tasks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("benchmarks.soak_tasks._EVERY_S", 0.01)
+    monkeypatch.setattr(asyncio.BaseEventLoop, "run_forever", asyncio.BaseEventLoop.run_forever)
+    note_tasks(str(tmp_path))
+
+    async def three() -> int:
+        async with asyncio.TaskGroup() as tasks:
+            for _ in range(2):
+                tasks.create_task(_until(tmp_path))
+        return read_held(tmp_path)[os.getpid()].tasks
+
+    assert asyncio.run(three()) == 3
+    assert hooked_environment(tmp_path)[FOLDER_VARIABLE] == str(tmp_path)
+
+
+async def _until(folder: Path) -> None:
+    while not read_held(folder):  # noqa: ASYNC110 — a file: there is no event
+        await asyncio.sleep(0.005)
+
+
+def test_what_is_kept_is_counted_in_the_time_of_the_site(tmp_path: Path) -> None:
+    tempo = Tempo(20.0)
+    filmed = Filmed(tmp_path, tempo)
+    for camera in CAMERAS:
+        (tmp_path / f"{camera}.mp4").touch()
+    content = {
+        "site": filmed.site,
+        "cameras": [{**it, "source": "scene:room"} for it in filmed.cameras],
+        **filmed.settings(tmp_path / "recorded", 3.0),
+    }
+    config = build_config(content, where="soak", folder=tmp_path)
+    assert (config.site.width, config.site.height) == (WIDTH, HEIGHT)
+    assert config.record.keep_s * tempo.speed == pytest.approx(3.0 * 3600.0)
+    assert config.view.buffer_s * config.site.fps == pytest.approx(60.0 * 3.0)
+    assert tempo.hours(tempo.pulse(24.0)) == pytest.approx(24.0)
