@@ -1,7 +1,9 @@
-"""The served application: addresses, parameters and bodies by its own description, and raw bytes."""
+"""The served application: what anybody asks, what an operator sends, and what strangers get."""
 
 from __future__ import annotations
 
+from benchmarks.fuzz_http_operator import Operator
 from benchmarks.fuzz_http_requests import Requests
+from benchmarks.fuzz_http_strangers import Strangers
 
-TARGETS = (Requests,)
+TARGETS = (Requests, Operator, Strangers)

@@ -12,6 +12,8 @@ from random import Random
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from aiohttp import web
+
 from benchmarks.fuzz_loop import HurryingLoop, leaves_no_trace
 from benchmarks.fuzz_site import (
     CAMERAS,
@@ -42,18 +44,22 @@ Word = Callable[[Random, str, int], CameraTracks]
 
 
 class Served:
-    """A site that has run for some epochs, and stands still. ``sections`` are its configuration's."""
+    """A site that has run for some epochs, and stands still. ``sections`` are its configuration's.
+
+    ``before`` is given the application before it is served.
+    """
 
     def __init__(
         self,
         sections: Mapping[str, Any] | None = None,
         word: Word = word,
         loop: AbstractEventLoop | None = None,
+        before: Callable[[web.Application], None] = lambda _: None,
     ) -> None:
         self.loop = loop or HurryingLoop()
         self._folder = TemporaryDirectory()
         self._stack = AsyncExitStack()
-        self._word = word
+        self._word, self._before = word, before
         self.loop.run_until_complete(self._serve(dict(sections or {})))
 
     async def _serve(self, sections: dict[str, Any]) -> None:
@@ -65,6 +71,7 @@ class Served:
         for epoch in range(EPOCHS):
             self._feed_epoch(rng, epoch)
         self.app = make_app(self.service)
+        self._before(self.app)
         self.port = await self._stack.enter_async_context(
             serving(self.app, config.http.model_copy(update={"port": 0}))
         )

@@ -10,8 +10,11 @@ from random import Random
 import pytest
 
 from benchmarks.fuzz import PARTS, targets_of
+from benchmarks.fuzz_http_strangers import SECRETS, Strangers
 from benchmarks.fuzz_run import Attempt, Crash, Plan, Runner, numbered
 from benchmarks.fuzz_target import Target, UnclearError, refused
+from server.web import access
+from server.web.access_grant import Need
 
 SECONDS = 0.25
 INPUTS = 1000
@@ -92,6 +95,31 @@ def test_a_saved_input_says_again_what_it_did() -> None:
         found = attempt.feed(b"raises")
     assert isinstance(found, Crash)
     assert "KeyError" in found.text
+
+
+@pytest.mark.parametrize(
+    ("asked", "who"),
+    [
+        ("/api/objects", ""),
+        ("/objects/1/best.mp4?from=p0", ""),
+        ("/objects/2/best.ts?from=p0", "family"),
+        ("/cameras/c1/live.mp4?from=p0", "door"),
+        ("/api/operator/people", "hall"),
+    ],
+)
+def test_a_site_that_lets_anybody_in_is_found_out(
+    asked: str, who: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    target = Strangers()
+    token = f"Authorization: Bearer {SECRETS[who]}\r\n" if who else ""
+    request = f"\0GET {asked} HTTP/1.1\r\nHost: x\r\n{token}Connection: close\r\n\r\n".encode()
+    try:
+        assert target.feed(request) is False
+        monkeypatch.setattr(access, "need_of", lambda *_: Need.NOTHING)
+        with pytest.raises(AssertionError, match=who or r"\[\]"):
+            target.feed(request)
+    finally:
+        target.close()
 
 
 @pytest.mark.parametrize("text", ["", "two\nlines", "x" * 5000, "Traceback (most recent call last)"])
