@@ -1,7 +1,15 @@
 """Starting things: the command line, the supervisor, and the offline way."""
 
 import os
+import signal
+import sys
 
 # One process per camera already uses the cores; matrices here are small, and threads only get in the way.
 # It must be said before NumPy is imported.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+# What runs until it is told to end may be told while it still loads, which takes a second on a busy machine:
+# that is no failure either.
+_SERVING = frozenset({"up", "demo", "sync", "camera", "bestview"})
+if sys.argv[0].rpartition("/")[2] in {"-m", "myview"} and _SERVING.intersection(sys.argv[1:2]):
+    signal.signal(signal.SIGTERM, lambda *_: os._exit(0))

@@ -46,7 +46,8 @@ def main() -> None:
     if os.environ.get("MYVIEW_SUPERVISED"):
         end_with_parent()
     # So that what is half-written is tidied away; what runs until it is told to end has its own handler.
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(_TERMINATED))
+    if signal.getsignal(signal.SIGTERM) == signal.SIG_DFL:
+        signal.signal(signal.SIGTERM, lambda *_: sys.exit(_TERMINATED))
     try:
         app(args=one_value_per_flag(sys.argv[1:], file_commands.SEVERAL))
     except UserError as error:

@@ -5,21 +5,41 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import ctypes
+import logging
+import os
 import signal
+import threading
 from collections.abc import Callable, Coroutine, Iterator
 from contextlib import contextmanager
 from typing import Any
 
+log = logging.getLogger(__name__)
+
 _PR_SET_PDEATHSIG = 1
 _ENDING = (signal.SIGINT, signal.SIGTERM)
+_LET_GO_S = 1.2
+"""How long a process has to let go of everything; a camera that is silent is waited for longer."""
 
 
-async def run_until_told(main: Callable[[], Coroutine[Any, Any, None]], *, hang_up: bool = True) -> None:
-    """Run a coroutine until it is over or a signal asks to end; ``hang_up``: SIGHUP does so, too."""
+async def run_until_told(
+    main: Callable[[], Coroutine[Any, Any, None]],
+    told: Callable[[], None] = lambda: None,
+    *,
+    hang_up: bool = True,
+) -> None:
+    """Run a coroutine until it is over or a signal asks to end, when ``told`` is called first.
+
+    ``hang_up``: SIGHUP asks for that, too.
+    """
     task = asyncio.create_task(main())
     loop = asyncio.get_running_loop()
+
+    def end() -> None:
+        told()
+        task.cancel()
+
     for number in (*_ENDING, signal.SIGHUP) if hang_up else _ENDING:
-        loop.add_signal_handler(number, task.cancel)
+        loop.add_signal_handler(number, end)
     with contextlib.suppress(asyncio.CancelledError):
         await task
 
@@ -30,9 +50,23 @@ def end_with_parent() -> None:
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
 
 
-def run_process(main: Callable[[], Coroutine[Any, Any, None]]) -> None:
-    """Run a process's coroutine until it is over, or SIGTERM or SIGINT comes; it looks after SIGHUP itself."""
-    asyncio.run(run_until_told(main, hang_up=False))
+def run_process(main: Callable[[], Coroutine[Any, Any, None]], let_go_s: float = _LET_GO_S) -> None:
+    """Run a process's coroutine until it is over, or SIGTERM or SIGINT comes; it looks after SIGHUP itself.
+
+    Who is told to end has so many seconds to let go of everything. Then the process ends all the same: a
+    thread may be held up by a camera that says nothing, and whoever stops a site would wait for that, too.
+    """
+    asyncio.run(run_until_told(main, lambda: _end_after(let_go_s), hang_up=False))
+
+
+def _end_after(seconds: float) -> None:
+    def end() -> None:
+        log.info("told to end: what is held up is left as it is")
+        os._exit(0)
+
+    timer = threading.Timer(seconds, end)
+    timer.daemon = True
+    timer.start()
 
 
 @contextmanager

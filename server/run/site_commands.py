@@ -19,6 +19,8 @@ from server.wire.output import check_new_folder
 from server.wire.running import Running
 
 ConfigPath = Annotated[Path, typer.Argument(metavar="CONFIG", help="The site's configuration, a YAML file.")]
+_UP_LETS_GO_S = 1.9
+"""Those that it has started end before."""
 LogFolder = Annotated[
     Path | None, typer.Option("--out", help="Write tracks and camera choices into this new folder.")
 ]
@@ -79,7 +81,7 @@ def up(
     check_exposed(running.now)
     check_ports(running.now)
     check_recordings(running.now)
-    run_process(lambda: run_up(running, environment, out))
+    run_process(lambda: run_up(running, environment, out), let_go_s=_UP_LETS_GO_S)
 
 
 def demo(

@@ -19,8 +19,8 @@ log = logging.getLogger(__name__)
 _RETRY_FIRST_S, _RETRY_MAX_S = 0.2, 10.0
 _SETTLED_S = 10.0
 """A process that ran this long has started well: its next restart is quick again."""
-_END_S = 5.0
-"""How long processes have to end before they are killed."""
+_END_S = 1.6
+"""How long processes have to end before they are killed; they end by themselves a little sooner."""
 
 
 @dataclass(slots=True)

@@ -7,7 +7,8 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import pytest
 
@@ -79,3 +80,40 @@ def test_a_child_inherits_the_mask_and_can_lift_it() -> None:
             [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True
         )
     assert done.stdout.split() == ["2", "0"]
+
+
+def test_a_process_that_is_held_up_ends_all_the_same(tmp_path: Path) -> None:
+    started = tmp_path / "started"
+    script = (
+        "import asyncio, pathlib, sys, time\n"
+        "from server.run.ending import run_process\n"
+        "def held_up(): pathlib.Path(sys.argv[1]).touch(); time.sleep(60)\n"
+        "async def main(): await asyncio.to_thread(held_up)\n"
+        "run_process(main, let_go_s=0.3)\n"
+    )
+    process = subprocess.Popen([sys.executable, "-c", script, str(started)])
+    until_true(started.exists)
+    process.terminate()
+    assert process.wait(PATIENCE) == 0, "the thread would have slept for a minute"
+
+
+def test_a_process_that_is_told_to_end_while_it_loads_ends_with_0(tmp_path: Path) -> None:
+    hurried = subprocess.Popen([sys.executable, "-m", "server.run.cli", "sync", str(tmp_path / "none.yaml")])
+    status = Path(f"/proc/{hurried.pid}/status")
+    until_true(
+        lambda: caught(status.read_text(encoding="ascii"), signal.SIGTERM) or hurried.poll() is not None
+    )
+    hurried.terminate()
+    assert hurried.wait(PATIENCE) == 0, "it had not read its configuration, which is not there"
+
+
+def caught(status: str, number: signal.Signals) -> bool:
+    mask = next(line for line in status.splitlines() if line.startswith("SigCgt")).split()[1]
+    return bool(int(mask, 16) >> number - 1 & 1)
+
+
+def until_true(condition: Callable[[], bool]) -> None:
+    end = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.01)

@@ -23,6 +23,7 @@ log = logging.getLogger(__name__)
 OPEN_S, READ_S = 10.0, 5.0
 """Seconds in which a camera must answer, and send something."""
 _RETRY_FIRST_S, _RETRY_MAX_S = 0.5, 10.0
+_LET_GO_S = 0.5
 _STALE_S = 2.0
 """A picture older than this is not shown again: the camera counts as away."""
 
@@ -57,7 +58,7 @@ class Stream:
     def close(self) -> None:
         """Stop reading."""
         self._closing.set()
-        self._thread.join(READ_S)
+        self._thread.join(_LET_GO_S)  # a silent camera holds it up for longer: it ends by itself
 
     def _run(self, opened: Opened | None) -> None:
         pause = _RETRY_FIRST_S
