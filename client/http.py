@@ -44,12 +44,12 @@ class HttpSettings:
     """Seconds until a connection must stand."""
     read_timeout: float = 15.0
     """Seconds without a byte until the server is taken for gone."""
-    retries: int = 8
+    retries: int = 26
     """Attempts in a row that bring nothing until a stream is given up; 0: no second attempt."""
     backoff_first: float = 0.25
     """Seconds before the first further attempt; doubled each time."""
-    backoff_most: float = 5.0
-    """Seconds between attempts at most."""
+    backoff_most: float = 1.0
+    """Seconds between attempts at most: a server that is back is seen again by then."""
     token: str | None = field(default=None, repr=False)
     """What lets in, where the server asks for it."""
 
