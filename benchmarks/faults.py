@@ -26,7 +26,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from benchmarks import faults_processes
+from benchmarks import faults_apart, faults_ends, faults_processes, faults_recorded
 from benchmarks.faults_film import Views, make
 from benchmarks.faults_run import Outcome, run
 from benchmarks.faults_site import Fault
@@ -34,7 +34,7 @@ from benchmarks.faults_table import describe
 from benchmarks.report import Report
 from benchmarks.surroundings import CannotRunError, finish, parser
 
-FAULTS: tuple[Fault, ...] = (*faults_processes.FAULTS,)
+FAULTS: tuple[Fault, ...] = (*faults_processes.FAULTS, *faults_apart.FAULTS, *faults_ends.FAULTS)
 _PULSES = 15_000
 """Detections for so many: ten minutes."""
 
@@ -43,7 +43,7 @@ async def measure(faults: list[Fault], folder: Path, report: Report) -> list[Out
     """Inject these faults one after the other."""
     views = await asyncio.to_thread(make, folder, _PULSES)
     outcomes: list[Outcome] = []
-    groups = itertools.groupby(faults, key=lambda fault: fault.setup)
+    groups = itertools.groupby(faults, key=lambda fault: fault.alone or fault.setup)
     for number, (_, some) in enumerate(groups):
         outcomes += await _group(list(some), views, folder / f"site-{number}", report)
     return outcomes
@@ -53,10 +53,15 @@ async def _group(faults: list[Fault], views: Views, folder: Path, report: Report
     await asyncio.to_thread(folder.mkdir)
     outcomes: list[Outcome] = []
     try:
+        if faults[0].alone is not None:
+            return [Outcome(faults[0], ended=await faults[0].alone(views, folder))]
         async with faults[0].setup(views, folder) as stand:
             for fault in faults:
-                outcomes.append(await run(fault, stand))
+                outcomes.append(await run(fault, stand, views))
                 print(f"{fault.name}: done", file=sys.stderr, flush=True)
+        outcomes[-1].ended += stand.ended[-1:]
+        files = await asyncio.to_thread(faults_recorded.read, stand.recorded, stand.live)
+        faults_recorded.note(outcomes, stand.told, files)
     except RuntimeError as error:
         report.say(f"{faults[0].name} and what follows it: {error}")
     return outcomes

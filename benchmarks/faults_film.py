@@ -9,7 +9,7 @@ box that belongs to another picture from one that belongs to this.
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -56,6 +56,13 @@ class Views:
     cameras: list[dict[str, Any]]
     site: dict[str, Any]
     ground: Path | None
+    found: Mapping[tuple[str, int, int, int, int], int]
+    """In which frame of a camera a box was found: left, top, right, bottom in thousandths."""
+
+    def frame_of(self, camera: str, box: Box) -> int | None:
+        """Say in which frame a box was found; None where it is a mean of several and says nothing."""
+        sides = (round(1000 * side) for side in (box.left, box.top, box.right, box.bottom))
+        return self.found.get((camera, *sides))  # type: ignore[arg-type]
 
 
 def stamped(image: NDArray[np.uint8], camera: int, frame: int) -> NDArray[np.uint8]:
@@ -82,30 +89,27 @@ def read_stamp(grey: NDArray[np.uint8]) -> Stamp | None:
     return Stamp(f"c{camera}", frame)
 
 
-def frame_of(box: Box) -> int | None:
-    """Say in which frame a box was found; None where it is a mean of several and says nothing."""
-    left, top = (round(value % 1.0 * FRAMES) % FRAMES for value in (box.left, box.top))
-    return left if left == top else None
-
-
 def make(folder: Path, pulses: int) -> Views:
     """Write films, detections for so many pulses, and the homographies into a folder."""
     scene = Scene("room", len(CAMERAS), _PEOPLE, _SEED, WIDTH, HEIGHT, FPS)
     places = _places()
     truths = {place: scene.truth(place) for place in sorted(set(places))}
-    cameras = []
+    cameras, found = [], {}
     for number, name in enumerate(CAMERAS):
         drawn = {place: scene.image(number, place) for place in truths}
         pictures = [stamped(drawn[place], number, frame) for frame, place in enumerate(places)]
         write_film(pictures, folder / f"{name}.mp4")
         boxes = [_boxes(truths[place][number]) for place in places]
         _write_detections(boxes, pulses, folder / f"{name}.txt")
-        source, found = str(folder / f"{name}.mp4"), str(folder / f"{name}.txt")
-        cameras.append({"id": name, "source": source, "at_end": "loop", "detections": found})
+        for frame, some in enumerate(boxes):
+            for left, top, width, height in (1000 * some.astype(int) + (frame, frame, 0, 0)).tolist():
+                found[name, left, top, left + width, top + height] = frame
+        source, detected = str(folder / f"{name}.mp4"), str(folder / f"{name}.txt")
+        cameras.append({"id": name, "source": source, "at_end": "loop", "detections": detected})
     ground = {name: scene.homography(number).tolist() for number, name in enumerate(CAMERAS)}
     (folder / "ground.json").write_text(json.dumps({"unit": "m", "homography": ground}), encoding="ascii")
     site = {"name": "faults", "fps": FPS, "width": WIDTH, "height": HEIGHT}
-    return Views(cameras, site, folder / "ground.json")
+    return Views(cameras, site, folder / "ground.json", found)
 
 
 def write_film(pictures: Sequence[NDArray[np.uint8]], path: Path) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from benchmarks.faults_film import FPS, FRAMES, frame_of
+from benchmarks.faults_film import FPS, FRAMES, Views
 from benchmarks.faults_viewer import Picture, Told
 from client import Box, Gop
 
@@ -46,7 +46,9 @@ class Received:
         return max((b - a for a, b in pairwise([before, *inside, until])), default=0.0)
 
 
-def judge(pictures: Sequence[Picture], told: Told, number: int, live: Iterable[str] = ()) -> Received:
+def judge(
+    pictures: Sequence[Picture], told: Told, number: int, views: Views, live: Iterable[str] = ()
+) -> Received:
     """Judge every picture; a picture of a camera of ``live`` has no number that is known beforehand."""
     said = dict(_said(told, number))
     live = frozenset(live)
@@ -67,10 +69,10 @@ def judge(pictures: Sequence[Picture], told: Told, number: int, live: Iterable[s
             notes.append(f"pulse {picture.pulse}: {stamp}")
         else:
             fresh.append((picture.at, stamp.camera))
-        if camera in live or stamp is None:
+        if camera is None or camera in live or stamp is None:
             continue
         for box in found:
-            frame = frame_of(box)
+            frame = views.frame_of(camera, box)
             boxes += 1
             blurred += frame is None
             if frame is not None and frame != stamp.frame:

@@ -7,6 +7,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from benchmarks.faults_film import Views
 from benchmarks.faults_judge import RHYTHM_S, Received, judge
 from benchmarks.faults_site import Ended, Fault, Stand
 from benchmarks.faults_viewer import Viewer
@@ -44,7 +45,7 @@ class Outcome:
     """What kept it from being measured."""
 
 
-async def run(fault: Fault, stand: Stand) -> Outcome:
+async def run(fault: Fault, stand: Stand, views: Views) -> Outcome:
     """Let viewers watch, inject the fault, and judge what they received."""
     outcome = Outcome(fault)
     ended_before = len(stand.ended)
@@ -72,7 +73,7 @@ async def run(fault: Fault, stand: Stand) -> Outcome:
     await asyncio.sleep(RHYTHM_S)  # events of the last pictures
     outcome.gops = (first, len(stand.told.gops))
     outcome.ended = stand.ended[ended_before:]
-    received = await asyncio.to_thread(_received, stand)
+    received = await asyncio.to_thread(_received, stand, views)
     _sum_up(outcome, received, stand)
     return outcome
 
@@ -91,8 +92,9 @@ async def _all_watch(viewers: Sequence[Viewer]) -> None:
         await asyncio.sleep(_POLL_S)
 
 
-def _received(stand: Stand) -> list[Received]:
-    return [judge(viewer.pictures(), stand.told, viewer.number, stand.live) for viewer in stand.viewers]
+def _received(stand: Stand, views: Views) -> list[Received]:
+    told, live = stand.told, stand.live
+    return [judge(viewer.pictures(), told, viewer.number, views, live) for viewer in stand.viewers]
 
 
 def _sum_up(outcome: Outcome, received: Sequence[Received], stand: Stand) -> None:

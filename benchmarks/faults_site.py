@@ -183,7 +183,13 @@ async def told_to_end(name: str, process: asyncio.subprocess.Process) -> Ended:
 
 
 Inject = Callable[[Stand], Awaitable[None]]
+Alone = Callable[[Views, Path], Awaitable[list[Ended]]]
 Setup = Callable[[Views, Path], contextlib.AbstractAsyncContextManager[Stand]]
+
+
+async def _nothing(stand: Stand) -> None:
+    """Leave it as it is."""
+    del stand
 
 
 @dataclass(frozen=True, slots=True)
@@ -197,11 +203,13 @@ class Fault:
         seconds: for how long viewers are watched from when it begins.
         within: promised: so many seconds at most without a fresh picture; None: nobody is there to take over.
         breaks: it is the viewers' own server that dies.
+        alone: does all by itself, with sites of its own, and gives what was told to end.
     """
 
     name: str
     setup: Setup
-    inject: Inject
+    inject: Inject = _nothing
     seconds: float = 6.0
     within: float | None = 1.0
     breaks: bool = False
+    alone: Alone | None = None

@@ -26,9 +26,10 @@ def describe(report: Report, outcomes: Sequence[Outcome]) -> None:
     ]
     report.table("faults", [*columns, "kept"], [_row(it) for it in outcomes])
     for outcome in outcomes:
-        for note in [outcome.failed, *(note for it in outcome.received for note in it.notes)][:_NOTES]:
-            if note:
-                report.say(f"{outcome.fault.name}: {note}")
+        notes = [outcome.failed, *(note for it in outcome.received for note in it.notes)]
+        notes += [f"{it.name}: {it.seconds:.2f} s, {it.code}" for it in outcome.ended if not it.well]
+        for note in [note for note in notes if note][:_NOTES]:
+            report.say(f"{outcome.fault.name}: {note}")
     broken = [it.fault.name for it in outcomes if not kept(it)]
     report.say(f"{len(outcomes) - len(broken)} of {len(outcomes)} keep all promises" + _list(broken))
 
@@ -55,11 +56,11 @@ def _row(it: Outcome) -> list[str]:
     slowest = max(it.ended, key=lambda one: one.seconds, default=None)
     return [
         it.fault.name,
-        str(it.reconnections),
+        str(it.reconnections) if it.received else "",
         _fresh(it),
         _promised(it),
-        f"{wrong} of {frames}",
-        f"{wrong_boxes} of {boxes}",
+        f"{wrong} of {frames}" if it.received else "",
+        f"{wrong_boxes} of {boxes}" if it.received else "",
         "" if it.lost is None else f"{it.lost} lost, {it.broken_files} broken",
         "" if slowest is None else f"{slowest.seconds:.2f} s, {slowest.code}",
         "yes" if kept(it) else "NO",
@@ -67,6 +68,8 @@ def _row(it: Outcome) -> list[str]:
 
 
 def _fresh(it: Outcome) -> str:
+    if not it.received:
+        return ""
     if not it.fault.breaks:
         return f"{it.without:.2f} ({it.ordinary:.2f})"
     return f"{'never' if it.back is None else f'{it.back:.2f}'} ({it.without:.2f})"
@@ -75,7 +78,7 @@ def _fresh(it: Outcome) -> str:
 def _promised(it: Outcome) -> str:
     if it.fault.breaks:
         return f"{_BACK_S:g}"
-    return "" if it.fault.within is None else f"{it.fault.within:g}"
+    return "" if it.fault.within is None or not it.received else f"{it.fault.within:g}"
 
 
 def _list(names: Sequence[str]) -> str:

@@ -1,0 +1,81 @@
+"""Sites and processes that are told to end at awkward moments."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import sys
+from pathlib import Path
+
+import aiohttp
+
+from benchmarks.faults_apart import NAMES, Apart, configured
+from benchmarks.faults_film import Views
+from benchmarks.faults_site import Ended, Fault, Stand, told_to_end, with_up
+from benchmarks.faults_viewer import Viewer
+from benchmarks.surroundings import one_thread_environment
+
+_MOMENTS_S = (0.3, 1.0, 2.0, 4.0)
+"""After the start."""
+
+
+async def right_after_start(views: Views, folder: Path) -> list[Ended]:
+    """Start a site, and each process for itself, and tell them to end soon after."""
+    config, _ = await asyncio.to_thread(configured, views, folder)
+    ended = []
+    with (folder / "site.log").open("w", encoding="utf-8") as log:
+        for moment in _MOMENTS_S:
+            site = await asyncio.create_subprocess_exec(
+                *(sys.executable, "-m", "server.run.cli", "up", str(config)),
+                env=one_thread_environment(),
+                stdout=log,
+                stderr=log,
+            )
+            await asyncio.sleep(moment)
+            ended.append(await told_to_end(f"up after {moment:g} s", site))
+        for moment in _MOMENTS_S:
+            single = Apart(config, log)
+            for name in NAMES:
+                await single.start(name)
+            await asyncio.sleep(moment)
+            ended += await asyncio.gather(
+                *(told_to_end(f"{name} after {moment:g} s", it) for name, it in single.processes.items())
+            )
+    return ended
+
+
+async def while_watched(views: Views, folder: Path) -> list[Ended]:
+    """Tell a site to end while somebody watches each way there is."""
+    ways = ("objects/{0}/best.mp4", "objects/{0}/best.ts", "objects/{0}/best.mjpeg", "cameras/c0/live.mp4")
+    async with with_up(views, folder) as stand, aiohttp.ClientSession(stand.url) as session:
+        viewer = Viewer(stand.url, stand.people(1)[0])
+        tasks = [asyncio.create_task(viewer.run())]
+        tasks += [asyncio.create_task(_read(session, f"/{way.format(viewer.number)}")) for way in ways]
+        await asyncio.sleep(4.0)
+        before = _below(stand)
+    for task in tasks:
+        task.cancel()
+    await asyncio.gather(*tasks, return_exceptions=True)
+    left = [name for name, pid in before if pid in _running()]
+    return [*stand.ended, *(Ended(f"{name} is left behind", 0.0, None) for name in left)]
+
+
+def _below(stand: Stand) -> list[tuple[str, int]]:
+    return [(name, pid) for name in (*NAMES, "drawing") for pid in stand.pids(name)]
+
+
+def _running() -> frozenset[int]:
+    return frozenset(int(entry.name) for entry in Path("/proc").iterdir() if entry.name.isdecimal())
+
+
+async def _read(session: aiohttp.ClientSession, path: str) -> None:
+    with contextlib.suppress(aiohttp.ClientError):
+        async with session.get(path) as answer:
+            async for _ in answer.content.iter_any():
+                pass
+
+
+FAULTS = (
+    Fault("end right after start", with_up, alone=right_after_start),
+    Fault("end while watched", with_up, alone=while_watched),
+)
