@@ -9,7 +9,7 @@ from collections.abc import AsyncIterator
 from playwright.async_api import Error, Page
 
 from server.run.demo import run_demo
-from server.run.setup import DEMO, free_port
+from server.run.setup import free_port
 
 _AGAIN_MS = 1000
 
@@ -17,9 +17,8 @@ _AGAIN_MS = 1000
 @contextlib.asynccontextmanager
 async def demo_at(fps: float) -> AsyncIterator[str]:
     """Run the demo at a frame rate; give its address, where nothing may answer yet."""
-    DEMO["site"]["fps"] = fps
     port = free_port()
-    running = asyncio.create_task(run_demo(port, None, open_browser=False))
+    running = asyncio.create_task(run_demo(port, None, open_browser=False, fps=fps))
     try:
         yield f"http://127.0.0.1:{port}/"
     finally:

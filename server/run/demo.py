@@ -13,19 +13,30 @@ import aiohttp
 import typer
 
 from server.run.checks import check_port_free
+from server.run.processors import processors
 from server.run.setup import demo_config, free_port
 from server.run.supervise import Supervisor
 
 log = logging.getLogger(__name__)
 
 _PORT = 8080
+_RATES = {4: 25.0, 2: 12.5, 0: 6.25}
+"""Frames a second, by how many processors there are at least: drawing people, finding them, and a browser
+that decodes and paints without a graphics card take more than two at 25."""
 _POLL_S = 0.2
 _FIRST_BYTES = 4096
 """More than the head of a stream: with so many bytes the first picture has come."""
 
 
-async def run_demo(port: int | None, seconds: float | None, *, open_browser: bool) -> None:
-    """Run the demo until it is told to end, or for so many seconds.
+def rate_for(there: float) -> float:
+    """Give the frames a second that so many processors can do."""
+    return next(rate for least, rate in _RATES.items() if there >= least)
+
+
+async def run_demo(
+    port: int | None, seconds: float | None, *, open_browser: bool, fps: float | None = None
+) -> None:
+    """Run the demo until it is told to end, or for so many seconds; ``fps``: not what the machine can do.
 
     Raises:
         UserError: the port was asked for and is taken.
@@ -33,8 +44,10 @@ async def run_demo(port: int | None, seconds: float | None, *, open_browser: boo
     if port is not None:
         check_port_free("127.0.0.1", port, "--port")
     chosen = port or free_port(_PORT if port is None else 0)
+    there = processors()
     with tempfile.TemporaryDirectory(prefix="myview-demo-") as folder:
-        path, config = demo_config(Path(folder), chosen)
+        path, config = demo_config(Path(folder), chosen, fps or rate_for(there))
+        typer.echo(_rate_line(config.site.fps, there))
         supervisor = asyncio.create_task(Supervisor(path, config, {}, None).run())
         invite = asyncio.create_task(_invite(f"http://127.0.0.1:{chosen}/", open_browser=open_browser))
         try:
@@ -45,6 +58,14 @@ async def run_demo(port: int | None, seconds: float | None, *, open_browser: boo
             for task in (invite, supervisor):
                 task.cancel()
             await asyncio.gather(invite, supervisor, return_exceptions=True)
+
+
+def _rate_line(fps: float, there: float) -> str:
+    line = f"Three cameras at {fps:g} frames a second"
+    if fps != rate_for(there):
+        return line
+    have = f"{there:.3g} processor{'s' if there > 1 else ''}"
+    return f"{line}, which {have} can do (MYVIEW_SITE__FPS takes another rate)"
 
 
 async def _invite(url: str, *, open_browser: bool) -> None:

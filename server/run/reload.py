@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from server.wire.config import Config
 from server.wire.differing import differing
@@ -14,7 +13,7 @@ _LIVE = tuple(f"view.{name}" for name in TUNED)
 """The best view takes these over from one GOP to the next."""
 _OF_A_CAMERA = ("source", "offset", "at_end", "h264", "options", "ignore", "detections")
 """What nobody but the camera's own process goes by."""
-_TRACK = ("solver", "window", "costs", "witness", "witness_wait_s")
+_TRACK = tuple(name for name in Track.model_fields if name != "backlog_s")
 _OF_CAMERAS = ("detect", *(f"track.{name}" for name in _TRACK))
 """What all cameras' processes go by, and nobody else."""
 _WINDOW = ("track.window",)
@@ -90,10 +89,8 @@ def _of(keys: Sequence[str], sections: Sequence[str]) -> tuple[str, ...]:
 
 def _track(running: Config, wanted: Config, *, kept_window: bool) -> Track:
     """Take over how people are followed, but not when windows end."""
-    kept: dict[str, Any] = {"backlog_s": running.track.backlog_s}
-    if kept_window:
-        kept["window"] = running.track.window
-    return wanted.track.model_copy(update=kept)
+    names = [name for name in _TRACK if not (kept_window and name == "window")]
+    return running.track.model_copy(update={name: getattr(wanted.track, name) for name in names})
 
 
 def _camera(running: Config, wanted: Config, camera_id: str) -> Camera:

@@ -99,11 +99,12 @@ def _site_like(video: Path) -> dict[str, Any]:
     return {"fps": opened.fps, "width": width - width % 2, "height": height - height % 2}
 
 
-def demo_config(folder: Path, port: int) -> tuple[Path, Config]:
-    """Write the demo's configuration into a folder, on ports that are free."""
+def demo_config(folder: Path, port: int, fps: float) -> tuple[Path, Config]:
+    """Write the demo's configuration into a folder, on free ports; the environment goes before it."""
     sync, bus = free_port(), free_port()
     content = {
         **DEMO,
+        "site": {**DEMO["site"], "fps": fps},
         "sync": {"port": sync},
         "zenoh": {"connect": f"tcp/127.0.0.1:{bus}", "listen": f"tcp/127.0.0.1:{bus}"},
         "http": {"port": port},
