@@ -8,7 +8,14 @@ import sys
 
 import typer
 
-from server.run import calibrate_commands, file_commands, site_commands, token_commands, viewer_commands
+from server.run import (
+    calibrate_commands,
+    file_commands,
+    operation_commands,
+    site_commands,
+    token_commands,
+    viewer_commands,
+)
 from server.run.ending import end_with_parent
 from server.run.logs import say_failure
 from server.run.several import one_value_per_flag
@@ -32,6 +39,7 @@ for command in (
     file_commands.scene,
     calibrate_commands.calibrate,
     viewer_commands.watch,
+    operation_commands.doctor,
     token_commands.token,
 ):
     app.command()(command)

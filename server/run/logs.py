@@ -17,7 +17,7 @@ log = logging.getLogger("myview")
 
 
 def log_to_stderr(name: str) -> None:
-    """Log under the name of this process; MYVIEW_LOG=DEBUG shows more, MYVIEW_LOG_FORMAT=json is for programs.
+    """Log as this process; MYVIEW_LOG=DEBUG shows more, MYVIEW_LOG_FORMAT=json is for programs.
 
     Raises:
         UserError: MYVIEW_LOG is no level, or MYVIEW_LOG_FORMAT no format.

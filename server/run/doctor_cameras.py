@@ -1,0 +1,104 @@
+"""All cameras tried at once, each for so long; and what to say of each."""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from collections.abc import Mapping
+
+from server.run.doctor_findings import Finding, bad, ok, warning
+from server.run.doctor_probe import Probe, probe
+from server.wire.config import Config
+
+_GRACE_S = 3.0
+"""What a busy machine takes longer than a camera was given."""
+_SAME_RATE = 0.1
+"""Part by which a camera's rate may be off the site's without a word."""
+
+
+def probe_all(config: Config, seconds: float) -> dict[str, Probe]:
+    """Try all cameras in parallel; one that has not answered in time says so."""
+    found: dict[str, Probe] = {}
+
+    def run(camera: str) -> None:
+        try:
+            found[camera] = probe(config, camera, seconds)
+        except Exception as error:  # noqa: BLE001 — of one camera; the others are still to be told of
+            found[camera] = Probe(f"a mistake in MyView: {type(error).__name__}: {error}")
+
+    # Daemons: what hangs in a driver must not keep the doctor from ending.
+    threads = [threading.Thread(target=run, args=(it,), daemon=True) for it in config.camera_ids]
+    for thread in threads:
+        thread.start()
+    until = time.monotonic() + 2 * seconds + _GRACE_S
+    for thread in threads:
+        thread.join(max(0.0, until - time.monotonic()))
+    late = Probe(f"no answer within {2 * seconds + _GRACE_S:.0f} s{_while_busy()}")
+    return {camera: found.get(camera, late) for camera in config.camera_ids}
+
+
+def _while_busy() -> str:
+    """Say that the machine has more to do than it can, if so: then that may be why."""
+    load, cores = os.getloadavg()[0], os.cpu_count() or 1
+    return f", while the machine is busy with other things (load {load:.0f})" if load > 2 * cores else ""
+
+
+def camera_findings(config: Config, probes: Mapping[str, Probe], *, runs: bool) -> list[Finding]:
+    """Say of each camera how it is; ``runs``: the site runs, and may hold a device that only one can have."""
+    return [it for camera, found in probes.items() for it in _of(config, camera, found, runs=runs)]
+
+
+def _of(config: Config, camera: str, found: Probe, *, runs: bool) -> list[Finding]:
+    check = f"camera {camera}"
+    if found.problem or found.size is None:
+        if runs:
+            do = "the site runs, and may have it to itself: see /api/cameras"
+            return [warning(check, found.problem, do)]
+        return [bad(check, found.problem, "try its source in ffplay; address, password, cable, file")]
+    parts = [f"{_size(found.size)} pixels"]
+    if found.sent is not None and found.sent.fps is not None:
+        parts.append(f"{found.sent.fps:.1f} pictures a second")
+    how = "its own H.264 passes" if found.passes else f"{found.kbps:.0f} kbit/s"
+    parts += [how, f"{found.cores:.2f} of a core"]
+    return [ok(check, ", ".join(parts)), *_doubts(config, check, found)]
+
+
+def _doubts(config: Config, check: str, found: Probe) -> list[Finding]:
+    site, doubts = config.site, []
+    wide, high = found.size or (site.width, site.height)
+    if wide < site.width and high < site.height:
+        doubts.append(
+            warning(
+                check,
+                f"its pictures ({_size((wide, high))}) are smaller than the site's "
+                f"({_size((site.width, site.height))}), and are enlarged",
+                "lower site.width and site.height, or set the camera to a larger size",
+            )
+        )
+    rate = found.sent.fps if found.sent is not None else None
+    if rate is not None and rate < (1 - _SAME_RATE) * site.fps:
+        doubts.append(
+            warning(
+                check,
+                f"it sends {rate:.1f} pictures a second, the site takes {site.fps:g}: some are shown twice",
+                "set the camera to that rate, or lower site.fps",
+            )
+        )
+    if found.sent is not None and found.sent.damaged:
+        doubts.append(
+            warning(
+                check,
+                f"{found.sent.damaged} packets could not be decoded, {found.sent.pictures} pictures could",
+                "options: {rtsp_transport: tcp}, or a better network",
+            )
+        )
+    if found.why_encoded:
+        doubts.append(
+            warning(check, f"is encoded anew: {found.why_encoded}", "set the camera so, or h264: encode")
+        )
+    return doubts
+
+
+def _size(size: tuple[int, int]) -> str:
+    return "x".join(map(str, size))

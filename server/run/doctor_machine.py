@@ -1,0 +1,111 @@
+"""Whether the clock is right, and whether the machine is large enough."""
+
+from __future__ import annotations
+
+import asyncio
+import ctypes
+import os
+import time
+from collections.abc import Mapping
+from pathlib import Path
+
+from camsync.messages import Greeting
+from camsync.protocol import ProtocolError, parse_server_line
+from server.run.doctor_findings import Finding, ok, warning
+from server.run.doctor_probe import Probe
+from server.wire.config import Config
+
+_TIME_ERROR = 5
+"""What adjtimex(2) returns where nobody keeps the clock."""
+_TIMEX_BYTES = 512
+"""More than struct timex has."""
+_FAR_S = 1.0
+_ANSWER_S = 2.0
+_SERVICE_CORES = 0.3
+"""The best view with a few cameras and viewers, and the pulse server: docs/scaling.md has more of them."""
+_FULL = 0.8
+"""Share of the cores above which a machine has nothing left for a busy scene."""
+_PROCESS_MB = 250
+"""A process without its pictures: its libraries, and what a tracker holds."""
+
+
+async def clock_findings(config: Config) -> list[Finding]:
+    """Say whether somebody keeps this machine's clock, and how far it is from the pulse server's."""
+    found = [_kept()]
+    offset = await _offset(config.sync.host, config.sync.port)
+    if offset is None:
+        found.append(ok("pulse server", "is not running: its clock cannot be compared"))
+    elif abs(offset) > _FAR_S:
+        text = f"its clock is {offset:+.1f} s off this machine's"
+        found.append(
+            warning("pulse server", text, "frames do not mind; logs and times of the past do: use NTP")
+        )
+    else:
+        found.append(ok("pulse server", f"its clock is {1000 * offset:+.0f} ms off this machine's"))
+    return found
+
+
+def machine_findings(config: Config, probes: Mapping[str, Probe]) -> list[Finding]:
+    """Compare what these cameras take with what this machine has, as if all of them ran here."""
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    untried = [camera for camera, it in probes.items() if it.problem]
+    takes = sum(it.cores for it in probes.values()) + _SERVICE_CORES
+    who = "all cameras" if not untried else f"without {', '.join(untried)}, the cameras"
+    text = f"{who} and the best view take about {takes:.1f} of {cores} cores"
+    found = [
+        ok("processor", text)
+        if takes <= _FULL * cores
+        else warning(
+            "processor", text, "lower site.fps or detect.work_width, or put cameras on other machines"
+        )
+    ]
+    free = available_mb()
+    if free is not None:
+        site = config.site
+        pictures = 3 * site.width * site.height * config.track.backlog_s * site.fps / 1e6
+        needs = len(config.cameras) * (_PROCESS_MB + pictures) + 2 * _PROCESS_MB
+        text = f"takes up to {needs:.0f} MB while it is busy; {free:.0f} MB are free"
+        found.append(
+            ok("memory", text)
+            if needs <= free
+            else warning("memory", text, "a lower track.backlog_s, fewer cameras, or more memory")
+        )
+    return found
+
+
+def available_mb() -> float | None:
+    """Give the memory that programs may still have, in megabytes; None where the system does not say."""
+    try:
+        lines = Path("/proc/meminfo").read_text(encoding="ascii").splitlines()
+    except OSError:
+        return None
+    kilobytes = next((it.split()[1] for it in lines if it.startswith("MemAvailable:")), None)
+    return None if kilobytes is None else int(kilobytes) * 1024 / 1e6
+
+
+def _kept() -> Finding:
+    try:
+        state = ctypes.CDLL(None).adjtimex(ctypes.create_string_buffer(_TIMEX_BYTES))
+    except (OSError, AttributeError):
+        state = -1
+    if state < 0:
+        return ok("clock", "the system does not say whether it is kept by NTP")
+    if state == _TIME_ERROR:
+        return warning(
+            "clock", "nobody keeps it right (NTP)", "timedatectl set-ntp true, or chrony; frames do not mind"
+        )
+    return ok("clock", "is kept right (NTP)")
+
+
+async def _offset(host: str, port: int) -> float | None:
+    """Give the pulse server's clock minus ours by its greeting; None: it does not greet."""
+    try:
+        async with asyncio.timeout(_ANSWER_S):
+            asked = time.time()
+            reader, writer = await asyncio.open_connection(host, port)
+            line = await reader.readline()
+            writer.close()
+            said = parse_server_line(line.rstrip(b"\r\n"))
+    except (OSError, TimeoutError, ProtocolError, ValueError):
+        return None
+    return said.now - (asked + time.time()) / 2 if isinstance(said, Greeting) else None

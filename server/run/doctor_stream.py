@@ -1,0 +1,67 @@
+"""What a network camera or a device really sends: size, rate, and whether it can be decoded."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import av
+from av.video.frame import VideoFrame
+
+from server.camera.sources.opening import Opened, open_video
+
+_LEAST = 5
+"""Pictures without which no rate is told."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sent:
+    """What came.
+
+    Attributes:
+        size: width and height in pixels.
+        fps: pictures a second, by their own times where they have some; None: too few came.
+        pictures: how many could be decoded.
+        damaged: how many packets could not.
+        cpu_s: processor seconds for decoding one picture.
+    """
+
+    size: tuple[int, int]
+    fps: float | None
+    pictures: int
+    damaged: int
+    cpu_s: float
+
+
+def watch(url: str, options: Mapping[str, str], seconds: float, open_s: float) -> Sent:
+    """Decode what comes for so many seconds.
+
+    Raises:
+        UserError: it cannot be opened.
+    """
+    opened = open_video(url, options, (open_s, open_s))
+    try:
+        return _watched(opened, time.monotonic() + seconds)
+    finally:
+        opened.container.close()
+
+
+def _watched(opened: Opened, until: float) -> Sent:
+    times: list[float] = []
+    damaged, began = 0, time.thread_time()
+    try:
+        for packet in opened.container.demux(opened.stream):
+            try:
+                pictures = [it for it in packet.decode() if isinstance(it, VideoFrame)]
+            except av.error.InvalidDataError:
+                damaged, pictures = damaged + 1, []
+            times += [time.monotonic() if it.time is None else it.time for it in pictures]
+            if time.monotonic() >= until:
+                break
+    except (av.error.FFmpegError, OSError):
+        damaged += 1  # it stopped sending
+    spent = time.thread_time() - began
+    span = times[-1] - times[0] if times else 0.0
+    fps = (len(times) - 1) / span if len(times) >= _LEAST and span > 0 else None
+    return Sent(opened.size, fps, len(times), damaged, spent / max(1, len(times)))

@@ -1,0 +1,312 @@
+"""`myview doctor` says of a configuration what will not work, and what to do."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import socket
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pytest
+import yaml
+from cameras_by_hand import FPS, HEIGHT, WIDTH, encoded
+from command_line import Run
+from halls import Hall
+from rtsp_by_hand import RtspCamera
+from videos_by_hand import write_video
+
+from camsync import PulseServer
+from server.run.doctor_cameras import camera_findings, probe_all
+from server.run.doctor_certificate import certificate_finding
+from server.run.doctor_disk import disk_findings, needed_mb
+from server.run.doctor_files import file_findings
+from server.run.doctor_findings import Finding, Level
+from server.run.doctor_machine import clock_findings, machine_findings
+from server.run.doctor_ports import port_findings
+from server.run.doctor_probe import Probe
+from server.run.doctor_stream import Sent
+from server.wire.config import Config
+from server.wire.loading import load_config
+
+SIZE = {"width": WIDTH, "height": HEIGHT}
+
+
+def free() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def site(folder: Path, **changes: Any) -> Path:
+    content = {
+        "site": {"name": "hall", **SIZE},
+        "cameras": [{"id": "c0", "source": "c0.mp4"}],
+        **{section: {"port": free()} for section in ("sync", "http")},
+        "zenoh": dict.fromkeys(("connect", "listen"), f"tcp/127.0.0.1:{free()}"),
+        **changes,
+    }
+    path = folder / "site.yaml"
+    path.write_text(yaml.safe_dump(content))
+    return path
+
+
+def config(folder: Path, **changes: Any) -> Config:
+    return load_config(site(folder, **changes))
+
+
+class Said(NamedTuple):
+    level: Level
+    text: str
+
+
+def of(findings: list[Finding], check: str) -> list[Said]:
+    return [Said(it.level, it.text) for it in findings if it.check == check]
+
+
+def only(findings: list[Finding], check: str) -> Said:
+    (said,) = of(findings, check)
+    return said
+
+
+def test_a_site_that_is_well_is_said_to_be_so_and_nothing_is_left_behind(myview: Run, tmp_path: Path) -> None:
+    write_video(tmp_path / "c0.mp4", 12)
+    path = site(tmp_path, record={"folder": "kept"})
+    before = sorted(tmp_path.iterdir())
+    ended = myview("doctor", path, "--json", "--seconds", 20)
+    said = json.loads(ended.out)
+    assert (ended.code, ended.err, said["well"]) == (0, "", True)
+    (camera,) = [it for it in said["findings"] if it["check"] == "camera c0"]
+    assert camera["level"] == "ok"
+    assert camera["text"].startswith("64x48 pixels, ")
+    assert {it["check"] for it in said["findings"]} >= {
+        "configuration", "http.port", "sync.port", "zenoh.listen", "clock", "disk", "processor", "memory"
+    }  # fmt: skip
+    assert sorted(tmp_path.iterdir()) == before
+
+
+def test_a_missing_camera_is_one_line_with_what_to_do_and_an_exit_code(myview: Run, tmp_path: Path) -> None:
+    ended = myview("doctor", site(tmp_path))
+    assert (ended.code, ended.err) == (1, "")
+    (line,) = [it for it in ended.out.splitlines() if "camera c0" in it]
+    assert line.startswith("bad ")
+    assert "c0.mp4: no such file or folder" in line
+    assert "→ try its source in ffplay" in line
+    assert ended.out.splitlines()[-1].endswith("1 bad")
+
+
+def test_a_wrong_configuration_is_all_that_is_said(myview: Run, tmp_path: Path) -> None:
+    ended = myview("doctor", site(tmp_path, htp={"port": 1}), "--json")
+    said = json.loads(ended.out)
+    assert (ended.code, said["well"]) == (1, False)
+    (finding,) = said["findings"]
+    assert (finding["check"], finding["level"]) == ("configuration", "bad")
+    assert "did you mean 'http'?" in finding["text"]
+
+
+@pytest.fixture
+def taken() -> Iterator[int]:
+    """Give a port that somebody listens on who never answers."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        yield int(server.getsockname()[1])
+
+
+async def test_a_port_that_something_else_has_is_bad(tmp_path: Path, taken: int) -> None:
+    found, runs = await port_findings(config(tmp_path, sync={"port": taken}))
+    assert not runs
+    assert only(found, "sync.port") == (Level.BAD, f"127.0.0.1:{taken} is taken by something else")
+    assert {only(found, it).level for it in ("http.port", "zenoh.listen")} == {Level.OK}
+
+
+async def test_an_address_of_another_machine_cannot_be_listened_on(tmp_path: Path) -> None:
+    found, _ = await port_findings(config(tmp_path, sync={"bind": "192.0.2.7", "port": 7}))
+    assert only(found, "sync.port").level is Level.BAD
+    assert "192.0.2.7:7" in only(found, "sync.port").text
+
+
+async def test_ports_of_the_very_site_are_no_reason_to_worry(hall: Hall, tmp_path: Path, taken: int) -> None:
+    cameras = [{"id": it, "source": "scene:room"} for it in hall.service.config.camera_ids]
+    changes: Any = {
+        "http": {"port": hall.port},
+        "cameras": cameras,
+        "zenoh": dict.fromkeys(("connect", "listen"), f"tcp/127.0.0.1:{taken}"),
+    }
+    found, runs = await port_findings(config(tmp_path, **changes))
+    assert runs
+    assert only(found, "http.port").text.endswith("by this very site, which runs")
+    assert only(found, "zenoh.listen").level is Level.OK
+    found, runs = await port_findings(config(tmp_path, **changes, site={"name": "another", **SIZE}))
+    assert (runs, only(found, "http.port").level) == (False, Level.BAD)
+    assert only(found, "zenoh.listen").level is Level.BAD
+
+
+async def test_the_pulse_servers_clock_is_compared_where_it_runs(tmp_path: Path) -> None:
+    there = config(tmp_path)
+    assert "is not running" in only(await clock_findings(there), "pulse server").text
+    async with PulseServer(FPS, port=there.sync.port):
+        found = only(await clock_findings(there), "pulse server")
+    assert found.level is Level.OK
+    assert "ms off this machine's" in found.text
+
+
+def test_a_network_camera_is_measured_against_the_site(tmp_path: Path) -> None:
+    units = encoded(0, 40)
+    camera = RtspCamera([units[at : at + 5] for at in range(0, 40, 5)], 12.5)
+    cameras = [{"id": "door", "source": camera.url, "options": {"rtsp_transport": "tcp"}}]
+    site_of = config(tmp_path, cameras=cameras, site={"name": "hall", "width": 128, "height": 96})
+    try:
+        camera.let = 1000
+        found = camera_findings(site_of, probe_all(site_of, 4.0), runs=False)
+    finally:
+        camera.close()
+    first, *doubts = of(found, "camera door")
+    assert first.level is Level.OK, first
+    assert first.text.startswith("64x48 pixels, ")
+    assert any("are smaller than the site's (128x96)" in it.text for it in doubts)
+    assert all(it.level is Level.WARNING for it in doubts)
+
+
+def test_cameras_are_tried_at_once_and_a_dead_one_holds_nobody_up(tmp_path: Path, taken: int) -> None:
+    write_video(tmp_path / "c0.mp4", 12)
+    silent = {"id": "gate", "source": f"rtsp://127.0.0.1:{taken}/live"}
+    both = config(tmp_path, cameras=[silent, {"id": "c0", "source": "c0.mp4"}])
+    probes = probe_all(both, 1.5)
+    assert probes["gate"].problem
+    found = camera_findings(both, probes, runs=False)
+    assert only(found, "camera gate").level is Level.BAD
+    assert only(camera_findings(both, probes, runs=True), "camera gate").level is Level.WARNING
+
+
+@pytest.mark.parametrize(
+    ("found", "words"),
+    [
+        (Probe(size=(640, 360), sent=Sent((640, 360), 12.5, 25, 0, 0.0)), "it sends 12.5 pictures a second"),
+        (Probe(size=(640, 360), sent=Sent((640, 360), 25.0, 25, 3, 0.0)), "3 packets could not be decoded"),
+        (Probe(size=(640, 360), why_encoded="it has B pictures"), "is encoded anew: it has B pictures"),
+        (Probe(size=(320, 180)), "are smaller than the site's"),
+    ],
+)
+def test_a_camera_that_does_not_fit_is_doubted(tmp_path: Path, found: Probe, words: str) -> None:
+    small = config(tmp_path, site={"width": 640, "height": 360})
+    assert len(of(camera_findings(small, {"c0": Probe(size=(640, 360))}, runs=False), "camera c0")) == 1
+    fine, doubt = of(camera_findings(small, {"c0": found}, runs=False), "camera c0")
+    assert (fine.level, doubt.level) == (Level.OK, Level.WARNING)
+    assert words in doubt.text
+
+
+def test_what_a_recording_takes_is_held_against_the_disk(tmp_path: Path) -> None:
+    record: dict[str, Any] = {"folder": "kept", "keep_s": 3600.0, "most_mb": 1e6}
+    probes = {"c0": Probe(size=(WIDTH, HEIGHT), kbps=1000.0)}
+    small = config(tmp_path, record=record)
+    assert needed_mb(small, probes) == pytest.approx((1000 + 8 * 100 * 25 / 1000) * 3600 / 8000)
+    assert only(disk_findings(small, probes), "disk").level is Level.OK
+    assert not (tmp_path / "kept").exists()
+    huge = {"c0": Probe(size=(WIDTH, HEIGHT), kbps=1e12)}
+    assert (
+        only(disk_findings(config(tmp_path, record={**record, "most_mb": 1e12}), huge), "disk").level
+        is Level.BAD
+    )
+    capped = config(tmp_path, record=record, encode={"max_kbps": 500})
+    assert needed_mb(capped, huge) == pytest.approx((500 + 20) * 3600 / 8000)
+    less = disk_findings(config(tmp_path, record={**record, "most_mb": 46.0}), probes)
+    assert "about 0.1 hours are kept" in only(less, "record.most_mb").text
+
+
+def test_a_folder_that_cannot_be_written_is_bad(tmp_path: Path) -> None:
+    (tmp_path / "kept").write_text("a file")
+    assert (
+        only(disk_findings(config(tmp_path, record={"folder": "kept"}), {}), "record.folder").level
+        is Level.BAD
+    )
+
+
+def test_files_that_others_can_read_or_write_are_told_of(tmp_path: Path) -> None:
+    tokens, users = tmp_path / "tokens.yaml", tmp_path / "users"
+    tokens.write_text("tokens: []\n")
+    users.write_text("bestview:secret\n")
+    tokens.chmod(0o666)
+    users.chmod(0o644)
+    changes: Any = {"access": {"tokens": "tokens.yaml"}}
+    bus = {**dict.fromkeys(("connect", "listen"), "tcp/127.0.0.1:7447"), "users": "users"}
+    found = file_findings(config(tmp_path, **changes, zenoh=bus))
+    words = " ".join(it.text for it in found if it.level is Level.WARNING)
+    assert "lets nobody in" in words
+    assert f"others may write {tokens}" in words
+    assert f"others may read {users}" in words
+    assert "no line for c0" in words
+    tokens.write_text("tokens: nonsense\n")
+    assert of(file_findings(config(tmp_path, **changes)), "access.tokens")[0].level is Level.BAD
+
+
+def test_a_site_that_is_open_by_accident_is_bad(tmp_path: Path) -> None:
+    found = only(file_findings(config(tmp_path, http={"host": "0.0.0.0"})), "access")  # noqa: S104
+    assert found.level is Level.BAD
+    assert "http.host" in found.text
+
+
+def test_a_camera_without_a_place_among_those_that_have_one_is_told_of(tmp_path: Path) -> None:
+    ground = [[1.0, 0, 0], [0, 1, 0], [0, 0, 1]]
+    cameras = [{"id": "c0", "source": "x", "ground": ground}, {"id": "c1", "source": "y"}]
+    said = only(file_findings(config(tmp_path, cameras=cameras)), "ground")
+    assert said == (Level.WARNING, "c1: not in the file: known by looks alone")
+
+
+def test_a_machine_that_is_too_small_is_told_of(tmp_path: Path) -> None:
+    small = config(tmp_path)
+    fine, busy = ({"c0": Probe(size=(WIDTH, HEIGHT), cores=cores)} for cores in (0.0, 1000.0))
+    assert only(machine_findings(small, fine), "processor").level is Level.OK
+    assert only(machine_findings(small, busy), "processor").level is Level.WARNING
+    large = config(tmp_path, track={"backlog_s": 1e7})
+    assert only(machine_findings(large, fine), "memory").level is Level.WARNING
+
+
+def expired(folder: Path) -> tuple[Path, Path]:
+    """Make a certificate whose time is over, which takes an authority: that may say when it begins."""
+    certificate, key, asked, settings = (folder / it for it in ("over.pem", "over.key", "asked", "settings"))
+    (folder / "known").touch()
+    (folder / "serial").write_text("01\n")
+    settings.write_text(
+        "[ca]\ndefault_ca = here\n[here]\ndefault_md = sha256\npolicy = any\n"
+        f"database = {folder}/known\nserial = {folder}/serial\nnew_certs_dir = {folder}\n"
+        "[any]\ncommonName = supplied\n"
+    )
+    made = ["openssl", "req", "-new", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes"]
+    made += ["-subj", "/CN=hall", "-out", str(asked), "-keyout", str(key)]
+    signed = ["openssl", "ca", "-batch", "-notext", "-config", str(settings), "-selfsign"]
+    signed += ["-keyfile", str(key), "-in", str(asked), "-out", str(certificate)]
+    signed += ["-startdate", "20200101000000Z", "-enddate", "20200201000000Z"]
+    for command in (made, signed):
+        subprocess.run(command, check=True, capture_output=True)
+    return certificate, key
+
+
+@pytest.mark.skipif(shutil.which("openssl") is None, reason="needs openssl, to make certificates")
+def test_a_certificate_is_good_for_as_long_as_it_says(tmp_path: Path) -> None:
+    def made(name: str, *until: str) -> tuple[Path, Path]:
+        certificate, key = tmp_path / f"{name}.pem", tmp_path / f"{name}.key"
+        request = [
+            "openssl",
+            "req",
+            "-x509",
+            "-newkey",
+            "ec",
+            "-pkeyopt",
+            "ec_paramgen_curve:P-256",
+            "-nodes",
+        ]
+        request += [*until, "-subj", "/CN=hall", "-out", str(certificate), "-keyout", str(key)]
+        subprocess.run(request, check=True, capture_output=True)
+        return certificate, key
+
+    (certificate, key), (other, _) = made("long", "-days", "100"), made("short", "-days", "3")
+    good = certificate_finding("http.tls", certificate, key)
+    assert (good.level, good.text) == (Level.OK, f"{certificate} is good for 100 days")
+    assert certificate_finding("http.tls", *made("soon", "-days", "3")).level is Level.WARNING
+    over = certificate_finding("http.tls", *expired(tmp_path))
+    assert (over.level, over.text) == (Level.BAD, f"{tmp_path / 'over.pem'}: certificate has expired")
+    wrong = certificate_finding("http.tls", other, key)
+    assert wrong.level is Level.BAD
+    assert "no certificate and its key" in wrong.text
+    assert certificate_finding("http.tls", tmp_path / "none.pem", key).level is Level.BAD
