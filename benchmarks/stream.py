@@ -28,17 +28,20 @@ from benchmarks.stream_peers import ffmpeg_switching, hls_here, hls_of_nginx
 from benchmarks.stream_right import judge
 from benchmarks.stream_site import running, viewers
 from benchmarks.stream_splice import encode_again, splice
+from benchmarks.stream_stalled import Beside, beside_stalled, describe_stalled
 from benchmarks.stream_tables import Found, describe, plot
 from benchmarks.surroundings import parser
 from server.camera.encode import AccessUnit
 
-PARTS = ("splice", "objects", "viewers", "first", "right", "drift", "hls")
+PARTS = ("splice", "objects", "viewers", "first", "right", "drift", "hls", "stalled")
 _OBJECTS = 50
 _FILM = 50
 """Frames of each camera; they go round."""
 _HOUR = 3600
 _COUNTS = (250, 500, 1000, 2000, 3000, 4000)
 _QUICK_COUNTS = (100, 250)
+_ALL, _QUICK_ALL = 1000, 100
+"""Viewers of whom a tenth stall."""
 _FREE = 200
 """Open files that a process needs besides its viewers."""
 
@@ -62,6 +65,16 @@ def carry_out(options: argparse.Namespace, films: Films, folder: Path) -> Found:
     if {"objects", "viewers", "first"} & set(parts):
         _watch(options, parts, films, folder, found)
     return found
+
+
+def stall(options: argparse.Namespace, films: Films, folder: Path) -> Beside:
+    """Let a tenth of all viewers stall."""
+    _open_files()
+    rounds = 2 if options.quick else options.rounds
+    with running(films, folder / "stalled") as site, viewers(site.http) as crowd:
+        numbers = site.objects(_OBJECTS)[:_OBJECTS]
+        count = _QUICK_ALL if options.quick else _ALL
+        return beside_stalled(site, crowd, numbers, count, options.seconds, rounds)
 
 
 def _watch(
@@ -106,7 +119,10 @@ def measure(options: argparse.Namespace) -> None:
     )
     with tempfile.TemporaryDirectory(prefix="myview-stream-") as temporary:
         found = carry_out(options, films, Path(temporary))
+        stalled = stall(options, films, Path(temporary)) if "stalled" in (options.part or PARTS) else None
     describe(report, found)
+    if stalled is not None:
+        describe_stalled(report, stalled)
     if found.steps:
         plot(found, options.out / "stream.png")
     report.save(options.out / "stream.txt")
@@ -119,6 +135,7 @@ def main() -> None:
     options.add_argument("--quick", action="store_true", help="less of everything")
     options.add_argument("--viewers", type=int, action="append", help="so many at once; may be repeated")
     options.add_argument("--seconds", type=float, default=8.0, help="of each measurement of a running site")
+    options.add_argument("--rounds", type=int, default=8, help="with and without stalled viewers")
     measure(options.parse_args())
 
 

@@ -24,6 +24,7 @@ from benchmarks.stream_right import Right
 from benchmarks.stream_service import Given, read
 from benchmarks.stream_site import running, viewers
 from benchmarks.stream_splice import encode_again, splice
+from benchmarks.stream_stalled import Beside, Turn, beside_stalled, stalling
 from benchmarks.stream_tables import Found, describe, per_core, plot
 from server.camera.encode import AccessUnit
 from server.view.fmp4 import Sample, fragment, ticks
@@ -173,3 +174,30 @@ def test_a_real_site_is_watched(films: Films, tmp_path: Path) -> None:
         late = first_pictures(site, numbers, 5)
         assert (late > 0).all()
         assert (late < 5000).all()
+
+
+def test_stalled_viewers_are_judged_by_the_medians_of_the_rounds() -> None:
+    alone = [Turn(10.0, p99, 1.0) for p99 in (50.0, 400.0, 52.0)]
+    beside = [Turn(10.0, p99, 1.0) for p99 in (54.0, 56.0, 900.0)]
+    assert Beside(900, 100, alone, beside).ratio == pytest.approx(56.0 / 52.0)
+
+
+def test_who_stalls_asks_and_never_reads() -> None:
+    with create_server(("127.0.0.1", 0)) as server, stalling(server.getsockname()[1], ["/a", "/b"]) as there:
+        connection, _ = server.accept()
+        with connection:
+            assert connection.recv(100).startswith(b"GET /a ")
+            connection.settimeout(0.2)
+            with pytest.raises(TimeoutError):  # soon nothing more fits anywhere
+                connection.sendall(bytes(64_000_000))
+        assert len(there) == 2
+
+
+@pytest.mark.slow
+def test_a_tenth_of_a_real_site_stalls_and_the_others_are_sent_everything(
+    films: Films, tmp_path: Path
+) -> None:
+    with running(films, tmp_path / "site") as site, viewers(site.http) as crowd:
+        found = beside_stalled(site, crowd, site.objects(20)[:20], 50, 4.0, 2)
+        assert (found.good, found.stalled) == (45, 5)
+        assert all(it.arrived > 0.9 for it in found.beside)

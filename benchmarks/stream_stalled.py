@@ -1,0 +1,130 @@
+"""Viewers who never read: whether the others notice, measured by turns with and without them."""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+import statistics
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.report import Report
+from benchmarks.stream_cameras import ENCODE, SITE
+from benchmarks.stream_load import send_delays
+from benchmarks.stream_site import StreamSite, Viewers
+from server.view.fmp4 import TIMESCALE
+
+STALLED_SHARE = 0.1
+"""Of all viewers."""
+_FILL_S = 4.0
+"""Until nothing more fits into the system's buffers: from then on the server must lose what waits."""
+_LEAVE_S = 1.0
+_BUFFER = 4096
+"""Bytes that the system keeps for a stalled viewer, about."""
+
+
+@dataclass(frozen=True, slots=True)
+class Turn:
+    """One turn: the others' delays, and how much of what was sent has come to them.
+
+    Attributes:
+        p50: milliseconds from when a GOP was given to the streams to when its end was read.
+        p99: likewise.
+        arrived: share of the GOPs that anybody was sent.
+    """
+
+    p50: float
+    p99: float
+    arrived: float
+
+
+@dataclass(frozen=True, slots=True)
+class Beside:
+    """The others alone, and beside those who stall; round by round.
+
+    Attributes:
+        good: how many read.
+        stalled: how many do not.
+    """
+
+    good: int
+    stalled: int
+    alone: list[Turn]
+    beside: list[Turn]
+
+    @property
+    def ratio(self) -> float:
+        """The p99 beside stalled viewers against that alone: the medians of the rounds."""
+        alone, beside = (statistics.median(it.p99 for it in turns) for turns in (self.alone, self.beside))
+        return beside / alone
+
+
+def beside_stalled(
+    site: StreamSite, crowd: Viewers, numbers: Sequence[int], viewers: int, seconds: float, rounds: int
+) -> Beside:
+    """Let most read and, every other turn, a tenth besides never; the order of the turns changes, too."""
+    stalled = round(STALLED_SHARE * viewers)
+    good = viewers - stalled
+    paths = [f"/objects/{numbers[place % len(numbers)]}/best.mp4" for place in range(good)]
+    crowd.watch(paths, _FILL_S)
+    alone, beside = [], []
+    for number in range(rounds):
+        if number % 2 == 0:
+            alone.append(_turn(site, crowd, good, seconds))
+        with stalling(site.http, paths[:stalled]):
+            crowd.read(_FILL_S)
+            beside.append(_turn(site, crowd, good, seconds))
+        crowd.read(_LEAVE_S)
+        if number % 2:
+            alone.append(_turn(site, crowd, good, seconds))
+    crowd.watch([])
+    return Beside(good, stalled, alone, beside)
+
+
+def _turn(site: StreamSite, crowd: Viewers, good: int, seconds: float) -> Turn:
+    heard = crowd.read(seconds)
+    delays: NDArray[np.float64] = send_delays(heard, {first: it.began for first, it in site.sent.items()})
+    p50, p99 = np.percentile(delays, [50, 99]).tolist()
+    ticks, counts = np.unique(heard.ticks, return_counts=True)
+    gops = np.rint(ticks * SITE.fps / TIMESCALE).astype(int) % ENCODE.gop == ENCODE.gop - 1
+    whole = counts[gops][1:-1]  # those at both ends had come, or have yet to come, to some
+    return Turn(p50, p99, float(whole.mean()) / good)
+
+
+@contextlib.contextmanager
+def stalling(port: int, paths: Sequence[str]) -> Iterator[list[socket.socket]]:
+    """Have viewers who ask for a stream each, and read nothing of it."""
+    with contextlib.ExitStack() as stack:
+        found = []
+        for path in paths:
+            viewer = stack.enter_context(socket.socket())
+            viewer.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BUFFER)
+            viewer.connect(("127.0.0.1", port))
+            viewer.sendall(f"GET {path} HTTP/1.1\r\nHost: here\r\n\r\n".encode())
+            found.append(viewer)
+        yield found
+
+
+def describe_stalled(report: Report, found: Beside) -> None:
+    """Print the rounds."""
+    rows = [
+        [
+            str(number),
+            *(f"{it:.1f}" for it in (alone.p50, beside.p50, alone.p99, beside.p99)),
+            *_rest(alone, beside),
+        ]
+        for number, (alone, beside) in enumerate(zip(found.alone, found.beside, strict=True), 1)
+    ]
+    report.table(
+        f"{found.good} viewers alone, and beside {found.stalled} who never read, by turns: ms until a GOP is in",
+        ["round", "p50 alone", "beside", "p99 alone", "beside", "ratio", "arrived alone", "beside"],
+        rows,
+    )
+    report.say(f"p99 beside stalled viewers, against alone: {found.ratio:.2f} (medians of the rounds)")
+
+
+def _rest(alone: Turn, beside: Turn) -> list[str]:
+    return [f"{beside.p99 / alone.p99:.2f}", f"{alone.arrived:.3f}", f"{beside.arrived:.3f}"]
