@@ -50,13 +50,17 @@ def end_with_parent() -> None:
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
 
 
-def run_process(main: Callable[[], Coroutine[Any, Any, None]], let_go_s: float = _LET_GO_S) -> None:
-    """Run a process's coroutine until it is over, or SIGTERM or SIGINT comes; it looks after SIGHUP itself.
+def run_process(
+    main: Callable[[], Coroutine[Any, Any, None]], let_go_s: float = _LET_GO_S, *, hang_up: bool = False
+) -> None:
+    """Run a process's coroutine until it is over, or SIGTERM or SIGINT comes.
+
+    ``hang_up``: SIGHUP ends it, too; else it looks after that itself.
 
     Who is told to end has so many seconds to let go of everything. Then the process ends all the same: a
     thread may be held up by a camera that says nothing, and whoever stops a site would wait for that, too.
     """
-    asyncio.run(run_until_told(main, lambda: _end_after(let_go_s), hang_up=False))
+    asyncio.run(run_until_told(main, lambda: _end_after(let_go_s), hang_up=hang_up))
 
 
 def _end_after(seconds: float) -> None:

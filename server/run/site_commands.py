@@ -5,14 +5,13 @@ Each imports what it runs only when it runs, so that a process loads no more tha
 
 from __future__ import annotations
 
-import asyncio
 import os
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from server.run.ending import run_process, run_until_told
+from server.run.ending import run_process
 from server.run.logs import log_to_stderr
 from server.wire.errors import UserError
 from server.wire.output import check_new_folder
@@ -93,4 +92,6 @@ def demo(
     from server.run.demo import run_demo
 
     log_to_stderr("demo")
-    asyncio.run(run_until_told(lambda: run_demo(port, seconds, open_browser=not no_browser)))
+    run_process(
+        lambda: run_demo(port, seconds, open_browser=not no_browser), let_go_s=_UP_LETS_GO_S, hang_up=True
+    )
