@@ -12,6 +12,7 @@ from tracking.births import Birth, find_births
 from tracking.boxes import Floats, iou
 from tracking.bridges import bridged
 from tracking.detections import Detections
+from tracking.detectors.base import Image
 from tracking.duplicates import duplicates
 from tracking.glimpses import with_glimpses
 from tracking.network import CostSettings, build_network
@@ -49,7 +50,12 @@ class OnlineTracker:
         self._first: int | None = None
         self._last: int | None = None
 
-    def push(self, frame: int, detections: Detections) -> WindowResult | None:
+    def push(
+        self,
+        frame: int,
+        detections: Detections,
+        image: Image | None = None,  # noqa: ARG002 — other trackers look at it
+    ) -> WindowResult | None:
         """Take the detections of a frame; give a result where one or more windows end.
 
         A frame number that is left out is a frame without detections. After a gap longer than

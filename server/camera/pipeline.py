@@ -17,7 +17,8 @@ from server.camera.witness import Heard, Witness
 from server.wire.config import Config
 from server.wire.fit import Fit
 from server.wire.messages import CameraTracks, Found
-from tracking import Detections, OnlineTracker, solver_named
+from tracking import Detections, solver_named
+from tracking.yardsticks import tracker_named
 
 _BY_ITSELF = Heard()
 
@@ -75,10 +76,10 @@ class CameraPipeline:
         check_floor(camera, self.source.size)
         self._encoder = Passing(own.source) if own.source else Encoder(site, config.encode)
         self._detector = ready_detector(config, camera, self.source, self._fit)
-        window = config.track.window
-        tracker = OnlineTracker(window, config.track.costs, solver_named(config.track.solver))
-        self._tracker = Stepping(tracker, self._detector.bins, window.stride)
-        self._reporter = Reporter(camera_id, boot, self.source.size, window.stride)
+        track = config.track
+        tracker = tracker_named(track.tracker, track.window, track.costs, lambda: solver_named(track.solver))
+        self._tracker = Stepping(tracker, self._detector.bins, track.window.stride)
+        self._reporter = Reporter(camera_id, boot, self.source.size, track.window.stride)
         self._sharpness = Sharpness() if config.view.quality.sharp > 0 else None
         self.witness = (
             Witness(config, camera_id, self.source.size, boot) if config.witnesses(camera_id) else None
@@ -147,7 +148,9 @@ class CameraPipeline:
             if heard.alone:
                 self._reporter.alone(pulse)
         result = (
-            self._tracker.leave_out(pulse) if searched.left_out else self._tracker.push(pulse, detections)
+            self._tracker.leave_out(pulse)
+            if searched.left_out
+            else self._tracker.push(pulse, detections, searched.image)
         )
         return None if result is None else self._measured(self._reporter.regular(result), searched.image)
 

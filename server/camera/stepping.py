@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from tracking import Detections, OnlineTracker, WindowResult, between, joined
+from tracking import Detections, WindowResult, between, joined
+from tracking.detectors import Image
+from tracking.yardsticks import Tracker
 
 
 class Stepping:
@@ -12,7 +14,7 @@ class Stepping:
     its window: no window is late for it.
     """
 
-    def __init__(self, tracker: OnlineTracker, bins: int, stride: int) -> None:
+    def __init__(self, tracker: Tracker, bins: int, stride: int) -> None:
         self._tracker, self._nothing, self._stride = tracker, Detections.empty(bins), stride
         self._held: list[int] = []
         self._before: tuple[int, Detections] | None = None
@@ -24,9 +26,9 @@ class Stepping:
         # Its window must not wait for a frame that may never come.
         return self._release(None) if (pulse + 1) % self._stride == 0 else None
 
-    def push(self, pulse: int, detections: Detections) -> WindowResult | None:
+    def push(self, pulse: int, detections: Detections, image: Image | None = None) -> WindowResult | None:
         """Take in what was found in a frame."""
-        results = [self._release((pulse, detections)), self._tracker.push(pulse, detections)]
+        results = [self._release((pulse, detections)), self._tracker.push(pulse, detections, image)]
         self._before = pulse, detections
         return joined([it for it in results if it is not None])
 

@@ -57,6 +57,9 @@ def track(
     out: Annotated[Path, typer.Option("--out", help="The file to write: MOTChallenge text.")],
     video: Annotated[Path | None, typer.Argument(metavar="[VIDEO]", help="Not needed with --det.")] = None,
     det: Annotated[Path | None, typer.Option("--det", help="Detections, MOTChallenge text.")] = None,
+    tracker: Annotated[
+        str | None, typer.Option(help="Which tracker; lp is MyView's, the network program.")
+    ] = None,
     solver: Annotated[str | None, typer.Option(help="Which solver of the network program.")] = None,
     config: Annotated[Path | None, typer.Option("--config", help="Settings of detector and tracker.")] = None,
     template: Annotated[
@@ -66,6 +69,8 @@ def track(
 ) -> None:
     """Track everybody in one video, or in its detections alone, or what is shown with --template."""
     if template:
+        if tracker is not None:
+            raise UserError("--template: has a tracker of its own; leave --tracker out")
         _track_templates(out, video, det, solver, config, template)
         return
     from server.run.progress import bar, total_frames
@@ -80,6 +85,7 @@ def track(
             config,
             solver,
             lambda done: progress.update(task, completed=done),
+            tracker,
         )
     typer.echo(f"{out}: {count} people")
 

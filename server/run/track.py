@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import count
 from pathlib import Path
 
@@ -17,11 +17,21 @@ from server.wire.errors import UserError
 from server.wire.fit import Fit
 from server.wire.loading import build_config, read_content
 from server.wire.output import whole_file
-from tracking import Detections, OnlineTracker, Solver, WindowResult, solver_named, solver_names
+from tracking import Detections, Solver, WindowResult, solver_named, solver_names
 from tracking.detectors import MotFileDetector
 from tracking.motchallenge import MotRow, write_rows
+from tracking.yardsticks import needs_pictures, tracker_named, tracker_names
 
 _NO_PICTURE = np.empty((0, 0, 3), dtype=np.uint8)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Frame:
+    """A frame of a recording, counted from 0; there is no picture where only detections are known."""
+
+    number: int
+    detections: Detections
+    image: Image | None
 
 
 def track_one(
@@ -31,26 +41,43 @@ def track_one(
     config: Path | None,
     solver: str | None,
     progress: Callable[[int], None],
+    tracker: str | None = None,
 ) -> int:
     """Track and write; give the number of people.
 
     Raises:
-        UserError: there is nothing to track in, or something cannot be read or written.
+        UserError: there is nothing to track in, something cannot be read or written, or no solver or
+            tracker has that name.
     """
     if video is None and det is None:
         raise UserError("track: name a video, or its detections with --det, or both")
     loaded = loaded_for(video, det, config)
     settings = loaded.track
-    frames = _from_detections(det) if video is None and det is not None else _from_video(loaded)
-    tracker = OnlineTracker(settings.window, settings.costs, solver_for(loaded, solver))
+    frames = _from_detections(det) if video is None and det is not None else searched(loaded)
+    name = _tracker_for(loaded, tracker, video)
+    follower = tracker_named(name, settings.window, settings.costs, lambda: solver_for(loaded, solver))
     rows: list[MotRow] = []
     with whole_file(out) as draft:
-        for number, detections in frames:
-            rows += final_rows(tracker.push(number, detections))
-            progress(number + 1)
-        rows += final_rows(tracker.flush())
+        for frame in frames:
+            rows += final_rows(follower.push(frame.number, frame.detections, frame.image))
+            progress(frame.number + 1)
+        rows += final_rows(follower.flush())
         write_rows(draft, rows)
     return len({row.id for row in rows})
+
+
+def _tracker_for(config: Config, name: str | None, video: Path | None) -> str:
+    """Give the tracker of that name, or the configuration's.
+
+    Raises:
+        UserError: there is none, or it looks at pictures and there are none.
+    """
+    if name is not None and name not in tracker_names():
+        raise UserError(f"--tracker: no tracker is called {name!r}; there are {', '.join(tracker_names())}")
+    chosen = name or config.track.tracker
+    if video is None and needs_pictures(chosen):
+        raise UserError(f"--tracker: {chosen} follows what pictures show: name a video, too")
+    return chosen
 
 
 def solver_for(config: Config, name: str | None) -> Solver:
@@ -77,8 +104,8 @@ def loaded_for(video: Path | None, det: Path | None, config: Path | None) -> Con
     return build_config({**base, "cameras": [nothing]}, where=where, folder=folder)
 
 
-def _from_video(config: Config) -> Iterator[tuple[int, Detections]]:
-    """Give the detections of every frame of the video in its own pixels."""
+def searched(config: Config) -> Iterator[Frame]:
+    """Give every frame of the video, and what is found in it, in its own pixels."""
     camera = config.cameras[0]
     source = open_source(camera, config.site)
     fit = Fit(source.size, (config.site.width, config.site.height))
@@ -86,7 +113,7 @@ def _from_video(config: Config) -> Iterator[tuple[int, Detections]]:
     for number, image in pictures(source):
         if image is not None:
             found = detector.detect(fit.image(image), number)
-            yield number, replace(found, boxes=fit.boxes_to_own(found.boxes))
+            yield Frame(number, replace(found, boxes=fit.boxes_to_own(found.boxes)), image)
     source.close()
 
 
@@ -100,7 +127,7 @@ def pictures(source: Source, first: int = 0) -> Iterator[tuple[int, Image | None
         yield number, image
 
 
-def _from_detections(path: Path) -> Iterator[tuple[int, Detections]]:
+def _from_detections(path: Path) -> Iterator[Frame]:
     try:
         detector = MotFileDetector(path)
     except OSError as error:
@@ -108,7 +135,7 @@ def _from_detections(path: Path) -> Iterator[tuple[int, Detections]]:
     except ValueError as error:
         raise UserError(f"--det: {error}") from error
     for number in range(detector.last + 1):
-        yield number, detector.detect(_NO_PICTURE, number)
+        yield Frame(number, detector.detect(_NO_PICTURE, number), None)
 
 
 def final_rows(result: WindowResult | None) -> Iterator[MotRow]:

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tracking.assignment import best_pairs
 from tracking.boxes import BOX_SIDES, Floats, iou
-from tracking.evaluation.assignment import best_pairs
 from tracking.motchallenge import MotRow
 
 Ids = NDArray[np.int64]

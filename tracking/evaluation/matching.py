@@ -14,7 +14,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from tracking.evaluation.assignment import best_pairs
+from tracking.assignment import best_pairs
 from tracking.evaluation.frames import Frame
 
 _STAY = 1000.0

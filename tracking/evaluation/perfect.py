@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from tracking.assignment import best_pairs
 from tracking.boxes import BOX_SIDES, iou
-from tracking.evaluation.assignment import best_pairs
 from tracking.evaluation.scores import DEFAULT_IOU
 from tracking.motchallenge import MotRow
 

@@ -12,6 +12,7 @@ from server.wire.ground_unit import checked_unit
 from server.wire.library import validated
 from server.wire.sections.base import Name, Polygon, Section
 from tracking import DEFAULT_SOLVER, CostSettings, WindowSettings, solver_named
+from tracking.yardsticks import DEFAULT_TRACKER, tracker_names
 
 
 class Camera(Section):
@@ -50,6 +51,8 @@ class Camera(Section):
 class Track(Section):
     """Following people in one camera: the network LP over a moving window (paper, II)."""
 
+    tracker: str = DEFAULT_TRACKER
+    """MyView's own, or one of those that it is measured beside."""
     solver: str = DEFAULT_SOLVER
     backlog_s: PositiveFloat = 2.0
     """Seconds of frames that may wait on a busy machine; a camera's older ones are left out, and said so."""
@@ -61,6 +64,13 @@ class Track(Section):
     """How a camera goes by what others find that look at the same ground."""
     witness_wait_s: NonNegativeFloat = 0.3
     """Seconds after a frame was taken until which it waits for what the others found in it."""
+
+    @field_validator("tracker")
+    @classmethod
+    def _tracker_is_known(cls, tracker: str) -> str:
+        if tracker not in tracker_names():
+            raise ValueError(f"no tracker is called {tracker!r}; there are {', '.join(tracker_names())}")
+        return tracker
 
     @field_validator("solver")
     @classmethod

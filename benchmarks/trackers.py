@@ -1,0 +1,125 @@
+"""The trackers of the survey beside the network program, on the same pictures and the same detections.
+
+    OPENBLAS_NUM_THREADS=1 python -m benchmarks.trackers --data ../shared/data --out out/bench
+
+Every camera is searched once, as `myview track` does it, and what was found is given to each tracker, with
+the pictures. All begin and end objects by the detections. `lp` and `kalman` follow them by the detections as
+well; the others by what pictures show, so that what they lose, or take a place in the background for,
+is their own. Perfect association of the same detections is the ceiling. The time is the tracker's alone.
+"""
+
+from __future__ import annotations
+
+import argparse
+import statistics
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import matplotlib as mpl
+
+from benchmarks.peer_plot import plot
+from benchmarks.report import Report
+from benchmarks.surroundings import CannotRunError, finish, parser
+from server.run.track import Frame, final_rows, loaded_for, searched
+from tracking import CostSettings, WindowSettings, solver_named
+from tracking.evaluation import HEADINGS, Scores, cells, evaluate, perfect_association
+from tracking.motchallenge import MotRow, read_rows
+from tracking.solvers import DEFAULT_SOLVER
+from tracking.yardsticks import tracker_named, tracker_names
+
+CEILING = "perfect association"
+_SHOWN = ("hota", "mota", "idf1", "recall", "precision", "switches", "tracks", "objects")
+_VIEWS = (("pets09", "view1"), ("terrace", "c0"), ("terrace", "c1"))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class View:
+    """One camera's pictures, what was found in them, and who is really there."""
+
+    name: str
+    frames: Sequence[Frame]
+    truth: Sequence[MotRow]
+
+    @property
+    def detections(self) -> list[MotRow]:
+        """All that was found, as rows of nobody."""
+        return [
+            MotRow(it.number + 1, -1, box[0], box[1], box[2] - box[0], box[3] - box[1], score)
+            for it in self.frames
+            for box, score in zip(it.detections.boxes.tolist(), it.detections.scores.tolist(), strict=True)
+        ]
+
+
+def views(data: Path, most: int | None) -> list[View]:
+    """Search the first `most` frames of every view there is.
+
+    Raises:
+        CannotRunError: there is none.
+    """
+    found = []
+    for scene, name in _VIEWS:
+        video, truth = data / scene / f"{name}.mp4", data / scene / "gt" / f"{name}.txt"
+        if video.is_file() and truth.is_file():
+            frames = [
+                it for it in searched(loaded_for(video, None, None)) if most is None or it.number < most
+            ]
+            rows = [row for row in read_rows(truth) if row.frame <= len(frames)]
+            found.append(View(f"{scene} {name}", frames, rows))
+    if not found:
+        raise CannotRunError(f"needs pets09 or terrace in {data}; --data or MYVIEW_TEST_DATA say where")
+    return found
+
+
+def follow(name: str, frames: Sequence[Frame]) -> tuple[list[MotRow], float]:
+    """Give a tracker's tracks, and the milliseconds that it took for each frame."""
+    tracker = tracker_named(name, WindowSettings(), CostSettings(), lambda: solver_named(DEFAULT_SOLVER))
+    rows, began = [], time.perf_counter()
+    for frame in frames:
+        rows += final_rows(tracker.push(frame.number, frame.detections, frame.image))
+    rows += final_rows(tracker.flush())
+    return rows, 1e3 * (time.perf_counter() - began) / len(frames)
+
+
+def measure(options: argparse.Namespace) -> None:
+    """Measure, print and save."""
+    report = Report()
+    table: dict[str, dict[str, Scores]] = {}
+    took: dict[str, list[float]] = {}
+    for view in views(options.data, options.frames):
+        found = table[view.name] = {}
+        for name in tracker_names():
+            rows, milliseconds = follow(name, view.frames)
+            found[name] = evaluate(view.truth, rows)
+            took.setdefault(name, []).append(milliseconds)
+        found[CEILING] = evaluate(view.truth, perfect_association(view.detections, view.truth))
+        report.table(
+            view.name,
+            ["", *(HEADINGS[score] for score in _SHOWN)],
+            [[name, *cells(scores, _SHOWN)] for name, scores in found.items()],
+        )
+    report.table(
+        "What following takes: milliseconds a frame, the median of the views",
+        ["", "ms"],
+        [[name, f"{statistics.median(values):.1f}"] for name, values in took.items()],
+    )
+    plot(table, CEILING, options.out / "trackers.png")
+    report.save(options.out / "trackers.txt")
+
+
+def main() -> None:
+    """Run the benchmark."""
+    mpl.use("Agg")
+    cv2.setNumThreads(1)
+    options = parser(__doc__, "trackers")
+    options.add_argument("--frames", type=int, help="of each view at most")
+    try:
+        measure(options.parse_args())
+    except CannotRunError as problem:
+        finish(problem, "trackers")
+
+
+if __name__ == "__main__":
+    main()

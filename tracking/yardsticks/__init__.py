@@ -1,0 +1,20 @@
+"""The trackers of the survey behind the interface of the network's: to measure it beside them."""
+
+from tracking.yardsticks.catalogue import (
+    DEFAULT_TRACKER,
+    Tracker,
+    needs_pictures,
+    tracker_named,
+    tracker_names,
+)
+from tracking.yardsticks.stepwise import StepwiseSettings, StepwiseTracker
+
+__all__ = [
+    "DEFAULT_TRACKER",
+    "StepwiseSettings",
+    "StepwiseTracker",
+    "Tracker",
+    "needs_pictures",
+    "tracker_named",
+    "tracker_names",
+]

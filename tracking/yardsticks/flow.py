@@ -1,0 +1,110 @@
+"""KLT: corners followed by optical flow (Lucas, Kanade 1981; Shi, Tomasi 1994; Kalal et al., ICPR 2010).
+
+The corners in a box are followed from picture to picture and back. Those that come back to where they were
+move the box by the median of their steps, and grow it by the median of how distances between them change.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from tracking.boxes import BOX_SIDES, Floats
+from tracking.detectors.base import Image, Mask, Plane
+
+_CORNERS = 40
+_QUALITY, _BETWEEN = 0.01, 3.0
+"""Of the best corner's; and pixels between two corners."""
+_WINDOW, _LEVELS = (11, 11), 3
+_RETURNS = 1.0
+"""Pixels from its place at which a corner that was followed back must end."""
+_LEAST = 4
+"""Corners that a step is told from."""
+_INSIDE = 0.15
+"""Of a box's width on either side in which its corners are the background's."""
+_GROWS = 1.1
+"""Factor by which a box may change from one picture to the next."""
+
+
+@dataclass(slots=True)
+class Flowing:
+    """Somebody who is followed."""
+
+    box: Floats
+
+
+class OpticalFlow:
+    """The median of the flow of a box's corners."""
+
+    name = "klt"
+    sees = True
+
+    def __init__(self) -> None:
+        self._before: Mask | None = None
+
+    def begin(self, image: Image, box: Floats) -> Flowing:  # noqa: ARG002 — the next picture tells
+        """Take somebody new in: their corners are looked for when the next picture comes."""
+        return Flowing(box.copy())
+
+    def move(self, image: Image | None, objects: Sequence[Flowing]) -> Floats:
+        """Follow everybody's corners: `(N, 4)`, NaN where too few came back."""
+        boxes = np.full((len(objects), BOX_SIDES), np.nan)
+        if image is None:
+            return boxes
+        now: Mask = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
+        before, self._before = self._before, now
+        if before is None or before.shape != now.shape:
+            return boxes
+        for row, item in enumerate(objects):
+            moved = _followed(before, now, item.box)
+            if moved is not None:
+                boxes[row] = item.box = moved
+        return boxes
+
+    def found(self, known: Flowing, box: Floats) -> Floats:  # noqa: ARG002 — the flow alone says where
+        """Give where somebody is: detections move nobody."""
+        return known.box
+
+
+def _followed(before: Mask, now: Mask, box: Floats) -> Floats | None:
+    """Give a box `(4,)` of one picture in the next; None: it cannot be told."""
+    mask = np.zeros_like(before)
+    inset = _INSIDE * (box[2] - box[0])
+    left, right = round(box[0] + inset), round(box[2] - inset)
+    mask[max(round(box[1]), 0) : max(round(box[3]), 0), max(left, 0) : max(right, 0)] = 255
+    found = cv2.goodFeaturesToTrack(before, _CORNERS, _QUALITY, _BETWEEN, mask=mask)
+    if found is None or len(found) < _LEAST:
+        return None
+    corners = np.asarray(found, dtype=np.float32)
+    there, reached = _flow(before, now, corners)
+    back, returned = _flow(now, before, there)
+    start, end = corners[:, 0], there[:, 0]
+    kept = reached & returned & (np.hypot(*(back[:, 0] - start).T) <= _RETURNS)
+    if np.count_nonzero(kept) < _LEAST:
+        return None
+    start, end = start[kept].astype(np.float64), end[kept].astype(np.float64)
+    scale = float(np.clip(_growth(start, end), 1 / _GROWS, _GROWS))
+    middle = (box[:2] + box[2:]) / 2 + np.median(end - start, axis=0)
+    half = scale * (box[2:] - box[:2]) / 2
+    return np.concatenate([middle - half, middle + half])
+
+
+def _flow(before: Mask, now: Mask, corners: Plane) -> tuple[Plane, NDArray[np.bool_]]:
+    """Follow corners `(P, 1, 2)` into the next picture: where they are, and `(P,)` whether it is known."""
+    there, found, _ = cv2.calcOpticalFlowPyrLK(
+        before, now, corners, np.empty(0, dtype=np.float32), winSize=_WINDOW, maxLevel=_LEVELS
+    )
+    return np.asarray(there, dtype=np.float32), np.asarray(found)[:, 0] == 1
+
+
+def _growth(start: Floats, end: Floats) -> float:
+    """Give the median of how the distances between points `(P, 2)` change."""
+    first, second = np.triu_indices(len(start), 1)
+    was = np.hypot(*(start[first] - start[second]).T)
+    now = np.hypot(*(end[first] - end[second]).T)
+    apart = was > _BETWEEN
+    return float(np.median(now[apart] / was[apart])) if apart.any() else 1.0
