@@ -13,11 +13,14 @@ from client.http import (
 from client.model import Box, Camera, Cameras, Choice, Cut, Event, Gop, Objects, SeenObject, Site, Span
 from client.player import Watched, record, watch
 from client.session import Progress
+from client.status_asking import status
+from client.status_model import CameraNow, PersonNow, ServiceNow, SiteNow
 
 __all__ = [
     "AwayError",
     "Box",
     "Camera",
+    "CameraNow",
     "Cameras",
     "Choice",
     "ClientError",
@@ -28,10 +31,13 @@ __all__ = [
     "HttpSettings",
     "NotFoundError",
     "Objects",
+    "PersonNow",
     "Progress",
     "RefusedError",
     "SeenObject",
+    "ServiceNow",
     "Site",
+    "SiteNow",
     "Span",
     "Watched",
     "cameras",
@@ -42,5 +48,6 @@ __all__ = [
     "record",
     "site",
     "spans",
+    "status",
     "watch",
 ]

@@ -40,6 +40,7 @@ for command in (
     calibrate_commands.calibrate,
     viewer_commands.watch,
     operation_commands.doctor,
+    operation_commands.status,
     token_commands.token,
 ):
     app.command()(command)
