@@ -5,6 +5,9 @@ from __future__ import annotations
 from enum import Enum
 from pathlib import Path
 
+_MEMORY = Path("/dev/shm")  # noqa: S108 — nothing is written there
+"""Below /dev, and yet of files: a folder in memory."""
+
 
 class SourceKind(Enum):
     """Where pictures come from."""
@@ -23,9 +26,20 @@ def kind_of(source: str) -> SourceKind:
     """Tell the kind of a source from how it is written."""
     if source.startswith("scene:"):
         return SourceKind.SCENE
-    if "://" in source or source.startswith("/dev/"):
+    if "://" in source or is_device(source):
         return SourceKind.STREAM
     return SourceKind.FOLDER if Path(source).is_dir() else SourceKind.FILE
+
+
+def is_device(source: str) -> bool:
+    """Tell whether this is a device of this machine, such as ``/dev/video0``, be it there or unplugged."""
+    path = Path(source)
+    if Path("/dev") not in path.parents:
+        return False
+    try:
+        return path.is_char_device() or (not path.exists() and _MEMORY not in path.parents)
+    except OSError:
+        return True  # it is there, and not for this user
 
 
 def resolved(source: str, folder: Path) -> str:

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import os
+import tempfile
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from server.camera.scene import Scene
+from server.camera.sources.opening import open_video
 from server.camera.sources.stage import Stage
 from server.wire.errors import UserError
 from server.wire.sections import Site
@@ -56,9 +61,24 @@ def test_a_wrong_address_is_refused_with_the_reason(source: str, why: str) -> No
         ("scene:room", SourceKind.SCENE),
         ("rtsp://camera/stream", SourceKind.STREAM),
         ("/dev/video0", SourceKind.STREAM),
+        ("/dev/unplugged", SourceKind.STREAM),
+        ("/dev/null", SourceKind.STREAM),
+        ("/dev/shm/nowhere.mp4", SourceKind.FILE),  # noqa: S108
+        ("/devices/a.mp4", SourceKind.FILE),
         ("/", SourceKind.FOLDER),
         ("a.mp4", SourceKind.FILE),
     ],
 )
 def test_the_kind_of_a_source_shows_in_how_it_is_written(source: str, kind: SourceKind) -> None:
     assert kind_of(source) is kind
+
+
+@pytest.mark.skipif(not os.access("/dev/shm", os.W_OK), reason="needs a folder in memory")  # noqa: S108
+def test_a_recording_in_memory_is_one_though_it_is_below_dev() -> None:
+    with tempfile.TemporaryDirectory(dir="/dev/shm") as folder:  # noqa: S108
+        recording = Path(folder) / "c0.mp4"
+        recording.touch()
+        assert kind_of(str(recording)) is SourceKind.FILE
+        assert kind_of(folder) is SourceKind.FOLDER
+        with pytest.raises(UserError, match="cannot open this video"):
+            open_video(str(recording))

@@ -14,6 +14,7 @@ from av.video.stream import VideoStream
 
 from server.camera.sources.base import Image
 from server.wire.errors import UserError
+from server.wire.sources import is_device
 
 _DEFAULT_FPS = 25.0
 
@@ -39,10 +40,9 @@ def open_video(
     Raises:
         UserError: it cannot be opened, or there is no video in it.
     """
-    device = source.startswith("/dev/")
     try:
         container = av.open(
-            source, format="v4l2" if device else None, options=dict(options or {}), timeout=timeout
+            source, format="v4l2" if is_device(source) else None, options=dict(options or {}), timeout=timeout
         )
     except (av.error.FFmpegError, OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or " ".join(str(error).split())
