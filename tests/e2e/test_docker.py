@@ -1,120 +1,49 @@
-"""docker-compose.yml on a real engine: five containers that show people, and heal."""
+"""docker-compose.yml on a real engine: five containers that show people, within their limits, and heal."""
 
 from __future__ import annotations
 
 import asyncio
-import json
-import os
-import shutil
-import subprocess
-import uuid
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import av
 import pytest
+import yaml
 
 import client
+from benchmarks.faults_compose import PLAIN, ComposeSite, composed, missing
 
 pytestmark = [pytest.mark.live, pytest.mark.slow, pytest.mark.timeout(1200)]
 
-ROOT = Path(__file__).resolve().parents[2]
 SERVICES = {"sync", "bestview", "c0", "c1", "c2"}
-BUILD_S = 900  # an image without any cache downloads some 250 MB
-COMMAND_S = 120
 SEEN_S = 180  # a background must be learned first, and people come and go
 HEALED_S = 60
 WATCHED_S = 12.0
-FPS = 25
-
-
-@dataclass(frozen=True, slots=True)
-class Site:
-    """One running compose project."""
-
-    environment: dict[str, str]
-    url: str = ""
-
-    def run(self, *words: str, seconds: float = COMMAND_S, check: bool = True) -> str:
-        done = subprocess.run(
-            words,
-            cwd=ROOT,
-            env=self.environment,
-            capture_output=True,
-            text=True,
-            timeout=seconds,
-            check=False,
-        )
-        if check and done.returncode:
-            pytest.fail(f"{' '.join(words)}: exit code {done.returncode}\n{done.stdout}\n{done.stderr}")
-        return done.stdout.strip()
-
-    def compose(self, *words: str, seconds: float = COMMAND_S, check: bool = True) -> str:
-        return self.run("docker", "compose", *words, seconds=seconds, check=check)
-
-    def containers(self) -> dict[str, dict[str, Any]]:
-        """Inspect every container, those included that have ended."""
-        ids = self.compose("ps", "--all", "--quiet").split()
-        found = json.loads(self.run("docker", "inspect", *ids)) if ids else []
-        return {it["Config"]["Labels"]["com.docker.compose.service"]: it for it in found}
+FPS = 12.5  # two processors show the demo at half the rate, and do other things, too
 
 
 @pytest.fixture(scope="module")
-def site() -> Iterator[Site]:
+def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ComposeSite]:
     """Build, start and await a whole site; nothing of it is left."""
-    _need_engine()
-    name = f"myview-test-{uuid.uuid4().hex[:8]}"
-    down = Site(
-        {
-            **{key: it for key, it in os.environ.items() if not key.startswith(("MYVIEW_", "COMPOSE_"))},
-            "COMPOSE_PROJECT_NAME": name,
-            "MYVIEW_IMAGE": name,
-            "MYVIEW_CONFIG": "demo.yaml",
-            "MYVIEW_PUBLISH": "127.0.0.1:0",
-            "MYVIEW_RESTART": "unless-stopped",
-        }
-    )
-    try:
-        down.compose("build", seconds=BUILD_S)
-        _up(down)
-        yield Site(down.environment, f"http://{down.compose('port', 'bestview', '8080')}")
-    finally:
-        down.compose("down", "--volumes", "--rmi", "all", "--timeout", "5")
+    lacking = missing()
+    if lacking is not None:
+        pytest.skip(lacking)
+    slower = tmp_path_factory.mktemp("compose") / "slower.yml"
+    environment = {"environment": {"MYVIEW_SITE__FPS": str(FPS)}}
+    slower.write_text(yaml.safe_dump({"services": dict.fromkeys(sorted(SERVICES), environment)}))
+    with composed((*PLAIN, slower), MYVIEW_CONFIG="demo.yaml") as running:
+        yield running
 
 
-def _need_engine() -> None:
-    if shutil.which("docker") is None:
-        pytest.skip("needs Docker: there is no `docker` here")
-    for words in (["docker", "info"], ["docker", "compose", "version"]):
-        try:
-            answer = subprocess.run(words, capture_output=True, timeout=30, check=False).returncode
-        except subprocess.TimeoutExpired:
-            answer = 1
-        if answer:
-            pytest.skip(f"needs a Docker Engine with Compose: `{' '.join(words)}` fails")
+def url_of(site: ComposeSite) -> str:
+    return f"http://{site.address()}"
 
 
-def _up(site: Site) -> None:
-    """Start all and wait for their health; what they said goes with a failure."""
-    done = subprocess.run(
-        ["docker", "compose", "up", "--detach", "--wait", "--wait-timeout", "240"],
-        cwd=ROOT,
-        env=site.environment,
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-    )
-    if done.returncode:
-        pytest.fail(f"compose up: {done.stderr}\n{site.compose('logs', check=False)}")
-
-
-async def _somebody(site: Site, camera: str | None = None) -> int:
+async def _somebody(site: ComposeSite, camera: str | None = None) -> int:
     """Wait until a person is listed whom this camera shows (None: any camera)."""
     async with asyncio.timeout(SEEN_S):
-        async for event in client.events(site.url):
+        async for event in client.events(url_of(site)):
             if isinstance(event, client.Objects):
                 shown = [it.object for it in event.objects if it.visible and camera in {None, it.camera}]
                 if shown:
@@ -122,22 +51,22 @@ async def _somebody(site: Site, camera: str | None = None) -> int:
     pytest.fail("the events have ended")
 
 
-async def _sees_somebody(site: Site, camera: str, after: int) -> None:
+async def _sees_somebody(site: ComposeSite, camera: str, after: int) -> None:
     """Wait until this camera has somebody in a frame after that pulse."""
     async with asyncio.timeout(HEALED_S):
-        async for event in client.events(site.url):
+        async for event in client.events(url_of(site)):
             if isinstance(event, client.Gop) and event.first > after and any(event.boxes.get(camera, ())):
                 return
 
 
-def test_five_containers_are_healthy(site: Site) -> None:
+def test_five_containers_are_healthy(site: ComposeSite) -> None:
     containers = site.containers()
     assert set(containers) == SERVICES
     assert {it["State"]["Health"]["Status"] for it in containers.values()} == {"healthy"}
     assert len({it["Image"] for it in containers.values()}) == 1, "one image serves all"
 
 
-def test_no_service_runs_as_root_and_only_the_best_view_is_published(site: Site) -> None:
+def test_no_service_runs_as_root_and_only_the_best_view_is_published(site: ComposeSite) -> None:
     containers = site.containers()
     for service in SERVICES:
         assert site.compose("exec", "-T", service, "id", "-u") not in {"", "0"}
@@ -145,26 +74,50 @@ def test_no_service_runs_as_root_and_only_the_best_view_is_published(site: Site)
     assert published == {"bestview"}
 
 
-async def test_people_are_listed_and_their_best_view_plays(site: Site, tmp_path: Path) -> None:
+def test_limits_hold(site: ComposeSite) -> None:
+    """A process that wants more memory than its container has is ended; what else is there goes on."""
+    for name, it in site.containers().items():
+        host = it["HostConfig"]
+        assert 0 < host["Memory"] == host["MemorySwap"], name
+        assert host["NanoCpus"] > 0, name
+        assert 0 < host["PidsLimit"] <= 512, name
+        assert host["ReadonlyRootfs"], name
+        assert not host["Privileged"], name
+        assert host["CapDrop"] == ["ALL"], name
+    hungry = "held = bytearray(400 << 20); held[::4096] = b'x' * (len(held) // 4096); print('held')"
+    assert site.compose("exec", "-T", "c1", "python", "-c", hungry) == "held"
+    before = site.state("sync")["StartedAt"]
+    assert "held" not in site.compose("exec", "-T", "sync", "python", "-c", hungry, check=False)
+    forks = "i=0; while [ $i -lt 200 ]; do sleep 20 & i=$((i+1)); done; echo all"
+    assert "all" not in site.compose("exec", "-T", "sync", "sh", "-c", forks, check=False)
+    assert site.state("sync")["StartedAt"] == before, "who wanted too much was ended, and not the pulses"
+    for path in ("/site/x", "/usr/x", "/site/configs/x"):
+        assert (
+            site.compose("exec", "-T", "c1", "sh", "-c", f"touch {path} || echo refused", check=False)
+            == "refused"
+        )
+
+
+async def test_people_are_listed_and_their_best_view_plays(site: ComposeSite, tmp_path: Path) -> None:
     number = await _somebody(site)
     out = tmp_path / "best.mp4"
     async with asyncio.timeout(60):
-        watched = await client.record(site.url, number, out, seconds=4.0)
+        watched = await client.record(url_of(site), number, out, seconds=4.0)
     assert watched.complete
     with av.open(str(out)) as video:
         pictures = [(frame.width, frame.height) for frame in video.decode(video=0)]
-    assert pictures == [(640, 360)] * 100
+    assert pictures == [(640, 360)] * round(4.0 * FPS)
 
 
-async def test_viewers_watch_on_while_a_camera_is_killed_and_comes_back(site: Site, tmp_path: Path) -> None:
+async def test_viewers_watch_on_while_a_camera_dies_and_comes_back(site: ComposeSite, tmp_path: Path) -> None:
     number = await _somebody(site, "c1")
     before = site.containers()["c1"]
     out = tmp_path / "best.mp4"
     async with asyncio.timeout(HEALED_S):
-        watching = asyncio.create_task(client.record(site.url, number, out, seconds=WATCHED_S))
+        watching = asyncio.create_task(client.record(url_of(site), number, out, seconds=WATCHED_S))
         await _kill(site, "c1")
         await _started_again(site, before)
-        newest = max(camera.pulse or 0 for camera in await client.cameras(site.url))
+        newest = max(camera.pulse or 0 for camera in await client.cameras(url_of(site)))
         watched = await watching
     await _sees_somebody(site, "c1", after=newest)
     assert watched.complete
@@ -172,10 +125,10 @@ async def test_viewers_watch_on_while_a_camera_is_killed_and_comes_back(site: Si
     with av.open(str(out)) as video:
         assert sum(1 for _ in video.decode(video=0)) == WATCHED_S * FPS, "not a frame is missing"
     assert site.containers()["c1"]["RestartCount"] == before["RestartCount"] + 1
-    _up(site)  # the engine finds all of them healthy again
+    site.up()  # the engine finds all of them healthy again
 
 
-async def _kill(site: Site, service: str) -> None:
+async def _kill(site: ComposeSite, service: str) -> None:
     """Kill all in a container but its init, which ends with them.
 
     `docker kill` would tell the engine that the container was meant to end.
@@ -183,7 +136,7 @@ async def _kill(site: Site, service: str) -> None:
     await asyncio.to_thread(site.compose, "exec", "-T", service, "sh", "-c", "kill -KILL -1", check=False)
 
 
-async def _started_again(site: Site, before: dict[str, Any]) -> None:
+async def _started_again(site: ComposeSite, before: dict[str, Any]) -> None:
     """Wait for the engine to start a container, counted from its last start."""
     since, container = before["State"]["StartedAt"], before["Id"]
     filters = ["--filter", f"container={container}", "--filter", "event=die", "--filter", "event=start"]

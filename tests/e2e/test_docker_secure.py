@@ -1,0 +1,218 @@
+"""docker-compose.secure.yml on a real engine: who has a token watches by HTTPS, and strangers get nowhere."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import re
+import shutil
+import ssl
+import subprocess
+from collections.abc import AsyncIterator, Iterator
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import aiohttp
+import av
+import pytest
+
+from benchmarks.faults_compose import PLAIN, ComposeSite, composed, missing
+from benchmarks.surroundings import ROOT
+
+pytestmark = [pytest.mark.live, pytest.mark.slow, pytest.mark.timeout(1200)]
+
+SEEN_S = 180
+SPEAK = """
+import json, pathlib, sys, time, zenoh
+config = zenoh.Config()
+said = {"mode": "client", "connect/endpoints": [sys.argv[1]], "connect/timeout_ms": 5000,
+        "scouting/multicast/enabled": False}
+if len(sys.argv) > 3:
+    said["transport/link/tls/root_ca_certificate"] = sys.argv[3]
+if len(sys.argv) > 4:
+    said["transport/auth/usrpwd/user"] = sys.argv[4]
+    said["transport/auth/usrpwd/password"] = sys.argv[5]
+for key, value in said.items():
+    config.insert_json5(key, json.dumps(value))
+try:
+    with zenoh.open(config) as bus:
+        for _ in range(30):
+            bus.put(sys.argv[2], b"{}")
+            time.sleep(0.1)
+    print("spoken")
+except zenoh.ZError as error:
+    print("refused", error)
+"""
+"""Says nonsense under a key of the bus; whoever hears it counts it as a bad message."""
+STATUS = "myview/demo/camera/c1/status"
+BUS = "tls/bestview:7447"
+
+
+@dataclass(frozen=True, slots=True)
+class Secure:
+    """A secure site, and what it was set up with."""
+
+    site: ComposeSite
+    secrets: Path
+    token: str
+    url: str
+
+    def stranger(self, *words: str, network: str) -> str:
+        """Run a container of our image that has nothing of the site's."""
+        image = self.site.environment["MYVIEW_IMAGE"]
+        mounted = f"{self.secrets / 'public'}:/run/public:ro"
+        words = (
+            "--volume",
+            mounted,
+            "--network",
+            network,
+            "--entrypoint",
+            "python",
+            image,
+            "-c",
+            SPEAK,
+            *words,
+        )
+        return self.site.run("docker", "run", "--rm", *words, check=False)
+
+
+@pytest.fixture(scope="module")
+def secure(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Secure]:
+    lacking = missing() or ("needs openssl" if shutil.which("openssl") is None else None)
+    if lacking is not None:
+        pytest.skip(lacking)
+    secrets = tmp_path_factory.mktemp("made") / "secrets"
+    made = subprocess.run(
+        ["sh", str(ROOT / "configs" / "secrets.sh"), "localhost", "c0", "c1", "c2"],
+        env={**os.environ, "MYVIEW_SECRETS": str(secrets)},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    token = re.search(r": (\S+)$", made.stdout.strip())
+    assert token
+    files = (*PLAIN, ROOT / "docker-compose.secure.yml")
+    with composed(files, MYVIEW_CONFIG="demo.yaml", MYVIEW_SECRETS=str(secrets)) as site:
+        port = site.address().rpartition(":")[2]
+        yield Secure(site, secrets, token[1], f"https://localhost:{port}")
+
+
+@pytest.fixture
+async def viewer(secure: Secure) -> AsyncIterator[aiohttp.ClientSession]:
+    """Somebody with a token, who goes by our authority."""
+    trust = ssl.create_default_context(cafile=str(secure.secrets / "public" / "authority.pem"))
+    heads = {"Authorization": f"Bearer {secure.token}"}
+    connector = aiohttp.TCPConnector(ssl=trust)
+    async with aiohttp.ClientSession(secure.url, headers=heads, connector=connector) as session:
+        yield session
+
+
+async def _json(viewer: aiohttp.ClientSession, path: str) -> Any:
+    async with viewer.get(path) as answer:
+        assert answer.status == 200
+        return await answer.json()
+
+
+async def _somebody(viewer: aiohttp.ClientSession) -> int:
+    async with asyncio.timeout(SEEN_S):
+        while True:
+            for it in (await _json(viewer, "/api/objects"))["objects"]:
+                if it["visible"]:
+                    return int(it["object"])
+            await asyncio.sleep(0.5)
+
+
+async def _bad_messages(viewer: aiohttp.ClientSession) -> float:
+    async with viewer.get("/metrics") as answer:
+        text = await answer.text()
+    found = re.findall(r"^myview_camera_bad_messages_total\{.*\} (\S+)$", text, re.MULTILINE)
+    assert found
+    return sum(map(float, found))
+
+
+def test_all_are_healthy_by_https_and_with_tokens(secure: Secure) -> None:
+    containers = secure.site.containers()
+    assert {it["State"]["Health"]["Status"] for it in containers.values()} == {"healthy"}
+
+
+def test_each_has_its_own_secrets_and_they_are_in_no_variable(secure: Secure) -> None:
+    for camera in ("c0", "c1", "c2"):
+        there = secure.site.compose("exec", "-T", camera, "ls", "/run/secrets").split()
+        assert sorted(there) == ["bus", "token"]
+        own = secure.site.compose("exec", "-T", camera, "cat", "/run/secrets/bus")
+        assert own == (secure.secrets / "cameras" / camera / "bus").read_text("ascii").strip()
+    hidden = [
+        it.read_text("ascii").strip() for it in secure.secrets.rglob("*") if it.name in {"token", "bus"}
+    ]
+    assert len(hidden) == 7
+    for container in secure.site.containers().values():
+        assert not [it for it in hidden if it in str(container["Config"])]
+
+
+async def test_who_has_a_token_watches_by_https(viewer: aiohttp.ClientSession, tmp_path: Path) -> None:
+    number = await _somebody(viewer)
+    out = tmp_path / "best.mp4"
+    async with viewer.get(f"/objects/{number}/best.mp4") as answer:
+        assert answer.status == 200
+        out.write_bytes(await answer.content.readexactly(300_000))
+    with av.open(str(out)) as video:
+        assert len(list(islice(video.decode(video=0), 25))) == 25
+    async with viewer.get("/") as page:
+        assert page.status == 200
+
+
+async def test_who_has_none_sees_nobody(viewer: aiohttp.ClientSession) -> None:
+    number = await _somebody(viewer)
+    for path in ("/api/objects", "/api/cameras", "/metrics", f"/objects/{number}/best.mp4"):
+        async with viewer.get(path, headers={"Authorization": ""}) as answer:
+            assert answer.status == 401, path
+        async with viewer.get(path, headers={"Authorization": "Bearer wrong"}) as answer:
+            assert answer.status in {401, 429}, path
+
+
+async def test_a_camera_s_token_shows_that_camera_alone(
+    secure: Secure, viewer: aiohttp.ClientSession
+) -> None:
+    token = (secure.secrets / "cameras" / "c0" / "token").read_text("ascii").strip()
+    async with viewer.get("/api/cameras", headers={"Authorization": f"Bearer {token}"}) as answer:
+        assert [it["camera"] for it in (await answer.json())["cameras"]] == ["c0"]
+
+
+async def test_strangers_on_the_bus_are_heard_by_nobody(
+    secure: Secure, viewer: aiohttp.ClientSession
+) -> None:
+    """Even in the site's own network; a right password is heard, so the others could have been."""
+    network, before = secure.site.network, await _bad_messages(viewer)
+    authority = "/run/public/authority.pem"
+
+    async def said(*words: str, on: str = network) -> str:
+        return await asyncio.to_thread(secure.stranger, *words, network=on)
+
+    assert "refused" in await said(BUS, STATUS, on="bridge"), "who is on another network does not get there"
+    assert "refused" in await said("tcp/bestview:7447", STATUS), "who does not encrypt"
+    assert "refused" in await said(BUS, STATUS), "who knows no authority"
+    await said(BUS, STATUS, authority)
+    await said(BUS, STATUS, authority, "c1", "guessed")
+    await said(BUS, STATUS, authority, "somebody", "guessed")
+    name, password = (secure.secrets / "cameras" / "c0" / "bus").read_text("ascii").strip().split(":")
+    await said(BUS, STATUS, authority, name, password)  # c0 does not speak for c1
+    assert await _bad_messages(viewer) == before
+    assert "spoken" in await said(BUS, STATUS.replace("c1", "c0"), authority, name, password)
+    assert await _bad_messages(viewer) > before
+
+
+async def test_a_token_that_is_taken_away_lets_nobody_in(
+    secure: Secure, viewer: aiohttp.ClientSession
+) -> None:
+    """By an editor that writes the file anew, without a restart."""
+    tokens = secure.secrets / "web" / "tokens.yaml"
+    lines = tokens.read_text("utf-8").splitlines(keepends=True)
+    assert (await viewer.get("/api/site")).status == 200
+    anew = tokens.with_suffix(".new")
+    anew.write_text("".join(it for it in lines if "operator" not in it), encoding="utf-8")
+    anew.replace(tokens)
+    async with asyncio.timeout(10):
+        while (await viewer.get("/api/site")).status != 401:  # noqa: ASYNC110
+            await asyncio.sleep(0.2)
