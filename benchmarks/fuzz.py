@@ -20,7 +20,7 @@ from benchmarks.fuzz_target import Target
 from benchmarks.report import Report
 from benchmarks.surroundings import ROOT
 
-PARTS = ("pulse", "zenoh", "http", "config", "mot", "calibration", "media")
+PARTS = ("pulse", "zenoh", "http", "config", "mot", "calibration", "media", "kept")
 _COLUMNS = ("target", "inputs", "a second", "refused", "accepted", "crashes", "kinds of crash")
 
 

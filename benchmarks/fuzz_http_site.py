@@ -15,32 +15,15 @@ from typing import Any
 from aiohttp import web
 
 from benchmarks.fuzz_loop import HurryingLoop, leaves_no_trace
-from benchmarks.fuzz_site import (
-    CAMERAS,
-    STRIDE,
-    Fed,
-    pictures,
-    site,
-    sound,
-    status,
-    thumbnail,
-    tracks,
-    video,
-    word,
-)
+from benchmarks.fuzz_site import Fed, Word, feed_epoch, site, word
 from server.web.app import make_app, serving
 from server.web.openapi import describe
-from server.wire.epochs import end_of_epoch
-from server.wire.messages import CameraTracks
 
 EPOCHS = 6
 _WAIT_S = 10.0
 """Then an answer is not waited for; by a clock that hurries."""
 _MOST = 65_536
 _HEALTH = b"GET /healthz HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n"
-
-Word = Callable[[Random, str, int], CameraTracks]
-"""What a camera says of an epoch."""
 
 
 class Served:
@@ -59,34 +42,22 @@ class Served:
         self.loop = loop or HurryingLoop()
         self._folder = TemporaryDirectory()
         self._stack = AsyncExitStack()
-        self._word, self._before = word, before
-        self.loop.run_until_complete(self._serve(dict(sections or {})))
+        self._before = before
+        self.loop.run_until_complete(self._serve(dict(sections or {}), word))
 
-    async def _serve(self, sections: dict[str, Any]) -> None:
+    async def _serve(self, sections: dict[str, Any], word: Word) -> None:
         config = site(record={"folder": str(Path(self._folder.name) / "kept")}, **sections)
         self.service, rng = Fed(config), Random(1)
         self.service.past.open()
         self._stack.callback(self.service.close)
         self.service.pulse0 = 1_700_000_000.0
         for epoch in range(EPOCHS):
-            self._feed_epoch(rng, epoch)
+            feed_epoch(self.service, rng, epoch, EPOCHS, word)
         self.app = make_app(self.service)
         self._before(self.app)
         self.port = await self._stack.enter_async_context(
             serving(self.app, config.http.model_copy(update={"port": 0}))
         )
-
-    def _feed_epoch(self, rng: Random, epoch: int) -> None:
-        service = self.service
-        for seed, camera in enumerate(CAMERAS):
-            for unit in pictures(seed, EPOCHS * STRIDE)[epoch * STRIDE :][:STRIDE]:
-                service.handle(video(camera, unit))
-            service.handle(tracks(self._word(rng, camera, epoch)))
-            service.handle(status(camera, epoch))
-            service.handle(thumbnail(camera, epoch))
-        service.handle(sound(epoch))
-        service.pulse = end_of_epoch(epoch, STRIDE)
-        service.decide()
 
     @property
     def described(self) -> list[tuple[str, tuple[str, ...]]]:

@@ -13,19 +13,17 @@ from pathlib import Path
 from random import Random
 from urllib.parse import unquote_to_bytes
 
-import msgspec
 import yaml
 from aiohttp import web
 
 from benchmarks.fuzz_http_asked import WORDS, address, some_range
 from benchmarks.fuzz_http_site import EPOCHS, Served, judged
 from benchmarks.fuzz_mutate import as_json, damaged
-from benchmarks.fuzz_site import CAMERAS, STRIDE, pictures, word
+from benchmarks.fuzz_site import STRIDE, one_each, pictures
 from benchmarks.fuzz_target import Target, folder
 from server.web.access import ACCESS
 from server.web.access_sessions import _Session
 from server.web.keys import SERVICE
-from server.wire.messages import CameraTracks, Glimpse, Track
 from server.wire.tokens import digest_of
 
 _WHO = ("hall", "family", "door", "night", "void")
@@ -79,7 +77,7 @@ class Strangers(Target):
         tokens.write_text(yaml.safe_dump({"tokens": listed}))
         self._answered: list[_Answered] = []
         self._served = Served(
-            {"access": {"tokens": str(tokens)}, "http": {"hls_segment_s": 0.2}}, _one_each, before=self._watch
+            {"access": {"tokens": str(tokens)}, "http": {"hls_segment_s": 0.2}}, one_each, before=self._watch
         )
         for number, name in _NAMES.items():
             self._served.service.decider.people.call(number, name)
@@ -196,17 +194,6 @@ def _nearly(rng: Random, secret: str) -> str:
         return digest_of(secret)
     hurt = damaged(rng, secret.encode()).decode("utf-8", "surrogateescape")
     return hurt.replace("\r", "").replace("\n", "") if rng.random() < 0.8 else hurt
-
-
-def _one_each(rng: Random, camera: str, epoch: int) -> CameraTracks:
-    """Let each camera see somebody of its own, in a place of their own."""
-    number, first = CAMERAS.index(camera), epoch * STRIDE
-    boxes = [(4.0 + 40 * number, 10.0 + 8 * number, 14.0 + 40 * number, 34.0 + 8 * number)] * STRIDE
-    looks = [
-        Glimpse(first=first, last=first + STRIDE - 1, histogram=[float(it == number) for it in range(8)])
-    ]
-    track = Track(id=1, boxes=[*boxes], confidence=1.0, looks=looks, sharpness=0.5)
-    return msgspec.structs.replace(word(rng, camera, epoch), tracks=[track], shed=[])
 
 
 def _windows(seed: int, begin: float) -> frozenset[bytes]:

@@ -21,7 +21,9 @@ from server.run.calibrate_points import read_points
 from server.view.agreement import Agreement
 from server.view.mp4_sound import sound_fragment
 from server.view.past.playlist import Playlist
+from server.view.past.run import Headers, Run, RunHead
 from server.view.past.sounds import frames_in
+from server.view.past.store import Bounds, Store
 from server.view.skip import UnfitError, continuing
 from server.web.app import make_app, serving
 from server.wire.errors import UserError
@@ -163,6 +165,45 @@ def test_a_playlist_that_names_no_place_in_a_file_is_passed_over(tmp_path: Path)
     playlist = Playlist(path, "", "", 25.0, None, 60.0)
     playlist.read()
     assert playlist.tape.all == ()
+
+
+@pytest.mark.parametrize("camera", ["../../../precious", "/precious", "a\0b", "c" * 300, "", "..", "c0\n"])
+def test_a_recorded_run_whose_cameras_no_site_has_is_left_alone(tmp_path: Path, camera: str) -> None:
+    precious = tmp_path / "precious" / "000000000000.mp4"
+    precious.parent.mkdir()
+    precious.write_bytes(b"nobody's")
+    head = RunHead(
+        site="hall", fps=25.0, width=64, height=48, codec="avc1", cameras=["c0"], began=0.0, pulse0=0.0
+    )
+    run = tmp_path / "kept" / "20260101T000000Z"
+    Run.begin(run, head, Headers(b""), 60.0)
+    (run / "index" / "000000000000.jsonl").write_bytes(b"")
+    told = json.loads((run / "run.json").read_bytes())
+    (run / "run.json").write_text(json.dumps({**told, "cameras": ["c0", camera]}))
+    store = Store(tmp_path / "kept", Bounds(-1e9, 1.0, 60.0))
+    store.open()
+    store.close()
+    assert store.earlier == []
+    assert precious.exists()
+
+
+@pytest.mark.parametrize("camera", ["c\0", "c" * 300, ".."])
+def test_a_playlist_that_leads_to_no_camera_is_passed_over(tmp_path: Path, camera: str) -> None:
+    path = tmp_path / "1.m3u8"
+    path.write_text(f"#EXTINF:1,p0+5\n#EXT-X-BYTERANGE:4@0\n../cameras/{camera}/000000000000.mp4\n")
+    playlist = Playlist(path, "", "", 25.0, None, 60.0)
+    playlist.read()
+    assert playlist.tape.all == ()
+
+
+def test_a_playlist_of_a_time_that_no_calendar_has_is_written_without_it(tmp_path: Path) -> None:
+    path = tmp_path / "1.m3u8"
+    path.write_text(f"#EXTINF:1,p{'9' * 15}+5\n#EXT-X-BYTERANGE:4@0\n../cameras/c0/000000000000.mp4\n")
+    playlist = Playlist(path, "../cameras/", "", 0.001, 1.7e9, 60.0)
+    playlist.read()
+    playlist.tidy()
+    assert f"p{'9' * 15}+5" in path.read_text()
+    assert "DATE-TIME" not in path.read_text()
 
 
 def test_a_recording_of_times_that_no_film_has_is_left_as_it_is(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ is written over that line. The title of each entry says which pulses it is.
 
 from __future__ import annotations
 
+import contextlib
 import math
 import os
 import re
@@ -16,11 +17,13 @@ from pathlib import Path
 from server.view.past.media import write_at
 from server.view.past.stretch import Stretch, Tape
 
+CAMERA = "[A-Za-z0-9][A-Za-z0-9_-]{0,31}"
+"""What a camera is called (:data:`server.wire.sections.base.Name`); the folder of the sound is, too."""
 _END = "#EXT-X-ENDLIST\n"
 _ENTRY = re.compile(
     r"#EXTINF:[0-9.]+,p([0-9]{1,15})\+([0-9]{1,15})\n"
     r"#EXT-X-BYTERANGE:([0-9]{1,15})@([0-9]{1,15})\n"
-    r"(?:[^\n]*/)?([^/\n]+)/([0-9]{1,15})\.mp4\n"
+    rf"(?:[^\n]*/)?({CAMERA})/([0-9]{{1,15}})\.mp4\n"
 )
 _NAME_DIGITS = 12
 
@@ -125,8 +128,9 @@ class Playlist:
         hole = "" if end in (None, stretch.first) else "#EXT-X-DISCONTINUITY\n"
         date = ""
         if end != stretch.first and self._pulse0 is not None:
-            moment = datetime.fromtimestamp(self._pulse0 + stretch.first / self._fps, UTC)
-            date = f"#EXT-X-PROGRAM-DATE-TIME:{moment.strftime('%Y-%m-%dT%H:%M:%S.%f')[:-3]}Z\n"
+            with contextlib.suppress(OverflowError, ValueError, OSError):  # a damaged file's year 9999999
+                moment = datetime.fromtimestamp(self._pulse0 + stretch.first / self._fps, UTC)
+                date = f"#EXT-X-PROGRAM-DATE-TIME:{moment.strftime('%Y-%m-%dT%H:%M:%S.%f')[:-3]}Z\n"
         return (
             f"{hole}{date}#EXTINF:{stretch.frames / self._fps:.6f},p{stretch.first}+{stretch.frames}\n"
             f"#EXT-X-BYTERANGE:{stretch.length}@{stretch.offset}\n"

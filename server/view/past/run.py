@@ -19,25 +19,30 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import msgspec
 
-from server.view.past.playlist import Playlist, file_name
+from server.view.past.playlist import CAMERA, Playlist, file_name
 from server.view.past.sounds import NAME as SOUND
 
 HEAD = "run.json"
 _HEADER = "init.mp4"
 
 
+Camera = Annotated[str, msgspec.Meta(pattern=rf"^{CAMERA}\Z")]
+"""A camera's name is part of files' names: what was damaged leads nowhere else."""
+
+
 class RunHead(msgspec.Struct, frozen=True, kw_only=True):
     """What holds for a whole run."""
 
     site: str
-    fps: float
+    fps: Annotated[float, msgspec.Meta(ge=0.001, le=1000)]
     width: int
     height: int
     codec: str
-    cameras: list[str]
+    cameras: list[Camera]
     sound: str | None = None
     """The codec of the sound; null: the site had none."""
     began: float
