@@ -1,4 +1,4 @@
-"""Who watches the site of a soak: some all the time, whose delay is measured, and some who come and go."""
+"""Who watches a site: some all the time, whose delay is measured, and some who come and go."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _TIMESCALE = 90_000
 _PATIENCE_S = 20.0
 _PAUSE_S = 0.5
 _VISITORS = 6
-"""Who come and go: so many at once."""
+"""Who come and go at a soak: so many at once."""
 _STAY_S = (1.0, 8.0)
 _AHEAD_S = 3.0
 """How far back somebody asks for the past, seconds of the world."""
@@ -40,10 +40,10 @@ class Seen:
 
 
 class Visitors:
-    """All who watch. What no viewer may see is counted in ``faults``."""
+    """All who watch. ``coming`` of them come and go. What no viewer may see is counted in ``faults``."""
 
-    def __init__(self, url: str, fps: float, seed: int) -> None:
-        self._url, self._fps = url, fps
+    def __init__(self, url: str, fps: float, seed: int, coming: int = _VISITORS) -> None:
+        self._url, self._fps, self._coming = url, fps, coming
         self._random = random.Random(seed)
         self.camera, self.person = Seen(), Seen()
         self.visits: Counter[str] = Counter()
@@ -63,7 +63,7 @@ class Visitors:
                 tasks.create_task(self._again(self._watch_camera))
                 tasks.create_task(self._again(self._watch_people))
                 tasks.create_task(self._again(self._hear_events))
-                for _ in range(_VISITORS):
+                for _ in range(self._coming):
                     tasks.create_task(self._visit())
 
     async def _again(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:

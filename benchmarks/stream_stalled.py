@@ -119,7 +119,7 @@ def describe_stalled(report: Report, found: Beside) -> None:
         for number, (alone, beside) in enumerate(zip(found.alone, found.beside, strict=True), 1)
     ]
     report.table(
-        f"{found.good} viewers alone, and beside {found.stalled} who never read, by turns: ms until a GOP is in",
+        f"{found.good} viewers alone, and beside {found.stalled} who never read: ms until a GOP has come",
         ["round", "p50 alone", "beside", "p99 alone", "beside", "ratio", "arrived alone", "beside"],
         rows,
     )

@@ -1,0 +1,292 @@
+"""More cameras than the machine carries: what is left out, what viewers see of it, and the way back; a plot.
+
+    OPENBLAS_NUM_THREADS=1 python -m benchmarks.load --out out/bench
+
+A site of 1, 2, 3, … cameras of 352x288 at 25 a second, real processes, up to twice what the machine carries
+without leaving anything out, or `--most`. Two viewers watch all the time. In the end all but one are killed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import tempfile
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import aiohttp
+import numpy as np
+from matplotlib.figure import Figure
+
+from benchmarks.load_site import FPS, LOG, Crowded, running
+from benchmarks.report import Report
+from benchmarks.soak_visitors import Visitors
+from benchmarks.surroundings import parser
+
+_STRIDE = 5
+"""Frames between two windows, by default."""
+_EVERY_S = 1.0
+_CARRIED = 0.99
+"""Share of the frames that are searched where the machine carries its cameras."""
+_RECOVERED_S = 180.0
+"""For how long the way back is watched at most."""
+_CALM = 5
+"""Samples in a row at which nothing is left out, for the way back to be over."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """The site at one moment.
+
+    Attributes:
+        at: seconds since the beginning.
+        levels: of the cameras that are there.
+        pulses: their newest frames, added up; of what follows likewise.
+        shed: frames that were not searched.
+        missed: pulses without a frame.
+        late: windows that came too late.
+        delays: milliseconds until pictures came to the viewer of a person, since the sample before.
+        holes: frames that viewers should have been shown and were not, so far.
+    """
+
+    at: float
+    levels: tuple[int, ...]
+    pulses: int
+    shed: int
+    missed: int
+    late: int
+    delays: tuple[float, ...]
+    holes: int
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """So many cameras, once they have settled.
+
+    Attributes:
+        cameras: how many.
+        levels: the median of all cameras, and the highest one.
+        searched: share of the frames.
+        missed: share of the pulses.
+        late: share of the windows.
+        delays: milliseconds, p50 and p95.
+        holes: frames that viewers missed, the time of settling included.
+    """
+
+    cameras: int
+    levels: tuple[float, int]
+    searched: float
+    missed: float
+    late: float
+    delays: tuple[float, float]
+    holes: int
+
+
+@dataclass(slots=True)
+class Loaded:
+    """What was found."""
+
+    samples: list[Sample] = field(default_factory=list)
+    steps: list[Step] = field(default_factory=list)
+    started: list[tuple[float, int]] = field(default_factory=list)
+    """When there were how many cameras."""
+    back: float | None = None
+    """Seconds from the killing until nothing was left out any more; None: it took too long."""
+
+    @property
+    def carried(self) -> int:
+        """How many cameras the machine carries; 0: not one."""
+        return max((it.cameras for it in self.steps if it.searched >= _CARRIED), default=0)
+
+
+class Watch:
+    """Samples a site."""
+
+    def __init__(self, site: Crowded, visitors: Visitors, found: Loaded) -> None:
+        self._site, self._visitors, self._found = site, visitors, found
+        self._began = time.monotonic()
+
+    @property
+    def now(self) -> float:
+        """Seconds since the beginning."""
+        return time.monotonic() - self._began
+
+    async def sample(self, session: aiohttp.ClientSession, seconds: float) -> list[Sample]:
+        """Take samples for a while."""
+        until, taken = self.now + seconds, []
+        while self.now < until:
+            await asyncio.sleep(_EVERY_S)
+            async with session.get(f"{self._site.url}api/cameras") as answer:
+                cameras = [
+                    it for it in (await answer.json())["cameras"] if it["camera"] in self._site.cameras
+                ]
+            taken.append(self._sample(cameras))
+        self._found.samples += taken
+        return taken
+
+    def _sample(self, cameras: Sequence[dict[str, Any]]) -> Sample:
+        person, camera = self._visitors.person, self._visitors.camera
+        delays = tuple(person.delays)
+        person.delays.clear()
+        camera.delays.clear()
+        sums = {what: sum(it[what] for it in cameras) for what in ("pulse", "shed", "missed", "late")}
+        return Sample(
+            at=self.now,
+            levels=tuple(it["load_level"] for it in cameras),
+            pulses=sums["pulse"],
+            shed=sums["shed"],
+            missed=sums["missed"],
+            late=sums["late"],
+            delays=delays,
+            holes=person.holes + camera.holes,
+        )
+
+
+def step_of(cameras: int, before: Sequence[Sample], samples: Sequence[Sample]) -> Step:
+    """Sum up the samples of so many cameras; ``before`` are those while they settled."""
+    first, last = samples[0], samples[-1]
+    frames = max(last.pulses - first.pulses, 1)
+    delays = [it for sample in samples[1:] for it in sample.delays] or [np.nan]
+    levels = [it for sample in samples for it in sample.levels] or [0]
+    return Step(
+        cameras=cameras,
+        levels=(float(np.median(levels)), max(levels)),
+        searched=1.0 - (last.shed - first.shed + last.missed - first.missed) / frames,
+        missed=(last.missed - first.missed) / frames,
+        late=(last.late - first.late) / (frames / _STRIDE),
+        delays=(float(np.median(delays)), float(np.percentile(delays, 95))),
+        holes=last.holes - before[0].holes,
+    )
+
+
+async def load(site: Crowded, most: int, settle: float, seconds: float) -> Loaded:
+    """Add cameras until there are too many by half; kill them, and wait until the rest is well."""
+    found = Loaded()
+    site.add()
+    async with aiohttp.ClientSession() as session:
+        await _first(session, site)
+        visitors = Visitors(site.url, FPS, seed=1, coming=0)
+        watching = asyncio.create_task(visitors.watch())
+        try:
+            watch = Watch(site, visitors, found)
+            while True:
+                found.started.append((watch.now, len(site.cameras)))
+                before = await watch.sample(session, settle)
+                samples = await watch.sample(session, seconds)
+                found.steps.append(step_of(len(site.cameras), before, samples))
+                enough = len(site.cameras) >= 2 * max(found.carried, 1) and len(found.steps) > found.carried
+                if len(site.cameras) >= most or enough:
+                    break
+                site.add()
+            await asyncio.to_thread(site.leave, 1)
+            found.started.append((watch.now, 1))
+            found.back = await _way_back(watch, session)
+        finally:
+            watching.cancel()
+            await asyncio.gather(watching, return_exceptions=True)
+    return found
+
+
+async def _first(session: aiohttp.ClientSession, site: Crowded) -> None:
+    """Wait until the first camera is live."""
+    while True:
+        async with session.get(f"{site.url}api/cameras") as answer:
+            if (await answer.json())["cameras"][0]["state"] == "live":
+                return
+        await asyncio.sleep(_EVERY_S)
+
+
+async def _way_back(watch: Watch, session: aiohttp.ClientSession) -> float | None:
+    began = watch.now
+    calm = 0
+    while watch.now < began + _RECOVERED_S:
+        (*_, sample) = await watch.sample(session, _EVERY_S)
+        calm = calm + 1 if max(sample.levels, default=0) == 0 else 0
+        if calm == _CALM:
+            return sample.at - began - (_CALM - 1) * _EVERY_S
+    return None
+
+
+def describe(report: Report, found: Loaded) -> None:
+    """Print the table."""
+    report.table(
+        f"cameras of 352x288 at {FPS:g} a second: what is left out, and what a viewer of a person sees",
+        [
+            "cameras",
+            "level, median",
+            "most",
+            "searched",
+            "missed",
+            "windows late",
+            "delay p50, ms",
+            "p95",
+            "holes",
+        ],
+        [
+            [
+                *(str(it.cameras), f"{it.levels[0]:g}", str(it.levels[1])),
+                *(f"{100 * share:.1f} %" for share in (it.searched, it.missed, it.late)),
+                *(f"{delay:.0f}" for delay in it.delays),
+                str(it.holes),
+            ]
+            for it in found.steps
+        ],
+    )
+    report.say(f"carried without leaving anything out: {found.carried}")
+    back = f"longer than {_RECOVERED_S:.0f} s" if found.back is None else f"{found.back:.0f} s"
+    report.say(f"all but one killed: nothing is left out any more after {back}")
+
+
+def plot(found: Loaded, path: Path) -> None:
+    """Draw levels and delay over time."""
+    figure = Figure(figsize=(9, 6))
+    levels, delay = figure.subplots(2, 1, sharex=True)
+    times = [it.at for it in found.samples]
+    levels.step(
+        *zip(*found.started, (times[-1], 1), strict=True), where="post", label="cameras", color="grey"
+    )
+    means = [float(np.mean(it.levels)) if it.levels else 0.0 for it in found.samples]
+    levels.plot(times, means, label="level, mean of the cameras")
+    levels.plot(
+        times, [max(it.levels, default=0) for it in found.samples], label="the highest", linewidth=0.7
+    )
+    levels.set(ylabel="cameras; level of the ladder", ylim=(0, None))
+    levels.legend(fontsize="small")
+    middles = [float(np.median(it.delays)) if it.delays else np.nan for it in found.samples]
+    delay.plot(times, middles, marker=".", linewidth=0.7)
+    delay.set(ylabel="delay of a person's view, ms", xlabel="seconds", ylim=(0, None))
+    for axis in (levels, delay):
+        axis.grid(alpha=0.3)
+    figure.tight_layout()
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path, dpi=110)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Run, print and save."""
+    options.out.mkdir(parents=True, exist_ok=True)
+    report = Report()
+    with tempfile.TemporaryDirectory(prefix="myview-load-") as temporary:
+        folder = Path(temporary)
+        with running(options.most, folder) as site:
+            found = asyncio.run(load(site, options.most, options.settle, options.seconds))
+        (options.out / "load.log").write_bytes((folder / LOG).read_bytes())
+    describe(report, found)
+    plot(found, options.out / "load.png")
+    report.save(options.out / "load.txt")
+
+
+def main() -> None:
+    """Read the command line and run."""
+    options = parser(__doc__, "load")
+    options.add_argument("--most", type=int, default=16, help="cameras at most")
+    options.add_argument("--settle", type=float, default=15.0, help="seconds after each camera's start")
+    options.add_argument("--seconds", type=float, default=20.0, help="of each measurement")
+    run(options.parse_args())
+
+
+if __name__ == "__main__":
+    main()
