@@ -18,7 +18,7 @@ from server.run.setup import free_port
 
 LOG = "up.log"
 _POLL_S = 0.2
-_START_S = 60.0
+_START_S = 150.0
 _END_S = 15.0
 
 

@@ -26,7 +26,16 @@ import sys
 import tempfile
 from pathlib import Path
 
-from benchmarks import faults_apart, faults_ends, faults_processes, faults_recorded
+from benchmarks import (
+    faults_apart,
+    faults_clock,
+    faults_disk,
+    faults_ends,
+    faults_messages,
+    faults_processes,
+    faults_recorded,
+    faults_sources,
+)
 from benchmarks.faults_film import Views, make
 from benchmarks.faults_run import Outcome, run
 from benchmarks.faults_site import Fault
@@ -34,7 +43,15 @@ from benchmarks.faults_table import describe
 from benchmarks.report import Report
 from benchmarks.surroundings import CannotRunError, finish, parser
 
-FAULTS: tuple[Fault, ...] = (*faults_processes.FAULTS, *faults_apart.FAULTS, *faults_ends.FAULTS)
+FAULTS: tuple[Fault, ...] = (
+    *faults_processes.FAULTS,
+    *faults_apart.FAULTS,
+    *faults_sources.FAULTS,
+    *faults_messages.FAULTS,
+    *faults_disk.FAULTS,
+    *faults_clock.FAULTS,
+    *faults_ends.FAULTS,
+)
 _PULSES = 15_000
 """Detections for so many: ten minutes."""
 
@@ -62,6 +79,8 @@ async def _group(faults: list[Fault], views: Views, folder: Path, report: Report
         outcomes[-1].ended += stand.ended[-1:]
         files = await asyncio.to_thread(faults_recorded.read, stand.recorded, stand.live)
         faults_recorded.note(outcomes, stand.told, files)
+    except CannotRunError as error:
+        report.say(f"{faults[0].name}: left out: {error}")
     except RuntimeError as error:
         report.say(f"{faults[0].name} and what follows it: {error}")
     return outcomes

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -110,6 +110,39 @@ def make(folder: Path, pulses: int) -> Views:
     (folder / "ground.json").write_text(json.dumps({"unit": "m", "homography": ground}), encoding="ascii")
     site = {"name": "faults", "fps": FPS, "width": WIDTH, "height": HEIGHT}
     return Views(cameras, site, folder / "ground.json", found)
+
+
+def make_unattractive(views: Views, folder: Path, best: str, pulses: int) -> Views:
+    """Let people be smaller in all cameras but one, so that this one is shown: by other detections."""
+    cameras, found = [], dict(views.found)
+    for camera in views.cameras:
+        name = camera["id"]
+        if name == best:
+            cameras.append(camera)
+            continue
+        boxes: list[list[tuple[int, int, int, int]]] = [[] for _ in range(FRAMES)]
+        for (of, left, top, right, bottom), frame in views.found.items():
+            if of == name:
+                width, height = (right - left) // 2000, (bottom - top) // 2000
+                x, y = (left + right) // 2000 - width // 2, bottom // 1000 - height
+                boxes[frame].append((x, y, width, height))
+                code = (1000 * x + frame, 1000 * y + frame)
+                found[name, *code, code[0] + 1000 * width, code[1] + 1000 * height] = frame
+        path = folder / f"{name}-small.txt"
+        _write_detections([np.array(some).reshape(-1, 4) for some in boxes], pulses, path)
+        cameras.append({**camera, "detections": str(path)})
+    return replace(views, cameras=cameras, found=found)
+
+
+def make_smaller(path: Path, out: Path) -> Path:
+    """Write a film again, in three quarters of its size."""
+    with av.open(str(path)) as container:
+        pictures = [
+            frame.reformat(WIDTH * 3 // 4, HEIGHT * 3 // 4).to_ndarray(format="bgr24")
+            for frame in container.decode(video=0)
+        ]
+    write_film(pictures, out)
+    return out
 
 
 def write_film(pictures: Sequence[NDArray[np.uint8]], path: Path) -> None:

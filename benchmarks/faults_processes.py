@@ -13,7 +13,6 @@ from benchmarks.faults_site import LEASE_S, Fault, Inject, Stand, with_up
 SHOWN = "shown"
 """The camera that most viewers are shown."""
 _FROZEN_S = 4.0
-_ROUTER_AWAY_S = 30.0
 
 
 def _names(stand: Stand, names: Sequence[str]) -> list[str]:
@@ -76,5 +75,4 @@ FAULTS = (
     Fault("kill bestview", with_up, killed("bestview"), 15.0, None, breaks=True),
     Fault("kill bestview+camera", with_up, killed("bestview", SHOWN), 15.0, None, breaks=True),
     Fault("kill bestview+sync", with_up, killed("bestview", "sync"), 15.0, None, breaks=True),
-    Fault("router away 30 s", with_up, frozen("bestview", seconds=_ROUTER_AWAY_S), 40.0, None),
 )

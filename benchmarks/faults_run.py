@@ -94,7 +94,9 @@ async def _all_watch(viewers: Sequence[Viewer]) -> None:
 
 def _received(stand: Stand, views: Views) -> list[Received]:
     told, live = stand.told, stand.live
-    return [judge(viewer.pictures(), told, viewer.number, views, live) for viewer in stand.viewers]
+    return [
+        judge(viewer.pictures(), told, viewer.number, stand.views or views, live) for viewer in stand.viewers
+    ]
 
 
 def _sum_up(outcome: Outcome, received: Sequence[Received], stand: Stand) -> None:

@@ -21,7 +21,7 @@ from benchmarks.processes import running_pids
 
 LEASE_S = 1.0
 """`zenoh.lease_s` by default."""
-_SETTLE_S = 45.0
+_SETTLE_S = 90.0
 _POLL_S = 0.05
 _SEEN_S = 1.5
 """So long all must be well before a fault."""
@@ -64,6 +64,8 @@ class Stand:
     control: Any = None
     """What the faults of this site are injected by, if not signals."""
     recorded: Path = Path()
+    views: Views | None = None
+    """What it plays, where that is not what all sites play."""
 
     def pids(self, name: str) -> list[int]:
         """Give the processes of a name: sync, bestview, drawing, or a camera's id; none where it is down."""
@@ -204,6 +206,7 @@ class Fault:
         within: promised: so many seconds at most without a fresh picture; None: nobody is there to take over.
         breaks: it is the viewers' own server that dies.
         alone: does all by itself, with sites of its own, and gives what was told to end.
+        unrecorded: meanwhile nothing can be recorded.
     """
 
     name: str
@@ -213,3 +216,4 @@ class Fault:
     within: float | None = 1.0
     breaks: bool = False
     alone: Alone | None = None
+    unrecorded: bool = False

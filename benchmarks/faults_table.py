@@ -45,7 +45,7 @@ def kept(outcome: Outcome) -> bool:
         return False
     if fault.within is not None and outcome.without > fault.within:
         return False
-    if outcome.lost is not None and outcome.lost > (1 if fault.breaks else 0):
+    if outcome.lost is not None and not fault.unrecorded and outcome.lost > (1 if fault.breaks else 0):
         return False
     return not outcome.broken_files and all(it.well for it in outcome.ended)
 

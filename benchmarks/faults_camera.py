@@ -1,0 +1,129 @@
+"""A network camera of our own: MPEG-TS over HTTP, as many cameras send it, which can be broken on purpose."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import io
+import random
+import time
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import cast
+
+import av
+from av.container import OutputContainer
+from av.video.stream import VideoStream
+
+from benchmarks.faults_film import FPS, FRAMES
+
+_TIME_BASE = Fraction(1, 90_000)
+_GOP = 10
+_GARBAGE_BYTES = 4000
+_HOUR_S = 3600
+_ANSWER = b"HTTP/1.0 200 OK\r\nContent-Type: video/mp2t\r\n\r\n"
+
+
+@dataclass(frozen=True, slots=True)
+class Film:
+    """What it sends: encoded pictures, over and over again."""
+
+    path: Path
+    pictures: tuple[bytes, ...]
+
+    @classmethod
+    def of(cls, path: Path) -> Film:
+        """Read a film."""
+        with av.open(str(path)) as container:
+            found = [bytes(packet) for packet in container.demux(video=0) if packet.size]
+        return cls(path, tuple(found))
+
+
+class _Muxer:
+    """Packs pictures of one film into a transport stream."""
+
+    def __init__(self, film: Film) -> None:
+        self._film, self._out = film, io.BytesIO()
+        self._container = cast("OutputContainer", av.open(self._out, "w", format="mpegts"))
+        with av.open(str(film.path)) as template:
+            self._stream: VideoStream = self._container.add_stream_from_template(template.streams.video[0])
+
+    def pack(self, number: int, shift_s: int) -> bytes:
+        """Give the packets of the picture of a frame."""
+        packet = av.Packet(self._film.pictures[number % FRAMES])
+        packet.stream, packet.time_base = self._stream, _TIME_BASE
+        packet.pts = packet.dts = round((number / FPS + shift_s) / _TIME_BASE)
+        packet.is_keyframe = number % _GOP == 0
+        self._container.mux(packet)
+        data = self._out.getvalue()
+        self._out.seek(0)
+        self._out.truncate()
+        return data
+
+
+class NetworkCamera:
+    """Serves a film at its rate, to anybody who connects. What is set holds from the next frame on."""
+
+    def __init__(self, film: Film, port: int) -> None:
+        self.film = film
+        self.frozen = self.garbage = False
+        self.shift_s = 0
+        """Seconds by which its time stamps are ahead."""
+        self.began = time.time()
+        """When its frame 0 was, unix seconds."""
+        self.url = f"http://127.0.0.1:{port}/live.ts"
+        self._port = port
+        self._server: asyncio.Server | None = None
+        self._connections: set[asyncio.StreamWriter] = set()
+
+    async def open(self) -> None:
+        """Let cameras' users in."""
+        self._server = await asyncio.start_server(self._serve, "127.0.0.1", self._port)
+
+    async def close(self) -> None:
+        """Be away: nobody is there, and nobody comes in."""
+        if self._server is not None:
+            self._server.close()
+        for writer in self._connections:
+            writer.transport.abort()
+
+    def jump(self) -> None:
+        """Let its time stamps jump by an hour."""
+        self.shift_s += _HOUR_S
+
+    async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self._connections.add(writer)
+        try:
+            with contextlib.suppress(ConnectionError, asyncio.IncompleteReadError):
+                await reader.readuntil(b"\r\n\r\n")
+                writer.write(_ANSWER)
+                await self._send(writer)
+        finally:
+            self._connections.discard(writer)
+            writer.close()
+
+    async def _send(self, writer: asyncio.StreamWriter) -> None:
+        noise = random.Random(1)
+        muxer: _Muxer | None = None
+        film = self.film
+        number = -1
+        while not writer.is_closing():
+            now = int((time.time() - self.began) * FPS)
+            if now <= number:
+                await asyncio.sleep(0.5 / FPS)
+                continue
+            number = now
+            if self.frozen:
+                continue
+            if self.garbage:
+                muxer = None
+                writer.write(noise.randbytes(_GARBAGE_BYTES))
+                continue
+            if film is not self.film or muxer is None:
+                if number % _GOP:  # whoever comes begins with a key picture
+                    continue
+                film = self.film
+                muxer = _Muxer(film)
+            writer.write(muxer.pack(number, self.shift_s))
+            await writer.drain()
