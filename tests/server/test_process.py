@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import threading
 from collections.abc import AsyncIterator
-from itertools import zip_longest
+from itertools import pairwise, zip_longest
 from pathlib import Path
 
 import msgspec
@@ -14,6 +14,8 @@ import zenoh
 from videos_by_hand import write_video
 
 from camsync import PulseServer
+from server.camera.ladder import Bounds, Ladder, rungs
+from server.camera.load import Load
 from server.camera.pipeline import CameraPipeline
 from server.camera.process import CameraProcess
 from server.camera.scene import Scene, write_recording
@@ -240,3 +242,48 @@ async def test_a_camera_started_after_its_recording_was_over_lets_everything_end
         await it.camera("c0")
         await over
     assert it.service.intake.states["c0"].word == "ended"
+
+
+class Overloaded(Load):
+    """A camera's load that stands on the topmost rung."""
+
+    def __init__(self, config: Config, camera_id: str, *, live: bool) -> None:
+        super().__init__(config, camera_id, live=live)
+        self._ladder = Ladder(rungs(config.track.window.stride, live=True)[-1:], Bounds(1e9, 1e9))
+
+    @property
+    def level(self) -> int:
+        return 4
+
+
+async def test_a_camera_on_the_topmost_rung_shows_every_gop_and_ends_every_window_in_time(
+    recording: Path, tmp_path: Path, running: list[Running], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("server.camera.process.Load", Overloaded)
+    config = site(recording, c0="c0.mp4", c1="c1.mp4")
+    it = Running(config, tmp_path / "out")
+    running.append(it)
+    gops: list[GopChoices] = []
+    it.service.on_decision.append(gops.append)
+    over = await it.start()
+    plain = await asyncio.to_thread(Plain, config, "myview/**")
+    async with asyncio.timeout(PATIENCE):
+        await asyncio.gather(over, *(it.camera(camera) for camera in config.camera_ids))
+    await asyncio.to_thread(plain.wait_and_close, "bestview/choices", len(gops))
+
+    heads = [msgspec.json.decode(head, type=FrameHead) for _, head in plain.of("c0/video")]
+    frames = [head.pulse for head in heads]
+    assert frames[:6] == [0, 2, 4, 6, 8, 9]
+    assert [head.pulse for head in heads if head.key] == list(range(0, FRAMES, config.encode.gop))
+    pairs = [(before.pulse, head.after) for before, head in pairwise(heads) if not head.key]
+    assert all(before == after for before, after in pairs), "what was not taken costs only itself"
+    words = [msgspec.json.decode(payload, type=CameraTracks) for payload, _ in plain.of("c0/tracks")]
+    assert [word.epoch for word in words] == list(range(FRAMES // 5 + 1))
+    assert sorted(pulse for word in words for pulse in word.shed) == [
+        it for it in range(FRAMES) if it % 5 != 4
+    ], "all but the last of every window, and it is told"
+    assert sum(gop.frames for gop in gops) == FRAMES
+    assert b"not searched" in in_folder(tmp_path / "out")["late.csv"]
+    statuses = [msgspec.json.decode(payload, type=CameraStatus) for payload, _ in plain.of("c0/status")]
+    assert statuses[-1].load_level == 4
+    assert "searching every 5th frame" in statuses[-1].load
