@@ -12,7 +12,11 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import multiprocessing
+import os
 import sys
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 
 from benchmarks.fuzz_run import Attempt, Crash, Plan, Runner, Tally
@@ -28,6 +32,18 @@ def targets_of(part: str) -> tuple[type[Target], ...]:
     """Give the targets of a part, whose libraries are loaded only now."""
     found: tuple[type[Target], ...] = importlib.import_module(f"benchmarks.fuzz_{part}").TARGETS
     return found
+
+
+def side_by_side(targets: Sequence[type[Target]], plan: Plan, jobs: int) -> Iterator[tuple[int, Tally]]:
+    """Run targets, so many at a time; give each one's place and what came of it, as they end."""
+    with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("fork")) as pool:
+        running = {pool.submit(_run, it, plan): place for place, it in enumerate(targets)}
+        for done in as_completed(running):
+            yield running[done], done.result()
+
+
+def _run(target: type[Target], plan: Plan) -> Tally:
+    return Runner(target, target.name, plan).run()
 
 
 def replay(path: Path) -> int:
@@ -64,30 +80,35 @@ def main() -> None:
     options = argparse.ArgumentParser(prog="python -m benchmarks.fuzz", description=__doc__.splitlines()[0])
     options.add_argument("--part", action="append", choices=PARTS, help="only this one; may be repeated")
     options.add_argument("--target", action="append", help="only this one of a part; may be repeated")
-    options.add_argument(
-        "--inputs", type=int, default=1_000_000, help="of each target; what is slow gets its share of them"
-    )
+    options.add_argument("--inputs", type=int, default=1_000_000, help="of each target")
     options.add_argument("--seconds", type=float, help="of each target at most")
+    options.add_argument(
+        "--jobs", type=int, default=len(os.sched_getaffinity(0)), help="targets at a time; each has a process"
+    )
     options.add_argument("--seed", type=int, default=1)
     options.add_argument("--out", type=Path, default=ROOT / "out" / "fuzz", help="folder for what crashed")
     options.add_argument("--replay", type=Path, metavar="FILE", help="only feed this input again")
     chosen = options.parse_args()
     if chosen.replay is not None:
         sys.exit(replay(chosen.replay))
-    report, rows, crashes = Report(), [], 0
-    for part in chosen.part or PARTS:
-        for target in targets_of(part):
-            if chosen.target and target.name not in chosen.target:
-                continue
-            inputs = max(1, round(chosen.inputs * target.share))
-            plan = Plan(inputs, chosen.seconds, chosen.seed, chosen.out)
-            tally = Runner(target, target.name, plan).run()
-            rows.append(row(target.name, tally))
-            crashes += tally.crashes
-            print("  ".join(rows[-1]), file=sys.stderr, flush=True)
+    report = Report()
+    targets = [
+        it
+        for part in chosen.part or PARTS
+        for it in targets_of(part)
+        if not chosen.target or it.name in chosen.target
+    ]
+    if not targets:
+        options.error("no target of these parts has such a name")
+    plan = Plan(chosen.inputs, chosen.seconds, chosen.seed, chosen.out)
+    tallies: dict[int, Tally] = {}
+    for place, tally in side_by_side(targets, plan, max(1, chosen.jobs)):
+        tallies[place] = tally
+        print("  ".join(row(targets[place].name, tally)), file=sys.stderr, flush=True)
+    rows = [row(it.name, tallies[place]) for place, it in enumerate(targets)]
     report.table("Inputs that nobody meant", _COLUMNS, rows)
     report.save(chosen.out / f"fuzz-{'-'.join(chosen.part or ['all'])}.txt")
-    sys.exit(crashes > 0)
+    sys.exit(any(it.crashes for it in tallies.values()))
 
 
 if __name__ == "__main__":

@@ -24,13 +24,9 @@ class UnclearError(AssertionError):
 
 
 class Target:
-    """One reader. Made in the process that runs it, once for many inputs.
-
-    ``share``: of the inputs that are asked for, so many are given to it; what is slow gets fewer.
-    """
+    """One reader. Made in the process that runs it, once for many inputs."""
 
     name: ClassVar[str]
-    share: ClassVar[float] = 1.0
 
     def make(self, rng: Random) -> bytes:
         """Give an input: most are nearly right, some are right, some are anything."""

@@ -9,7 +9,7 @@ from random import Random
 
 import pytest
 
-from benchmarks.fuzz import PARTS, targets_of
+from benchmarks.fuzz import PARTS, side_by_side, targets_of
 from benchmarks.fuzz_http_strangers import SECRETS, Strangers
 from benchmarks.fuzz_run import Attempt, Crash, Plan, Runner, numbered
 from benchmarks.fuzz_target import Target, UnclearError, refused
@@ -85,6 +85,34 @@ def test_whatever_a_reader_does_wrong_is_counted_and_saved(tmp_path: Path) -> No
     assert saved == set(given) - {b"right", b"wrong"}
     assert tally.accepted == given.count(b"right")
     assert tally.refused == given.count(b"wrong")
+
+
+class Raising(Broken):
+    """Now and then raises."""
+
+    name = "raising-reader"
+
+    def make(self, rng: Random) -> bytes:
+        return rng.choice((b"right", b"wrong", b"raises"))
+
+
+class Sound(Raising):
+    """Takes everything."""
+
+    name = "sound-reader"
+
+    def feed(self, data: bytes) -> bool:
+        return len(data) > 0
+
+
+def test_targets_side_by_side_count_as_they_do_one_by_one() -> None:
+    plan = Plan(INPUTS_OF_ALL_KINDS, seed=SEED)
+    tallies = dict(side_by_side((Raising, Sound, Sound), plan, jobs=2))
+    alone = Runner(Raising, Raising.name, plan).run()
+    assert sorted(tallies) == [0, 1, 2]
+    assert (tallies[0].refused, tallies[0].crashes) == (alone.refused, alone.crashes)
+    assert alone.crashes > 0
+    assert tallies[1].accepted == tallies[2].accepted == INPUTS_OF_ALL_KINDS
 
 
 def test_a_saved_input_says_again_what_it_did() -> None:
