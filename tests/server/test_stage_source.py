@@ -75,7 +75,7 @@ def test_the_kind_of_a_source_shows_in_how_it_is_written(source: str, kind: Sour
 
 @pytest.mark.skipif(not os.access("/dev/shm", os.W_OK), reason="needs a folder in memory")  # noqa: S108
 def test_a_recording_in_memory_is_one_though_it_is_below_dev() -> None:
-    with tempfile.TemporaryDirectory(dir="/dev/shm") as folder:  # noqa: S108
+    with tempfile.TemporaryDirectory(dir="/dev/shm") as folder:
         recording = Path(folder) / "c0.mp4"
         recording.touch()
         assert kind_of(str(recording)) is SourceKind.FILE

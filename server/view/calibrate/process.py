@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
 import logging
-import os
-import sys
 
 import msgspec
 
 from server.view.calibrate.task import Done, Task
+from server.view.child import start_child
 
 log = logging.getLogger(__name__)
 
@@ -18,15 +16,7 @@ log = logging.getLogger(__name__)
 async def calibrated(task: Task) -> Done:
     """Let a process of its own calibrate from a walk; it is ended where nobody waits for it any more."""
     try:
-        process = await asyncio.create_subprocess_exec(
-            sys.executable,
-            "-m",
-            "server.view.calibrate",
-            stdin=asyncio.subprocess.PIPE,
-            stdout=asyncio.subprocess.PIPE,
-            env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
-            process_group=0,  # Ctrl-C in a terminal is for the service alone
-        )
+        process = await start_child("server.view.calibrate")
     except OSError as error:
         return Done(error=f"the calibration cannot be started: {error.strerror}")
     try:

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import os
-import sys
 from typing import NoReturn, Self
 
 import msgspec
 
+from server.view.child import start_child
 from server.wire.drawing import LENGTH_BYTES, Canvas, Draw, Drawn, framed
 
 _ANSWER_S = 5.0
@@ -38,15 +37,7 @@ class DrawProcess:
             ProcessDiedError: the system does not let it start.
         """
         try:
-            process = await asyncio.create_subprocess_exec(
-                sys.executable,
-                "-m",
-                "server.draw",
-                stdin=asyncio.subprocess.PIPE,
-                stdout=asyncio.subprocess.PIPE,
-                env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
-                process_group=0,  # Ctrl-C in a terminal is for the service alone
-            )
+            process = await start_child("server.draw")
         except OSError as error:
             raise ProcessDiedError(f"cannot be started: {error.strerror}") from error
         started = cls(process)
