@@ -32,10 +32,10 @@ def disk_findings(config: Config, probes: Mapping[str, Probe]) -> list[Finding]:
     wanted = needed_mb(config, probes)
     held = sum(it.stat().st_size for it in _files(record.folder)) / 1e6
     free = shutil.disk_usage(there).free / 1e6
-    kept = f"{record.keep_s / 3600:.1f} hours of these cameras take about {wanted:.0f} MB"
+    kept = f"{_hours(record.keep_s)} of these cameras take about {wanted:.0f} MB"
     if wanted > record.most_mb:
-        hours = record.keep_s / 3600 * record.most_mb / wanted
-        text = f"{kept}, but record.most_mb is {record.most_mb:.0f}: about {hours:.1f} hours are kept"
+        fits = _hours(record.keep_s * record.most_mb / wanted)
+        text = f"{kept}, but record.most_mb is {record.most_mb:.0f}: about {fits} are kept"
         found.append(warning("record.most_mb", text, "raise it, or lower record.keep_s"))
     takes = min(wanted, record.most_mb)
     text = f"{kept}; {free:.0f} MB are free, and {held:.0f} MB are recorded already"
@@ -57,6 +57,10 @@ def needed_mb(config: Config, probes: Mapping[str, Probe]) -> float:
     kbps += config.sound.kbps if config.sound.source is not None else 0
     index = 8 * _INDEX_BYTES * config.site.fps * len(probes) / 1000
     return (kbps + index) * config.record.keep_s / 8000
+
+
+def _hours(seconds: float) -> str:
+    return f"{seconds / 3600:.1f} hours" if seconds >= 3600 else f"{seconds / 60:.0f} minutes"  # noqa: PLR2004
 
 
 def _files(folder: Path) -> list[Path]:

@@ -70,12 +70,13 @@ def _service(service: ServiceNow, rates: Rates) -> Text:
     return Text("; ".join(parts))
 
 
-def _cameras(cameras: tuple[CameraNow, ...]) -> Table:
-    heads = ("camera", "state", "a second", "after pulse", "tracks", "missed", "not searched", "late")
-    table = Table(*heads, "waiting", "certified", "", box=None, header_style="dim", pad_edge=False)
+def _cameras(cameras: tuple[CameraNow, ...]) -> RenderableType:
+    heads = ("camera", "state", "fps", "pulse", "tracks", "missed", "shed", "late", "waiting", "certified")
+    table = Table(*heads, box=None, header_style="dim", pad_edge=False)
+    for column in table.columns:
+        column.no_wrap = True
+    words = []
     for it in cameras:
-        step = "" if it.in_step or it.state != "live" else "counts by itself"
-        words = "; ".join(filter(None, (it.message, step)))
         table.add_row(
             escape(it.camera),
             Text(it.state, style=_STATES.get(it.state, "red")),
@@ -87,9 +88,10 @@ def _cameras(cameras: tuple[CameraNow, ...]) -> Table:
             str(it.late),
             "-" if it.waiting is None else str(it.waiting),
             "-" if it.certified is None else f"{100 * it.certified:.0f} %",
-            escape(words),
         )
-    return table
+        step = "" if it.in_step or it.state != "live" else "counts by itself"
+        words += [Text(f"{it.camera}: {said}", style="yellow") for said in (it.message, step) if said]
+    return Group(table, *words)
 
 
 def _people(people: tuple[PersonNow, ...]) -> RenderableType:

@@ -211,7 +211,7 @@ def test_what_a_recording_takes_is_held_against_the_disk(tmp_path: Path) -> None
     capped = config(tmp_path, record=record, encode={"max_kbps": 500})
     assert needed_mb(capped, huge) == pytest.approx((500 + 20) * 3600 / 8000)
     less = disk_findings(config(tmp_path, record={**record, "most_mb": 46.0}), probes)
-    assert "about 0.1 hours are kept" in only(less, "record.most_mb").text
+    assert "about 6 minutes are kept" in only(less, "record.most_mb").text
 
 
 def test_a_folder_that_cannot_be_written_is_bad(tmp_path: Path) -> None:
