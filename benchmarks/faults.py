@@ -37,6 +37,7 @@ from benchmarks import (
     faults_sources,
 )
 from benchmarks.faults_film import Views, make
+from benchmarks.faults_plot import draw
 from benchmarks.faults_run import Outcome, run
 from benchmarks.faults_site import Fault
 from benchmarks.faults_table import describe
@@ -52,6 +53,7 @@ FAULTS: tuple[Fault, ...] = (
     *faults_clock.FAULTS,
     *faults_ends.FAULTS,
 )
+_LINES = 20
 _PULSES = 15_000
 """Detections for so many: ten minutes."""
 
@@ -83,7 +85,14 @@ async def _group(faults: list[Fault], views: Views, folder: Path, report: Report
         report.say(f"{faults[0].name}: left out: {error}")
     except RuntimeError as error:
         report.say(f"{faults[0].name} and what follows it: {error}")
+        report.say(await asyncio.to_thread(_log_of, folder))
     return outcomes
+
+
+def _log_of(folder: Path) -> str:
+    """Give the end of what a site's processes said."""
+    said = [path.read_text(encoding="utf-8", errors="replace") for path in sorted(folder.glob("*.log"))]
+    return "\n".join("".join(said).splitlines()[-_LINES:])
 
 
 def main() -> None:
@@ -105,6 +114,7 @@ def main() -> None:
         finish(problem, "faults")
     describe(report, outcomes)
     report.save(chosen.out / "faults.txt")
+    draw(outcomes, chosen.out / "faults.png")
 
 
 if __name__ == "__main__":

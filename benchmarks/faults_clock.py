@@ -7,14 +7,17 @@ import contextlib
 import mmap
 import shutil
 import struct
+import time
 from collections.abc import AsyncIterator
 from pathlib import Path
 
 from benchmarks.faults_film import Views
 from benchmarks.faults_site import Fault, Inject, Stand, with_up
 from benchmarks.surroundings import CannotRunError
+from client import site
 
 _HOUR_S = 3600
+_EXACT_S = 60.0
 _SHIM = r"""
 #define _GNU_SOURCE
 #include <fcntl.h>
@@ -102,7 +105,11 @@ def stepped(seconds: int) -> Inject:
     """Step the clock of all processes."""
 
     async def inject(stand: Stand) -> None:
+        before = (await site(stand.url)).now - time.time()
         stand.control.step(seconds)
+        after = (await site(stand.url)).now - time.time()
+        if abs(after - before - seconds) > _EXACT_S:
+            raise RuntimeError("the server's clock did not step")
 
     return inject
 

@@ -1,0 +1,105 @@
+"""The faults' judge: it sees what is right, and each thing that is wrong."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.faults_film import FRAMES, Stamp, Views, read_stamp, stamped
+from benchmarks.faults_judge import judge
+from benchmarks.faults_processes import FAULTS
+from benchmarks.faults_recorded import File, note
+from benchmarks.faults_run import Outcome
+from benchmarks.faults_table import kept
+from benchmarks.faults_viewer import Picture, Told
+from client import Box, Gop
+
+GOP = 10
+SIDES = (10, 20, 30, 60)
+
+
+def box_of(frame: int) -> Box:
+    left, top, right, bottom = (side + frame / FRAMES for side in SIDES)
+    return Box(1, left, top, right, bottom)
+
+
+FOUND = {("c0", *(1000 * side + frame for side in SIDES)): frame for frame in range(FRAMES)}
+VIEWS = Views([], {}, None, FOUND)
+
+
+def told(gops: int, camera: str | None = "c0") -> Told:
+    heard = Told()
+    for number in range(gops):
+        first = number * GOP
+        boxes = {"c0": tuple((box_of(frame % FRAMES),) for frame in range(first, first + GOP))}
+        heard.take(Gop(first=first, frames=GOP, choices={1: camera}, boxes=boxes, cuts=()))
+    return heard
+
+
+def watched(gops: int) -> list[Picture]:
+    return [
+        Picture(pulse, 100.0 + pulse // GOP * 0.4, Stamp("c0", pulse % FRAMES)) for pulse in range(gops * GOP)
+    ]
+
+
+@pytest.mark.parametrize(("camera", "frame"), [(0, 0), (1, 517), (2, 999)])
+def test_a_picture_says_whose_it_is_and_which(camera: int, frame: int) -> None:
+    noise = np.random.default_rng(1).integers(0, 255, (144, 256, 3), dtype=np.uint8)
+    grey = stamped(noise, camera, frame).mean(axis=2).astype(np.uint8)
+    assert read_stamp(grey) == Stamp(f"c{camera}", frame)
+    assert read_stamp(noise.mean(axis=2).astype(np.uint8)) is None
+
+
+def test_what_is_right_is_right_over_the_end_of_the_film() -> None:
+    received = judge(watched(102), told(102), 1, VIEWS)
+    assert (received.frames, received.wrong, received.repeated) == (1020, 0, 0)
+    assert (received.boxes, received.wrong_boxes, received.blurred) == (1020, 0, 0)
+    assert received.without(100.0, 140.0) == pytest.approx(0.4)
+
+
+def test_a_picture_of_another_camera_is_wrong() -> None:
+    pictures = watched(3)
+    pictures[14] = replace(pictures[14], stamp=Stamp("c1", 14))
+    assert judge(pictures, told(3), 1, VIEWS).wrong == 1
+
+
+def test_a_picture_of_another_moment_is_wrong_and_so_is_the_box_on_it() -> None:
+    pictures = watched(3)
+    pictures[14] = replace(pictures[14], stamp=Stamp("c0", 12))
+    received = judge(pictures, told(3), 1, VIEWS)
+    assert (received.wrong, received.wrong_boxes) == (1, 1)
+
+
+def test_a_picture_that_is_shown_again_is_not_fresh_and_boxes_of_the_next_one_do_not_belong_on_it() -> None:
+    pictures = watched(3)
+    pictures[14] = replace(pictures[14], stamp=Stamp("c0", 13))
+    received = judge(pictures, told(3), 1, VIEWS)
+    assert (received.wrong, received.repeated, received.wrong_boxes, len(received.fresh)) == (0, 1, 1, 29)
+
+
+def test_who_gets_nothing_waits() -> None:
+    pictures = [it for it in watched(10) if not 30 <= it.pulse < 70]
+    assert judge(pictures, told(10), 1, VIEWS).without(100.0, 104.0) == pytest.approx(2.0)
+    assert judge([], told(10), 1, VIEWS).without(100.0, 104.0) == pytest.approx(4.0)
+
+
+def test_a_gop_that_was_shown_and_is_not_on_the_disk_is_lost() -> None:
+    outcome = Outcome(FAULTS[0], gops=(0, 3))
+    there = frozenset(range(25))
+    note(
+        [outcome],
+        told(3),
+        [File("c0", 0, there, plays=True), File("c1", 0, frozenset(range(30)), plays=False)],
+    )
+    assert (outcome.lost, outcome.broken_files) == (1, 1)
+    assert not kept(outcome)
+
+
+def test_promises_are_kept_or_not() -> None:
+    good = Outcome(FAULTS[0], received=[judge(watched(3), told(3), 1, VIEWS)], without=0.9)
+    assert kept(good)
+    assert not kept(replace(good, without=1.1))
+    assert not kept(replace(good, reconnections=1))
+    assert not kept(replace(good, failed="there is no process c0"))
