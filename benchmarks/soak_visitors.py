@@ -24,9 +24,33 @@ _STAY_S = (1.0, 8.0)
 _AHEAD_S = 3.0
 """How far back somebody asks for the past, seconds of the world."""
 _TFDT, _TIME_AT = b"tfdt", 8
+_TRUN, _COUNT_AT, _ENTRY = b"trun", 8, 12
+"""Of a run of samples, as MyView writes it: where their number stands, and the bytes of each."""
 _RECEIVED = 65_536
 _FAMILIAR = (200, 204, 404, 503)
 """Answers that a visitor may get: somebody may be gone, and places are limited."""
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """A picture of a stream, shown from one pulse to another."""
+
+    pulse: int
+    until: int
+
+
+def shown_by(moof: bytes, fps: float) -> Shown | None:
+    """Say what a fragment shows, by the box before its pictures; None: it is sound, or another box."""
+    time, run = moof.find(_TFDT), moof.find(_TRUN)
+    if not moof.startswith(b"moof") or min(time, run) < 0:
+        return None
+    start = int.from_bytes(moof[time + _TIME_AT : time + _TIME_AT + 8], "big")
+    count = int.from_bytes(moof[run + _COUNT_AT : run + _COUNT_AT + 4], "big")
+    first = run + _COUNT_AT + 8
+    lasts = sum(
+        int.from_bytes(moof[at : at + 4], "big") for at in range(first, first + _ENTRY * count, _ENTRY)
+    )
+    return Shown(round(start * fps / _TIMESCALE), round((start + lasts) * fps / _TIMESCALE))
 
 
 @dataclass(slots=True)
@@ -36,7 +60,18 @@ class Seen:
     delays: list[float] = field(default_factory=list)
     """Milliseconds from when a pulse was due until its picture was there."""
     holes: int = 0
+    """Frames for which there was nothing to show: also a frame that lasts is something."""
     pulse: int = 0
+    """The newest."""
+    until: int = 0
+    """The pulse up to which there is something to show."""
+
+    def take(self, shown: Shown, delay: float) -> None:
+        """Take in a picture that came so many milliseconds after its pulse was due."""
+        if self.until:
+            self.holes += max(0, shown.pulse - self.until)
+        self.pulse, self.until = shown.pulse, shown.until
+        self.delays.append(delay)
 
 
 class Visitors:
@@ -75,41 +110,35 @@ class Visitors:
             await asyncio.sleep(_PAUSE_S)
 
     async def _watch_camera(self) -> None:
-        async for pulse, came in self._stream(f"/cameras/{CAMERAS[0]}/live.mp4"):
-            self._note(self.camera, pulse, came)
+        self.camera.until = 0
+        async for shown, delay in self._stream(f"/cameras/{CAMERAS[0]}/live.mp4"):
+            self.camera.take(shown, delay)
 
     async def _watch_people(self) -> None:
         """Watch one after the other, whoever is there."""
         number = await self._somebody()
         if number is None:
             return
-        until, before = time.monotonic() + self._random.uniform(*_STAY_S), 0
+        until = time.monotonic() + self._random.uniform(*_STAY_S)
+        self.person.until = 0
         with contextlib.suppress(aiohttp.ClientResponseError):  # who has just been forgotten
-            async for pulse, came in self._stream(f"/objects/{number}/best.mp4"):
-                if before:
-                    self.person.pulse = before
-                    self._note(self.person, pulse, came)
-                before = pulse
+            async for shown, delay in self._stream(f"/objects/{number}/best.mp4"):
+                if self.person.until:  # what is there when somebody comes is older than what follows
+                    self.person.take(shown, delay)
+                self.person.until = shown.until
                 if time.monotonic() > until:
                     return
 
-    def _note(self, seen: Seen, pulse: int, came: float) -> None:
-        if seen.pulse and pulse > seen.pulse + 1:
-            seen.holes += pulse - seen.pulse - 1
-        seen.pulse = pulse
-        seen.delays.append(1e3 * (came - self._pulse0 - pulse / self._fps))
-
-    async def _stream(self, path: str) -> AsyncIterator[tuple[int, float]]:
-        """Give each picture's pulse, and when it came."""
+    async def _stream(self, path: str) -> AsyncIterator[tuple[Shown, float]]:
+        """Give what is shown, and how many milliseconds after its pulse was due it came."""
         async with self._session.get(path) as answer:
             answer.raise_for_status()
             while True:
                 size = int.from_bytes(await answer.content.readexactly(4), "big")
                 box = await answer.content.readexactly(size - 4)
-                place = box.find(_TFDT) if box.startswith(b"moof") else -1
-                if place >= 0:
-                    ticks = int.from_bytes(box[place + _TIME_AT : place + _TIME_AT + 8], "big")
-                    yield round(ticks * self._fps / _TIMESCALE), time.time()
+                shown = shown_by(box, self._fps)
+                if shown is not None:
+                    yield shown, 1e3 * (time.time() - self._pulse0 - shown.pulse / self._fps)
 
     async def _hear_events(self) -> None:
         async with self._session.get("/api/events") as answer:

@@ -21,6 +21,8 @@ from benchmarks.soak_samples import (
 )
 from benchmarks.soak_site import CAMERAS, HEIGHT, WIDTH, Filmed, Tempo
 from benchmarks.soak_tasks import FOLDER_VARIABLE, hooked_environment, note_tasks, read_held
+from benchmarks.soak_visitors import Seen, shown_by
+from server.view import fmp4
 from server.wire.loading import build_config
 
 HOURS = np.linspace(0.1, 24.0, 200)
@@ -94,3 +96,21 @@ def test_what_is_kept_is_counted_in_the_time_of_the_site(tmp_path: Path) -> None
     assert config.record.keep_s * tempo.speed == pytest.approx(3.0 * 3600.0)
     assert config.view.buffer_s * config.site.fps == pytest.approx(60.0 * 3.0)
     assert tempo.hours(tempo.pulse(24.0)) == pytest.approx(24.0)
+
+
+def test_a_stream_has_a_hole_where_there_is_nothing_to_show_and_not_where_a_picture_lasts() -> None:
+    seen = Seen()
+    pictures = [
+        fmp4.fragment([fmp4.Sample(b"a", key=True)], 10, 25.0),
+        fmp4.fragment([fmp4.Sample(b"b", key=False), fmp4.Sample(b"c", key=False)], 11, 25.0),
+        fmp4.still([fmp4.Sample(b"d", key=False)], 13, 90, 25.0),
+        fmp4.fragment([fmp4.Sample(b"e", key=True)], 90, 25.0),
+        fmp4.fragment([fmp4.Sample(b"f", key=True)], 94, 25.0),
+    ]
+    for place, data in enumerate(pictures):
+        shown = shown_by(data[4:], 25.0)
+        assert shown is not None
+        seen.take(shown, 400.0)
+        assert seen.holes == (3 if place == 4 else 0)
+    assert (seen.pulse, seen.until) == (94, 95)
+    assert shown_by(b"mdat" + pictures[0], 25.0) is None
