@@ -13,6 +13,8 @@ from server.wire.config import Config
 
 _GRACE_S = 3.0
 """What a busy machine takes longer than a camera was given."""
+_SAME_SPEED = 0.01
+"""Part by which a recording may be played faster or slower: 29.97 for 30."""
 _SAME_RATE = 0.1
 """Part by which a camera's rate may be off the site's without a word."""
 
@@ -57,8 +59,9 @@ def _of(config: Config, camera: str, found: Probe, *, runs: bool) -> list[Findin
             return [warning(check, found.problem, do)]
         return [bad(check, found.problem, "try its source in ffplay; address, password, cable, file")]
     parts = [f"{_size(found.size)} pixels"]
-    if found.sent is not None and found.sent.fps is not None:
-        parts.append(f"{found.sent.fps:.1f} pictures a second")
+    rate = found.recorded_fps if found.sent is None else found.sent.fps
+    if rate is not None:
+        parts.append(f"{rate:.1f} pictures a second")
     how = "its own H.264 passes" if found.passes else f"{found.kbps:.0f} kbit/s"
     parts += [how, f"{found.cores:.2f} of a core"]
     return [ok(check, ", ".join(parts)), *_doubts(config, check, found)]
@@ -83,6 +86,15 @@ def _doubts(config: Config, check: str, found: Probe) -> list[Finding]:
                 check,
                 f"it sends {rate:.1f} pictures a second, the site takes {site.fps:g}: some are shown twice",
                 "set the camera to that rate, or lower site.fps",
+            )
+        )
+    recorded = found.recorded_fps
+    if recorded is not None and abs(recorded / site.fps - 1) > _SAME_SPEED:
+        doubts.append(
+            warning(
+                check,
+                f"was recorded at {recorded:g} pictures a second, and is played at {site.fps:g}",
+                "set site.fps to that, or all but its speed is right",
             )
         )
     if found.sent is not None and found.sent.damaged:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from server.camera.pipeline import CameraPipeline
 from server.camera.sources import SourceEnded
-from server.run.doctor_stream import Sent, watch
+from server.run.doctor_stream import Sent, fps_of, watch
 from server.wire.config import Config
 from server.wire.errors import UserError
 from server.wire.sources import SourceKind, kind_of
@@ -24,6 +24,7 @@ class Probe:
         problem: why the camera cannot run; empty: it can.
         sent: what a network camera sends; None: it is none.
         size: width and height of its own pictures.
+        recorded_fps: pictures a second of a video file, as it says; None: it is none.
         passes: its own H.264 passes through.
         why_encoded: why it does not, where it could have.
         frames: how many frames were tried.
@@ -34,6 +35,7 @@ class Probe:
     problem: str = ""
     sent: Sent | None = None
     size: tuple[int, int] | None = None
+    recorded_fps: float | None = None
     passes: bool = False
     why_encoded: str = ""
     frames: int = 0
@@ -44,14 +46,16 @@ class Probe:
 def probe(config: Config, camera_id: str, seconds: float) -> Probe:
     """Try a camera for so many seconds, after it has answered."""
     camera, sent = config.camera(camera_id), None
+    kind = kind_of(camera.source)
     try:
-        if kind_of(camera.source) is SourceKind.STREAM:
+        if kind is SourceKind.STREAM:
             sent = watch(camera.source, camera.options, seconds / 2, seconds)
         pipeline = CameraPipeline(config, camera_id)
     except UserError as error:
         return Probe(str(error).removeprefix(f"camera {camera_id}: "), sent)
     try:
-        return _tried(config, pipeline, sent, time.monotonic() + seconds / 2)
+        tried = _tried(config, pipeline, sent, time.monotonic() + seconds / 2)
+        return replace(tried, recorded_fps=fps_of(camera.source) if kind is SourceKind.FILE else None)
     finally:
         pipeline.close()
 

@@ -47,6 +47,17 @@ def watch(url: str, options: Mapping[str, str], seconds: float, open_s: float) -
         opened.container.close()
 
 
+def fps_of(file: str) -> float:
+    """Give the pictures a second of a recording, as it says.
+
+    Raises:
+        UserError: it cannot be opened.
+    """
+    opened = open_video(file)
+    opened.container.close()
+    return opened.fps
+
+
 def _watched(opened: Opened, until: float) -> Sent:
     times: list[float] = []
     damaged, began = 0, time.thread_time()

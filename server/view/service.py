@@ -76,6 +76,8 @@ class BestViewService:
         self.pulse0: float | None = None
         """When pulse 0 was due, unix seconds; None before the first pulse."""
         self._pulsed_at: float | None = None
+        self._clock: Callable[[], float] = time.time
+        """The pulses', which does not step when the system's is set."""
         self.late_epochs = 0
         self.lost_pictures = dict.fromkeys(cameras, 0)
         """By camera: pictures of decided GOPs that did not come though it was delivering."""
@@ -211,6 +213,7 @@ class BestViewService:
         sync, fps = self.config.sync, self.config.site.fps
         name = pulse_client(self.config.view.share.index)
         async with PulseClient(sync.host, sync.port, name, fps_hint=fps) as pulses:
+            self._clock = pulses.now
             async for pulse in pulses:
                 self.pulse = pulse.number
                 self.pulse0 = pulse.due - pulse.number / fps
@@ -241,10 +244,12 @@ class BestViewService:
 
     def _publish(self, decision: GopDecision) -> None:
         """Say which boxes go with the frames before the frames are sent."""
-        pulse0 = self.pulse0
-        due = None if pulse0 is None else pulse0 + decision.first / self.config.site.fps
-        with self.stages.sending(due):
+        with self.stages.sending(lambda: self._late(decision.first)):
             self._send(decision)
+
+    def _late(self, pulse: int) -> float | None:
+        """Give the seconds since a pulse was due; None before the first one."""
+        return None if self.pulse0 is None else self._clock() - self.pulse0 - pulse / self.config.site.fps
 
     def _send(self, decision: GopDecision) -> None:
         choices = self.board.put(decision)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from server.view.histogram import Histogram
@@ -28,12 +28,13 @@ class Stages:
             yield
 
     @contextmanager
-    def sending(self, due: float | None) -> Iterator[None]:
-        """Measure what is done with a GOP; ``due`` is when its first pulse was; None: unknown."""
+    def sending(self, late: Callable[[], float | None]) -> Iterator[None]:
+        """Measure what is done with a GOP; ``late`` says how long ago its first pulse was due, if known."""
         with _measured(self.send):
             yield
-        if due is not None:
-            self.delay.observe(time.time() - due)
+        seconds = late()
+        if seconds is not None:
+            self.delay.observe(seconds)
 
 
 @contextmanager

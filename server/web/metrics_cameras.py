@@ -45,7 +45,7 @@ class CameraStages(Collector):
         late, lost = self._service.aligner.late_messages, self._service.lost_pictures
         yield self._counter("late_windows", "Windows that came too late to count.", lambda it, _: late[it])
         yield self._counter(
-            "lost_pictures", "Pictures that were not there when their GOP was decided.", lambda it, _: lost[it]
+            "lost_pictures", "Pictures not there when their GOP was decided.", lambda it, _: lost[it]
         )
         yield self._counter("windows", "Windows solved.", lambda _, it: it.gauge.totals.windows)
         yield self._counter(

@@ -80,7 +80,7 @@ def test_a_site_that_is_well_is_said_to_be_so_and_nothing_is_left_behind(myview:
     assert (ended.code, ended.err, said["well"]) == (0, "", True)
     (camera,) = [it for it in said["findings"] if it["check"] == "camera c0"]
     assert camera["level"] == "ok"
-    assert camera["text"].startswith("64x48 pixels, ")
+    assert camera["text"].startswith("64x48 pixels, 25.0 pictures a second, ")
     assert {it["check"] for it in said["findings"]} >= {
         "configuration", "http.port", "sync.port", "zenoh.listen", "clock", "disk", "processor", "memory"
     }  # fmt: skip
@@ -185,6 +185,7 @@ def test_cameras_are_tried_at_once_and_a_dead_one_holds_nobody_up(tmp_path: Path
         (Probe(size=(640, 360), sent=Sent((640, 360), 12.5, 25, 0, 0.0)), "it sends 12.5 pictures a second"),
         (Probe(size=(640, 360), sent=Sent((640, 360), 25.0, 25, 3, 0.0)), "3 packets could not be decoded"),
         (Probe(size=(640, 360), why_encoded="it has B pictures"), "is encoded anew: it has B pictures"),
+        (Probe(size=(640, 360), recorded_fps=30.0), "was recorded at 30 pictures a second"),
         (Probe(size=(320, 180)), "are smaller than the site's"),
     ],
 )
