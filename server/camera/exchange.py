@@ -23,6 +23,8 @@ _JOINED_S = 2.0
 _AGAIN_S = 1.0
 _LISTENERS_S = 1.0
 """How long the first word waits until all the others can hear it: all have come when pulses begin."""
+_TOLD_EVERY_S = 60.0
+"""Words that come too late are told of so often at most: on a machine with too much to do there are many."""
 _DECODER = msgspec.json.Decoder(Found)
 
 
@@ -45,6 +47,8 @@ class Exchange:
         self._opening: asyncio.Task[Bus] | None = None
         self._bus: Bus | None = None
         self._told = False
+        self._late: dict[str, tuple[float, int]] = {}
+        """When it was told last that a camera's words come too late, and how many have come since."""
         self.bad_messages = 0
 
     async def join(self) -> None:
@@ -99,8 +103,18 @@ class Exchange:
         if self._bus is not None:
             await self._until(lambda: not self._earshot.misses(pulse), until)
         for camera in self._earshot.give_up(pulse):
-            log.info("camera %s: what %s found in frame %d came too late", self._camera, camera, pulse)
+            self._tell_late(camera, pulse)
         return self._earshot.heard(pulse)
+
+    def _tell_late(self, camera: str, pulse: int) -> None:
+        now = asyncio.get_running_loop().time()
+        told, since = self._late.get(camera, (-_TOLD_EVERY_S, 0))
+        if now - told < _TOLD_EVERY_S:
+            self._late[camera] = (told, since + 1)
+            return
+        more = f", and {since} times before" if since else ""
+        log.info("camera %s: what %s found in frame %d came too late%s", self._camera, camera, pulse, more)
+        self._late[camera] = (now, 0)
 
     async def end(self, word: Found | None) -> None:
         """Tell the others that nothing follows."""
