@@ -17,6 +17,7 @@ from benchmarks.fuzz_target import Target, folder
 from server.view.past.kept import kept_from, kept_until, known, shown
 from server.view.past.past import Past
 from server.view.past.play import CameraPast, ObjectPast, last_before, play, sounds
+from server.view.past.run import HEAD
 from server.view.past.store import Bounds
 from server.view.past.told import told
 
@@ -50,6 +51,7 @@ class Runs(Target):
         (self._run,) = (self._path / "kept").glob("2*")
         files = sorted(it for it in self._run.rglob("*") if it.is_file())
         self._right = {str(it.relative_to(self._run)): it.read_bytes() for it in files}
+        self._right[HEAD] = as_json({**msgspec.json.decode(self._right[HEAD]), "began": _PULSE0})
         self._kinds = {it.suffix: [name for name in self._right if name.endswith(it.suffix)] for it in files}
         self._restore()
 

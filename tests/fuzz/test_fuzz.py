@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+from collections.abc import Iterator
 from pathlib import Path
 from random import Random
 
@@ -125,6 +126,13 @@ def test_a_saved_input_says_again_what_it_did() -> None:
     assert "KeyError" in found.text
 
 
+@pytest.fixture(scope="module")
+def strangers() -> Iterator[Strangers]:
+    target = Strangers()
+    yield target
+    target.close()
+
+
 @pytest.mark.parametrize(
     ("asked", "who"),
     [
@@ -136,18 +144,14 @@ def test_a_saved_input_says_again_what_it_did() -> None:
     ],
 )
 def test_a_site_that_lets_anybody_in_is_found_out(
-    asked: str, who: str, monkeypatch: pytest.MonkeyPatch
+    asked: str, who: str, strangers: Strangers, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    target = Strangers()
     token = f"Authorization: Bearer {SECRETS[who]}\r\n" if who else ""
     request = f"\0GET {asked} HTTP/1.1\r\nHost: x\r\n{token}Connection: close\r\n\r\n".encode()
-    try:
-        assert target.feed(request) is False
-        monkeypatch.setattr(access, "need_of", lambda *_: Need.NOTHING)
-        with pytest.raises(AssertionError, match=who or r"\[\]"):
-            target.feed(request)
-    finally:
-        target.close()
+    assert strangers.feed(request) is False
+    monkeypatch.setattr(access, "need_of", lambda *_: Need.NOTHING)
+    with pytest.raises(AssertionError, match=who or r"\[\]"):
+        strangers.feed(request)
 
 
 @pytest.mark.parametrize("text", ["", "two\nlines", "x" * 5000, "Traceback (most recent call last)"])
