@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import aiohttp
 import pytest
 import yaml
 from cameras_by_hand import CAMERAS, FedService, small_config
@@ -19,11 +20,13 @@ from hypothesis import strategies as st
 
 from server.run.reload import reloaded
 from server.run.setup import free_port
+from server.web.app import make_app, serving
 from server.wire.config import Config
 from server.wire.differing import differing
 from server.wire.errors import UserError
 from server.wire.loading import build_config
-from server.wire.running import IN_FORCE, Running, written
+from server.wire.running import IN_FORCE, OnDisk, Running, written
+from server.wire.sections import Http
 
 LIVE, CAMERA, ALL_CAMERAS, BEST_VIEW, SITE = "live", "camera c1", "all cameras", "best view", "site"
 
@@ -175,6 +178,23 @@ def test_a_service_goes_by_it_and_what_was_tried_out_stays_where_nothing_else_is
         service.go_by(small_config(view={"lookahead": 10_000}))
     assert service.config is before
     service.close()
+
+
+@pytest.mark.parametrize(
+    "found", [OnDisk("", ()), OnDisk("site.yaml: is wrong", ()), OnDisk("", ("site.fps",))]
+)
+async def test_the_operator_and_prometheus_are_told(found: OnDisk) -> None:
+    service = FedService(small_config())
+    async with (
+        asyncio.timeout(PATIENCE),
+        serving(make_app(service, lambda: found), Http(port=0)) as port,
+        aiohttp.ClientSession(f"http://127.0.0.1:{port}") as session,
+    ):
+        told = await (await session.get("/api/operator/config")).json()
+        metrics = await (await session.get("/metrics")).text()
+    service.close()
+    assert (told["error"], told["waiting"]) == (found.error, list(found.waiting))
+    assert f"myview_config_differs {float(found.differs)}" in metrics
 
 
 async def until_said(terminal: int, text: bytes) -> None:
