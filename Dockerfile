@@ -1,19 +1,23 @@
 # MyView in one image. Every process of a site is `myview` with another command: see docker-compose.yml.
 
+# To build the same image again, name the base by its digest, or your own copy of it:
+#   docker build --build-arg BASE=python:3.11-slim-bookworm@sha256:… -t myview .
+ARG BASE=python:3.11-slim-bookworm
+
 # The package as a wheel, in a stage of its own: neither the sources nor the build tools stay in the image.
-FROM python:3.11-slim-bookworm AS wheel
+FROM ${BASE} AS wheel
 WORKDIR /src
 COPY . .
 RUN pip wheel --no-cache-dir --no-deps --wheel-dir /wheel .
 
-FROM python:3.11-slim-bookworm
+FROM ${BASE}
 
 # Not root. A number, so that Kubernetes can check it too; the group `video` may open /dev/video*.
 RUN useradd --uid 10001 --create-home --groups video myview
 
 # What MyView leans on, in the locked versions and without the development tools. The wheels of av and
-# opencv-python-headless bring their libraries, so that nothing comes from apt. This layer, nearly all of the
-# image, is made anew only when one of the two files changes.
+# opencv-python-headless bring their libraries, so that nothing comes from apt. The libraries' own tests are left
+# out. This layer, nearly all of the image, is made anew only when one of the two files changes.
 RUN --mount=type=bind,source=pyproject.toml,target=/src/pyproject.toml \
     --mount=type=bind,source=requirements/lock.txt,target=/src/lock.txt \
     python -c 'import sys, tomllib; \
@@ -21,7 +25,9 @@ RUN --mount=type=bind,source=pyproject.toml,target=/src/pyproject.toml \
         < /src/pyproject.toml > /tmp/dependencies.txt \
     && pip install --no-cache-dir --root-user-action ignore --disable-pip-version-check \
         --constraint /src/lock.txt --requirement /tmp/dependencies.txt \
-    && rm /tmp/dependencies.txt
+    && rm /tmp/dependencies.txt \
+    && find "$(python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')" \
+        -type d -name tests -prune -exec rm -rf {} +
 
 RUN --mount=type=bind,from=wheel,source=/wheel,target=/wheel \
     pip install --no-cache-dir --root-user-action ignore --disable-pip-version-check --no-deps /wheel/*.whl
@@ -30,6 +36,9 @@ RUN --mount=type=bind,from=wheel,source=/wheel,target=/wheel \
 ENV MPLCONFIGDIR=/tmp/matplotlib PYTHONUNBUFFERED=1
 USER 10001
 WORKDIR /site
+LABEL org.opencontainers.image.title="MyView" \
+    org.opencontainers.image.description="Pick a person; see them, live, from whichever camera sees them best." \
+    org.opencontainers.image.licenses="Apache-2.0"
 EXPOSE 8080
 ENTRYPOINT ["myview"]
 CMD ["--help"]

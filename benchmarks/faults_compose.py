@@ -20,7 +20,7 @@ from server.run.setup import free_port
 PLAIN = (ROOT / "docker-compose.yml",)
 _BUILD_S = 900.0
 """An image without any cache downloads some 250 MB."""
-_UP_S = 240.0
+_UP_S = 300.0
 _COMMAND_S = 120.0
 
 
@@ -72,7 +72,7 @@ class ComposeSite:
         Raises:
             ComposeError: they do not become healthy; with what they said.
         """
-        words = ("up", "--detach", "--wait", "--wait-timeout", f"{_UP_S:.0f}")
+        words = ("up", "--detach", "--no-build", "--wait", "--wait-timeout", f"{_UP_S:.0f}")
         try:
             self.compose(*words, seconds=_UP_S + _COMMAND_S)
         except ComposeError as error:
