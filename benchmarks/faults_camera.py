@@ -106,24 +106,22 @@ class NetworkCamera:
     async def _send(self, writer: asyncio.StreamWriter) -> None:
         noise = random.Random(1)
         muxer: _Muxer | None = None
-        film = self.film
-        number = -1
+        sent = self.film, self.shift_s
+        number = self._now()
         while not writer.is_closing():
-            now = int((time.time() - self.began) * FPS)
-            if now <= number:
+            if number > self._now():
                 await asyncio.sleep(0.5 / FPS)
                 continue
-            number = now
-            if self.frozen:
-                continue
+            if self.frozen or self.garbage or sent != (self.film, self.shift_s):
+                muxer = None  # what follows begins with a key picture, as an encoder does that starts anew
+                sent = self.film, self.shift_s
             if self.garbage:
-                muxer = None
                 writer.write(noise.randbytes(_GARBAGE_BYTES))
-                continue
-            if film is not self.film or muxer is None:
-                if number % _GOP:  # whoever comes begins with a key picture
-                    continue
-                film = self.film
-                muxer = _Muxer(film)
-            writer.write(muxer.pack(number, self.shift_s))
-            await writer.drain()
+            elif not self.frozen and (muxer is not None or number % _GOP == 0):
+                muxer = muxer or _Muxer(self.film)
+                writer.write(muxer.pack(number, self.shift_s))
+                await writer.drain()
+            number += 1  # none is left out: the next ones are decoded by it
+
+    def _now(self) -> int:
+        return int((time.time() - self.began) * FPS)

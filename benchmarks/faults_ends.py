@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import signal
 import sys
 from pathlib import Path
 
@@ -15,8 +16,9 @@ from benchmarks.faults_site import Ended, Fault, Stand, told_to_end, with_up
 from benchmarks.faults_viewer import Viewer
 from benchmarks.surroundings import one_thread_environment
 
-_MOMENTS_S = (0.3, 1.0, 2.0, 4.0)
-"""After the start."""
+_MOMENTS_S = (0.0, 1.0, 3.0)
+"""After the first line of ours: before it the interpreter itself starts, and ends as any does."""
+_POLL_S = 0.005
 
 
 async def right_after_start(views: Views, folder: Path) -> list[Ended]:
@@ -31,17 +33,30 @@ async def right_after_start(views: Views, folder: Path) -> list[Ended]:
                 stdout=log,
                 stderr=log,
             )
+            await _begun(site)
             await asyncio.sleep(moment)
             ended.append(await told_to_end(f"up after {moment:g} s", site))
         for moment in _MOMENTS_S:
             single = Apart(config, log)
             for name in NAMES:
                 await single.start(name)
+            await asyncio.gather(*(_begun(it) for it in single.processes.values()))
             await asyncio.sleep(moment)
             ended += await asyncio.gather(
                 *(told_to_end(f"{name} after {moment:g} s", it) for name, it in single.processes.items())
             )
     return ended
+
+
+async def _begun(process: asyncio.subprocess.Process) -> None:
+    """Wait until a process looks after SIGTERM itself (proc(5), SigCgt), or has ended."""
+    status = Path(f"/proc/{process.pid}/status")
+    while process.returncode is None:
+        lines = (await asyncio.to_thread(status.read_text, encoding="ascii")).splitlines()
+        caught = next((line.split()[1] for line in lines if line.startswith("SigCgt")), "0")
+        if int(caught, 16) >> signal.SIGTERM - 1 & 1:
+            return
+        await asyncio.sleep(_POLL_S)
 
 
 async def while_watched(views: Views, folder: Path) -> list[Ended]:

@@ -1,15 +1,15 @@
 """Views of the synthetic room that say on every picture, and in every box, whose they are and of which frame.
 
 A strip at the bottom of each picture has its camera and its number in black and white blocks, which survive
-encoding. Detections are the scene's truth, and the thousandths of a box's left and top are the number of the
-frame it was found in. So a viewer can tell a picture of the wrong camera or moment from the right one, and a
+encoding. Detections are the scene's truth, and the thousandths of a box's left and top tell the frame it was
+found in. So a viewer can tell a picture of the wrong camera or moment from the right one, and a
 box that belongs to another picture from one that belongs to this.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
@@ -34,6 +34,8 @@ _START, _DRAWN = 300, 50
 _BLOCK = 8
 """Pixels of one bit; there are 32 of them: 4 of the camera, 12 of the number, and the same inverted."""
 _CAMERA_BITS, _BITS = 4, 16
+_SHUFFLED = np.random.default_rng(1).permutation(FRAMES)
+"""The thousandths of a box's top, by its frame: means of boxes, which the tracker makes, hardly ever fit."""
 _DARK, _BRIGHT, _MIDDLE = 40, 215, 128
 _SHOWS = 0.3
 """Share of a person that must show to be found."""
@@ -102,8 +104,7 @@ def make(folder: Path, pulses: int) -> Views:
         boxes = [_boxes(truths[place][number]) for place in places]
         _write_detections(boxes, pulses, folder / f"{name}.txt")
         for frame, some in enumerate(boxes):
-            for left, top, width, height in (1000 * some.astype(int) + (frame, frame, 0, 0)).tolist():
-                found[name, left, top, left + width, top + height] = frame
+            found.update(dict.fromkeys(((name, *sides) for sides in _sides(some, frame)), frame))
         source, detected = str(folder / f"{name}.mp4"), str(folder / f"{name}.txt")
         cameras.append({"id": name, "source": source, "at_end": "loop", "detections": detected})
     ground = {name: scene.homography(number).tolist() for number, name in enumerate(CAMERAS)}
@@ -126,10 +127,11 @@ def make_unattractive(views: Views, folder: Path, best: str, pulses: int) -> Vie
                 width, height = (right - left) // 2000, (bottom - top) // 2000
                 x, y = (left + right) // 2000 - width // 2, bottom // 1000 - height
                 boxes[frame].append((x, y, width, height))
-                code = (1000 * x + frame, 1000 * y + frame)
-                found[name, *code, code[0] + 1000 * width, code[1] + 1000 * height] = frame
+        smaller = [np.array(some).reshape(-1, 4) for some in boxes]
+        for frame, some in enumerate(smaller):
+            found.update(dict.fromkeys(((name, *sides) for sides in _sides(some, frame)), frame))
         path = folder / f"{name}-small.txt"
-        _write_detections([np.array(some).reshape(-1, 4) for some in boxes], pulses, path)
+        _write_detections(smaller, pulses, path)
         cameras.append({**camera, "detections": str(path)})
     return replace(views, cameras=cameras, found=found)
 
@@ -177,6 +179,14 @@ def _boxes(truth: Any) -> NDArray[np.float64]:
 def _write_detections(boxes: Sequence[NDArray[np.float64]], pulses: int, path: Path) -> None:
     with path.open("w", encoding="ascii") as file:
         for pulse in range(pulses):
-            mark = f".{pulse % FRAMES:03d}"
-            for left, top, width, height in boxes[pulse % FRAMES].astype(int).tolist():
-                file.write(f"{pulse + 1},-1,{left}{mark},{top}{mark},{width},{height},1,-1,-1,-1\n")
+            frame = pulse % FRAMES
+            x, y = f".{frame:03d}", f".{_SHUFFLED[frame]:03d}"
+            for left, top, width, height in boxes[frame].astype(int).tolist():
+                file.write(f"{pulse + 1},-1,{left}{x},{top}{y},{width},{height},1,-1,-1,-1\n")
+
+
+def _sides(boxes: NDArray[Any], frame: int) -> Iterator[tuple[int, int, int, int]]:
+    """Give left, top, right and bottom in thousandths of the boxes ``(N, 4)`` of a frame."""
+    for left, top, width, height in (1000 * boxes.astype(int)).tolist():
+        x, y = left + frame, top + int(_SHUFFLED[frame])
+        yield x, y, x + width, y + height

@@ -24,8 +24,9 @@ OPEN_S, READ_S = 10.0, 5.0
 """Seconds in which a camera must answer, and send something."""
 _RETRY_FIRST_S, _RETRY_MAX_S = 0.5, 10.0
 _LET_GO_S = 0.5
-_STALE_S = 2.0
-"""A picture older than this is not shown again: the camera counts as away."""
+_STALE_S = 1.5
+"""A picture older than this is not shown again: the camera counts as away, and others have half a second
+to take over within the two that are promised."""
 
 
 class Stream:

@@ -1,0 +1,27 @@
+"""Faults in a real site, as `python -m benchmarks.faults` injects them: what no busy machine changes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from benchmarks import faults_processes
+from benchmarks.faults import measure
+from benchmarks.report import Report
+
+pytestmark = [pytest.mark.live, pytest.mark.slow, pytest.mark.timeout(400)]
+
+NAMES = ("kill camera", "kill sync")
+
+
+async def test_viewers_notice_neither_a_killed_camera_nor_killed_pulses(tmp_path: Path) -> None:
+    chosen = [fault for fault in faults_processes.FAULTS if fault.name in NAMES]
+    outcomes = await measure(chosen, tmp_path, Report())
+    assert [it.fault.name for it in outcomes] == [fault.name for fault in chosen]
+    for it in outcomes:
+        assert not it.failed, it.fault.name
+        assert it.reconnections == 0, it.fault.name
+        assert sum(received.frames for received in it.received) > 100
+        assert [note for received in it.received for note in received.notes] == []
+        assert (it.lost, it.broken_files) == (0, 0)
