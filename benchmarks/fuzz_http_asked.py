@@ -5,7 +5,7 @@ from __future__ import annotations
 from random import Random
 from urllib.parse import quote
 
-from benchmarks.fuzz_mutate import odd
+from benchmarks.fuzz_mutate import damaged, odd
 
 WORDS = (
     b"\r\n", b"\n", b"\r", b"\x00", b"\xff", b" ", b"%", b"%00", b"%2e%2e%2f", b"../", b"/..//", b"%ff",
@@ -53,9 +53,20 @@ def some_range(rng: Random) -> str:
 
 def _value(rng: Random, name: str) -> str:
     if name in {"from", "to", "at"}:
-        return quote(rng.choice(_MOMENTS), safe="+")
+        return _moment(rng)
     if name in {"camera", "prefer"}:
         return rng.choice(_NAMES["camera"])
     if rng.random() < 0.5:
         return str(rng.choice((0, 1, 2, 5, -1, 10**12)))
     return quote(str(odd(rng)), errors="replace")[:200]
+
+
+def _moment(rng: Random) -> str:
+    """Give a moment that is known, far away, or none."""
+    way = rng.random()
+    if way < 0.5:
+        return quote(rng.choice(_MOMENTS), safe="+")
+    if way < 0.8:
+        return f"p{rng.randrange(-3, 40)}"
+    hurt = damaged(rng, rng.choice(_MOMENTS).encode(), WORDS)
+    return quote(hurt, safe="+")[:300]
