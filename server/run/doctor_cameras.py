@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import threading
 import time
 from collections.abc import Mapping
@@ -13,6 +14,8 @@ from server.wire.config import Config
 
 _GRACE_S = 3.0
 """What a busy machine takes longer than a camera was given."""
+_PASSWORD = re.compile(r"(://[^\s:/@]*:)[^\s/]*@")
+"""In the address of a camera."""
 _SAME_SPEED = 0.01
 """Part by which a recording may be played faster or slower: 29.97 for 30."""
 _SAME_RATE = 0.1
@@ -54,10 +57,11 @@ def camera_findings(config: Config, probes: Mapping[str, Probe], *, runs: bool) 
 def _of(config: Config, camera: str, found: Probe, *, runs: bool) -> list[Finding]:
     check = f"camera {camera}"
     if found.problem or found.size is None:
+        problem = _PASSWORD.sub(r"\1…@", found.problem)  # what is printed here is shown to others
         if runs:
             do = "the site runs, and may have it to itself: see /api/cameras"
-            return [warning(check, found.problem, do)]
-        return [bad(check, found.problem, "try its source in ffplay; address, password, cable, file")]
+            return [warning(check, problem, do)]
+        return [bad(check, problem, "try its source in ffplay; address, password, cable, file")]
     parts = [f"{_size(found.size)} pixels"]
     rate = found.recorded_fps if found.sent is None else found.sent.fps
     if rate is not None:

@@ -197,6 +197,13 @@ def test_a_camera_that_does_not_fit_is_doubted(tmp_path: Path, found: Probe, wor
     assert words in doubt.text
 
 
+def test_a_cameras_password_is_not_shown(tmp_path: Path, taken: int) -> None:
+    source = f"rtsp://me:pa@ss:w@127.0.0.1:{taken}/live?x=a:b@c"
+    there = config(tmp_path, cameras=[{"id": "gate", "source": source}])
+    shown = only(camera_findings(there, probe_all(there, 1.0), runs=False), "camera gate").text
+    assert f"rtsp://me:…@127.0.0.1:{taken}/live?x=a:b@c: cannot open" in shown
+
+
 def test_what_a_recording_takes_is_held_against_the_disk(tmp_path: Path) -> None:
     record: dict[str, Any] = {"folder": "kept", "keep_s": 3600.0, "most_mb": 1e6}
     probes = {"c0": Probe(size=(WIDTH, HEIGHT), kbps=1000.0)}
