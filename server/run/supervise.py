@@ -7,7 +7,7 @@ import logging
 import os
 import signal
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -39,12 +39,18 @@ class Supervisor:
     """Starts one process each for the pulses, every camera and the best view; restarts what dies.
 
     A camera whose recording is over ends with 0 and stays so; when the best-view service ends with 0,
-    everything is over.
+    everything is over. ``before_start`` is called whenever a process is about to be started.
     """
 
     def __init__(
-        self, config_path: Path, config: Config, environment: Mapping[str, str], out: Path | None
+        self,
+        config_path: Path,
+        config: Config,
+        environment: Mapping[str, str],
+        out: Path | None,
+        before_start: Callable[[], None] = lambda: None,
     ) -> None:
+        self._before_start = before_start
         self._environment = {**os.environ, **environment, "MYVIEW_SUPERVISED": "1"}
         path = str(config_path)
         self._out = out
@@ -82,6 +88,7 @@ class Supervisor:
         pause = _RETRY_FIRST_S
         loop = asyncio.get_running_loop()
         while True:
+            self._before_start()
             started = loop.time()
             child.process = await asyncio.create_subprocess_exec(
                 sys.executable,

@@ -31,8 +31,14 @@ async def run_up(running: Running, environment: Mapping[str, str], out: Path | N
     """
     with _folder() as folder:
         kept = Path(folder) / "site.yaml"
-        _keep(running, kept)
-        supervisor = Supervisor(running.path, running.now, {**environment, IN_FORCE: str(kept)}, out)
+        # Anew each time: what is old and temporary may be tidied away, and sites run for months.
+        supervisor = Supervisor(
+            running.path,
+            running.now,
+            {**environment, IN_FORCE: str(kept)},
+            out,
+            before_start=lambda: _keep(running, kept),
+        )
         following = asyncio.create_task(_follow(running, supervisor, kept), name="reload")
         try:
             await supervisor.run()
@@ -56,11 +62,7 @@ async def _follow(running: Running, supervisor: Supervisor, kept: Path) -> None:
     async for reload in reloads(running, _check):
         log.info("%s", reload.line)
         running.now = reload.now
-        try:
-            _keep(running, kept)
-        except OSError as error:
-            log.warning("%s: cannot write what is in force: %s", kept, error.strerror)
-            continue
+        _keep(running, kept)
         supervisor.hang_up("bestview")
         for number, camera in enumerate(reload.cameras):
             if number:
@@ -90,5 +92,9 @@ def _check(wanted: Config, reload: Reload) -> None:
 def _keep(running: Running, kept: Path) -> None:
     """Write down what the site runs by, for processes that begin: all of it or nothing."""
     new = kept.with_suffix(".new")
-    new.write_text(written(running.now, running.path.parent), encoding="utf-8")
-    new.replace(kept)
+    try:
+        kept.parent.mkdir(mode=0o700, exist_ok=True)
+        new.write_text(written(running.now, running.path.parent), encoding="utf-8")
+        new.replace(kept)
+    except OSError as error:
+        log.warning("%s: cannot write what is in force: %s", kept, error.strerror)

@@ -56,7 +56,7 @@ class Running:
             UserError: it cannot be read, or something in it is wrong.
         """
         kept = os.environ.get(IN_FORCE)
-        if kept is None:
+        if kept is None or not Path(kept).exists():
             return load_config(self.path)
         return build_config(read_content(Path(kept)), where=str(self.path), folder=self.path.parent)
 

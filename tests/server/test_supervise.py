@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 from typing import Any
 
@@ -59,8 +59,11 @@ class Machine:
             process.arguments[-1 if process.arguments[0] == "camera" else 0]: process for process in found
         }
 
-    def run(self, out: Path | None = None) -> asyncio.Task[None]:
-        self.task = asyncio.create_task(Supervisor(Path("site.yaml"), small_config(), {}, out).run())
+    def run(
+        self, out: Path | None = None, before_start: Callable[[], None] = lambda: None
+    ) -> asyncio.Task[None]:
+        supervisor = Supervisor(Path("site.yaml"), small_config(), {}, out, before_start)
+        self.task = asyncio.create_task(supervisor.run())
         return self.task
 
 
@@ -94,6 +97,16 @@ async def test_what_dies_is_started_again_alone(machine: Machine, code: int) -> 
         processes |= await machine.processes(1)
         assert processes["c0"].returncode is None
     assert machine.started.empty()
+
+
+async def test_what_is_needed_to_start_is_seen_to_before_every_start(machine: Machine) -> None:
+    seen: list[int] = []
+    machine.run(before_start=lambda: seen.append(len(seen)))
+    processes = await machine.processes(4)
+    assert len(seen) == 4
+    processes["c0"].end(-9)
+    await machine.processes(1)
+    assert len(seen) == 5
 
 
 async def test_a_camera_whose_recording_is_over_stays_so_and_the_best_views_end_ends_everything(
