@@ -177,8 +177,8 @@ def test_a_real_site_is_watched(films: Films, tmp_path: Path) -> None:
 
 
 def test_stalled_viewers_are_judged_by_the_medians_of_the_rounds() -> None:
-    alone = [Turn(10.0, p99, 1.0) for p99 in (50.0, 400.0, 52.0)]
-    beside = [Turn(10.0, p99, 1.0) for p99 in (54.0, 56.0, 900.0)]
+    alone = [Turn(10.0, p99, 1.0, 0.3) for p99 in (50.0, 400.0, 52.0)]
+    beside = [Turn(10.0, p99, 1.0, 0.3) for p99 in (54.0, 56.0, 900.0)]
     assert Beside(900, 100, alone, beside).ratio == pytest.approx(56.0 / 52.0)
 
 
