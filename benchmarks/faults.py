@@ -32,6 +32,7 @@ from benchmarks import (
     faults_disk,
     faults_ends,
     faults_messages,
+    faults_page,
     faults_processes,
     faults_recorded,
     faults_sources,
@@ -46,6 +47,7 @@ from benchmarks.surroundings import CannotRunError, finish, parser
 
 FAULTS: tuple[Fault, ...] = (
     *faults_processes.FAULTS,
+    *faults_page.FAULTS,
     *faults_apart.FAULTS,
     *faults_sources.FAULTS,
     *faults_messages.FAULTS,

@@ -3,7 +3,8 @@
     python -m benchmarks.faults_bus LISTEN CONNECT
 
 is the router that cameras connect to; what they say it passes on to the best view's router. A word on its
-standard input says how: plain, lost, doubled or disordered. That happens to three in ten of all messages but
+standard input says how: plain, lost, doubled or disordered, and how many that has befallen so far is printed.
+It happens to three in ten of all messages but
 pictures and sound, by numbers drawn from a seed.
 """
 
@@ -12,6 +13,7 @@ from __future__ import annotations
 import asyncio
 import random
 import sys
+from typing import Protocol
 
 from server.run.ending import end_with_parent, run_process
 from server.wire.bus import Bus
@@ -25,17 +27,27 @@ _LATER = 3
 """A message that is held back comes after so many others of its camera."""
 
 
+class Sends(Protocol):
+    """What a message can be passed on to, such as a bus."""
+
+    def publish(self, key: str, payload: bytes, attachment: bytes | None = None) -> None:
+        """Send a message."""
+
+
 class Way:
     """Passes messages on, more or less."""
 
-    def __init__(self, to: Bus) -> None:
+    def __init__(self, to: Sends) -> None:
         self._to, self.how = to, "plain"
         self._random = random.Random(1)
         self._held: list[tuple[int, Message]] = []
+        self.faulty = 0
+        """Messages that something was done to."""
 
     def take(self, message: Message) -> None:
         """Pass a message on, or not, or twice, or later."""
-        faulty = not message.key.endswith("/video") and self._random.random() < SHARE
+        faulty = self.how != "plain" and not message.key.endswith("/video") and self._random.random() < SHARE
+        self.faulty += faulty
         self._held = [(left - 1, held) for left, held in self._held]
         if faulty and self.how == "disordered":
             self._held.append((_LATER, message))
@@ -84,6 +96,7 @@ async def _run() -> None:
     )
     while word := await reader.readline():
         way.how = word.decode().strip()
+        print(way.faulty, flush=True)
 
 
 def main() -> None:

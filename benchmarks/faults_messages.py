@@ -14,6 +14,7 @@ from benchmarks.surroundings import one_thread_environment
 from server.run.setup import free_port
 
 _GONE_S = 30.0
+_FAULTY_S = 8.0
 
 
 class _Middle:
@@ -26,12 +27,16 @@ class _Middle:
     async def start(self) -> None:
         pipe, environment = asyncio.subprocess.PIPE, one_thread_environment()
         self._process = await asyncio.create_subprocess_exec(
-            sys.executable, *self._words, stdin=pipe, env=environment
+            sys.executable, *self._words, stdin=pipe, stdout=pipe, env=environment
         )
 
-    def say(self, word: str) -> None:
-        if self._process is not None and self._process.stdin is not None:
-            self._process.stdin.write(f"{word}\n".encode())
+    async def say(self, word: str) -> int:
+        """Say how messages pass from now on; give how many have not passed plainly so far."""
+        process = self._process
+        if process is None or process.stdin is None or process.stdout is None:
+            return 0
+        process.stdin.write(f"{word}\n".encode())
+        return int(await process.stdout.readline() or b"0")
 
     async def kill(self) -> None:
         if self._process is not None and self._process.returncode is None:
@@ -57,9 +62,10 @@ def passed(how: str) -> Inject:
     """Let messages pass in some way for a while."""
 
     async def inject(stand: Stand) -> None:
-        stand.control.say(how)
-        await asyncio.sleep(8.0)
-        stand.control.say("plain")
+        before = await stand.control.say(how)
+        await asyncio.sleep(_FAULTY_S)
+        if await stand.control.say("plain") <= before:
+            raise RuntimeError("nothing has befallen any message")
 
     return inject
 
@@ -72,8 +78,8 @@ async def router_gone(stand: Stand) -> None:
 
 
 FAULTS = (
-    Fault("30 % of messages lost", with_middle, passed("lost"), 10.0),
-    Fault("30 % of messages doubled", with_middle, passed("doubled"), 10.0),
-    Fault("30 % of messages disordered", with_middle, passed("disordered"), 10.0),
+    Fault("messages: 30 % lost", with_middle, passed("lost"), 10.0),
+    Fault("messages: 30 % doubled", with_middle, passed("doubled"), 10.0),
+    Fault("messages: 30 % disordered", with_middle, passed("disordered"), 10.0),
     Fault("router gone 30 s", with_middle, router_gone, 40.0, None),
 )

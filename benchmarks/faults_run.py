@@ -15,6 +15,8 @@ from benchmarks.faults_viewer import Viewer
 _VIEWERS = 2
 _BEFORE_S = 4.0
 _JOIN_S = 20.0
+_LONGEST_S = 150.0
+"""A fault may take so much longer than it should: a browser starts, a process is slow to load."""
 _POLL_S = 0.05
 
 
@@ -33,6 +35,8 @@ class Outcome:
     ordinary: float = 0.0
     without: float = 0.0
     back: float | None = None
+    page: float | None = None
+    """The same of the page, where there is one."""
     reconnections: int = 0
     received: list[Received] = field(default_factory=list)
     gops: tuple[int, int] = (0, 0)
@@ -62,6 +66,7 @@ async def run(fault: Fault, stand: Stand, views: Views) -> Outcome:
         await asyncio.sleep(_BEFORE_S)
         before = [viewer.reconnections for viewer in stand.viewers]
         stand.returned.clear()
+        stand.page_at = None
         outcome.began = time.monotonic()
         await asyncio.gather(_injected(fault, stand, outcome), asyncio.sleep(fault.seconds))
         outcome.until = time.monotonic()
@@ -80,7 +85,7 @@ async def run(fault: Fault, stand: Stand, views: Views) -> Outcome:
 
 async def _injected(fault: Fault, stand: Stand, outcome: Outcome) -> None:
     try:
-        async with asyncio.timeout(fault.seconds + _JOIN_S):
+        async with asyncio.timeout(fault.seconds + _LONGEST_S):
             await fault.inject(stand)
     except (OSError, RuntimeError, TimeoutError) as error:
         outcome.failed = f"{type(error).__name__}: {error}"
@@ -109,4 +114,5 @@ def _sum_up(outcome: Outcome, received: Sequence[Received], stand: Stand) -> Non
         ready = stand.returned[0]
         first = [min((at for at, _ in it.fresh if at > ready - RHYTHM_S), default=None) for it in received]
         if all(at is not None for at in first):
+            outcome.page = None if stand.page_at is None else max(0.0, stand.page_at - ready)
             outcome.back = max(0.0, *(at - ready for at in first if at is not None))

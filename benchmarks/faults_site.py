@@ -64,6 +64,8 @@ class Stand:
     control: Any = None
     """What the faults of this site are injected by, if not signals."""
     recorded: Path = Path()
+    page_at: float | None = None
+    """When the page had new pictures again."""
     views: Views | None = None
     """What it plays, where that is not what all sites play."""
 

@@ -39,7 +39,7 @@ def kept(outcome: Outcome) -> bool:
     fault = outcome.fault
     if outcome.failed or any(it.wrong or it.wrong_boxes for it in outcome.received):
         return False
-    if fault.breaks and (outcome.back is None or outcome.back > _BACK_S):
+    if fault.breaks and (outcome.back is None or max(outcome.back, outcome.page or 0.0) > _BACK_S):
         return False
     if not fault.breaks and outcome.reconnections:
         return False
@@ -72,7 +72,8 @@ def _fresh(it: Outcome) -> str:
         return ""
     if not it.fault.breaks:
         return f"{it.without:.2f} ({it.ordinary:.2f})"
-    return f"{'never' if it.back is None else f'{it.back:.2f}'} ({it.without:.2f})"
+    page = "" if it.page is None else f", page {it.page:.2f}"
+    return f"{'never' if it.back is None else f'{it.back:.2f}'}{page} ({it.without:.2f})"
 
 
 def _promised(it: Outcome) -> str:

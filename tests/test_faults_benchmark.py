@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.faults_bus import Way
 from benchmarks.faults_film import FRAMES, Stamp, Views, read_stamp, stamped
 from benchmarks.faults_judge import judge
 from benchmarks.faults_processes import FAULTS
@@ -15,6 +16,7 @@ from benchmarks.faults_run import Outcome
 from benchmarks.faults_table import kept
 from benchmarks.faults_viewer import Picture, Told
 from client import Box, Gop
+from server.wire.inbox import Message
 
 GOP = 10
 SIDES = (10, 20, 30, 60)
@@ -103,3 +105,35 @@ def test_promises_are_kept_or_not() -> None:
     assert not kept(replace(good, without=1.1))
     assert not kept(replace(good, reconnections=1))
     assert not kept(replace(good, failed="there is no process c0"))
+
+
+class Heard:
+    """Notes what is published."""
+
+    def __init__(self) -> None:
+        self.of: dict[str, list[int]] = {"video": [], "tracks": []}
+
+    def publish(self, key: str, payload: bytes, attachment: bytes | None = None) -> None:
+        del attachment
+        self.of[key.rpartition("/")[2]].append(int(payload))
+
+
+@pytest.mark.parametrize("how", ["plain", "lost", "doubled", "disordered"])
+def test_messages_are_lost_doubled_or_disordered_and_pictures_are_not(how: str) -> None:
+    heard = Heard()
+    way = Way(heard)
+    way.how = how
+    for number in range(1000):
+        for what in ("video", "tracks"):
+            way.take(Message(f"myview/faults/camera/c0/{what}", b"%d" % number, b""))
+    tracks, everything = heard.of["tracks"], list(range(1000))
+    assert heard.of["video"] == everything
+    if how == "plain":
+        assert (way.faulty, tracks) == (0, everything)
+        return
+    assert 250 < way.faulty < 350
+    held_back = 1000 - len(tracks) if how == "disordered" else 0
+    assert 0 <= held_back <= 3, "those that would still come"
+    assert len(tracks) == 1000 + {"lost": -way.faulty, "doubled": way.faulty, "disordered": -held_back}[how]
+    assert (sorted(tracks) == tracks) == (how != "disordered")
+    assert len(set(tracks)) == 1000 - held_back - (way.faulty if how == "lost" else 0)
