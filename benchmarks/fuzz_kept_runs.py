@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import shutil
 import zlib
 from pathlib import Path
@@ -10,6 +9,7 @@ from random import Random
 
 import msgspec
 
+from benchmarks.fuzz_loop import AtOnceLoop
 from benchmarks.fuzz_media_made import WORDS as MEDIA
 from benchmarks.fuzz_mutate import as_json, damaged, otherwise
 from benchmarks.fuzz_site import CAMERAS, Fed, feed_epoch, site
@@ -30,7 +30,7 @@ _EPOCHS = 6
 _FAR = 10_000
 _MOST_GOPS = 40
 _PULSE0 = 1_700_000_000.0
-_DROPS_EVERY = 4
+_DROPS_EVERY = 16
 _LONG_S = 1e9
 _Files = list[tuple[str, bytes]]
 _files = msgspec.msgpack.Decoder(_Files)
@@ -42,7 +42,7 @@ class Runs(Target):
     name = "kept-runs"
 
     def __init__(self) -> None:
-        self._loop = asyncio.new_event_loop()
+        self._loop = AtOnceLoop()
         self._folder = folder()
         self._path = Path(self._folder.name)
         self._precious = self._path / "precious" / "000000000000.mp4"

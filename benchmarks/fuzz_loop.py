@@ -1,8 +1,8 @@
-"""An event loop that waits for nobody: where nothing is ready, its clock is put forward to what comes next.
+"""Event loops. One waits for nobody: where nothing is ready, its clock is put forward to what comes next.
 
-A reader that waits two seconds before it gives somebody up is seen to do so at once, over real sockets,
-and as it would on any machine however busy. What threads do is waited for as ever,
-and what child processes do for a while.
+A reader that waits two seconds before it gives somebody up is seen to do so at once, over real sockets, and
+as it would on any machine however busy. What threads do is waited for as ever, and what child processes do
+for a while. The other loop has no threads.
 """
 
 from __future__ import annotations
@@ -82,6 +82,21 @@ class HurryingLoop(asyncio.SelectorEventLoop):
 
     def _process_done(self, _: object) -> None:
         self._impatient.processes -= 1
+
+
+class AtOnceLoop(asyncio.SelectorEventLoop):
+    """Does what is meant for a thread at once, and waits for it."""
+
+    def run_in_executor(  # type: ignore[override]  # whatever it takes
+        self, _: Any, func: Callable[..., Any], *args: Any
+    ) -> asyncio.Future[Any]:
+        """Do something; give a future that has it."""
+        future = self.create_future()
+        try:
+            future.set_result(func(*args))
+        except Exception as error:  # noqa: BLE001 — whoever waits for it gets it
+            future.set_exception(error)
+        return future
 
 
 def leaves_no_trace(writer: asyncio.StreamWriter) -> None:
