@@ -9,7 +9,7 @@ import msgspec
 import typer
 from rich.console import Console
 
-from server.run.doctor_cameras import camera_findings, probe_all
+from server.run.doctor_cameras import camera_findings, probe_all, sound_findings
 from server.run.doctor_disk import disk_findings
 from server.run.doctor_files import file_findings
 from server.run.doctor_findings import Finding, Findings, all_of, bad, ok, show
@@ -46,6 +46,7 @@ async def _checked(path: Path, seconds: float) -> list[Finding]:
         *file_findings(with_scene_ground(config)),
         *clock,
         *camera_findings(config, probes, runs=runs),
+        *sound_findings(config),
         *disk_findings(config, probes),
         *machine_findings(config, probes),
     ]

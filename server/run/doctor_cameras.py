@@ -8,9 +8,11 @@ import threading
 import time
 from collections.abc import Mapping
 
+from server.camera.sound import open_sound
 from server.run.doctor_findings import Finding, bad, ok, warning
 from server.run.doctor_probe import Probe, probe
 from server.wire.config import Config
+from server.wire.errors import UserError
 
 _GRACE_S = 3.0
 """What a busy machine takes longer than a camera was given."""
@@ -47,6 +49,21 @@ def _while_busy() -> str:
     """Say that the machine has more to do than it can, if so: then that may be why."""
     load, cores = os.getloadavg()[0], os.cpu_count() or 1
     return f", while the machine is busy with other things (load {load:.0f})" if load > 2 * cores else ""
+
+
+def sound_findings(config: Config) -> list[Finding]:
+    """Say whether the site's sound can be opened, where it has one."""
+    if config.sounding is None:
+        return []
+    try:
+        open_sound(config, config.sounding)
+    except UserError as error:
+        return [
+            bad(
+                "sound", str(error).removeprefix("sound: "), "another file, or a camera that has sound"
+            )
+        ]
+    return [ok("sound", f"{config.sound.source}: {config.sound.codec}, {config.sound.kbps} kbit/s")]
 
 
 def camera_findings(config: Config, probes: Mapping[str, Probe], *, runs: bool) -> list[Finding]:

@@ -19,7 +19,7 @@ from rtsp_by_hand import RtspCamera
 from videos_by_hand import write_video
 
 from camsync import PulseServer
-from server.run.doctor_cameras import camera_findings, probe_all
+from server.run.doctor_cameras import camera_findings, probe_all, sound_findings
 from server.run.doctor_certificate import certificate_finding
 from server.run.doctor_disk import disk_findings, needed_mb
 from server.run.doctor_files import file_findings
@@ -195,6 +195,15 @@ def test_a_camera_that_does_not_fit_is_doubted(tmp_path: Path, found: Probe, wor
     fine, doubt = of(camera_findings(small, {"c0": found}, runs=False), "camera c0")
     assert (fine.level, doubt.level) == (Level.OK, Level.WARNING)
     assert words in doubt.text
+
+
+def test_sound_that_cannot_be_opened_is_bad(tmp_path: Path) -> None:
+    assert sound_findings(config(tmp_path)) == []
+    write_video(tmp_path / "silent.mp4", 3)
+    for source, words in (("none.wav", "none.wav: is neither"), ("silent.mp4", "sound")):
+        found = only(sound_findings(config(tmp_path, sound={"source": source})), "sound")
+        assert found.level is Level.BAD
+        assert words in found.text
 
 
 def test_a_cameras_password_is_not_shown(tmp_path: Path, taken: int) -> None:
