@@ -1,8 +1,8 @@
 """Views of the synthetic room that say on every picture, and in every box, whose they are and of which frame.
 
 A strip at the bottom of each picture has its camera and its number in black and white blocks, which survive
-encoding. Detections are the scene's truth, and the thousandths of a box's left and top tell the frame it was
-found in. So a viewer can tell a picture of the wrong camera or moment from the right one, and a
+encoding. Detections are the scene's truth, and the thousandths of a box's left, top and width tell the frame
+it was found in. So a viewer can tell a picture of the wrong camera or moment from the right one, and a
 box that belongs to another picture from one that belongs to this.
 """
 
@@ -34,8 +34,8 @@ _START, _DRAWN = 300, 50
 _BLOCK = 8
 """Pixels of one bit; there are 32 of them: 4 of the camera, 12 of the number, and the same inverted."""
 _CAMERA_BITS, _BITS = 4, 16
-_SHUFFLED = np.random.default_rng(1).permutation(FRAMES)
-"""The thousandths of a box's top, by its frame: means of boxes, which the tracker makes, hardly ever fit."""
+_TOPS, _WIDTHS = np.random.default_rng(1).permuted(np.tile(np.arange(FRAMES), (2, 1)), axis=1).tolist()
+"""The thousandths of a box's top and width, by its frame; means of boxes, which trackers make, fit none."""
 _DARK, _BRIGHT, _MIDDLE = 40, 215, 128
 _SHOWS = 0.3
 """Share of a person that must show to be found."""
@@ -180,13 +180,13 @@ def _write_detections(boxes: Sequence[NDArray[np.float64]], pulses: int, path: P
     with path.open("w", encoding="ascii") as file:
         for pulse in range(pulses):
             frame = pulse % FRAMES
-            x, y = f".{frame:03d}", f".{_SHUFFLED[frame]:03d}"
+            x, y, wide = (f".{code:03d}" for code in (frame, _TOPS[frame], _WIDTHS[frame]))
             for left, top, width, height in boxes[frame].astype(int).tolist():
-                file.write(f"{pulse + 1},-1,{left}{x},{top}{y},{width},{height},1,-1,-1,-1\n")
+                file.write(f"{pulse + 1},-1,{left}{x},{top}{y},{width}{wide},{height},1,-1,-1,-1\n")
 
 
 def _sides(boxes: NDArray[Any], frame: int) -> Iterator[tuple[int, int, int, int]]:
     """Give left, top, right and bottom in thousandths of the boxes ``(N, 4)`` of a frame."""
     for left, top, width, height in (1000 * boxes.astype(int)).tolist():
-        x, y = left + frame, top + int(_SHUFFLED[frame])
-        yield x, y, x + width, y + height
+        x, y = left + frame, top + _TOPS[frame]
+        yield x, y, x + width + _WIDTHS[frame], y + height
