@@ -16,10 +16,10 @@ def why_not_ready(service: BestViewService) -> list[str]:
     It takes pulses, a camera that delivers, and decisions that keep up with the pulses.
     """
     reasons = []
-    sync, fps = service.config.sync, service.config.site.fps
+    fps = service.config.site.fps
     silent = service.silent_s
     if service.pulse < 0:
-        reasons.append(f"no pulse has come from the pulse server (sync.port {sync.port})")
+        reasons.append("no pulse has come from the pulse server")
     elif silent is not None and silent > max(_SILENT_S, 3 / fps):
         reasons.append(f"no pulse has come for {silent:.0f} s")
     if not any(state.word == "live" for state in service.intake.states.values()):

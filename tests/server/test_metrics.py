@@ -154,7 +154,7 @@ async def test_a_site_is_ready_when_pulses_and_frames_come_and_decisions_keep_up
     code, words = await ready(hall)
     assert code == 503
     assert words.split("; ") == [
-        "no pulse has come from the pulse server (sync.port 7400)",
+        "no pulse has come from the pulse server",
         "no camera delivers frames",
         "nothing has been decided yet",
     ]
