@@ -180,8 +180,8 @@ class CameraStatus(msgspec.Struct, frozen=True, kw_only=True):
     """Frames that wait to be searched."""
     load_level: Annotated[int, msgspec.Meta(ge=0, le=100)] = 0
     """How much is left out because the machine has too much to do; 0: nothing."""
-    load: Annotated[str, msgspec.Meta(max_length=200)] = ""
-    """What is left out, for people."""
+    load: Annotated[str, msgspec.Meta(max_length=200, pattern=r"^[ -~]*\Z")] = ""
+    """What is left out, for people: printable, since it stands on pages and in terminals."""
     in_step: bool
     """Pulses come from the server; otherwise the camera goes on at its own rate."""
     clock_offset: float

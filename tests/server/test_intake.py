@@ -82,6 +82,27 @@ def test_a_count_that_no_metric_could_say_is_refused(field: str) -> None:
     assert hall.intake.states["c0"].status is None
 
 
+@pytest.mark.parametrize("words", ["\x1b[2J", "searching\n", "x" * 201, "suchend: zu groß"])
+def test_what_is_left_out_is_told_in_words_that_a_terminal_can_show(words: str) -> None:
+    hall = Hall()
+    hall.handle("status", status("c0", load=words))
+    assert hall.bad() == 1
+    assert hall.intake.states["c0"].status is None
+
+
+def test_a_camera_that_leaves_frames_out_says_so_while_it_is_there() -> None:
+    hall = Hall()
+    words = "searching every 3rd frame: the machine is too busy"
+    state = hall.intake.states["c0"]
+    hall.handle("status", status("c0", load_level=2, load=words))
+    assert state.message == words
+    hall.handle("status", status("c0"))
+    assert state.message == ""
+    hall.handle("status", status("c0", load_level=2, load=words))
+    hall.intake.alive(KEYS.camera("c0", "alive"), there=False)
+    assert state.message == ""
+
+
 anything = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text(),
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=5), inner, max_size=3),
