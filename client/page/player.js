@@ -5,25 +5,21 @@
  * stream's init segment in the same SourceBuffer, over the same moments.
  */
 
-import { MediaBuffer } from './buffer.js';
 import { Going } from './going.js';
+import { begunAnew, landingOf } from './landing.js';
 import { join } from './mp4.js';
+import { opened, plays } from './opening.js';
 import { Pace } from './pace.js';
 import { Run } from './run.js';
 import { same } from './subject.js';
 
+/** @import {MediaBuffer} from './buffer.js' */
 /** @import {Segment} from './mp4.js' */
 /** @import {Form} from './players.js' */
 /** @import {Subject} from './subject.js' */
 
 const TICK_MS = 100;
-const RESTARTED_S = 10; // a stream that begins this far back is of a site whose pulses began anew
-const LANDING_MS = 300; // how long a new stream may take to reach the moment now shown
 const PAUSED_S = 30; // of video that waits behind a paused picture; then the download stops
-const INSIDE_S = 0.001; // a seek to the very start of a range may round to just before it
-
-/** @type {typeof MediaSource | undefined} iPhones have only the managed kind */
-export const Source = /** @type {any} */ (globalThis).ManagedMediaSource ?? globalThis.MediaSource;
 
 /**
  * @typedef {object} Listener
@@ -72,7 +68,7 @@ export class Player {
    * @returns {boolean} whether this browser can play such streams at all
    */
   configure({ container, codec }) {
-    if (!Source?.isTypeSupported(mime(container, codec))) return false;
+    if (!plays(container, codec)) return false;
     if (container !== this.#container || codec !== this.#codec) {
       this.#container = container;
       this.#codec = codec;
@@ -111,14 +107,10 @@ export class Player {
 
   /** @returns {Promise<MediaBuffer>} */
   async #open() {
-    const source = new /** @type {typeof MediaSource} */ (Source)();
-    const address = URL.createObjectURL(source);
-    this.video.src = address;
-    await new Promise((resolve) => source.addEventListener('sourceopen', resolve, { once: true }));
-    URL.revokeObjectURL(address);
-    this.#opened = new MediaBuffer(source.addSourceBuffer(mime(this.#container, this.#codec)));
+    const buffer = await opened(this.video, this.#container, this.#codec);
+    this.#opened = buffer;
     this.play();
-    return this.#opened;
+    return buffer;
   }
 
   /**
@@ -134,7 +126,7 @@ export class Player {
       return;
     }
     if (first && Number.isNaN(run.start)) {
-      const again = first.start < this.video.currentTime - RESTARTED_S;
+      const again = begunAnew(first.start, this.video.currentTime);
       if (again && run.landed && this.video.paused) return this.#leaveFor(run); // the old picture stays
       run.start = first.start;
       // Nothing of the old stream may be met again behind the edge of the new one.
@@ -160,23 +152,8 @@ export class Player {
   #land(run, buffer) {
     if (run.landed || run !== this.#run || Number.isNaN(run.since)) return;
     const end = buffer.ranges.at(-1)?.[1] ?? 0;
-    const { past } = run.subject;
-    if (past) {
-      if (end > past.time) this.#landAt(run, Math.max(past.time, run.start) + INSIDE_S);
-      return;
-    }
-    const time = this.video.currentTime;
-    const within = run.start <= time && time < end;
-    const before = time < run.start || run.start < time - RESTARTED_S;
-    if (!within && !before && performance.now() - run.since < LANDING_MS) return;
-    this.#landAt(run, within ? time : run.start + INSIDE_S);
-  }
-
-  /**
-   * @param {Run} run
-   * @param {number} time
-   */
-  #landAt(run, time) {
+    const time = landingOf(run, end, this.video.currentTime, performance.now());
+    if (time === null) return;
     run.landed = true;
     this.#landing = run;
     this.video.addEventListener('seeked', () => this.#showing(run), { once: true });
@@ -251,12 +228,4 @@ export class Player {
     this.stop();
     this.#left = run.subject;
   }
-}
-
-/**
- * @param {string} container
- * @param {string} codec
- */
-function mime(container, codec) {
-  return `video/${container}; codecs="${codec}"`;
 }

@@ -1,7 +1,8 @@
 /** A player as this browser has it. */
 
 import { HlsPlayer } from './hls_player.js';
-import { Player, Source } from './player.js';
+import { Source } from './opening.js';
+import { Player } from './player.js';
 
 /** @import {Listener} from './player.js' */
 
