@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bestview.likelihood import CameraLooks, LookWeights, distance_of
-from bestview.ranges import pairs_within
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -46,12 +44,9 @@ def cluster(
         join: the least evidence that joins.
     """
     groups = _Groups(evidence, apart, past, linked, looks, weights)
-    while True:
-        keep = int(np.argmax(groups.best)) if groups.best.size else 0
-        if not groups.best.size or not groups.best[keep] >= join:
-            return groups.label
-        lose = int(groups.at[keep])
-        groups.merge(min(keep, lose), max(keep, lose))
+    while (pair := groups.best_pair(join)) is not None:
+        groups.merge(*pair)
+    return groups.labels()
 
 
 class _Looks:
@@ -73,58 +68,57 @@ class _Looks:
         self._count = np.concatenate([np.zeros(0), *(camera.count for camera in looks)]).astype(np.float64)
         self._root = np.sqrt(self._total / self._count[:, None])
         """Square roots of the mean histograms, whose products are how alike two are."""
-        self._group = np.concatenate([np.zeros(0, dtype=np.int64), *(camera.rows for camera in looks)])
+        self._known = weights.known(self._count)
         self._slope = np.repeat([camera.scale.slope(weights) for camera in looks], size)
         self._middle = np.repeat([camera.scale.middle for camera in looks], size)
-        start = np.cumsum([0, *size])
-        self._camera = [np.arange(a, b) for a, b in pairwise(start.tolist())]
-        """(K,) of each camera: which looks are of it."""
+        self._at = np.full((len(looks), rows), -1)
+        """(C, N) of each camera and group: which look, -1: none."""
         self._of: list[dict[int, int]] = [{} for _ in range(rows)]
         """Of each group, the look by camera."""
-        for number, (camera, first) in enumerate(zip(looks, start.tolist(), strict=False)):
+        start = np.cumsum([0, *size]).tolist()
+        for number, (camera, first) in enumerate(zip(looks, start, strict=False)):
+            self._at[number, camera.rows] = np.arange(first, first + camera.rows.size)
             for at, row in enumerate(camera.rows.tolist(), first):
                 self._of[row][number] = at
 
-    def add_all(self, to: Floats) -> None:
-        """Add to (N, N) what looks say about all rows; before any of them were merged."""
-        camera = np.repeat(np.arange(len(self._camera)), [rows.size for rows in self._camera])
-        one, two = pairs_within(camera)
-        for some in (slice(start, start + _SOME) for start in range(0, one.size, _SOME)):
-            told = self._evidence(one[some], two[some])
-            a, b = self._group[one[some]], self._group[two[some]]
-            np.add.at(to, (a, b), told)
-            np.add.at(to, (b, a), told)
+    def of_pairs(self, one: Ints, two: Ints) -> Floats:
+        """Say what looks say about (P,) pairs of groups: (P,)."""
+        told = np.zeros(one.size)
+        for camera in self._at:
+            a, b = camera[one], camera[two]
+            both = np.flatnonzero((a >= 0) & (b >= 0))
+            for some in (both[start : start + _SOME] for start in range(0, both.size, _SOME)):
+                told[some] += self._evidence(a[some], b[some])
+        return told
 
     def _evidence(self, one: Ints, two: Ints) -> Floats:
         """Evidence of (P,) pairs of looks, each in one camera."""
         distance = distance_of(np.einsum("ij,ij->i", self._root[one], self._root[two]))
         told = self._weights.told(distance, self._slope[one], self._middle[one])
-        # Who was merged away has no frames, and so no evidence.
-        return told * self._weights.known(self._count[one], self._count[two])
+        return told * (self._known[one] * self._known[two])
 
-    def add_evidence(self, row: int, asked: NDArray[np.bool_], to: Floats) -> None:
-        """Add to (N,) what looks say about a group and those that are (N,) asked about."""
+    def of_group(self, row: int, others: Ints) -> Floats:
+        """Say what looks say about a group and (K,) others: (K,)."""
         mine = self._of[row]
-        if not mine:
-            return
-        others = np.concatenate([self._camera[number] for number in mine])
-        own = np.repeat(list(mine.values()), [self._camera[number].size for number in mine])
-        some = asked[self._group[others]]
-        others, own = others[some], own[some]
-        to += np.bincount(self._group[others], self._evidence(others, own), to.size)
+        theirs = self._at[np.array(list(mine), dtype=np.int64)[:, None], others]
+        camera, other = np.nonzero(theirs >= 0)
+        if not other.size:
+            return np.zeros(others.size)
+        own = np.array(list(mine.values()), dtype=np.int64)[camera]
+        return np.asarray(np.bincount(other, self._evidence(theirs[camera, other], own), others.size))
 
     def merge(self, keep: int, lose: int) -> None:
         """Give one group's looks to another."""
         mine = self._of[keep]
         for number, two in self._of[lose].items():
             one = mine.setdefault(number, two)
-            if one == two:
-                self._group[two] = keep
-                continue
-            self._total[one] += self._total[two]
-            self._count[one] += self._count[two]
-            self._count[two] = 0.0
-            self._root[one] = np.sqrt(self._total[one] / self._count[one])
+            self._at[number, lose] = -1
+            self._at[number, keep] = one
+            if one != two:
+                self._total[one] += self._total[two]
+                self._count[one] += self._count[two]
+                self._root[one] = np.sqrt(self._total[one] / self._count[one])
+                self._known[one] = self._weights.known(self._count[one])
         self._of[lose] = {}
 
 
@@ -135,13 +129,7 @@ def _padded(table: Floats, columns: int) -> Floats:
 
 
 class _Groups:
-    """Groups of rows, named by their lowest, with the best partner of each at hand.
-
-    Attributes:
-        label: (N,) each row's group.
-        best: (N,) the most evidence of each group with another one; -inf: it was merged away.
-        at: (N,) with which.
-    """
+    """Groups of rows, named by their lowest, with what the best partner of each is worth at hand."""
 
     def __init__(
         self,
@@ -153,51 +141,81 @@ class _Groups:
         weights: LookWeights,
     ) -> None:
         count = len(evidence)
-        self._evidence, self._apart, self._past = evidence.copy(), apart.copy(), past.copy()
-        self._linked = linked.copy()
-        np.fill_diagonal(self._apart, val=True)
+        # Sums keep it: whoever was apart from one of a group is apart from the group.
+        self._evidence = np.where(apart, -np.inf, evidence)
+        self._past, self._linked = past.copy(), linked.copy()
+        np.fill_diagonal(self._linked, val=False)
         self._looks = _Looks(looks, count, weights)
-        self.label = np.arange(count)
-        self._value = self._evidence.copy()
-        self._looks.add_all(self._value)
-        self._value[self._apart | ~self._linked | (self._past[:, None] & self._past)] = -np.inf
-        self.best = self._value.max(axis=1, initial=-np.inf)
-        self.at = self._value.argmax(axis=1) if count else np.zeros(0, dtype=np.int64)
+        self._kept = np.arange(count)
+        """(N,) the group that each row was made part of, its own where of none."""
+        one, two = np.nonzero(np.triu(self._linked, 1))
+        value = self._evidence[one, two] + self._looks.of_pairs(one, two)
+        value[self._past[one] & self._past[two]] = -np.inf
+        self._value = np.full((count, count), -np.inf)
+        self._value[one, two] = self._value[two, one] = value
+        self._best = self._value.max(axis=1, initial=-np.inf)
+        """(N,) the most evidence of each group with another one; -inf: none, or it was merged away."""
+        self._at = self._value.argmax(axis=1) if count else np.zeros(0, dtype=np.int64)
+        """(N,) with which, the lowest of equals."""
+        self._stale = np.zeros(count, dtype=np.bool_)
+        """(N,) that one has changed or gone: no other one is worth more than `_best`, but maybe less."""
 
-    def _row(self, row: int) -> Floats:
-        value = self._evidence[row].copy()
-        possible = self._linked[row] & ~(self._apart[row] | (self._past[row] & self._past))
-        self._looks.add_evidence(row, possible, value)
-        value[~possible] = -np.inf
-        return np.asarray(value)
+    def labels(self) -> Ints:
+        """Give each row's group: (N,)."""
+        label = self._kept.copy()
+        # A row is only ever made part of a lower one, whose group is known by then.
+        for row in np.flatnonzero(label != np.arange(label.size)).tolist():
+            label[row] = label[label[row]]
+        return label
+
+    def best_pair(self, least: float) -> tuple[int, int] | None:
+        """Give the two groups with the most evidence, the lower first; None: none has `least`."""
+        while self._best.size:
+            one = int(self._best.argmax())
+            if not self._best[one] >= least:
+                break
+            if not self._stale[one]:
+                two = int(self._at[one])
+                return min(one, two), max(one, two)
+            row = self._value[one]
+            self._at[one] = at = row.argmax()
+            self._best[one], self._stale[one] = row[at], False
+        return None
 
     def merge(self, keep: int, lose: int) -> None:
         """Make two groups one."""
-        self.label[self.label == lose] = keep
-        self._evidence[keep] += self._evidence[lose]
-        self._evidence[:, keep] = self._evidence[keep]
-        self._apart[keep] |= self._apart[lose]
-        self._apart[:, keep] = self._apart[keep]
-        self._apart[lose] = self._apart[:, lose] = True
-        self._linked[keep] |= self._linked[lose]
-        self._linked[:, keep] = self._linked[keep]
+        self._kept[lose] = keep
+        evidence, linked = self._evidence[keep], self._linked[keep]
+        evidence += self._evidence[lose]
+        self._evidence[:, keep] = evidence
+        linked |= self._linked[lose]
+        linked[keep] = linked[lose] = False
+        # Whoever has no link to either of them had no value with them, and has none now.
+        others = linked.nonzero()[0]
+        self._linked[others, keep] = True
+        self._linked[others, lose] = False
         self._past[keep] &= self._past[lose]
         self._looks.merge(keep, lose)
-        row = self._row(keep)
-        self._value[lose] = self._value[:, lose] = -np.inf
-        self._value[keep] = self._value[:, keep] = row
-        self._find_best(keep, lose)
+        value = evidence[others] + self._looks.of_group(keep, others)
+        if self._past[keep]:
+            value[self._past[others]] = -np.inf
+        self._value[others, lose] = -np.inf
+        self._value[others, keep] = value
+        self._value[keep] = -np.inf
+        self._value[keep, others] = value
+        self._find_best(keep, lose, others, value)
 
-    def _find_best(self, keep: int, lose: int) -> None:
-        """Look again for the best partner of whoever's may have changed."""
-        self.best[lose] = -np.inf
-        row = self._value[keep]
-        # Lost their partner, or it is worth less to them now.
-        anew = ((self.at == keep) | (self.at == lose)) & (self.best > -np.inf)
-        anew[keep] = True
-        better = ~anew & ((row > self.best) | ((row == self.best) & (keep < self.at)))
-        better &= self.best > -np.inf
-        self.best[better], self.at[better] = row[better], keep
-        groups = anew.nonzero()[0]
-        self.at[groups] = at = self._value[groups].argmax(axis=1)
-        self.best[groups] = self._value[groups, at]
+    def _find_best(self, keep: int, lose: int, others: Ints, value: Floats) -> None:
+        """Note what is known now of the best partner of a new group, and of those with a link to it."""
+        best, at = self._best[others], self._at[others]
+        stale = self._stale[others] | (at == keep) | (at == lose)
+        better = value > best
+        first = better | ((value == best) & ~stale & (keep < at))
+        self._at[others[first]] = keep
+        self._best[others[better]] = value[better]
+        self._stale[others] = stale & ~better
+        self._best[lose] = self._best[keep] = -np.inf
+        self._stale[keep] = self._stale[lose] = False
+        if others.size:
+            place = value.argmax()
+            self._best[keep], self._at[keep] = value[place], others[place]

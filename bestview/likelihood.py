@@ -59,9 +59,9 @@ class LookWeights:
         # Not np.clip, which takes longer than all the rest for the few of a group.
         return np.asarray(np.minimum(np.maximum(slope * (middle - distance), -self.cap), self.cap))
 
-    def known(self, one: Floats, two: Floats) -> Floats:
-        """Give how much it counts where looks are of so many frames, shapes that fit together."""
-        return np.asarray(np.minimum(one / self.frames, 1.0) * np.minimum(two / self.frames, 1.0))
+    def known(self, count: Floats) -> Floats:
+        """Give how much looks of so many frames count, any shape: times the same of the other look."""
+        return np.asarray(np.minimum(count / self.frames, 1.0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -105,4 +105,5 @@ def look_evidence(
     In between it is a straight line, beyond it goes on up to `cap`. Who was seen alone in fewer frames, (N,)
     `one` and `two`, than `frames` weighs less.
     """
-    return weights.told(distance, scale.slope(weights), scale.middle) * weights.known(one, two)
+    known = weights.known(one) * weights.known(two)
+    return weights.told(distance, scale.slope(weights), scale.middle) * known

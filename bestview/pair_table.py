@@ -84,6 +84,8 @@ class PairTable:
         return total
 
     def _at(self, code: Ints) -> Ints:
+        if not self._code.size:
+            return np.full(code.size, -1)
         at = np.searchsorted(self._code, code)
         there = at < self._code.size
         there[there] = self._code[at[there]] == code[there]

@@ -7,6 +7,7 @@ more to say than that they are elsewhere have an entry, so that a site of many c
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 
 import numpy as np
@@ -46,6 +47,8 @@ class PairTables:
         self._name: Ints = np.zeros(0, dtype=np.int64)
         self._names = 0
         self._presence = Presence(settings.recent + _BEFORE)
+        # Frames of being elsewhere after which more of them say nothing more.
+        self._enough = max(_LEAST_COMMON, math.ceil(settings.ground_cap * settings.ground_frames / -WORST))
         self._apart = PairTable()
         self._alike = PairTable()
         # Evidence of standing on the same ground, and in how many frames; no more than says anything.
@@ -211,7 +214,7 @@ class PairTables:
 
     def _elsewhere(self, one: Ints, two: Ints) -> Floats:
         """Evidence and frames of (P,) pairs of rows that never met: (P, 2)."""
-        common = self._presence.common(one, two).astype(np.float64)
+        common = self._presence.common(one, two, self._enough).astype(np.float64)
         evidence = np.maximum(WORST * common / self._frames, -self._cap)
         return np.stack([evidence, np.minimum(common, _LEAST_COMMON)], axis=1)
 

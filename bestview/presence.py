@@ -47,6 +47,25 @@ class Presence:
         """Count the frames of (P,) rows as others' as well."""
         np.bitwise_or.at(self._bits, kept, self._bits[lost])
 
-    def common(self, one: Ints, two: Ints) -> Ints:
-        """In how many frames both of (P,) pairs of rows stood somewhere."""
-        return np.asarray(np.bitwise_count(self._bits[one] & self._bits[two]).sum(axis=1, dtype=np.int64))
+    def common(self, one: Ints, two: Ints, enough: int) -> Ints:
+        """In how many frames both of (P,) pairs of rows stood somewhere; `enough`: so many or more."""
+        newest_first = (self._newest - np.arange(self._words)) % self._words
+        bits = np.ascontiguousarray(self._bits[:, newest_first].T)
+        # Of each row, how many words there are up to the last one that has anything.
+        words = (np.arange(1, self._words + 1)[:, None] * (bits != 0)).max(axis=0, initial=0)
+        total = np.zeros(one.size, dtype=np.int64)
+        until = np.minimum(words[one], words[two])
+        left = np.flatnonzero(until > 0)
+        one, two, until, count = one[left], two[left], until[left], total[left]
+        for word, row in enumerate(bits, start=1):
+            if not left.size:
+                break
+            count += np.bitwise_count(row[one] & row[two])
+            # Nearly all are told apart, or were not there at all, within a few words.
+            goes_on = (count < enough) & (until > word)
+            if not goes_on.all():
+                done = ~goes_on
+                total[left[done]] = np.minimum(count[done], enough)
+                left, one, two = left[goes_on], one[goes_on], two[goes_on]
+                until, count = until[goes_on], count[goes_on]
+        return total

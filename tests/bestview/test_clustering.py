@@ -57,7 +57,8 @@ class Case:
 def cases(draw: st.DrawFn, most: int = 9) -> Case:
     count = draw(st.integers(0, most))
     rng = np.random.default_rng(draw(st.integers(0, 2**32)))
-    evidence = np.round(rng.normal(0, 2, (count, count)), 2)
+    # Whole numbers are often equal.
+    evidence = np.round(rng.normal(0, 2, (count, count)), draw(st.sampled_from([0, 2])))
     evidence = np.triu(evidence, 1) + np.triu(evidence, 1).T
     apart = np.triu(rng.random((count, count)) < draw(st.sampled_from([0.0, 0.1, 0.4])), 1)
     looks = []
@@ -88,8 +89,8 @@ def plainly(case: Case) -> list[int]:
         del groups[j]
 
 
-@settings(deadline=None, max_examples=150)
-@given(cases())
+@settings(deadline=None, max_examples=300)
+@given(cases(12))
 def test_groups_are_those_of_joining_the_best_pair_until_none_is_left(case: Case) -> None:
     assert case.grouped() == plainly(case)
 

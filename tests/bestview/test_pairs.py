@@ -158,10 +158,12 @@ def test_presence_counts_the_frames_in_common_of_late(steps: list[tuple[int, int
         stood[0] |= {now}
         presence.stand(np.array([row, row, 0]), np.array([now, now + 1, now]))
     one, two = np.triu_indices(4, 1)
-    common = presence.common(one, two)
+    common = presence.common(one, two, 1000)
     for i, j, count in zip(one.tolist(), two.tolist(), common.tolist(), strict=True):
         both = stood[i] & stood[j]
         assert len([frame for frame in both if frame > now - frames]) <= count <= len(both)
+    for enough in (1, 2, 3):
+        assert presence.common(one, two, enough).tolist() == np.minimum(common, enough).tolist()
 
 
 @st.composite
