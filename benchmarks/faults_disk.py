@@ -18,7 +18,7 @@ from benchmarks.surroundings import CannotRunError, one_thread_environment
 _MB = 48
 _FULL_S = 6.0
 _MOUNTED = 'mount -t tmpfs -o size="$1" none "$2" && shift 2 && exec "$@"'
-_CHUNK = 4096
+_CHUNK = 1 << 20
 
 
 @contextlib.asynccontextmanager

@@ -12,6 +12,9 @@ from benchmarks.faults_film import FPS, FRAMES, read_stamp
 from benchmarks.faults_run import Outcome
 from benchmarks.faults_viewer import Told
 
+_GOES_ON = 5
+"""So many of the last GOPs of a fault must be there, whatever it was."""
+
 
 @dataclass(frozen=True, slots=True)
 class File:
@@ -59,11 +62,15 @@ def note(outcomes: Sequence[Outcome], told: Told, files: Sequence[File]) -> None
         shown = [gop for _, gop in told.gops[first:end]]
         if not shown:
             continue
-        outcome.lost = sum(
-            not there.get(camera, set()).issuperset(range(gop.first, gop.first + gop.frames))
+        missing = [
+            gop.first
             for gop in shown
             for camera in sorted({camera for camera in gop.choices.values() if camera})
-        )
+            if not there.get(camera, set()).issuperset(range(gop.first, gop.first + gop.frames))
+        ]
+        outcome.lost = len(missing)
+        if outcome.fault.unrecorded and missing and missing[-1] >= shown[-min(_GOES_ON, len(shown))].first:
+            outcome.failed = "the recording did not go on"
         last = number == len(outcomes) - 1
         until = shown[-1].first + shown[-1].frames
         mine = [it for it in files if shown[0].first <= it.first < until or (last and it.first >= until)]

@@ -99,6 +99,16 @@ def test_a_gop_that_was_shown_and_is_not_on_the_disk_is_lost() -> None:
     assert not kept(outcome)
 
 
+def test_a_recording_that_does_not_go_on_after_the_disk_was_full_is_no_recording() -> None:
+    full = replace(FAULTS[0], unrecorded=True)
+    before, after = frozenset(range(50)), frozenset(range(100, 200))
+    for pulses, lost, goes_on in ((before, 15, False), (before | after, 5, True)):
+        outcome = Outcome(full, gops=(0, 20))
+        note([outcome], told(20), [File("c0", 0, pulses, plays=True)])
+        assert outcome.lost == lost
+        assert kept(outcome) == goes_on
+
+
 def test_promises_are_kept_or_not() -> None:
     good = Outcome(FAULTS[0], received=[judge(watched(3), told(3), 1, VIEWS)], without=0.9)
     assert kept(good)
