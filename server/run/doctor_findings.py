@@ -9,6 +9,8 @@ import msgspec
 from rich.console import Console
 from rich.markup import escape
 
+from server.run.printable import printable
+
 
 class Level(Enum):
     """How bad it is."""
@@ -68,8 +70,6 @@ def show(findings: Findings, console: Console) -> None:
         colour = _COLOURS[it.level]
         do = f" → {it.do}" if it.do else ""
         head = f"[{colour}]{it.level.value:7}[/{colour}] {escape(f'{it.check:{width}}')}"
-        console.print(
-            f"{head}  {escape(' '.join(f'{it.text}{do}'.split()))}", soft_wrap=True, highlight=False
-        )
+        console.print(f"{head}  {escape(printable(f'{it.text}{do}'))}", soft_wrap=True, highlight=False)
     counts = {level: sum(it.level is level for it in findings.findings) for level in Level}
     console.print(", ".join(f"{count} {level.value}" for level, count in counts.items()), highlight=False)

@@ -14,6 +14,7 @@ from rich.text import Text
 
 from client import AwayError as ServerAway
 from client import ClientError, HttpSettings, RefusedError, SiteNow, status
+from server.run.printable import printable
 from server.run.status_view import Rates, picture
 from server.wire.errors import AwayError, UserError
 
@@ -62,7 +63,11 @@ async def status_live(url: str, token: str | None, *, as_json: bool) -> None:
         async for look in looks:
             if look.now is None:
                 notice = f"{look.away}; trying again"
-                shown = Text(notice, style="red") if before is None else picture(before, Rates(), notice)
+                shown = (
+                    Text(printable(notice), style="red")
+                    if before is None
+                    else picture(before, Rates(), notice)
+                )
             else:
                 if before is not None and _is_another_run(before, look.now):
                     restarted = "the service was restarted: people have new numbers"

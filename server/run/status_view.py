@@ -11,6 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from client import CameraNow, PersonNow, ServiceNow, SiteNow
+from server.run.printable import printable
 
 _STATES = {"live": "green", "ended": "cyan", "starting": "yellow"}
 _MEGA = 1e6
@@ -41,7 +42,7 @@ def picture(now: SiteNow, rates: Rates, notice: str = "") -> RenderableType:
     if now.service is not None:
         parts.append(_service(now.service, rates))
     if notice:
-        parts.append(Text(notice, style="yellow"))
+        parts.append(Text(printable(notice), style="yellow"))
     parts += [Text(), _cameras(now.cameras), Text(), _people(now.people)]
     return Group(*parts)
 
@@ -49,8 +50,8 @@ def picture(now: SiteNow, rates: Rates, notice: str = "") -> RenderableType:
 def _head(now: SiteNow) -> Text:
     at = datetime.fromtimestamp(now.now, UTC).strftime("%H:%M:%S UTC")
     pulse = "no pulse" if now.pulse is None else f"pulse {now.pulse}"
-    ready = ("ready", "green") if now.ready else (f"not ready: {now.why}", "red")
-    return Text.assemble((now.name, "bold"), f"  {at}  {pulse}  ", ready)
+    ready = ("ready", "green") if now.ready else (f"not ready: {printable(now.why)}", "red")
+    return Text.assemble((printable(now.name), "bold"), f"  {at}  {pulse}  ", ready)
 
 
 def _service(service: ServiceNow, rates: Rates) -> Text:
@@ -78,8 +79,8 @@ def _cameras(cameras: tuple[CameraNow, ...]) -> RenderableType:
     words = []
     for it in cameras:
         table.add_row(
-            escape(it.camera),
-            Text(it.state, style=_STATES.get(it.state, "red")),
+            escape(printable(it.camera)),
+            Text(printable(it.state), style=_STATES.get(it.state, "red")),
             f"{it.fps:.1f}",
             _ms(it.sync_error_s),
             _ms(it.tracking_delay_s),
@@ -90,7 +91,9 @@ def _cameras(cameras: tuple[CameraNow, ...]) -> RenderableType:
             "-" if it.certified is None else f"{100 * it.certified:.0f} %",
         )
         step = "" if it.in_step or it.state != "live" else "counts by itself"
-        words += [Text(f"{it.camera}: {said}", style="yellow") for said in (it.message, step) if said]
+        words += [
+            Text(printable(f"{it.camera}: {said}"), style="yellow") for said in (it.message, step) if said
+        ]
     return Group(table, *words)
 
 
@@ -98,11 +101,12 @@ def _people(people: tuple[PersonNow, ...]) -> RenderableType:
     if not people:
         return Text("nobody is known", style="dim")
     table = Table("person", "shown by", "for", "seen by", box=None, header_style="dim", pad_edge=False)
-    for it in people:
-        who = f"{it.object} {it.name}" if it.name else str(it.object)
-        since = "-" if it.since_s is None else f"{it.since_s:.0f} s"
-        seen = " ".join(it.cameras) or "nobody"
-        table.add_row(escape(who), it.camera or "-", since, seen, style="" if it.visible else "dim")
+    for person in people:
+        who = f"{person.object} {person.name}" if person.name else str(person.object)
+        since = "-" if person.since_s is None else f"{person.since_s:.0f} s"
+        seen = " ".join(person.cameras) or "nobody"
+        shown = [escape(printable(it)) for it in (who, person.camera or "-", since, seen)]
+        table.add_row(*shown, style="" if person.visible else "dim")
     return table
 
 

@@ -101,6 +101,19 @@ async def test_who_sees_one_camera_alone_is_shown_it_alone_and_no_metrics(tmp_pa
             await status_once(url(hall), None, as_json=False)
 
 
+async def test_nothing_that_is_said_commands_the_terminal(busy: Hall) -> None:
+    now = await client.status(url(busy))
+    evil = "\x1b[2J\x1b]0;owned\x07\nnew [red]line"
+    camera = msgspec.structs.replace(now.cameras[0], message=evil, state=evil, camera=evil)
+    person = msgspec.structs.replace(now.people[0], name=evil, camera=evil, cameras=(evil,))
+    said = printed(
+        msgspec.structs.replace(now, name=evil, ready=False, why=evil, cameras=(camera,), people=(person,)),
+        notice=evil,
+    )
+    assert said.count("·[2J·]0;owned· new [red]line") == 10
+    assert all(it.isprintable() or it == "\n" for it in said)
+
+
 async def test_rates_are_between_two_looks_at_one_run(busy: Hall) -> None:
     one = await client.status(url(busy))
     assert one.service is not None
