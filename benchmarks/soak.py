@@ -26,6 +26,7 @@ import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import aiohttp
 import numpy as np
 
 from benchmarks.delay_site import LOG, running_site
@@ -98,7 +99,7 @@ async def soak(hours: float, tempo: Tempo, folder: Path, out: Path) -> Soaked:
             soaked.broken = str(problem)
         finally:
             soaked.seconds = time.monotonic() - began
-            with contextlib.suppress(OSError):
+            with contextlib.suppress(OSError, aiohttp.ClientError):
                 soaked.counts = await read_counts(site.url)
             watching.cancel()
             await asyncio.gather(watching, return_exceptions=True)
@@ -120,7 +121,7 @@ async def _sample(
     while visitors.camera.pulse < tempo.pulse(hours):
         await asyncio.wait({watching}, timeout=every)
         if watching.done():
-            watching.result()
+            raise BrokenError(f"the visitors ended: {watching.exception()!r}")
         if time.monotonic() > give_up:
             raise BrokenError(f"it came no further than hour {tempo.hours(visitors.camera.pulse):.2f}")
         now, held = tempo.hours(visitors.camera.pulse), read_held(folder / "notes")

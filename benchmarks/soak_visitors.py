@@ -27,6 +27,7 @@ _TFDT, _TIME_AT = b"tfdt", 8
 _TRUN, _COUNT_AT, _ENTRY = b"trun", 8, 12
 """Of a run of samples, as MyView writes it: where their number stands, and the bytes of each."""
 _RECEIVED = 65_536
+_FAULTS = (aiohttp.ClientError, OSError, TimeoutError, EOFError, ValueError)
 _FAMILIAR = (200, 204, 404, 503)
 """Answers that a visitor may get: somebody may be gone, and places are limited."""
 
@@ -105,7 +106,7 @@ class Visitors:
         while True:
             try:
                 await work()
-            except (aiohttp.ClientError, ConnectionError, TimeoutError) as error:
+            except _FAULTS as error:
                 self.faults[f"{work.__name__}: {type(error).__name__}"] += 1
             await asyncio.sleep(_PAUSE_S)
 
@@ -113,6 +114,7 @@ class Visitors:
         self.camera.until = 0
         async for shown, delay in self._stream(f"/cameras/{CAMERAS[0]}/live.mp4"):
             self.camera.take(shown, delay)
+        self.faults["the stream of a camera ended"] += 1
 
     async def _watch_people(self) -> None:
         """Watch one after the other, whoever is there."""
@@ -134,8 +136,11 @@ class Visitors:
         async with self._session.get(path) as answer:
             answer.raise_for_status()
             while True:
-                size = int.from_bytes(await answer.content.readexactly(4), "big")
-                box = await answer.content.readexactly(size - 4)
+                try:
+                    size = int.from_bytes(await answer.content.readexactly(4), "big")
+                    box = await answer.content.readexactly(size - 4)
+                except asyncio.IncompleteReadError:
+                    return  # as a stream ends whose person is forgotten
                 shown = shown_by(box, self._fps)
                 if shown is not None:
                     yield shown, 1e3 * (time.time() - self._pulse0 - shown.pulse / self._fps)
@@ -171,7 +176,7 @@ class Visitors:
                 if number is not None:
                     self.visits[kind] += 1
                     await kinds[kind](number)
-            except (aiohttp.ClientError, ConnectionError, TimeoutError) as error:
+            except _FAULTS as error:
                 self.faults[f"{kind}: {type(error).__name__}"] += 1
 
     async def _read(self, path: str) -> None:

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from aiohttp import web
+from aiohttp.test_utils import TestServer
 
 from benchmarks.soak_samples import (
     DELAY,
@@ -21,7 +23,7 @@ from benchmarks.soak_samples import (
 )
 from benchmarks.soak_site import CAMERAS, HEIGHT, WIDTH, Filmed, Tempo
 from benchmarks.soak_tasks import FOLDER_VARIABLE, hooked_environment, note_tasks, read_held
-from benchmarks.soak_visitors import Seen, shown_by
+from benchmarks.soak_visitors import Seen, Visitors, shown_by
 from server.view import fmp4
 from server.wire.loading import build_config
 
@@ -114,3 +116,34 @@ def test_a_stream_has_a_hole_where_there_is_nothing_to_show_and_not_where_a_pict
         assert seen.holes == (3 if place == 4 else 0)
     assert (seen.pulse, seen.until) == (94, 95)
     assert shown_by(b"mdat" + pictures[0], 25.0) is None
+
+
+async def test_a_person_may_be_forgotten_and_a_camera_may_not() -> None:
+    async def best(_: web.Request) -> web.Response:
+        return web.Response(body=b"".join(FILM), headers={"Connection": "close"})
+
+    async def site(_: web.Request) -> web.Response:
+        return web.json_response({"pulse0": 0.0})
+
+    async def objects(_: web.Request) -> web.Response:
+        return web.json_response({"objects": [{"object": 1, "visible": True}]})
+
+    app = web.Application()
+    app.router.add_get("/api/site", site)
+    app.router.add_get("/api/objects", objects)
+    app.router.add_get("/objects/1/best.mp4", best)
+    app.router.add_get("/cameras/c0/live.mp4", best)
+    async with TestServer(app) as server:
+        visitors = Visitors(str(server.make_url("/")), 25.0, seed=1, coming=0)
+        watching = asyncio.create_task(visitors.watch())
+        async with asyncio.timeout(20.0):
+            while len(visitors.person.delays) < 2 or not visitors.faults:  # noqa: ASYNC110 — nobody tells
+                await asyncio.sleep(0.01)
+        watching.cancel()
+        await asyncio.gather(watching, return_exceptions=True)
+    assert "the stream of a camera ended" in visitors.faults
+    assert not [it for it in visitors.faults if "person" in it or "people" in it]
+    assert visitors.camera.holes == visitors.person.holes == 0
+
+
+FILM = [fmp4.fragment([fmp4.Sample(b"a", key=not it)], it, 25.0) for it in range(3)]
