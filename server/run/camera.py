@@ -10,6 +10,7 @@ from server.camera.process import CameraProcess
 from server.run.checks import check_recording
 from server.run.hang_up import reloads
 from server.run.reload import Reload
+from server.wire.camera_password import with_password
 from server.wire.config import Config
 from server.wire.errors import AwayError, UserError
 from server.wire.running import Running
@@ -27,10 +28,12 @@ async def camera_process(running: Running, camera_id: str) -> None:
     anew = asyncio.Event()
     following = asyncio.create_task(_follow(running, camera_id, anew), name="reload")
     try:
-        camera = await asyncio.to_thread(CameraProcess, running.now, camera_id)
+        camera = await asyncio.to_thread(_made, running.now, camera_id)
         while not await _run(camera, anew):
             try:
-                camera = await asyncio.to_thread(CameraProcess, running.now, camera_id)
+                camera = await asyncio.to_thread(
+                    CameraProcess, with_password(running.now, camera_id), camera_id
+                )
             except UserError as error:  # whoever looks after this process starts it again
                 raise AwayError(str(error)) from error
     except SyncError as error:
@@ -38,6 +41,10 @@ async def camera_process(running: Running, camera_id: str) -> None:
     finally:
         following.cancel()
         await asyncio.gather(following, return_exceptions=True)
+
+
+def _made(config: Config, camera_id: str) -> CameraProcess:
+    return CameraProcess(with_password(config, camera_id), camera_id)
 
 
 async def _run(camera: CameraProcess, anew: asyncio.Event) -> bool:

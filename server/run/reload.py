@@ -11,7 +11,7 @@ from server.wire.sections import TUNED, Camera, Track
 
 _LIVE = tuple(f"view.{name}" for name in TUNED)
 """The best view takes these over from one GOP to the next."""
-_OF_A_CAMERA = ("source", "offset", "at_end", "h264", "options", "ignore", "detections")
+_OF_A_CAMERA = ("source", "password", "offset", "at_end", "h264", "options", "ignore", "detections")
 """What nobody but the camera's own process goes by."""
 _TRACK = tuple(name for name in Track.model_fields if name != "backlog_s")
 _OF_CAMERAS = ("detect", *(f"track.{name}" for name in _TRACK))

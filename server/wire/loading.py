@@ -129,10 +129,14 @@ def _resolved(camera: Camera, homographies: Mapping[str, Any], unit: str | None,
     if ground is None:
         ground, ground_unit = homographies.get(camera.id), ground_unit or unit
     detections = folder / camera.detections if camera.detections else None
-    source = resolved(camera.source, folder)
-    return camera.model_copy(
-        update={"ground": ground, "ground_unit": ground_unit, "source": source, "detections": detections}
-    )
+    update = {
+        "ground": ground,
+        "ground_unit": ground_unit,
+        "source": resolved(camera.source, folder),
+        "password": folder / camera.password if camera.password else None,
+        "detections": detections,
+    }
+    return camera.model_copy(update=update)
 
 
 def _one_side(cameras: Sequence[Camera]) -> None:

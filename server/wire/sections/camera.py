@@ -21,6 +21,8 @@ class Camera(Section):
     id: Name
     source: str
     """A file, a folder of images, a URL that FFmpeg opens, /dev/video0, or scene:NAME?camera=0&…"""
+    password: Path | None = None
+    """A file whose one line, the camera's password, goes where `source` says `{password}`."""
     offset: int = 0
     """A recording shows its frame n - offset at pulse n."""
     at_end: Literal["stop", "loop"] = "stop"
@@ -37,6 +39,13 @@ class Camera(Section):
     """The ground plane's unit: by m, cm or mm it is known how tall people are in the picture."""
     detections: Path | None = None
     """A MOTChallenge detection file to use instead of looking for people in the picture."""
+
+    @field_validator("password")
+    @classmethod
+    def _password_has_its_place(cls, password: Path | None, info: ValidationInfo) -> Path | None:
+        if password is not None and "{password}" not in info.data.get("source", ""):
+            raise ValueError("names a file, but source does not say where it goes: rtsp://name:{password}@…")
+        return password
 
     @field_validator("ground")
     @classmethod
