@@ -35,7 +35,10 @@ _OTHERS = """async () => {
   const { objects } = await (await fetch('api/objects')).json();
   return objects.filter((it) => it.visible && it.object !== myview.object).map((it) => it.object);
 }"""
-_SHOWN = "myview.switches.every((it) => it.object !== myview.object || it.shownAt !== null)"
+_SHOWN = "myview.switches.at(-1)?.shownAt !== null"
+"""Of whom was chosen last: who was left before they were shown, and is chosen again, is shown once."""
+_TRIES = 20
+"""For each switch that is wanted: on a machine that is too slow nobody else may be in view."""
 _BUFFERED = (
     "video.buffered.length ? video.buffered.end(video.buffered.length - 1) - video.buffered.start(0) : 0"
 )
@@ -71,9 +74,15 @@ async def visit(url: str, switches: int, minutes: float) -> Visit:
         tools = await page.context.new_cdp_session(page)
         readings = [await _reading(page, tools)]
         took: list[float] = []
-        while len(took) < switches:
-            took += await _switch(page, len(took))
+        for turn in range(_TRIES * switches):
+            took += await _switch(page, turn)
+            if len(took) >= switches:
+                break
             await asyncio.sleep(_BETWEEN_S)
+        else:
+            raise CannotRunError(
+                f"in {_TRIES * switches} tries there were {len(took)} people to switch to: take fewer --fps"
+            )
         readings.append(await _reading(page, tools))
         for _ in range(round(4 * minutes)):
             await asyncio.sleep(15.0)

@@ -6,8 +6,19 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
 import pytest
+import pytest_asyncio
 from aiohttp.test_utils import TestServer
+from playwright.async_api import Browser
 from site_by_hand import HandMadeSite
+
+from benchmarks.browser import chromium
+
+
+@pytest_asyncio.fixture(scope="session", loop_scope="session")
+async def browser() -> AsyncIterator[Browser]:
+    """Start one for all tests; each has pages of its own, which share nothing."""
+    async with chromium() as running:
+        yield running
 
 
 @pytest.fixture

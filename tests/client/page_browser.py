@@ -38,7 +38,7 @@ class Visit:
         """Wait until frames of a person are being shown."""
         await self.until(
             f"myview.state === 'playing' && myview.object === {person} && myview.camera !== null"
-            " && myview.switches.every((s) => s.object !== myview.object || s.shownAt !== null)"
+            " && myview.switches.at(-1)?.shownAt !== null"
         )
 
     async def get(self, expression: str) -> Any:

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-import pytest_asyncio
 from page_browser import Visit, needs_chromium, visiting
 from page_site import FakeSite
 from playwright.async_api import Browser
-
-from benchmarks.browser import chromium
 
 AXE = Path(__file__).parents[2] / "node_modules/axe-core/axe.min.js"
 SERIOUS = ("serious", "critical")
@@ -20,14 +16,8 @@ SERIOUS = ("serious", "critical")
 pytestmark = [
     needs_chromium,
     pytest.mark.skipif(not AXE.exists(), reason="needs axe-core: make node_modules/.installed"),
-    pytest.mark.asyncio(loop_scope="module"),
+    pytest.mark.asyncio(loop_scope="session"),
 ]
-
-
-@pytest_asyncio.fixture(scope="module", loop_scope="module")
-async def browser() -> AsyncIterator[Browser]:
-    async with chromium() as running:
-        yield running
 
 
 async def faults(visit: Visit) -> list[Any]:

@@ -2,27 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator
-
 import pytest
-import pytest_asyncio
 from page_browser import needs_chromium, visiting
 from page_pattern import CAMERAS, HEIGHT, SQUARE, WIDTH
 from page_site import FakeSite
 from playwright.async_api import Browser, expect
 
-from benchmarks.browser import chromium
-
-pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="module")]
+pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="session")]
 
 # The last frame before a pause may still be on its way to the screen.
 SOME_REFRESHES = "(async () => { for (let n = 0; n < 9; n++) await new Promise(requestAnimationFrame); })()"
-
-
-@pytest_asyncio.fixture(scope="module", loop_scope="module")
-async def browser() -> AsyncIterator[Browser]:
-    async with chromium() as running:
-        yield running
 
 
 async def test_opens_on_the_first_person_in_view(browser: Browser) -> None:
@@ -46,6 +35,18 @@ async def test_a_link_opens_on_its_person(browser: Browser) -> None:
     async with visiting(browser, query="?object=2") as visit:
         await visit.playing(2)
         assert visit.server.site.opened == [2]
+
+
+async def test_who_was_left_before_they_were_shown_is_shown_when_chosen_again(browser: Browser) -> None:
+    async with visiting(browser) as visit:
+        await visit.playing(1)
+        press = "document.querySelector(`#people li[data-object='${it}'] .person`).click()"
+        await visit.get(f"[2, 1, 2].forEach((it) => {press})")
+        await visit.playing(2)
+        first, _, last = await visit.get("myview.switches.slice(-3)")
+        assert (first["object"], first["shownAt"]) == (2, None)
+        assert last["object"] == 2
+        assert last["shownAt"] > last["chosenAt"]
 
 
 async def test_a_click_switches_and_keeps_the_player(browser: Browser) -> None:

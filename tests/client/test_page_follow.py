@@ -2,32 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator
 from pathlib import Path
 
 import av
 import numpy as np
 import pytest
-import pytest_asyncio
 from page_browser import Visit, needs_chromium, visiting
 from page_pattern import HEIGHT, SQUARE, WIDTH
 from page_site import FakeSite
 from playwright.async_api import Browser
 
-from benchmarks.browser import chromium
-
-pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="module")]
+pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="session")]
 
 BRIGHT = 150
 """Of 255: person 1's square is brighter in all three colours, nothing else is."""
 BROWN = 50
 """Of 255: person 2's square is more red than blue by more than that, nothing else is."""
-
-
-@pytest_asyncio.fixture(scope="module", loop_scope="module")
-async def browser() -> AsyncIterator[Browser]:
-    async with chromium() as running:
-        yield running
 
 
 async def bright_share(visit: Visit) -> float:

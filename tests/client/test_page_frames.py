@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator
-
 import numpy as np
 import numpy.typing as npt
 import pytest
-import pytest_asyncio
 from page_browser import needs_chromium, visiting
 from page_pattern import CAMERAS, FPS, GROUNDS, HEIGHT, SQUARE, WIDTH
 from page_site import HOLD, LOOKAHEAD, FakeSite
 from playwright.async_api import Browser
 
-from benchmarks.browser import chromium
-
-pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="module")]
+pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="session")]
 
 ACCENT = np.array([0x3F, 0xDC, 0x7F], np.int16)
 GROUNDS_SEEN = f"""
@@ -34,12 +29,6 @@ GROUNDS_SEEN = f"""
 BEHIND_AT_MOST = 5.0  # seconds: three are lived with before a jump, and the look-ahead and a GOP come on top
 MISSED = 6  # seconds
 BUSY = "setInterval(() => { const t = performance.now() + 25; while (performance.now() < t); }, 40)"
-
-
-@pytest_asyncio.fixture(scope="module", loop_scope="module")
-async def browser() -> AsyncIterator[Browser]:
-    async with chromium() as running:
-        yield running
 
 
 def middle(mask: npt.NDArray[np.bool_]) -> npt.NDArray[np.float64] | None:

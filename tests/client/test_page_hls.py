@@ -6,26 +6,17 @@ import contextlib
 from collections.abc import AsyncIterator
 
 import pytest
-import pytest_asyncio
 from page_browser import Visit, needs_chromium, visiting
 from page_pattern import FPS
 from page_site import SEGMENT, FakeSite
 from playwright.async_api import Browser, expect
 from test_page_hold import camera_on_the_stage
 
-from benchmarks.browser import chromium
-
-pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="module")]
+pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="session")]
 
 AS_A_PHONE = "delete window.MediaSource; delete window.ManagedMediaSource; window.begun = () => NaN;"
 TELLS = "HTMLMediaElement.prototype.getStartDate = function () { return new Date(window.begun(this.src)) };"
 """Of what Safari adds to a video element; the rest of HLS Chromium plays by itself."""
-
-
-@pytest_asyncio.fixture(scope="module", loop_scope="module")
-async def browser() -> AsyncIterator[Browser]:
-    async with chromium() as running:
-        yield running
 
 
 @contextlib.asynccontextmanager

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator
-
 import pytest
-import pytest_asyncio
 from page_browser import needs_chromium, visiting
 from page_pattern import HEIGHT, WIDTH
 from page_site import FakeSite, serving
 from playwright.async_api import Browser, expect
 
-from benchmarks.browser import chromium
-
-pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="module")]
+pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="session")]
 
 MANY = {person: person % 4 != 0 for person in range(1, 24)}
 # Over the picture a slow machine's page has the time to say first this, then that: no jump.
@@ -24,12 +19,6 @@ WATCH_SHIFTS = """
       for (const entry of list.getEntries()) if (!entry.sources.every(said)) shifts.push(entry.value);
     }).observe({ type: 'layout-shift', buffered: true });
 """
-
-
-@pytest_asyncio.fixture(scope="module", loop_scope="module")
-async def browser() -> AsyncIterator[Browser]:
-    async with chromium() as running:
-        yield running
 
 
 @pytest.mark.parametrize("people", [{}, MANY], ids=["nobody", "many"])

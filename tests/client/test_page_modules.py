@@ -12,26 +12,18 @@ from page_pattern import FPS, GOP
 from page_site import STARTS_AT, FakeSite, SiteServer, serving
 from playwright.async_api import Browser, Page
 
-from benchmarks.browser import chromium
-
-pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="module")]
+pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="session")]
 
 FIRST = STARTS_AT - STARTS_AT % GOP
 
 
-@pytest_asyncio.fixture(scope="module", loop_scope="module")
-async def browser() -> AsyncIterator[Browser]:
-    async with chromium() as running:
-        yield running
-
-
-@pytest_asyncio.fixture(scope="module", loop_scope="module")
+@pytest_asyncio.fixture(scope="module", loop_scope="session")
 async def server() -> AsyncIterator[SiteServer]:
     async with serving(FakeSite(people={})) as running:
         yield running
 
 
-@pytest_asyncio.fixture(scope="module", loop_scope="module")
+@pytest_asyncio.fixture(scope="module", loop_scope="session")
 async def page(browser: Browser, server: SiteServer) -> AsyncIterator[Page]:
     opened = await browser.new_page(bypass_csp=True)
     await opened.goto(server.url)

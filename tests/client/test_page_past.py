@@ -2,29 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator
 from itertools import pairwise
 
 import numpy as np
 import pytest
-import pytest_asyncio
 from page_browser import Visit, needs_chromium, visiting
 from page_pattern import CAMERAS, FPS, GOP
 from page_site import STARTS_AT, FakeSite
 from playwright.async_api import Browser, expect
 
-from benchmarks.browser import chromium
-
-pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="module")]
+pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="session")]
 
 HIDDEN = "Object.defineProperty(document, 'hidden', {{ value: {}, configurable: true }})"
 LIVE = "myview.delays.at(-1).delayMs < 2000"
-
-
-@pytest_asyncio.fixture(scope="module", loop_scope="module")
-async def browser() -> AsyncIterator[Browser]:
-    async with chromium() as running:
-        yield running
 
 
 async def seconds_of_playing(visit: Visit, seconds: float) -> None:

@@ -2,24 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator
-
 import pytest
-import pytest_asyncio
 from page_browser import needs_chromium, visiting
 from page_pattern import FPS
 from page_site import STARTS_AT, FakeSite
 from playwright.async_api import Browser, expect
 
-from benchmarks.browser import chromium
-
-pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="module")]
-
-
-@pytest_asyncio.fixture(scope="module", loop_scope="module")
-async def browser() -> AsyncIterator[Browser]:
-    async with chromium() as running:
-        yield running
+pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="session")]
 
 
 async def test_a_lost_server_is_said_under_the_last_picture_and_found_again(browser: Browser) -> None:

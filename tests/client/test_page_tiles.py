@@ -2,26 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator
-
 import pytest
-import pytest_asyncio
 from page_browser import Visit, needs_chromium, visiting
 from page_pattern import FPS
 from page_site import FakeSite
 from playwright.async_api import Browser, expect
 
-from benchmarks.browser import chromium
-
-pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="module")]
+pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="session")]
 
 FIVE = {1: True, 2: True, 3: True, 4: True, 5: True}
-
-
-@pytest_asyncio.fixture(scope="module", loop_scope="module")
-async def browser() -> AsyncIterator[Browser]:
-    async with chromium() as running:
-        yield running
 
 
 async def small_ones_play(visit: Visit, count: int) -> None:

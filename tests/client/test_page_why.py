@@ -3,24 +3,14 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator
 
 import pytest
-import pytest_asyncio
 from page_browser import needs_chromium, visiting
 from page_pattern import FPS
 from page_site import STARTS_AT, FakeSite
 from playwright.async_api import Browser, Route, expect
 
-from benchmarks.browser import chromium
-
-pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="module")]
-
-
-@pytest_asyncio.fixture(scope="module", loop_scope="module")
-async def browser() -> AsyncIterator[Browser]:
-    async with chromium() as running:
-        yield running
+pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="session")]
 
 
 async def test_the_present_view_is_explained_camera_by_camera(browser: Browser) -> None:
