@@ -31,6 +31,7 @@ async def killed(stand: Stand) -> None:
         page = await browser.new_page(bypass_csp=True)  # the page's policy forbids eval, which asks it here
         await open_when_there(page, f"{stand.url}?object={stand.viewers[0].number}")
         await page.wait_for_function("myview.state === 'playing'", timeout=_PLAYING_MS)
+        stand.returned.clear()  # a browser that starts may have kept a busy machine from being ready
         stand.send("bestview", signal.SIGKILL)
         await asyncio.sleep(_POLL_S)
         before = await page.evaluate(_END)
