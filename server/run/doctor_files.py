@@ -23,6 +23,9 @@ def file_findings(config: Config) -> list[Finding]:
             found += _private(f"{check}.key", tls.key)
     if config.zenoh.users is not None:
         found += _users(config, config.zenoh.users)
+    for camera in config.cameras:
+        if camera.password is not None:
+            found += _private(f"camera {camera.id}", camera.password)
     return found
 
 

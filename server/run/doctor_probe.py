@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from server.camera.pipeline import CameraPipeline
 from server.camera.sources import SourceEnded
 from server.run.doctor_stream import Sent, fps_of, watch
+from server.wire.camera_password import with_password
 from server.wire.config import Config
 from server.wire.errors import UserError
 from server.wire.sources import SourceKind, kind_of
@@ -45,9 +46,11 @@ class Probe:
 
 def probe(config: Config, camera_id: str, seconds: float) -> Probe:
     """Try a camera for so many seconds, after it has answered."""
-    camera, sent = config.camera(camera_id), None
-    kind = kind_of(camera.source)
+    sent = None
     try:
+        config = with_password(config, camera_id)
+        camera = config.camera(camera_id)
+        kind = kind_of(camera.source)
         if kind is SourceKind.STREAM:
             sent = watch(camera.source, camera.options, seconds / 2, seconds)
         pipeline = CameraPipeline(config, camera_id)

@@ -197,6 +197,20 @@ def test_a_camera_that_does_not_fit_is_doubted(tmp_path: Path, found: Probe, wor
     assert words in doubt.text
 
 
+def test_a_password_from_a_file_is_used_and_others_should_not_read_it(tmp_path: Path, taken: int) -> None:
+    cameras = [
+        {"id": "gate", "source": f"rtsp://me:{{password}}@127.0.0.1:{taken}/live", "password": "secret"}
+    ]
+    there = config(tmp_path, cameras=cameras)
+    missing = only(camera_findings(there, probe_all(there, 1.0), runs=False), "camera gate").text
+    assert "secret: cannot be read" in missing
+    (tmp_path / "secret").write_text("open sesame\n")
+    (tmp_path / "secret").chmod(0o644)
+    assert "others may read" in only(file_findings(there), "camera gate").text
+    shown = only(camera_findings(there, probe_all(there, 1.0), runs=False), "camera gate").text
+    assert "rtsp://me:…@127.0.0.1" in shown
+
+
 def test_sound_that_cannot_be_opened_is_bad(tmp_path: Path) -> None:
     assert sound_findings(config(tmp_path)) == []
     write_video(tmp_path / "silent.mp4", 3)
