@@ -58,11 +58,7 @@ def sound_findings(config: Config) -> list[Finding]:
     try:
         open_sound(config, config.sounding)
     except UserError as error:
-        return [
-            bad(
-                "sound", str(error).removeprefix("sound: "), "another file, or a camera that has sound"
-            )
-        ]
+        return [bad("sound", str(error).removeprefix("sound: "), "another file, or a camera that has sound")]
     return [ok("sound", f"{config.sound.source}: {config.sound.codec}, {config.sound.kbps} kbit/s")]
 
 
