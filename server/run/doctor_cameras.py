@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 import threading
 import time
 from collections.abc import Mapping
@@ -11,13 +10,12 @@ from collections.abc import Mapping
 from server.camera.sound import open_sound
 from server.run.doctor_findings import Finding, bad, ok, warning
 from server.run.doctor_probe import Probe, probe
+from server.wire.addresses import shown
 from server.wire.config import Config
 from server.wire.errors import UserError
 
 _GRACE_S = 3.0
 """What a busy machine takes longer than a camera was given."""
-_PASSWORD = re.compile(r"(://[^\s:/@]*:)[^\s/]*@")
-"""In the address of a camera."""
 _SAME_SPEED = 0.01
 """Part by which a recording may be played faster or slower: 29.97 for 30."""
 _SAME_RATE = 0.1
@@ -70,7 +68,7 @@ def camera_findings(config: Config, probes: Mapping[str, Probe], *, runs: bool) 
 def _of(config: Config, camera: str, found: Probe, *, runs: bool) -> list[Finding]:
     check = f"camera {camera}"
     if found.problem or found.size is None:
-        problem = _PASSWORD.sub(r"\1…@", found.problem)  # what is printed here is shown to others
+        problem = shown(found.problem)  # what is printed here is shown to others
         if runs:
             do = "the site runs, and may have it to itself: see /api/cameras"
             return [warning(check, problem, do)]

@@ -18,6 +18,7 @@ from server.web.keys import ON_DISK, SERVICE
 from server.web.operator_permission import PREFIX
 from server.web.operator_schema import Choosing, Setting, Settings
 from server.web.operator_session import asked_for
+from server.wire.addresses import HIDDEN, SECRET_WORDS, shown
 from server.wire.config import Config
 from server.wire.errors import UserError
 from server.wire.loading import changed_view
@@ -25,12 +26,7 @@ from server.wire.sections import TUNED, View
 
 routes = web.RouteTableDef()
 
-HIDDEN = "(not shown)"
-_WORDS = "pas|pwd|psw|token|secret|key|auth"
-_SECRET = re.compile(f"{_WORDS}|header|cookie", re.IGNORECASE)
-_LOGIN = re.compile(r"(?<=://)[^/\s]+@")
-_QUERY = re.compile(rf"((?:{_WORDS})[^=&?/#]*=)[^&#]*", re.IGNORECASE)
-"""Some cameras have their password in the path, as ``user=…_password=…_channel=1``."""
+_SECRET = re.compile(f"{SECRET_WORDS}|header|cookie", re.IGNORECASE)
 
 
 @routes.get(f"{PREFIX}/config")
@@ -115,8 +111,7 @@ def _written(value: Any) -> str:
 
 
 def _shown(value: Any) -> Any:
-    """Take passwords out of an address."""
-    return _QUERY.sub(rf"\1{HIDDEN}", _LOGIN.sub(f"{HIDDEN}@", value)) if isinstance(value, str) else value
+    return shown(value) if isinstance(value, str) else value
 
 
 def _plain(value: Any) -> Any:

@@ -13,6 +13,7 @@ import pytest
 from videos_by_hand import HEIGHT, STEP, WIDTH, frame_in
 
 from server.camera.sources import open_source, stream
+from server.camera.sources.opening import open_video
 from server.camera.sources.stream import Stream
 from server.wire.errors import UserError
 from server.wire.sections import Camera, Site
@@ -127,6 +128,15 @@ def test_a_camera_that_is_not_there_is_refused_in_one_line(url: str) -> None:
         open_source(Camera(id="door", source=url), Site())
     assert "\n" not in str(caught.value)
     assert url in str(caught.value)
+
+
+@pytest.mark.parametrize("login", ["me:pa@ss:w@", ""])
+def test_a_password_is_in_no_error(login: str) -> None:
+    with pytest.raises(UserError, match="cannot open this video") as caught:
+        open_video(f"rtsp://{login}127.0.0.1:1/user=me_password=w0rd_channel=1", {}, (5.0, 5.0))
+    assert "pa@ss" not in str(caught.value)
+    assert "w0rd" not in str(caught.value)
+    assert "127.0.0.1:1/user=me_password=(not shown)" in str(caught.value)
 
 
 def test_options_are_passed_on(camera: MotionJpeg) -> None:

@@ -19,6 +19,7 @@ from server.camera.sound import LiveSound
 from server.camera.sources.base import Image
 from server.camera.sources.opening import Opened, open_video
 from server.camera.sources.stream import OPEN_S, READ_S, Stream
+from server.wire.addresses import shown
 
 log = logging.getLogger(__name__)
 
@@ -62,7 +63,7 @@ class OwnStream(Stream):
         try:
             Fitting(self._wanted).opened(opened)
         except MisfitError as misfit:
-            log.warning("%s: what it sends does not fit any more: %s", self._url, misfit)
+            log.warning("%s: what it sends does not fit any more: %s", shown(self._url), misfit)
             opened.container.close()
             return False
         at_once(opened)
@@ -107,6 +108,6 @@ def _check(url: str, options: Mapping[str, str], wanted: Wanted) -> None:
         if begun < 0:
             raise MisfitError(f"no GOP begins within {_LOOKED_AT_GOPS * wanted.gop} frames (encode.gop)")
     except (av.error.FFmpegError, ValueError) as error:
-        raise MisfitError(f"it cannot be read: {error}") from error
+        raise MisfitError(f"it cannot be read: {shown(str(error))}") from error
     finally:
         opened.container.close()

@@ -13,6 +13,7 @@ from av.video.frame import VideoFrame
 from av.video.stream import VideoStream
 
 from server.camera.sources.base import Image
+from server.wire.addresses import shown
 from server.wire.errors import UserError
 from server.wire.sources import is_device
 
@@ -40,23 +41,24 @@ def open_video(
     Raises:
         UserError: it cannot be opened, or there is no video in it.
     """
+    name = shown(source)
     try:
         container = av.open(
             source, format="v4l2" if is_device(source) else None, options=dict(options or {}), timeout=timeout
         )
     except (av.error.FFmpegError, OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or " ".join(str(error).split())
-        raise UserError(f"{source}: cannot open this video: {reason}") from error
+        reason = getattr(error, "strerror", None) or " ".join(shown(str(error)).split())
+        raise UserError(f"{name}: cannot open this video: {reason}") from error
     if not container.streams.video:
         container.close()
-        raise UserError(f"{source}: there is no video in this file")
+        raise UserError(f"{name}: there is no video in this file")
     stream = container.streams.video[0]
     context: VideoCodecContext | None = (
         stream.codec_context
     )  # PyAV's types do not know that it may be missing
     if context is None or not context.width or not context.height:
         container.close()
-        raise UserError(f"{source}: cannot decode this video: no picture size in it; is the file whole?")
+        raise UserError(f"{name}: cannot decode this video: no picture size in it; is the file whole?")
     context.thread_count = 1  # one process per camera already uses the cores
     fps = float(stream.average_rate) if stream.average_rate else _DEFAULT_FPS
     return Opened(container, stream, (context.width, context.height), fps, stream.frames)

@@ -16,6 +16,7 @@ from av.video.stream import VideoStream
 from server.camera.sound import LiveSound
 from server.camera.sources.base import Image
 from server.camera.sources.opening import Opened, bgr, open_video
+from server.wire.addresses import shown
 from server.wire.errors import UserError
 
 log = logging.getLogger(__name__)
@@ -87,7 +88,7 @@ class Stream:
                 elif self._listener is not None:
                     self._listener.packet(cast("av.Packet[AudioStream]", packet))
         except (av.error.FFmpegError, OSError) as error:
-            log.warning("%s: reading stopped: %s", self._url, error)
+            log.warning("%s: reading stopped: %s", shown(self._url), shown(str(error)))
         finally:
             opened.container.close()
         return any_picture
