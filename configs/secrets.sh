@@ -13,9 +13,11 @@
 #   cameras/ID/bus, token    a camera's own password of the bus, and a token to see whether it is well
 set -eu
 [ $# -ge 2 ] || { sed -n '2,7s/^# \{0,1\}//p' "$0" >&2; exit 2; }
+command -v openssl > /dev/null || { echo "secrets.sh: needs openssl, which is not there" >&2; exit 1; }
 name=$1
 shift
 case $name in
+    *:*) also=IP:$name ;;
     *[!0-9.]*) also=DNS:$name ;;
     *) also=IP:$name ;;
 esac
@@ -28,14 +30,20 @@ chmod 700 "$folder"
 cd "$folder"
 mkdir -p public web cameras
 
+# certify WORDS: openssl, which says something only where it fails
+certify() {
+    openssl "$@" 2> log || { cat log >&2; rm log; exit 1; }
+    rm log
+}
+
 # pair FILE KEY NAMES: a certificate of our authority
 pair() {
     [ ! -e "$1" ] || return 0
-    openssl req -newkey ec -pkeyopt ec_paramgen_curve:P-256 -nodes -subj "/CN=$name" -out request -keyout "$2" 2> log
+    certify req -newkey ec -pkeyopt ec_paramgen_curve:P-256 -nodes -subj "/CN=$name" -out request -keyout "$2"
     printf 'subjectAltName=%s\nextendedKeyUsage=serverAuth\n' "$3" > names
-    openssl x509 -req -in request -CA public/authority.pem -CAkey authority.key -CAcreateserial -CAserial serial \
-        -days 825 -extfile names -out "$1" 2> log
-    rm request names log
+    certify x509 -req -in request -CA public/authority.pem -CAkey authority.key -CAcreateserial -CAserial serial \
+        -days 825 -extfile names -out "$1"
+    rm request names
     chmod 444 "$2"
 }
 
@@ -49,9 +57,8 @@ token() {
 }
 
 if [ ! -e public/authority.pem ]; then
-    openssl req -x509 -newkey ec -pkeyopt ec_paramgen_curve:P-256 -nodes -days 3650 -subj "/CN=MyView authority" \
-        -out public/authority.pem -keyout authority.key 2> log
-    rm log
+    certify req -x509 -newkey ec -pkeyopt ec_paramgen_curve:P-256 -nodes -days 3650 -subj "/CN=MyView authority" \
+        -out public/authority.pem -keyout authority.key
     chmod 400 authority.key
 fi
 pair public/router.pem router.key "$also,DNS:bestview"

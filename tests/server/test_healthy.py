@@ -163,6 +163,51 @@ def test_what_is_made_for_a_secure_site_fits_together(secrets: Path) -> None:
     assert read_users(secrets / "bus") == read_users(secrets / "cameras" / "c0" / "bus")
 
 
+def made(folder: Path, name: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    script = ["/bin/sh", str(ROOT / "configs" / "secrets.sh"), name, "c0"]
+    surroundings = {**os.environ, "MYVIEW_SECRETS": str(folder), **environment}
+    return subprocess.run(script, env=surroundings, capture_output=True, text=True, check=False)
+
+
+def test_without_openssl_nothing_is_made_and_that_is_said(tmp_path: Path) -> None:
+    done = made(tmp_path / "secrets", "cameras.example", PATH=str(tmp_path))
+    assert (done.returncode, done.stderr) == (1, "secrets.sh: needs openssl, which is not there\n")
+    assert not (tmp_path / "secrets").exists()
+
+
+@NEEDS_OPENSSL
+def test_a_name_that_no_certificate_takes_is_said_and_a_shorter_one_is_taken_then(tmp_path: Path) -> None:
+    done = made(tmp_path, f"{'a' * 63}.example")
+    assert done.returncode == 1
+    assert "too long" in done.stderr
+    assert made(tmp_path, "cameras.example").returncode == 0
+    assert not [it.name for it in tmp_path.iterdir() if it.name in {"log", "names", "request"}]
+
+
+@NEEDS_OPENSSL
+@pytest.mark.parametrize(
+    ("name", "also"),
+    [
+        ("cameras.example", "DNS:cameras.example"),
+        ("10.0.0.5", "IP Address:10.0.0.5"),
+        ("2001:db8::5", "IP Address:2001:DB8:0:0:0:0:0:5"),
+    ],
+)
+def test_a_certificate_is_for_the_name_or_the_address(tmp_path: Path, name: str, also: str) -> None:
+    assert made(tmp_path, name).returncode == 0
+    words = [
+        "openssl",
+        "x509",
+        "-in",
+        str(tmp_path / "public" / "https.pem"),
+        "-noout",
+        "-ext",
+        "subjectAltName",
+    ]
+    said = subprocess.run(words, capture_output=True, text=True, check=True).stdout
+    assert said.splitlines()[1:] == [f"    {also}"]
+
+
 @NEEDS_OPENSSL
 def test_a_camera_is_added_to_a_secure_site_that_stays_as_it_is(secrets: Path, tmp_path: Path) -> None:
     folder = tmp_path / "secrets"
