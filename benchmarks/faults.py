@@ -44,6 +44,7 @@ from benchmarks.faults_site import Fault
 from benchmarks.faults_table import describe
 from benchmarks.report import Report
 from benchmarks.surroundings import CannotRunError, finish, parser
+from client import ClientError
 
 FAULTS: tuple[Fault, ...] = (
     *faults_processes.FAULTS,
@@ -85,9 +86,10 @@ async def _group(faults: list[Fault], views: Views, folder: Path, report: Report
         faults_recorded.note(outcomes, stand.told, files)
     except CannotRunError as error:
         report.say(f"{faults[0].name}: left out: {error}")
-    except RuntimeError as error:
+    except (ClientError, RuntimeError) as error:
         report.say(f"{faults[0].name} and what follows it: {error}")
         report.say(await asyncio.to_thread(_log_of, folder))
+        outcomes += [Outcome(it, failed="there was no site to try it on") for it in faults[len(outcomes) :]]
     return outcomes
 
 

@@ -4,8 +4,7 @@
 
 is the router that cameras connect to; what they say it passes on to the best view's router. A word on its
 standard input says how: plain, lost, doubled or disordered, and how many that has befallen so far is printed.
-It happens to three in ten of all messages but
-pictures and sound, by numbers drawn from a seed.
+It happens to three in ten of all messages but pictures, by numbers drawn from a seed.
 """
 
 from __future__ import annotations

@@ -40,17 +40,20 @@ class ComposeSite:
         """Run a command of Docker; give what it says.
 
         Raises:
-            ComposeError: it fails.
+            ComposeError: it fails, or does not end.
         """
-        done = subprocess.run(
-            words,
-            cwd=ROOT,
-            env=dict(self.environment),
-            capture_output=True,
-            text=True,
-            timeout=seconds,
-            check=False,
-        )
+        try:
+            done = subprocess.run(
+                words,
+                cwd=ROOT,
+                env=dict(self.environment),
+                capture_output=True,
+                text=True,
+                timeout=seconds,
+                check=False,
+            )
+        except subprocess.TimeoutExpired:
+            raise ComposeError(f"{' '.join(words)}: has not ended after {seconds:g} s") from None
         if check and done.returncode:
             raise ComposeError(
                 f"{' '.join(words)}: exit code {done.returncode}\n{done.stdout}\n{done.stderr}"

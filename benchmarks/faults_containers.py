@@ -174,7 +174,7 @@ def main() -> None:
     if lacking is not None:
         finish(CannotRunError(lacking), "faults_containers")
     report = Report()
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:  # recordings are another user's
         faults = [fault for fault in FAULTS if not chosen.fault or fault.name in chosen.fault]
         outcomes = asyncio.run(measure(faults, Path(folder), report))
     describe(report, outcomes)

@@ -31,6 +31,8 @@ _STRIDE = 5
 _EVERY_S = 1.0
 _CARRIED = 0.99
 """Share of the frames that are searched where the machine carries its cameras."""
+_FIRST_S = 120.0
+"""A camera has so long to start, on a machine with other work."""
 _RECOVERED_S = 180.0
 """For how long the way back is watched at most."""
 _CALM = 5
@@ -105,8 +107,10 @@ class Loaded:
 class Watch:
     """Samples a site."""
 
-    def __init__(self, site: Crowded, visitors: Visitors, found: Loaded) -> None:
-        self._site, self._visitors, self._found = site, visitors, found
+    def __init__(
+        self, site: Crowded, visitors: Visitors, watching: asyncio.Task[None], found: Loaded
+    ) -> None:
+        self._site, self._visitors, self._watching, self._found = site, visitors, watching, found
         self._began = time.monotonic()
 
     @property
@@ -115,10 +119,16 @@ class Watch:
         return time.monotonic() - self._began
 
     async def sample(self, session: aiohttp.ClientSession, seconds: float) -> list[Sample]:
-        """Take samples for a while."""
+        """Take samples for a while.
+
+        Raises:
+            RuntimeError: nobody watches any more: delays and holes would be those of nobody.
+        """
         until, taken = self.now + seconds, []
         while self.now < until:
-            await asyncio.sleep(_EVERY_S)
+            await asyncio.wait({self._watching}, timeout=_EVERY_S)
+            if self._watching.done():
+                raise RuntimeError(f"the viewers ended: {self._watching.exception()!r}")
             async with session.get(f"{self._site.url}api/cameras") as answer:
                 cameras = [
                     it for it in (await answer.json())["cameras"] if it["camera"] in self._site.cameras
@@ -171,7 +181,7 @@ async def load(site: Crowded, most: int, settle: float, seconds: float) -> Loade
         visitors = Visitors(site.url, FPS, seed=1, coming=0)
         watching = asyncio.create_task(visitors.watch())
         try:
-            watch = Watch(site, visitors, found)
+            watch = Watch(site, visitors, watching, found)
             while True:
                 found.started.append((watch.now, len(site.cameras)))
                 before = await watch.sample(session, settle)
@@ -191,12 +201,18 @@ async def load(site: Crowded, most: int, settle: float, seconds: float) -> Loade
 
 
 async def _first(session: aiohttp.ClientSession, site: Crowded) -> None:
-    """Wait until the first camera is live."""
-    while True:
+    """Wait until the first camera is live.
+
+    Raises:
+        RuntimeError: it does not come to that.
+    """
+    give_up = time.monotonic() + _FIRST_S
+    while time.monotonic() < give_up:
         async with session.get(f"{site.url}api/cameras") as answer:
             if (await answer.json())["cameras"][0]["state"] == "live":
                 return
         await asyncio.sleep(_EVERY_S)
+    raise RuntimeError(f"the first camera was not live after {_FIRST_S:.0f} s")
 
 
 async def _way_back(watch: Watch, session: aiohttp.ClientSession) -> float | None:

@@ -97,9 +97,9 @@ def plot(soaked: Soaked, path: Path) -> None:
         for process, samples in soaked.samples.items():
             axis.plot([it.hours for it in samples], [value(it) for it in samples], label=process, linewidth=1)
         axis.set(ylabel=name, ylim=(0, None))
-    axes[0].set_title(f"a day of a site, {soaked.tempo.speed:g} times as fast")
-    axes[0].legend(ncols=_NAMED, fontsize="small")
     hours = [it.hours for it in soaked.delays]
+    axes[0].set_title(f"{hours[-1]:.1f} hours of a site, {soaked.tempo.speed:g} times as fast")
+    axes[0].legend(ncols=_NAMED, fontsize="small")
     delay = axes[len(_CURVES)]
     _line(delay, hours, [it.camera for it in soaked.delays], "of a camera")
     _line(delay, hours, [it.person for it in soaked.delays], "of a person")

@@ -51,11 +51,18 @@ class Rule:
     quantile: float = 0.5
 
     def judge(self, hours: Sequence[float], values: Sequence[float]) -> Verdict:
-        """Compare the two quarters of the time; the first one is warming up."""
-        quarters = np.minimum(3, (4 * np.asarray(hours) / hours[-1]).astype(int))
+        """Compare the two quarters of the time; the first one is warming up.
+
+        Of a quarter without a sample nothing is known: NaN, which is not flat.
+        """
+        whole = max(hours, default=0.0) or 1.0
+        quarters = np.minimum(3, (4 * np.asarray(hours) / whole).astype(int))
         numbers: NDArray[np.float64] = np.asarray(values, dtype=np.float64)
-        second, fourth = (float(np.quantile(numbers[quarters == it], self.quantile)) for it in (1, 3))
+        second, fourth = (self._of(numbers[quarters == it]) for it in (1, 3))
         return Verdict(self, second, fourth)
+
+    def _of(self, samples: NDArray[np.float64]) -> float:
+        return float(np.quantile(samples, self.quantile)) if len(samples) else np.nan
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+import asyncio
+from contextlib import AbstractAsyncContextManager
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from benchmarks.faults import _group
 from benchmarks.faults_bus import Way
 from benchmarks.faults_film import FRAMES, Stamp, Views, read_stamp, stamped
 from benchmarks.faults_judge import judge
 from benchmarks.faults_processes import FAULTS
 from benchmarks.faults_recorded import File, note
-from benchmarks.faults_run import Outcome
+from benchmarks.faults_run import Outcome, _injected
+from benchmarks.faults_site import Stand
 from benchmarks.faults_table import kept
 from benchmarks.faults_viewer import Picture, Told
+from benchmarks.report import Report
 from client import Box, Gop
 from server.wire.inbox import Message
 
@@ -115,6 +121,26 @@ def test_promises_are_kept_or_not() -> None:
     assert not kept(replace(good, without=1.1))
     assert not kept(replace(good, reconnections=1))
     assert not kept(replace(good, failed="there is no process c0"))
+
+
+async def test_faults_of_a_site_that_does_not_start_are_broken_promises(tmp_path: Path) -> None:
+    def not_started(views: Views, folder: Path) -> AbstractAsyncContextManager[Stand]:
+        raise RuntimeError(f"{folder}, {len(views.cameras)} cameras: did not start")
+
+    faults = [replace(it, setup=not_started) for it in FAULTS[:2]]
+    outcomes = await _group(faults, VIEWS, tmp_path / "site", Report())
+    assert [it.fault for it in outcomes] == faults
+    assert not any(kept(it) for it in outcomes)
+
+
+async def test_a_stream_that_ends_meanwhile_fails_its_fault_and_no_other() -> None:
+    async def broken_off(stand: Stand) -> None:
+        raise asyncio.IncompleteReadError(stand.url.encode(), 10)
+
+    outcome = Outcome(replace(FAULTS[0], inject=broken_off))
+    await _injected(outcome.fault, Stand("here", Path(), 0), outcome)
+    assert outcome.failed.startswith("IncompleteReadError: 4 bytes read")
+    assert not kept(outcome)
 
 
 class Heard:

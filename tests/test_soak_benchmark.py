@@ -46,6 +46,11 @@ def test_the_delay_of_a_machine_with_other_work_is_judged_by_its_best_times() ->
     assert not DELAY.judge(HOURS, 300.0 + 10.0 * HOURS).flat
 
 
+@pytest.mark.parametrize("hours", [[], [0.0] * 10, [0.1, 0.2, 24.0]])
+def test_what_was_not_seen_is_not_flat(hours: list[float]) -> None:
+    assert not DELAY.judge(hours, [300.0] * len(hours)).flat
+
+
 def test_every_quantity_of_a_process_is_judged_by_itself() -> None:
     samples = [
         Sample(it, 100.0, 10, 5 + (it > 16.0) * 2, 7, 1000) for it in map(float, np.linspace(0.1, 24.0, 40))
