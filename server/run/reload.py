@@ -65,7 +65,9 @@ def reloaded(running: Config, wanted: Config) -> Reload:
         live = tuple(key for key in live if key != "view.lookahead")
     kept_window = any(key in _EPOCHS for key in keys)
     shared = tuple(key for key in _of(keys, _OF_CAMERAS) if not (kept_window and _of((key,), _WINDOW)))
-    own = {it: _of(keys, [f"cameras.{it}.{name}" for name in _OF_A_CAMERA]) for it in running.camera_ids}
+    # Whose H.264 can pass depends on the site's codec: with another one, that waits, too.
+    names_of_own = tuple(it for it in _OF_A_CAMERA if not (it == "h264" and "encode.codec" in keys))
+    own = {it: _of(keys, [f"cameras.{it}.{name}" for name in names_of_own]) for it in running.camera_ids}
     sharp = (running.view.quality.sharp > 0) != (view.quality.sharp > 0)  # cameras measure it, or do not
     anew = tuple(camera for camera in running.camera_ids if shared or sharp or own[camera])
     done = {*live, *shared, *(key for names in own.values() for key in names)}
@@ -76,7 +78,7 @@ def reloaded(running: Config, wanted: Config) -> Reload:
             "view": view,
             "detect": wanted.detect,
             "track": _track(running, wanted, kept_window=kept_window),
-            "cameras": [_camera(running, wanted, it) for it in running.camera_ids],
+            "cameras": [_camera(running, wanted, it, names_of_own) for it in running.camera_ids],
         }
     )
     return Reload(now, live, anew, best_view, tuple(key for key in waiting if key not in best_view))
@@ -93,10 +95,10 @@ def _track(running: Config, wanted: Config, *, kept_window: bool) -> Track:
     return running.track.model_copy(update={name: getattr(wanted.track, name) for name in names})
 
 
-def _camera(running: Config, wanted: Config, camera_id: str) -> Camera:
+def _camera(running: Config, wanted: Config, camera_id: str, names: Sequence[str]) -> Camera:
     """Take over what only the camera's own process goes by."""
     before = running.camera(camera_id)
     if running.camera_ids != wanted.camera_ids:
         return before
     after = wanted.camera(camera_id)
-    return before.model_copy(update={name: getattr(after, name) for name in _OF_A_CAMERA})
+    return before.model_copy(update={name: getattr(after, name) for name in names})

@@ -61,11 +61,14 @@ class Running:
         return build_config(read_content(Path(kept)), where=str(self.path), folder=self.path.parent)
 
     def on_disk(self) -> OnDisk:
-        """Say how the file is different from what runs; it is read when it has changed."""
+        """Say how the file is different from what runs; it is read when it has changed.
+
+        One that is wrong is read each time: what it refers to, and may be wrong itself, is not known.
+        """
         folder = self.path.parent
         ground = self._file.ground if isinstance(self._file, Config) else None
         seen = (state_of(self.path), None if ground is None else state_of(folder / ground))
-        if seen != self._seen:
+        if seen != self._seen or isinstance(self._file, UserError):
             self._seen = seen
             try:
                 self._file = load_config(self.path)

@@ -1,0 +1,35 @@
+"""What of a configuration has to wait for what, and a wrong file that is mended."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import yaml
+from cameras_by_hand import small_config
+
+from server.run.reload import reloaded
+from server.wire.running import Running
+
+
+def test_whose_h264_passes_waits_for_a_codec_that_can() -> None:
+    passing = [{"id": "c0", "source": "scene:room", "h264": "pass"}, "c1"]
+    running = small_config(encode={"codec": "vp8"})
+    reload = reloaded(running, small_config(passing))
+    assert (reload.cameras, reload.now) == ((), running)
+    assert reload.site == ("encode.codec", "cameras.c0.h264")
+    reload = reloaded(small_config(), small_config(passing))
+    assert (reload.cameras, reload.site) == (("c0",), ())
+
+
+def test_a_wrong_ground_file_is_wrong_until_it_is_mended(
+    tmp_path: Path,
+) -> None:
+    path, ground = tmp_path / "site.yaml", tmp_path / "ground.json"
+    path.write_text(yaml.safe_dump({"cameras": [{"id": "c0", "source": "x"}], "ground": "ground.json"}))
+    right = '{"homography": {"c0": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}}'
+    ground.write_text(right)
+    running = Running(path)
+    ground.write_text('{"homography": {"c0": [[1]]}}')
+    assert all("ground.json" in running.on_disk().error for _ in range(3))
+    ground.write_text(right)
+    assert not running.on_disk().differs
