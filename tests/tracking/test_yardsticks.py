@@ -160,6 +160,19 @@ def test_every_frame_is_told_once_and_no_number_is_used_twice(stream: list[tuple
     assert sorted(begins) == list(range(1, len(begins) + 1))
 
 
+@pytest.mark.parametrize("name", tracker_names())
+def test_no_result_spans_a_long_gap_and_nobody_is_known_after_it(name: str) -> None:
+    tracker, later = _tracker(name), WINDOW.forget_after + 12
+    before = _follow(tracker, 8, 1)
+    told = [tracker.push(frame, _seen(9, 1), _picture(9, 1)) for frame in range(later, later + 9)]
+    after = [it for it in (*told, tracker.flush()) if it is not None]
+    assert after[0].first == later
+    assert after[-1].final_to == later + 8
+    numbers = [{it.id for result in results for it in result.tracks} for results in (before, after)]
+    assert all(len(it) == 1 for it in numbers)
+    assert numbers[0] != numbers[1]
+
+
 def test_a_frame_that_does_not_come_after_the_last_one_is_refused() -> None:
     tracker = _tracker("kalman")
     tracker.push(5, _seen(0, 1))

@@ -84,13 +84,16 @@ class StepwiseTracker(Generic[S]):
     def push(self, frame: int, detections: Detections, image: Image | None = None) -> WindowResult | None:
         """Take a frame; give a result where one or more windows end.
 
-        A frame number that is left out is a frame of which nothing is known.
+        A frame number that is left out is a frame of which nothing is known. After a gap longer than
+        `forget_after` of the window everybody is forgotten, and the frames of the gap are in no result.
 
         Raises:
             ValueError: the frame number is not larger than the last one.
         """
         if self._last is not None and frame <= self._last:
             raise ValueError(f"frame {frame} came after frame {self._last}")
+        if self._last is not None and frame - self._last > self._window.forget_after:
+            return self._start_again(frame, detections, image)
         if self._last is not None:
             self._pass_by(frame - self._last - 1)
         if self._first is None:
@@ -106,6 +109,14 @@ class StepwiseTracker(Generic[S]):
         if self._first is None or self._last is None or self._last < self._first:
             return None
         return self._result(self._last)
+
+    def _start_again(self, frame: int, detections: Detections, image: Image | None) -> WindowResult | None:
+        """After a long gap: end what was before, so that no result has to span the gap."""
+        result = self.flush()
+        self._objects, self._seen = [], {frame: detections}
+        self._first = self._last = frame
+        self._step(frame, detections, image)
+        return result
 
     def _pass_by(self, frames: int) -> None:
         """Let frames go by of which nothing is known."""
