@@ -123,6 +123,13 @@ def test_a_camera_is_well_when_its_frames_arrive(plain: Service, capsys: pytest.
         assert capsys.readouterr().out.count("\n") == 1
 
 
+@pytest.mark.usefixtures("plain")
+def test_no_proxy_is_asked(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("http_proxy", f"http://127.0.0.1:{free_port()}")
+    monkeypatch.delenv("no_proxy", raising=False)
+    assert main(["bestview"]) == 0
+
+
 def test_what_cannot_be_asked_is_not_well(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
