@@ -10,7 +10,7 @@ from server.wire.config import Config
 log = logging.getLogger(__name__)
 
 _BEHIND, _ABREAST = 0.25, 0.1
-"""Of `track.backlog_s`, besides the patience with other cameras."""
+"""Of `track.backlog_s`, besides a frame's own time, which it may take, and the patience with others."""
 
 
 class Load:
@@ -20,6 +20,7 @@ class Load:
         track = config.track
         self._camera, self._stride, self._gop = camera_id, track.window.stride, config.encode.gop
         waits = track.witness_wait_s if config.witnesses(camera_id) else 0.0
+        waits += 1.0 / config.site.fps
         bounds = Bounds(waits + _BEHIND * track.backlog_s, waits + _ABREAST * track.backlog_s)
         all_rungs = rungs(self._stride, live=live) if track.shed_load else (Rung(),)
         self._ladder = Ladder(all_rungs, bounds)

@@ -6,10 +6,12 @@ from collections.abc import Callable
 from itertools import pairwise
 
 import pytest
+from cameras_by_hand import small_config
 from hypothesis import given
 from hypothesis import strategies as st
 
 from server.camera.ladder import Bounds, Ladder, Rung, rungs
+from server.camera.load import Load
 
 FPS, STRIDE, GOP = 25.0, 5, 10
 BOUNDS = Bounds(0.5, 0.2)
@@ -90,6 +92,14 @@ def test_every_rung_leaves_out_more_and_a_recording_is_always_shown_whole(stride
     )  # of a stride of 1, the last is alike
     if not live:
         assert set(taken) == {len(frames)}
+
+
+@pytest.mark.parametrize("fps", [0.5, 1.0, 2.0, FPS])
+def test_a_frame_may_take_all_the_time_that_it_has_at_any_rate(fps: float) -> None:
+    load = Load(small_config(site={"fps": fps}), "c0", live=True)
+    for pulse in range(200):
+        load.measured(0.95 / fps, pulse / fps)
+        assert load.level == 0
 
 
 def test_the_rungs_are_told_in_words() -> None:
