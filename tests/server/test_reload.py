@@ -7,6 +7,8 @@ import os
 import pty
 import signal
 import sys
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +19,7 @@ from cameras_by_hand import CAMERAS, FedService, small_config
 from halls import PATIENCE
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from test_ending import caught
 
 from server.run.reload import reloaded
 from server.run.setup import free_port
@@ -203,8 +206,9 @@ async def until_said(terminal: int, text: bytes) -> None:
         heard += await asyncio.to_thread(os.read, terminal, 4096)
 
 
-async def sync_at_a_terminal(path: Path) -> tuple[asyncio.subprocess.Process, int]:
-    """Start pulses whose log goes to a terminal; give the terminal's other end, too, once they are sent."""
+@asynccontextmanager
+async def sync_at_a_terminal(path: Path) -> AsyncIterator[tuple[asyncio.subprocess.Process, int]]:
+    """Run pulses whose log goes to a terminal; give the terminal's other end, too, once it minds SIGHUP."""
     port = free_port()
     write(path, sync={"port": port})
     ours, theirs = pty.openpty()
@@ -212,25 +216,27 @@ async def sync_at_a_terminal(path: Path) -> tuple[asyncio.subprocess.Process, in
         *(sys.executable, "-m", "server.run.cli", "sync", str(path)), stderr=theirs, start_new_session=True
     )
     os.close(theirs)
-    await until_said(ours, b"pulses at")
-    return process, ours
+    try:
+        await until_said(ours, b"pulses at")
+        status = Path(f"/proc/{process.pid}/status")
+        while not caught(status.read_text(encoding="ascii"), signal.SIGHUP):  # noqa: ASYNC110
+            await asyncio.sleep(0.01)
+        yield process, ours
+    finally:
+        if process.returncode is None:
+            process.kill()  # nor does anybody read its terminal then
+            await process.wait()
 
 
 async def test_a_process_says_what_waits_and_what_is_wrong_and_ends_with_its_terminal(tmp_path: Path) -> None:
     path = tmp_path / "site.yaml"
-    async with asyncio.timeout(PATIENCE):
-        process, terminal = await sync_at_a_terminal(path)
-        try:
-            content = yaml.safe_load(path.read_text())
-            for fps, said in (
-                (12.5, b"restart of all processes: site.fps"),
-                (-1, b"as it was stays in force"),
-            ):
-                path.write_text(yaml.safe_dump({**content, "site": {"fps": fps}}))
-                process.send_signal(signal.SIGHUP)
-                await until_said(terminal, said)
-            assert process.returncode is None
-        finally:
-            os.close(terminal)
+    async with asyncio.timeout(PATIENCE), sync_at_a_terminal(path) as (process, terminal):
+        content = yaml.safe_load(path.read_text())
+        for fps, said in ((12.5, b"restart of all processes: site.fps"), (-1, b"as it was stays in force")):
+            path.write_text(yaml.safe_dump({**content, "site": {"fps": fps}}))
+            process.send_signal(signal.SIGHUP)
+            await until_said(terminal, said)
+        assert process.returncode is None
+        os.close(terminal)
         process.send_signal(signal.SIGHUP)
         assert await process.wait() == 0
