@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import msgspec
+
+Moment = Annotated[float, msgspec.Meta(ge=0, le=1e11)]
+"""Unix seconds that a calendar has."""
 
 
 class Site(msgspec.Struct, frozen=True):
     """``/api/site``: what holds for all cameras."""
 
     name: str
-    fps: float
+    fps: Annotated[float, msgspec.Meta(gt=0)]
     width: int
     height: int
     gop: int
@@ -20,7 +25,7 @@ class Site(msgspec.Struct, frozen=True):
     """Of every stream (RFC 6381); None before the first picture."""
     pulse0: float | None
     """When pulse 0 was due (unix seconds); None before the first."""
-    now: float
+    now: Moment
     """The server's clock (unix seconds)."""
     cameras: tuple[str, ...]
     container: str = "mp4"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from prometheus_client.parser import text_string_to_metric_families
 
 from client.http import ContractError
@@ -20,6 +22,8 @@ class Metrics:
         try:
             for family in text_string_to_metric_families(text):
                 for it in family.samples:
+                    if not math.isfinite(it.value):
+                        continue  # nothing that MyView says of itself
                     self._values[it.name, frozenset(it.labels.items())] = it.value
         except ValueError as error:
             raise ContractError(f"/metrics is not understood: {error}") from error

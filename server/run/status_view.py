@@ -68,7 +68,7 @@ def _service(service: ServiceNow, rates: Rates) -> Text:
         parts.append(f"{rates.cores:.2f} cores, {rates.bytes_s / _MEGA:.2f} MB/s out")
     if waiting:
         parts.append(f"waiting: {waiting}")
-    return Text("; ".join(parts))
+    return Text(printable("; ".join(parts)))
 
 
 def _cameras(cameras: tuple[CameraNow, ...]) -> RenderableType:

@@ -9,6 +9,8 @@ from typing import Any
 
 import msgspec
 import pytest
+from aiohttp import web
+from aiohttp.test_utils import TestServer
 from cameras_by_hand import (
     CAMERAS,
     FPS,
@@ -23,6 +25,7 @@ from rich.console import Console
 from tokens_by_hand import locked, token_of
 
 import client
+from client.status_metrics import Metrics, service_of
 from server.run import status as command
 from server.run.status import status_live, status_once
 from server.run.status_view import Rates, picture
@@ -111,6 +114,10 @@ async def test_nothing_that_is_said_commands_the_terminal(busy: Hall) -> None:
         notice=evil,
     )
     assert said.count("·[2J·]0;owned· new [red]line") == 10
+    assert now.service is not None
+    counted = msgspec.structs.replace(now.service, viewers={evil: 1}, waiting={evil: 2})
+    said += printed(msgspec.structs.replace(now, service=counted))
+    assert said.count("·[2J·]0;owned· new [red]line") == 12
     assert all(it.isprintable() or it == "\n" for it in said)
 
 
@@ -186,6 +193,25 @@ async def test_what_is_no_myview_or_not_there_is_one_line(hall: Hall) -> None:
         await status_once("http://127.0.0.1:9", None, as_json=False)
     with pytest.raises(UserError):
         await status_once(f"{url(hall)}/api", None, as_json=False)
+
+
+def test_numbers_that_are_none_are_passed_over() -> None:
+    found = Metrics("myview_pulse +Inf\nmyview_decided_pulse NaN\nmyview_recorded_bytes 7\n")
+    assert found.get("myview_pulse") is None
+    assert (service_of(found).decided_pulse, service_of(found).recorded_bytes) == (0, 7)
+
+
+@pytest.mark.parametrize("wrong", [{"fps": 0.0}, {"now": 1e300}])
+async def test_a_site_that_no_site_is_like_is_one_line(hall: Hall, wrong: dict[str, float]) -> None:
+    async def site(_: web.Request) -> web.Response:
+        here = await client.site(url(hall))
+        return web.json_response({**msgspec.to_builtins(here), **wrong})
+
+    app = web.Application()
+    app.router.add_get("/api/site", site)
+    async with TestServer(app) as server:
+        with pytest.raises(UserError, match="does not answer like MyView"):
+            await status_once(str(server.make_url("/")), None, as_json=False)
 
 
 def test_the_command_refuses_in_one_line(myview: Run) -> None:
