@@ -10,6 +10,7 @@ from types import TracebackType
 
 import typer
 
+from server.run.printable import printable
 from server.wire.errors import UserError
 from server.wire.log_lines import JsonLines, formatter
 
@@ -39,7 +40,7 @@ def say_failure(text: str) -> None:
     if _logs_json():
         log.error("%s", text)
     else:
-        typer.echo(f"myview: {text}", err=True)
+        typer.echo(f"myview: {printable(text)}", err=True)
 
 
 def _logs_json() -> bool:

@@ -43,7 +43,13 @@ class JsonLines(logging.Formatter):
         }
         if record.exc_info:
             line["traceback"] = self.formatException(record.exc_info)
-        return msgspec.json.encode(line, enc_hook=str).decode()
+        sayable = {key: _sayable(value) if isinstance(value, str) else value for key, value in line.items()}
+        return msgspec.json.encode(sayable, enc_hook=lambda value: _sayable(str(value))).decode()
+
+
+def _sayable(text: str) -> str:
+    r"""Write what is no Unicode, as in the name of a file that is no UTF-8, as \udc80."""
+    return text.encode("utf-8", "backslashreplace").decode()
 
 
 def formatter(process: str) -> logging.Formatter:

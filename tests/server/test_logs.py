@@ -19,6 +19,7 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
+from server.run.logs import say_failure
 from server.wire.errors import UserError
 from server.wire.log_lines import JsonLines, formatter
 
@@ -73,6 +74,17 @@ def test_whatever_is_said_is_one_line(camera: str, why: str) -> None:
     said = line("camera %s: %s", camera, why)
     assert said["event"] == f"camera {camera}: {why}"
     assert said["camera"] == camera
+
+
+def test_the_name_of_a_file_that_is_no_utf_8_is_said_all_the_same() -> None:
+    said = line("camera %s: cannot read %s", "c\udc80", Path("a\udc81b"))
+    assert said["event"] == r"camera c\udc80: cannot read a\udc81b"
+    assert said["camera"] == r"c\udc80"
+
+
+def test_why_a_command_ends_commands_no_terminal(capsys: pytest.CaptureFixture[str]) -> None:
+    say_failure("hall says: \x1b[2Jgone\nand more")
+    assert capsys.readouterr().err == "myview: hall says: ·[2Jgone and more\n"
 
 
 def test_a_traceback_is_inside_the_line() -> None:
