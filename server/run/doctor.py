@@ -16,6 +16,7 @@ from server.run.doctor_findings import Finding, Findings, all_of, bad, ok, show
 from server.run.doctor_machine import clock_findings, machine_findings
 from server.run.doctor_ports import port_findings
 from server.run.scene_ground import with_scene_ground
+from server.wire.config import Config
 from server.wire.errors import UserError
 from server.wire.loading import load_config
 
@@ -43,13 +44,21 @@ async def _checked(path: Path, seconds: float) -> list[Finding]:
     return [
         head,
         *ports,
-        *file_findings(with_scene_ground(config)),
+        *file_findings(_placed(config)),
         *clock,
         *camera_findings(config, probes, runs=runs),
         *sound_findings(config),
         *disk_findings(config, probes),
         *machine_findings(config, probes),
     ]
+
+
+def _placed(config: Config) -> Config:
+    """Give the configuration with its scenes' floors; where there is no such scene, the camera says so."""
+    try:
+        return with_scene_ground(config)
+    except UserError:
+        return config
 
 
 def _tell(findings: Findings, *, as_json: bool) -> None:

@@ -56,8 +56,11 @@ def sound_findings(config: Config) -> list[Finding]:
     try:
         open_sound(config, config.sounding)
     except UserError as error:
-        return [bad("sound", str(error).removeprefix("sound: "), "another file, or a camera that has sound")]
-    return [ok("sound", f"{config.sound.source}: {config.sound.codec}, {config.sound.kbps} kbit/s")]
+        problem = shown(str(error).removeprefix("sound: "))
+        return [bad("sound", problem, "another file, or a camera that has sound")]
+    return [
+        ok("sound", f"{shown(str(config.sound.source))}: {config.sound.codec}, {config.sound.kbps} kbit/s")
+    ]
 
 
 def camera_findings(config: Config, probes: Mapping[str, Probe], *, runs: bool) -> list[Finding]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import ctypes
-import os
 import time
 from collections.abc import Mapping
 from pathlib import Path
@@ -13,6 +12,7 @@ from camsync.messages import Greeting
 from camsync.protocol import ProtocolError, parse_server_line
 from server.run.doctor_findings import Finding, ok, warning
 from server.run.doctor_probe import Probe
+from server.run.processors import processors
 from server.wire.config import Config
 
 _TIME_ERROR = 5
@@ -47,11 +47,11 @@ async def clock_findings(config: Config) -> list[Finding]:
 
 def machine_findings(config: Config, probes: Mapping[str, Probe]) -> list[Finding]:
     """Compare what these cameras take with what this machine has, as if all of them ran here."""
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    cores = processors()
     untried = [camera for camera, it in probes.items() if it.problem]
     takes = sum(it.cores for it in probes.values()) + _SERVICE_CORES
     who = "all cameras" if not untried else f"without {', '.join(untried)}, the cameras"
-    text = f"{who} and the best view take about {takes:.1f} of {cores} cores"
+    text = f"{who} and the best view take about {takes:.1f} of {cores:.3g} cores"
     found = [
         ok("processor", text)
         if takes <= _FULL * cores

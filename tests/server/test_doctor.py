@@ -19,6 +19,8 @@ from rtsp_by_hand import RtspCamera
 from videos_by_hand import write_video
 
 from camsync import PulseServer
+from server.run import doctor_machine
+from server.run.doctor import _checked
 from server.run.doctor_cameras import camera_findings, probe_all, sound_findings
 from server.run.doctor_certificate import certificate_finding
 from server.run.doctor_disk import disk_findings, needed_mb
@@ -85,6 +87,13 @@ def test_a_site_that_is_well_is_said_to_be_so_and_nothing_is_left_behind(myview:
         "configuration", "http.port", "sync.port", "zenoh.listen", "clock", "disk", "processor", "memory"
     }  # fmt: skip
     assert sorted(tmp_path.iterdir()) == before
+
+
+async def test_a_scene_that_there_is_not_is_its_cameras_fault_alone(tmp_path: Path) -> None:
+    found = await _checked(site(tmp_path, cameras=[{"id": "c0", "source": "scene:nowhere"}]), 1.0)
+    assert only(found, "camera c0").level is Level.BAD
+    assert "there is no scene 'nowhere'" in only(found, "camera c0").text
+    assert only(found, "configuration").level is Level.OK
 
 
 def test_a_missing_camera_is_one_line_with_what_to_do_and_an_exit_code(myview: Run, tmp_path: Path) -> None:
@@ -220,6 +229,13 @@ def test_sound_that_cannot_be_opened_is_bad(tmp_path: Path) -> None:
         assert words in found.text
 
 
+def test_a_sounds_password_is_not_shown(tmp_path: Path) -> None:
+    there = config(tmp_path, sound={"source": "http://viewer:hunter2@127.0.0.1:9/sound.aac"})
+    said = only(sound_findings(there), "sound").text
+    assert "127.0.0.1" in said
+    assert "hunter2" not in said
+
+
 def test_a_cameras_password_is_not_shown(tmp_path: Path, taken: int) -> None:
     source = f"rtsp://me:pa@ss:w@127.0.0.1:{taken}/live?x=a:b@c"
     there = config(tmp_path, cameras=[{"id": "gate", "source": source}])
@@ -282,6 +298,14 @@ def test_a_camera_without_a_place_among_those_that_have_one_is_told_of(tmp_path:
     cameras = [{"id": "c0", "source": "x", "ground": ground}, {"id": "c1", "source": "y"}]
     said = only(file_findings(config(tmp_path, cameras=cameras)), "ground")
     assert said == (Level.WARNING, "c1: not in the file: known by looks alone")
+
+
+def test_the_processors_are_those_that_this_process_may_use(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(doctor_machine, "processors", lambda: 0.5)
+    said = only(machine_findings(config(tmp_path), {"c0": Probe(cores=0.2)}), "processor")
+    assert (said.level, said.text.endswith("of 0.5 cores")) == (Level.WARNING, True)
 
 
 def test_a_machine_that_is_too_small_is_told_of(tmp_path: Path) -> None:
