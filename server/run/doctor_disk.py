@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import tempfile
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 
 from server.run.doctor_findings import Finding, bad, ok, warning
@@ -30,7 +32,7 @@ def disk_findings(config: Config, probes: Mapping[str, Probe]) -> list[Finding]:
         ]
     found = [ok("record.folder", f"{record.folder} can be written")]
     wanted = needed_mb(config, probes)
-    held = sum(it.stat().st_size for it in _files(record.folder)) / 1e6
+    held = _held_bytes(record.folder) / 1e6
     free = shutil.disk_usage(there).free / 1e6
     kept = f"{_hours(record.keep_s)} of these cameras take about {wanted:.0f} MB"
     if wanted > record.most_mb:
@@ -63,5 +65,11 @@ def _hours(seconds: float) -> str:
     return f"{seconds / 3600:.1f} hours" if seconds >= 3600 else f"{seconds / 60:.0f} minutes"  # noqa: PLR2004
 
 
-def _files(folder: Path) -> list[Path]:
-    return [it for it in folder.rglob("*") if it.is_file()] if folder.is_dir() else []
+def _held_bytes(folder: Path) -> int:
+    """Add up all files in a folder, but those that a running site removes meanwhile."""
+    held = 0
+    for inside, _, names in os.walk(folder):
+        for name in names:
+            with suppress(FileNotFoundError):
+                held += Path(inside, name).stat().st_size
+    return held

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import socket
 import subprocess
@@ -259,6 +260,24 @@ def test_what_a_recording_takes_is_held_against_the_disk(tmp_path: Path) -> None
     assert needed_mb(capped, huge) == pytest.approx((500 + 20) * 3600 / 8000)
     less = disk_findings(config(tmp_path, record={**record, "most_mb": 46.0}), probes)
     assert "about 6 minutes are kept" in only(less, "record.most_mb").text
+
+
+def test_what_a_running_site_removes_meanwhile_is_not_counted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "kept").mkdir()
+    for name in ("old", "new"):
+        (tmp_path / "kept" / name).write_bytes(bytes(3_000_000))
+    walk = os.walk
+
+    def walked(folder: Path) -> Iterator[Any]:
+        for found in walk(folder):
+            (tmp_path / "kept" / "old").unlink()
+            yield found
+
+    monkeypatch.setattr(os, "walk", walked)
+    findings = disk_findings(config(tmp_path, record={"folder": "kept"}), {})
+    assert "and 3 MB are recorded already" in only(findings, "disk").text
 
 
 def test_a_folder_that_cannot_be_written_is_bad(tmp_path: Path) -> None:
