@@ -126,6 +126,7 @@ async def test_a_camera_that_is_being_opened_keeps_nobody_waiting(tmp_path: Path
             assert await end(camera) == [0]
 
 
+@pytest.mark.slow
 async def test_a_whole_site_ends_while_it_starts_and_leaves_nothing_behind(tmp_path: Path) -> None:
     async with asyncio.timeout(PATIENCE_S), silent_camera() as (address, came):
         config, _ = site(tmp_path, address, SCENE)
@@ -136,6 +137,7 @@ async def test_a_whole_site_ends_while_it_starts_and_leaves_nothing_behind(tmp_p
     assert not processes_of(config)
 
 
+@pytest.mark.slow
 async def test_the_demo_ends_while_it_starts(tmp_path: Path) -> None:
     environment = {**os.environ, "PYTHONUNBUFFERED": "1", "TMPDIR": str(tmp_path)}
     async with asyncio.timeout(PATIENCE_S):
