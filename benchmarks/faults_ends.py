@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import signal
 import sys
+import time
 from pathlib import Path
 
 import aiohttp
@@ -19,6 +20,8 @@ from benchmarks.surroundings import one_thread_environment
 _MOMENTS_S = (0.0, 1.0, 3.0)
 """After the first line of ours: before it the interpreter itself starts, and ends as any does."""
 _POLL_S = 0.005
+_WATCHED_S = 4.0
+_MOMENT_S = 2.0
 
 
 async def right_after_start(views: Views, folder: Path) -> list[Ended]:
@@ -60,18 +63,27 @@ async def _begun(process: asyncio.subprocess.Process) -> None:
 
 
 async def while_watched(views: Views, folder: Path) -> list[Ended]:
-    """Tell a site to end while somebody watches each way there is."""
+    """Tell a site to end while somebody watches each way there is.
+
+    Raises:
+        RuntimeError: somebody does not.
+    """
     ways = ("objects/{0}/best.mp4", "objects/{0}/best.ts", "objects/{0}/best.mjpeg", "cameras/c0/live.mp4")
-    async with with_up(views, folder) as stand, aiohttp.ClientSession(stand.url) as session:
-        viewer = Viewer(stand.url, stand.people(1)[0])
-        tasks = [asyncio.create_task(viewer.run())]
-        tasks += [asyncio.create_task(_read(session, f"/{way.format(viewer.number)}")) for way in ways]
-        await asyncio.sleep(4.0)
-        before = _below(stand)
-    for task in tasks:
-        task.cancel()
-    await asyncio.gather(*tasks, return_exceptions=True)
-    left = [name for name, pid in before if pid in _running()]
+    async with aiohttp.ClientSession() as session:  # open for longer than the site: nobody hangs up first
+        async with with_up(views, folder) as stand:
+            viewer = Viewer(stand.url, stand.people(1)[0])
+            tasks = [asyncio.create_task(viewer.run())]
+            tasks += [
+                asyncio.create_task(_read(session, stand.url + way.format(viewer.number))) for way in ways
+            ]
+            await asyncio.sleep(_WATCHED_S)
+            if any(task.done() for task in tasks):
+                raise RuntimeError("a stream has ended before the site was told to end")
+            before = _below(stand)
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+    left = await _left(before)
     return [*stand.ended, *(Ended(f"{name} is left behind", 0.0, None) for name in left)]
 
 
@@ -79,13 +91,21 @@ def _below(stand: Stand) -> list[tuple[str, int]]:
     return [(name, pid) for name in (*NAMES, "drawing") for pid in stand.pids(name)]
 
 
+async def _left(before: list[tuple[str, int]]) -> list[str]:
+    """Give who is still there: whose supervisor has ended may end a moment after it."""
+    give_up = time.monotonic() + _MOMENT_S
+    while (left := [name for name, pid in before if pid in _running()]) and time.monotonic() < give_up:  # noqa: ASYNC110
+        await asyncio.sleep(_POLL_S)
+    return left
+
+
 def _running() -> frozenset[int]:
     return frozenset(int(entry.name) for entry in Path("/proc").iterdir() if entry.name.isdecimal())
 
 
-async def _read(session: aiohttp.ClientSession, path: str) -> None:
+async def _read(session: aiohttp.ClientSession, address: str) -> None:
     with contextlib.suppress(aiohttp.ClientError):
-        async with session.get(path) as answer:
+        async with session.get(address) as answer:
             async for _ in answer.content.iter_any():
                 pass
 
