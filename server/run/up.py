@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import errno
 import logging
 import tempfile
 from collections.abc import Mapping
@@ -15,7 +16,7 @@ from server.run.reload import Reload
 from server.run.supervise import Supervisor
 from server.wire.config import Config
 from server.wire.errors import UserError
-from server.wire.running import IN_FORCE, Running, written
+from server.wire.running import IN_FORCE, Running, is_ours, written
 
 log = logging.getLogger(__name__)
 
@@ -94,6 +95,8 @@ def _keep(running: Running, kept: Path) -> None:
     new = kept.with_suffix(".new")
     try:
         kept.parent.mkdir(mode=0o700, exist_ok=True)
+        if not is_ours(kept.parent):  # it was tidied away, and somebody else took the name
+            raise PermissionError(errno.EACCES, "its folder is somebody else's")
         new.write_text(written(running.now, running.path.parent), encoding="utf-8")
         new.replace(kept)
     except OSError as error:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import stat
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -56,7 +57,7 @@ class Running:
             UserError: it cannot be read, or something in it is wrong.
         """
         kept = os.environ.get(IN_FORCE)
-        if kept is None or not Path(kept).exists():
+        if kept is None or not is_ours(Path(kept)):
             return load_config(self.path)
         return build_config(read_content(Path(kept)), where=str(self.path), folder=self.path.parent)
 
@@ -77,6 +78,15 @@ class Running:
         if isinstance(self._file, UserError):
             return OnDisk(str(self._file), ())
         return OnDisk("", differing(self.now, self._file))
+
+
+def is_ours(path: Path) -> bool:
+    """Tell whether a file or folder is there and belongs to this process's user: no other says what runs."""
+    try:
+        found = path.lstat()
+    except OSError:
+        return False
+    return found.st_uid == os.geteuid() and not stat.S_ISLNK(found.st_mode)
 
 
 def written(config: Config, folder: Path) -> str:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
+import pytest
 import yaml
 from cameras_by_hand import small_config
 
 from server.run.reload import reloaded
-from server.wire.running import Running
+from server.wire.running import IN_FORCE, Running
 
 
 def test_whose_h264_passes_waits_for_a_codec_that_can() -> None:
@@ -33,3 +35,18 @@ def test_a_wrong_ground_file_is_wrong_until_it_is_mended(
     assert all("ground.json" in running.on_disk().error for _ in range(3))
     ground.write_text(right)
     assert not running.on_disk().differs
+
+
+def test_what_somebody_else_put_where_the_supervisor_kept_it_is_not_gone_by(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, theirs, link = (tmp_path / name for name in ("site.yaml", "theirs.yaml", "link.yaml"))
+    path.write_text("cameras: [{id: c0, source: x}]\n")
+    theirs.write_text("cameras: [{id: c9, source: x}]\n")
+    link.symlink_to(theirs)
+    monkeypatch.setenv(IN_FORCE, str(link))
+    assert Running(path).now.camera_ids == ("c0",)
+    monkeypatch.setenv(IN_FORCE, str(theirs))
+    assert Running(path).now.camera_ids == ("c9",), "the supervisor's own"
+    monkeypatch.setattr(os, "geteuid", lambda: os.getuid() + 1)
+    assert Running(path).now.camera_ids == ("c0",)

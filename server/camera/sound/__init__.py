@@ -5,6 +5,7 @@ from __future__ import annotations
 from server.camera.sound.frames import Frame, runs
 from server.camera.sound.live import LiveSound
 from server.camera.sound.recorded import RecordedSound
+from server.wire.addresses import shown
 from server.wire.config import Config
 from server.wire.errors import UserError
 from server.wire.sources import SourceKind, kind_of
@@ -28,8 +29,8 @@ def open_sound(config: Config, camera_id: str) -> RecordedSound | LiveSound | No
         if kind_of(path) is SourceKind.STREAM:
             return LiveSound(settings, fps)
         if kind_of(path) is not SourceKind.FILE:
-            raise UserError(f"sound: camera {camera_id} has none: {path}; name another, or a file")
+            raise UserError(f"sound: camera {camera_id} has none: {shown(path)}; name another, or a file")
     try:
         return RecordedSound(path, settings, fps, offset, at_end)
     except UserError as error:
-        raise UserError(f"sound: {error}") from error
+        raise UserError(f"sound: {shown(str(error))}") from error
