@@ -28,7 +28,7 @@ _TRUN, _COUNT_AT, _ENTRY = b"trun", 8, 12
 """Of a run of samples, as MyView writes it: where their number stands, and the bytes of each."""
 _RECEIVED = 65_536
 _FAULTS = (aiohttp.ClientError, OSError, TimeoutError, EOFError, ValueError)
-_FAMILIAR = (200, 204, 404, 503)
+_FAMILIAR = (200, 204, 404, 416, 503)
 """Answers that a visitor may get: somebody may be gone, and places are limited."""
 
 
