@@ -18,6 +18,7 @@
  * @property {number} fps
  * @property {number} missed
  * @property {number} shed
+ * @property {number} load_level
  * @property {number} late
  * @property {boolean} in_step
  * @property {number} bad_messages

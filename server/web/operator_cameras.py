@@ -73,6 +73,7 @@ def _camera(service: BestViewService, camera: str, state: CameraState) -> Operat
         fps=status.fps if status else 0.0,
         missed=status.missed if status else 0,
         shed=status.shed if status else 0,
+        load_level=status.load_level if status else 0,
         late=service.aligner.late_messages[camera],
         in_step=status.in_step if status else False,
         bad_messages=state.bad_messages,

@@ -22,12 +22,13 @@ class OperatorCamera(msgspec.Struct, frozen=True):
 
     camera: str
     state: str
-    """As in /api/cameras, as message, pulse, fps, missed, shed, late and in_step."""
+    """As in /api/cameras, as message, pulse, fps, missed, shed, load_level, late and in_step."""
     message: str
     pulse: int
     fps: float
     missed: int
     shed: int
+    load_level: int
     late: int
     in_step: bool
     bad_messages: int
