@@ -15,7 +15,7 @@ demo: $(STAMP)
 # Machines are shared: what fails is tried again and told of as RERUN. What is wrong fails every time.
 test: $(STAMP) $(NODE_STAMP)
 	$(BIN)/pytest -m "not slow" $(AGAIN) -n 2 --dist loadfile --ignore tests/client --ignore tests/e2e
-	$(BIN)/pytest -m "not slow" $(AGAIN) tests/client tests/e2e
+	$(BIN)/pytest -m "not slow" $(AGAIN) -n 2 --dist loadfile tests/client tests/e2e
 
 test-slow: $(STAMP) $(NODE_STAMP)
 	$(BIN)/pytest -m slow --timeout 1800
