@@ -11,7 +11,7 @@ AGAIN ?= --reruns 2 --reruns-delay 1
 demo: $(STAMP)
 	$(BIN)/myview demo
 
-# First what may share the machine, on two cores; then browsers and whole sites in real time, one after the other.
+# First libraries and services, on two cores; then browsers and whole sites, which run in real time.
 # Machines are shared: what fails is tried again and told of as RERUN. What is wrong fails every time.
 test: $(STAMP) $(NODE_STAMP)
 	$(BIN)/pytest -m "not slow" $(AGAIN) -n 2 --dist loadfile --ignore tests/client --ignore tests/e2e

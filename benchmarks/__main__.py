@@ -39,7 +39,7 @@ BENCHMARKS = (
     ),
     Benchmark("observations", "what detectors find, and what the tracker makes of it; 10 minutes"),
     Benchmark("peers", "MyView beside other trackers, which pip installs, on public detections; 5 minutes"),
-    Benchmark("trackers", "the survey's trackers beside the network program; 5 minutes"),
+    Benchmark("yardsticks", "the survey's trackers beside the network program; 5 minutes"),
     Benchmark(
         "bestview", "who is who and the best view, beside simpler ways and beside the truth; 20 minutes"
     ),

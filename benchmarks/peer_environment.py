@@ -78,7 +78,8 @@ class PeerEnvironment:
     def _run(self, *words: str) -> str:
         try:
             done = subprocess.run(
-                [str(self.python), str(_RUNNER), *words],
+                # -P: a file beside the runner that is called as one of their packages is not that package.
+                [str(self.python), "-P", str(_RUNNER), *words],
                 capture_output=True,
                 text=True,
                 timeout=_RUN_S,

@@ -1,6 +1,6 @@
 """The trackers of the survey beside the network program, on the same pictures and the same detections.
 
-    OPENBLAS_NUM_THREADS=1 python -m benchmarks.trackers --data ../shared/data --out out/bench
+    OPENBLAS_NUM_THREADS=1 python -m benchmarks.yardsticks --data ../shared/data --out out/bench
 
 Every camera is searched once, as `myview track` does it, and what was found is given to each tracker, with
 the pictures. All begin and end objects by the detections. `lp` and `kalman` follow them by the detections as
@@ -105,20 +105,20 @@ def measure(options: argparse.Namespace) -> None:
         ["", "ms"],
         [[name, f"{statistics.median(values):.1f}"] for name, values in took.items()],
     )
-    plot(table, CEILING, options.out / "trackers.png")
-    report.save(options.out / "trackers.txt")
+    plot(table, CEILING, options.out / "yardsticks.png")
+    report.save(options.out / "yardsticks.txt")
 
 
 def main() -> None:
     """Run the benchmark."""
     mpl.use("Agg")
     cv2.setNumThreads(1)
-    options = parser(__doc__, "trackers")
+    options = parser(__doc__, "yardsticks")
     options.add_argument("--frames", type=int, help="of each view at most")
     try:
         measure(options.parse_args())
     except CannotRunError as problem:
-        finish(problem, "trackers")
+        finish(problem, "yardsticks")
 
 
 if __name__ == "__main__":
