@@ -5,12 +5,10 @@ from __future__ import annotations
 from random import Random
 from typing import Any
 
-from benchmarks.fuzz_http_site import Served, judged
+from benchmarks.fuzz_http_site import Asked
 from benchmarks.fuzz_mutate import as_json, damaged, otherwise
-from benchmarks.fuzz_target import Target
 from server.web.operator_permission import CHANGES
 
-_WELL_EVERY = 100
 _ASKED: tuple[tuple[str, str, Any], ...] = (
     ("POST", "/api/operator/people", {"object": 1, "name": "Ada"}),
     ("POST", "/api/operator/people", {"object": 1, "merge": 2}),
@@ -29,14 +27,10 @@ _ASKED: tuple[tuple[str, str, Any], ...] = (
 """To finish a walk starts a process: that is for other tests."""
 
 
-class Operator(Target):
+class Operator(Asked):
     """One thing that is asked by somebody who may; what the one before did holds."""
 
     name = "http-operator"
-
-    def __init__(self) -> None:
-        self._served = Served()
-        self._fed = 0
 
     def make(self, rng: Random) -> bytes:
         """Give the bytes of a request."""
@@ -49,15 +43,3 @@ class Operator(Target):
             f"Content-Type: application/json\r\nContent-Length: {len(body)}\r\n\r\n"
         )
         return head.encode() + body
-
-    def feed(self, data: bytes) -> bool:
-        """Ask for it; what is chosen by goes on."""
-        granted = judged(data, self._served.ask(data))
-        self._fed += 1
-        if self._fed % _WELL_EVERY == 0:
-            assert self._served.is_well()
-        return granted
-
-    def close(self) -> None:
-        """End the server."""
-        self._served.close()

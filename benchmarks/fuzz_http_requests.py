@@ -5,13 +5,11 @@ from __future__ import annotations
 from random import Random
 
 from benchmarks.fuzz_http_asked import METHODS, WORDS, address, some_range
-from benchmarks.fuzz_http_site import Served, judged
+from benchmarks.fuzz_http_site import Asked
 from benchmarks.fuzz_mutate import as_json, damaged, otherwise
-from benchmarks.fuzz_target import Target
 from server.web.operator_permission import CHANGES
 
 _CHANGES_SHARE = 0.8
-_WELL_EVERY = 100
 _BODIES = (
     {"object": 1, "name": "Ada"},
     {"object": 1, "merge": 2},
@@ -38,15 +36,14 @@ _HEADERS = (
 )
 
 
-class Requests(Target):
+class Requests(Asked):
     """One request on a connection of its own."""
 
     name = "http-requests"
 
     def __init__(self) -> None:
-        self._served = Served()
+        super().__init__()
         self._paths = self._served.described
-        self._fed = 0
 
     def make(self, rng: Random) -> bytes:
         """Give the bytes of a request."""
@@ -68,15 +65,3 @@ class Requests(Target):
             lines += [f"Content-Length: {len(body)}", "Content-Type: application/json"]
         request = "\r\n".join([*lines, "Connection: close", "", ""]).encode("utf-8", "replace") + body
         return damaged(rng, request, WORDS) if rng.random() < 0.3 else request
-
-    def feed(self, data: bytes) -> bool:
-        """Ask, and read what is answered."""
-        granted = judged(data, self._served.ask(data))
-        self._fed += 1
-        if self._fed % _WELL_EVERY == 0:
-            assert self._served.is_well()
-        return granted
-
-    def close(self) -> None:
-        """End the server."""
-        self._served.close()

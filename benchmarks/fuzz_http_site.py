@@ -16,9 +16,11 @@ from aiohttp import web
 
 from benchmarks.fuzz_loop import HurryingLoop, leaves_no_trace
 from benchmarks.fuzz_site import Fed, Word, feed_epoch, site, word
+from benchmarks.fuzz_target import Target
 from server.web.app import make_app, serving
 from server.web.openapi import describe
 
+_WELL_EVERY = 100
 EPOCHS = 6
 _WAIT_S = 10.0
 """Then an answer is not waited for; by a clock that hurries."""
@@ -111,3 +113,23 @@ def judged(data: bytes, answer: bytes) -> bool:
         if b"application/json" in head and not data.startswith(b"HEAD"):
             assert body.startswith(b'{"error":'), body[:300]
     return code.startswith((b"2", b"3"))
+
+
+class Asked(Target):
+    """Requests to a site that is open to all: what the one before has chosen goes on."""
+
+    def __init__(self) -> None:
+        self._served = Served()
+        self._fed = 0
+
+    def feed(self, data: bytes) -> bool:
+        """Ask, and read what is answered."""
+        granted = judged(data, self._served.ask(data))
+        self._fed += 1
+        if self._fed % _WELL_EVERY == 0:
+            assert self._served.is_well()
+        return granted
+
+    def close(self) -> None:
+        """End the server."""
+        self._served.close()

@@ -17,9 +17,20 @@ from benchmarks.fuzz_target import Target, folder, refused
 from server.camera.own.annexb import packing_of
 from server.camera.own.fitting import MisfitError, Wanted
 from server.camera.own.recording import OwnRecording
-from server.camera.sources.base import SourceEnded
+from server.camera.sources.base import Source, SourceEnded
 from server.camera.sources.recording import Recording
 from server.wire.errors import UserError
+
+
+def _take(source: Source) -> None:
+    """Take the first frames of a recording, and close it."""
+    try:
+        for pulse in range(12):
+            source.take(pulse)
+    except SourceEnded:
+        pass
+    finally:
+        source.close()
 
 
 class OwnPackets(Target):
@@ -84,24 +95,12 @@ class Files(Target):
             recording = Recording(str(self._path), 0, "stop")
         except UserError as error:
             return refused(error)
-        try:
-            for pulse in range(12):
-                recording.take(pulse)
-        except SourceEnded:
-            pass
-        finally:
-            recording.close()
+        _take(recording)
         try:
             own = OwnRecording(str(self._path), 0, "stop", wanted)
         except (UserError, MisfitError) as error:
             return refused(error)
-        try:
-            for pulse in range(12):
-                own.take(pulse)
-        except SourceEnded:
-            pass
-        finally:
-            own.close()
+        _take(own)
         return True
 
     def close(self) -> None:

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 import yaml
 from command_line import Run, refusal
+from free_port import free
 from videos_by_hand import write_video
 
 
@@ -35,12 +36,6 @@ def site(folder: Path, **changes: Any) -> Path:
     path = folder / "site.yaml"
     path.write_text(yaml.safe_dump(content))
     return path
-
-
-def free() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 @pytest.fixture

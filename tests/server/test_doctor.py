@@ -15,6 +15,7 @@ import pytest
 import yaml
 from cameras_by_hand import FPS, HEIGHT, WIDTH, encoded
 from command_line import Run
+from free_port import free
 from halls import Hall
 from rtsp_by_hand import RtspCamera
 from videos_by_hand import write_video
@@ -35,12 +36,6 @@ from server.wire.config import Config
 from server.wire.loading import load_config
 
 SIZE = {"width": WIDTH, "height": HEIGHT}
-
-
-def free() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 def site(folder: Path, **changes: Any) -> Path:

@@ -6,7 +6,6 @@ import json
 import logging
 import os
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -16,6 +15,7 @@ from typing import Any
 
 import pytest
 import yaml
+from free_port import free
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -116,12 +116,6 @@ def site(folder: Path, **changes: Any) -> Path:
     path = folder / "site.yaml"
     path.write_text(yaml.safe_dump(content))
     return path
-
-
-def free() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 def started(*arguments: object) -> subprocess.Popen[str]:

@@ -39,6 +39,19 @@ class ColourField:
         return shares
 
 
+class ColourFields:
+    """Gives pictures' colours; those of the picture that was asked for last are summed once."""
+
+    def __init__(self) -> None:
+        self._last: tuple[Image, ColourField] | None = None
+
+    def of(self, image: Image) -> ColourField:
+        """Give a picture's colours."""
+        if self._last is None or self._last[0] is not image:
+            self._last = image, ColourField(image)
+        return self._last[1]
+
+
 def halves(boxes: Floats) -> Floats:
     """Give the upper and the lower half of boxes `(..., 4)`: `(..., 2, 4)`."""
     middle = (boxes[..., 1] + boxes[..., 3]) / 2

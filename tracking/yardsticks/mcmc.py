@@ -15,8 +15,8 @@ import numpy as np
 
 from tracking.boxes import BOX_SIDES, Floats, iou
 from tracking.detectors.base import Image
-from tracking.yardsticks.colour_field import ColourField, halves, unlike
-from tracking.yardsticks.particles import particle_boxes, stepped
+from tracking.yardsticks.colour_field import ColourField, ColourFields, halves, unlike
+from tracking.yardsticks.particles import particle_boxes, standing, stepped
 
 _LAMBDA, _APART = 20.0, 8.0
 _LOST = 0.5
@@ -67,22 +67,20 @@ class Mcmc:
     def __init__(self, settings: McmcSettings | None = None) -> None:
         self._settings = settings or McmcSettings()
         self._rng = np.random.default_rng(self._settings.seed)
+        self._colours = ColourFields()
 
     def begin(self, image: Image, box: Floats) -> Member:
         """Take somebody's colours."""
-        tall = max(box[3] - box[1], 1.0)
-        start = np.array([(box[0] + box[2]) / 2, (box[1] + box[3]) / 2, tall, 0.0, 0.0])
-        colours = ColourField(image).histograms(halves(box))
-        return Member(
-            colours, (box[2] - box[0]) / tall, np.tile(start, (self._settings.samples, 1)), box.copy()
-        )
+        start, aspect = standing(box)
+        colours = self._colours.of(image).histograms(halves(box))
+        return Member(colours, aspect, np.tile(start, (self._settings.samples, 1)), box.copy())
 
     def move(self, image: Image | None, objects: Sequence[Member]) -> Floats:
         """Let the chain run: `(N, 4)`, NaN where nobody of an object's colours is."""
         boxes = np.full((len(objects), BOX_SIDES), np.nan)
         if image is None or not objects:
             return boxes
-        field, before = ColourField(image), np.stack([item.states for item in objects], axis=1)
+        field, before = self._colours.of(image), np.stack([item.states for item in objects], axis=1)
         samples, distances = self._chain(field, objects, before)
         for row, item in enumerate(objects):
             item.states = samples[:, row]

@@ -15,7 +15,7 @@ import numpy as np
 
 from tracking.boxes import BOX_SIDES, Floats
 from tracking.detectors.base import Image
-from tracking.yardsticks.colour_field import ColourField, halves, unlike
+from tracking.yardsticks.colour_field import ColourFields, halves, unlike
 
 _LAMBDA = 20.0
 _STEP, _GROW = 0.04, 0.01
@@ -70,21 +70,13 @@ class ParticleFilters:
     def __init__(self, settings: ParticleSettings | None = None) -> None:
         self._settings = settings or ParticleSettings()
         self._rng = np.random.default_rng(self._settings.seed)
-        self._field: tuple[Image, ColourField] | None = None
+        self._colours = ColourFields()
 
     def begin(self, image: Image, box: Floats) -> Swarm:
         """Take somebody's colours, and put all particles at them."""
-        tall = max(box[3] - box[1], 1.0)
-        count = self._settings.particles
-        start = np.array([(box[0] + box[2]) / 2, (box[1] + box[3]) / 2, tall, 0.0, 0.0])
-        colours = self._colours(image).histograms(halves(box))
-        return Swarm(
-            colours,
-            (box[2] - box[0]) / tall,
-            np.tile(start, (count, 1)),
-            np.full(count, 1 / count),
-            box.copy(),
-        )
+        count, (start, aspect) = self._settings.particles, standing(box)
+        colours = self._colours.of(image).histograms(halves(box))
+        return Swarm(colours, aspect, np.tile(start, (count, 1)), np.full(count, 1 / count), box.copy())
 
     def move(self, image: Image | None, objects: Sequence[Swarm]) -> Floats:
         """Let all particles go on and weigh them: `(N, 4)`, NaN where none is like its object."""
@@ -93,7 +85,7 @@ class ParticleFilters:
             return boxes
         for row, item in enumerate(objects):
             self._go_on(item)
-            distance = unlike(self._colours(image), particle_boxes(item.states, item.aspect), item.colours)
+            distance = unlike(self._colours.of(image), particle_boxes(item.states, item.aspect), item.colours)
             # Relative to the nearest: what all of them lack, a shadow or a passer-by, is no weight.
             weights = item.weights * np.exp(-_LAMBDA * (distance - distance.min()))
             item.weights = weights / weights.sum()
@@ -106,12 +98,6 @@ class ParticleFilters:
         """Give where somebody is: detections move nobody."""
         return known.box
 
-    def _colours(self, image: Image) -> ColourField:
-        """Give a picture's colours, which are summed once."""
-        if self._field is None or self._field[0] is not image:
-            self._field = image, ColourField(image)
-        return self._field[1]
-
     def _go_on(self, item: Swarm) -> None:
         """Draw anew where few particles count, and move all of them."""
         count = len(item.weights)
@@ -121,6 +107,13 @@ class ParticleFilters:
             chosen = np.minimum(np.searchsorted(np.cumsum(item.weights), marks), count - 1)
             item.states, item.weights = item.states[chosen], np.full(count, 1.0 / count)
         item.states = stepped(self._rng, item.states)
+
+
+def standing(box: Floats) -> tuple[Floats, float]:
+    """Give the state `(5,)` of somebody in a box `(4,)` who stands, and width over height."""
+    tall = max(box[3] - box[1], 1.0)
+    state = np.array([(box[0] + box[2]) / 2, (box[1] + box[3]) / 2, tall, 0.0, 0.0])
+    return state, (box[2] - box[0]) / tall
 
 
 def stepped(rng: np.random.Generator, states: Floats) -> Floats:
