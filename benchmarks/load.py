@@ -13,14 +13,14 @@ import asyncio
 import tempfile
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import aiohttp
 import numpy as np
-from matplotlib.figure import Figure
 
+from benchmarks.load_found import RECOVERED_S, Loaded, Sample, Step
+from benchmarks.load_report import describe, plot
 from benchmarks.load_site import FPS, LOG, Crowded, running
 from benchmarks.report import Report
 from benchmarks.soak_visitors import Visitors
@@ -29,79 +29,10 @@ from benchmarks.surroundings import parser
 _STRIDE = 5
 """Frames between two windows, by default."""
 _EVERY_S = 1.0
-_CARRIED = 0.99
-"""Share of the frames that are searched where the machine carries its cameras."""
 _FIRST_S = 120.0
 """A camera has so long to start, on a machine with other work."""
-_RECOVERED_S = 180.0
-"""For how long the way back is watched at most."""
 _CALM = 5
 """Samples in a row at which nothing is left out, for the way back to be over."""
-
-
-@dataclass(frozen=True, slots=True)
-class Sample:
-    """The site at one moment.
-
-    Attributes:
-        at: seconds since the beginning.
-        levels: of the cameras that are there.
-        pulses: their newest frames, added up; of what follows likewise.
-        shed: frames that were not searched.
-        missed: pulses without a frame.
-        late: windows that came too late.
-        delays: milliseconds until pictures came to the viewer of a person, since the sample before.
-        holes: frames that viewers should have been shown and were not, so far.
-    """
-
-    at: float
-    levels: tuple[int, ...]
-    pulses: int
-    shed: int
-    missed: int
-    late: int
-    delays: tuple[float, ...]
-    holes: int
-
-
-@dataclass(frozen=True, slots=True)
-class Step:
-    """So many cameras, once they have settled.
-
-    Attributes:
-        cameras: how many.
-        levels: the median of all cameras, and the highest one.
-        searched: share of the frames.
-        missed: share of the pulses.
-        late: share of the windows.
-        delays: milliseconds, p50 and p95.
-        holes: frames that viewers missed, the time of settling included.
-    """
-
-    cameras: int
-    levels: tuple[float, int]
-    searched: float
-    missed: float
-    late: float
-    delays: tuple[float, float]
-    holes: int
-
-
-@dataclass(slots=True)
-class Loaded:
-    """What was found."""
-
-    samples: list[Sample] = field(default_factory=list)
-    steps: list[Step] = field(default_factory=list)
-    started: list[tuple[float, int]] = field(default_factory=list)
-    """When there were how many cameras."""
-    back: float | None = None
-    """Seconds from the killing until nothing was left out any more; None: it took too long."""
-
-    @property
-    def carried(self) -> int:
-        """How many cameras the machine carries; 0: not one."""
-        return max((it.cameras for it in self.steps if it.searched >= _CARRIED), default=0)
 
 
 class Watch:
@@ -218,67 +149,12 @@ async def _first(session: aiohttp.ClientSession, site: Crowded) -> None:
 async def _way_back(watch: Watch, session: aiohttp.ClientSession) -> float | None:
     began = watch.now
     calm = 0
-    while watch.now < began + _RECOVERED_S:
+    while watch.now < began + RECOVERED_S:
         (*_, sample) = await watch.sample(session, _EVERY_S)
         calm = calm + 1 if max(sample.levels, default=0) == 0 else 0
         if calm == _CALM:
             return sample.at - began - (_CALM - 1) * _EVERY_S
     return None
-
-
-def describe(report: Report, found: Loaded) -> None:
-    """Print the table."""
-    report.table(
-        f"cameras of 352x288 at {FPS:g} a second: what is left out, and what a viewer of a person sees",
-        [
-            "cameras",
-            "level, median",
-            "most",
-            "searched",
-            "missed",
-            "windows late",
-            "delay p50, ms",
-            "p95",
-            "holes",
-        ],
-        [
-            [
-                *(str(it.cameras), f"{it.levels[0]:g}", str(it.levels[1])),
-                *(f"{100 * share:.1f} %" for share in (it.searched, it.missed, it.late)),
-                *(f"{delay:.0f}" for delay in it.delays),
-                str(it.holes),
-            ]
-            for it in found.steps
-        ],
-    )
-    report.say(f"carried without leaving anything out: {found.carried}")
-    back = f"longer than {_RECOVERED_S:.0f} s" if found.back is None else f"{found.back:.0f} s"
-    report.say(f"all but one killed: nothing is left out any more after {back}")
-
-
-def plot(found: Loaded, path: Path) -> None:
-    """Draw levels and delay over time."""
-    figure = Figure(figsize=(9, 6))
-    levels, delay = figure.subplots(2, 1, sharex=True)
-    times = [it.at for it in found.samples]
-    levels.step(
-        *zip(*found.started, (times[-1], 1), strict=True), where="post", label="cameras", color="grey"
-    )
-    means = [float(np.mean(it.levels)) if it.levels else 0.0 for it in found.samples]
-    levels.plot(times, means, label="level, mean of the cameras")
-    levels.plot(
-        times, [max(it.levels, default=0) for it in found.samples], label="the highest", linewidth=0.7
-    )
-    levels.set(ylabel="cameras; level of the ladder", ylim=(0, None))
-    levels.legend(fontsize="small")
-    middles = [float(np.median(it.delays)) if it.delays else np.nan for it in found.samples]
-    delay.plot(times, middles, marker=".", linewidth=0.7)
-    delay.set(ylabel="delay of a person's view, ms", xlabel="seconds", ylim=(0, None))
-    for axis in (levels, delay):
-        axis.grid(alpha=0.3)
-    figure.tight_layout()
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=110)
 
 
 def run(options: argparse.Namespace) -> None:

@@ -9,7 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.load import Loaded, Sample, Step, load, plot, step_of
+from benchmarks.load import load, step_of
+from benchmarks.load_found import Loaded, Sample, Step
+from benchmarks.load_report import plot
 from benchmarks.load_site import running
 
 CALM = Sample(
