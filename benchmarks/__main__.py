@@ -39,9 +39,14 @@ BENCHMARKS = (
     ),
     Benchmark("observations", "what detectors find, and what the tracker makes of it; 10 minutes"),
     Benchmark("peers", "MyView beside other trackers, which pip installs, on public detections; 5 minutes"),
-    Benchmark("yardsticks", "the survey's trackers beside the network program; 5 minutes"),
+    Benchmark("yardsticks", "the survey's trackers beside the network program; 7 minutes"),
+    Benchmark("temporal", "from above: who is mistaken after a merge, and what pruning saves; 6 minutes"),
+    Benchmark("table1", "the survey's comparison measured: occlusions, identities, real time; 10 minutes"),
     Benchmark(
         "bestview", "who is who and the best view, beside simpler ways and beside the truth; 20 minutes"
+    ),
+    Benchmark(
+        "assist", "an operator helps to track identical fish; 4 minutes", ("--made-up", "--clips", "12")
     ),
     Benchmark("ablation", "what each term of the tracker brings; 15 minutes"),
     Benchmark("experiments", "the paper's experiments again, on synthetic scenes; 10 minutes"),

@@ -15,7 +15,8 @@ Recordings are looked at ahead, as MyView does with recordings; `--as-live` has 
 
 *Looks alone* are those of sites whose cameras have no floor in common, told without travel times.
 
-*No evidence* is without what the cameras tell each other about each frame. *Calibrated* has the homographies
+*Found only* leaves out views of people whom a camera does not find though others know where they stand. *No
+evidence* is without what the cameras tell each other about each frame. *Calibrated* has the homographies
 that `myview calibrate` makes of the cameras' own tracks. *Largest* chooses frame by frame the camera with the
 largest box. *Nearest feet* joins whole tracks of our cameras, each by itself (or of ByteTrack, on the same
 boxes), by the median distance of their feet, and chooses so, too. *Occupancy map* finds everybody on the

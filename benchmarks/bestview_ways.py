@@ -33,6 +33,7 @@ from tracking.motchallenge import MotRow, format_rows
 LEAST_IOU = 0.5
 BRIDGE = 20
 """Frames that somebody may be hidden for and still count as shown."""
+FOUND_ONLY = {"unfound": 0.0}
 LOOKS_ALONE = {"identity": {"travel_cap": 0.0}}
 TRUE, TRUE_LARGEST = "true boxes", "true boxes, largest"
 OURS, CALIBRATED, WITHOUT = "MyView", "MyView, calibrated", "no homographies"
@@ -137,6 +138,7 @@ def ways(
         apart = followed(uncalibrated, found.frames)
         ours = decide(scene.config(), said)
         yield Way(name, ours)
+        yield Way(f"{name}, found only", decide(scene.config(view=FOUND_ONLY), said))
         yield Way(f"{name}, no evidence", decide(scene.config(), apart))
         if case.apart:
             yield Way(f"{name}, looks alone", decide(scene.config(view=LOOKS_ALONE), said))

@@ -117,7 +117,7 @@ def terrace_rows(report: Report, data: Path, folder: Path, out: Path) -> None:
     ours = folder / "terrace.json"
     ours.write_text(ground_file("m", {it.camera: it.homography for it in found.cameras}))
     assert views.ground is not None  # noqa: S101 — the recording has one
-    rows = []
+    rows: list[list[str]] = []
     for name, ground in (("published", views.ground), ("from its own tracks", ours)):
         seen = agreement(ground, truth, size)["c0", "c1"]
         config = config_for_videos(

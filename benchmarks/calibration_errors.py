@@ -48,7 +48,7 @@ def error_of_known(found: WalkCalibration, truth: Mapping[str, Floats], walks: S
     x, y = np.concatenate(ours), np.concatenate(theirs)
     known = np.isfinite(x) & np.isfinite(y)
     x, y = x[known] - x[known].mean(), y[known] - y[known].mean()
-    return np.abs(x * np.exp(1j * np.angle((np.conj(x) * y).sum())) - y)
+    return np.asarray(np.abs(x * np.exp(1j * np.angle((np.conj(x) * y).sum())) - y), dtype=np.float64)
 
 
 def agreement(ground: Path, truth: Path, size: tuple[int, int]) -> dict[tuple[str, str], Agreement]:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.stopwatch import Stopwatch
+from benchmarks.stopwatch import Stopwatch, Watched
 from bestview import EpisodeKey, IdentityUpdate, LocalTrack, QualitySettings
 from server.view import decide
 from server.view.align import Epoch
@@ -26,7 +26,9 @@ from server.wire.messages import CameraTracks, Glimpse, Track
 _SEED, _WIDTH, _HEIGHT = 5, 1280, 720
 _WARM = 6
 """Epochs before it counts: the look-ahead has to fill."""
-_ALL = QualitySettings(1.0, *[0.5] * 6)
+_ALL = QualitySettings(
+    size=1.0, whole=0.5, unhidden=0.5, central=0.5, sharp=0.5, facing=0.5, sure=0.5, relative=True
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +110,7 @@ def decision_times(crowd: Crowd, gop: int, epochs: int, *, all_terms: bool) -> S
     decider = Decider(config, dict.fromkeys(config.camera_ids, ground), lambda _camera, _pulse: True)
     decider.people._registry = _Given()  # type: ignore[assignment]  # noqa: SLF001 — joining is measured elsewhere
     board, watch = Board(25.0), Stopwatch()
-    stages = (
+    stages: tuple[Watched, ...] = (
         (Reader, "read", "reading"),
         (Sight, "put", "quality"),
         (Outlook, "__init__", "costs"),

@@ -16,6 +16,7 @@ import yaml
 from benchmarks.surroundings import one_thread_environment
 from server.run.setup import free_port
 
+CONFIG = "site.yaml"
 LOG = "up.log"
 _POLL_S = 0.2
 _START_S = 150.0
@@ -75,7 +76,7 @@ async def running_site(
         content["ground"] = str(views.ground.absolute())
     for section, values in (settings or {}).items():
         content[section] = {**content.get(section, {}), **values}
-    config = folder / "site.yaml"
+    config = folder / CONFIG
     config.write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
     with (folder / LOG).open("w", encoding="utf-8") as log:
         process = await asyncio.create_subprocess_exec(

@@ -35,6 +35,7 @@ from benchmarks import (
     faults_page,
     faults_processes,
     faults_recorded,
+    faults_reload,
     faults_sources,
 )
 from benchmarks.faults_film import Views, make
@@ -48,6 +49,7 @@ from client import ClientError
 
 FAULTS: tuple[Fault, ...] = (
     *faults_processes.FAULTS,
+    *faults_reload.FAULTS,
     *faults_page.FAULTS,
     *faults_apart.FAULTS,
     *faults_sources.FAULTS,
@@ -81,7 +83,8 @@ async def _group(faults: list[Fault], views: Views, folder: Path, report: Report
             for fault in faults:
                 outcomes.append(await run(fault, stand, views))
                 print(f"{fault.name}: done", file=sys.stderr, flush=True)
-        outcomes[-1].ended += stand.ended[-1:]
+            ended = len(stand.ended)
+        outcomes[-1].ended += stand.ended[ended:]  # with the site
         files = await asyncio.to_thread(faults_recorded.read, stand.recorded, stand.live)
         faults_recorded.note(outcomes, stand.told, files)
     except CannotRunError as error:

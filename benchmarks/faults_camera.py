@@ -10,10 +10,8 @@ import time
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import cast
 
 import av
-from av.container import OutputContainer
 from av.video.stream import VideoStream
 
 from benchmarks.faults_film import FPS, FRAMES
@@ -45,7 +43,7 @@ class _Muxer:
 
     def __init__(self, film: Film) -> None:
         self._film, self._out = film, io.BytesIO()
-        self._container = cast("OutputContainer", av.open(self._out, "w", format="mpegts"))
+        self._container = av.open(self._out, "w", format="mpegts")
         with av.open(str(film.path)) as template:
             self._stream: VideoStream = self._container.add_stream_from_template(template.streams.video[0])
 

@@ -107,7 +107,8 @@ def make(folder: Path, pulses: int) -> Views:
             found.update(dict.fromkeys(((name, *sides) for sides in _sides(some, frame)), frame))
         source, detected = str(folder / f"{name}.mp4"), str(folder / f"{name}.txt")
         cameras.append({"id": name, "source": source, "at_end": "loop", "detections": detected})
-    ground = {name: scene.homography(number).tolist() for number, name in enumerate(CAMERAS)}
+    floors = {name: scene.homography(number) for number, name in enumerate(CAMERAS)}
+    ground = {name: floor.tolist() for name, floor in floors.items() if floor is not None}
     (folder / "ground.json").write_text(json.dumps({"unit": "m", "homography": ground}), encoding="ascii")
     site = {"name": "faults", "fps": FPS, "width": WIDTH, "height": HEIGHT}
     return Views(cameras, site, folder / "ground.json", found)
@@ -140,7 +141,9 @@ def make_smaller(path: Path, out: Path) -> Path:
     """Write a film again, in three quarters of its size."""
     with av.open(str(path)) as container:
         pictures = [
-            frame.reformat(WIDTH * 3 // 4, HEIGHT * 3 // 4).to_ndarray(format="bgr24")
+            np.asarray(
+                frame.reformat(WIDTH * 3 // 4, HEIGHT * 3 // 4).to_ndarray(format="bgr24"), dtype=np.uint8
+            )
             for frame in container.decode(video=0)
         ]
     write_film(pictures, out)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import av
+import numpy as np
 
 from benchmarks.faults_film import FPS, FRAMES, read_stamp
 from benchmarks.faults_run import Outcome
@@ -43,7 +44,7 @@ def _read(path: Path, live: Collection[str]) -> File:
         with av.open(str(path)) as container:
             for frame in container.decode(video=0):
                 pulse = round(float(frame.time or 0.0) * FPS)
-                stamp = read_stamp(frame.to_ndarray(format="gray"))
+                stamp = read_stamp(np.asarray(frame.to_ndarray(format="gray"), dtype=np.uint8))
                 pulses.add(pulse)
                 plays &= stamp is not None and stamp.camera == camera
                 plays &= camera in live or (stamp is not None and stamp.frame == pulse % FRAMES)

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from typing import cast
 
 import av
+import numpy as np
 
 from benchmarks.faults_film import FPS, Stamp, read_stamp
 from client import Cameras, ClientError, Event, Gop, HttpSettings, events
@@ -61,10 +62,10 @@ class Tape:
         if not moments:
             return []
         shown = []
-        with av.open(io.BytesIO(bytes(self.data)), format="mp4") as container:
+        with av.open(io.BytesIO(bytes(self.data)), "r", format="mp4") as container:
             for frame in container.decode(video=0):
                 pulse = round(float(frame.time or 0.0) * FPS)
-                stamp = read_stamp(frame.to_ndarray(format="gray"))
+                stamp = read_stamp(np.asarray(frame.to_ndarray(format="gray"), dtype=np.uint8))
                 shown.append(Picture(pulse, moments.get(pulse, 0.0), stamp))
         return shown
 

@@ -176,6 +176,7 @@ class Tried(Target):
             "switch_cost_s": 0.3,
             "goes_on_s": 0.5,
             "missed_s": 1.0,
+            "unfound": 1.0,
             "min_shot_s": 0.0,
             "quality": {"relative": 1.0},
         }

@@ -13,8 +13,17 @@ _ASKED: tuple[tuple[str, str, Any], ...] = (
     ("POST", "/api/operator/people", {"object": 1, "name": "Ada"}),
     ("POST", "/api/operator/people", {"object": 1, "merge": 2}),
     ("POST", "/api/operator/people", {"object": 1, "part": ["c0", "c1"]}),
+    (
+        "POST",
+        "/api/operator/pointing",
+        {"object": 1, "camera": "c0", "points": [{"pulse": 12, "x": 9.5, "y": 20.0, "reach": 3.0}]},
+    ),
     ("PUT", "/api/operator/choosing", {"switch_cost_s": 0.2, "goes_on_s": 0.5, "lookahead": 10}),
-    ("PUT", "/api/operator/choosing", {"missed_s": 1.0, "min_shot_s": 0.0, "quality": {"relative": 1.0}}),
+    (
+        "PUT",
+        "/api/operator/choosing",
+        {"missed_s": 1.0, "unfound": 0.5, "quality": {"relative": 1.0}},
+    ),
     ("DELETE", "/api/operator/choosing", None),
     ("POST", "/api/operator/walk", {"do": "start"}),
     ("POST", "/api/operator/walk", {"do": "go_on", "person": 1.75}),

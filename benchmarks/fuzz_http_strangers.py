@@ -29,7 +29,7 @@ from server.wire.tokens import digest_of
 _WHO = ("hall", "family", "door", "night", "void")
 SECRETS = {who: f"{who}-{Random(who).randbytes(24).hex()}" for who in _WHO}
 _COOKIES = {who: f"{who}+{Random(who + who).randbytes(24).hex()}" for who in _WHO}
-_RIGHTS = {
+_RIGHTS: dict[str, dict[str, object]] = {
     "hall": {"role": "watch"},
     "family": {"role": "watch", "object": 1, "made": "2999-01-01T00:00:00Z"},
     "door": {"role": "watch", "camera": "c0"},
@@ -38,7 +38,7 @@ _RIGHTS = {
 }
 _NAMES = {1: "Ada Lovelace", 2: "Charles Babbage"}
 _OPEN = {"/", "/operator", "/page/{file}", "/api", "/api/openapi.json", "/healthz", "/readyz", "/api/session"}
-_NARROW = {"/api/site", "/api/objects", "/api/cameras", "/api/events", "/api/past"}
+_NARROW = {"/api/site", "/api/objects", "/api/cameras", "/api/events", "/api/flags", "/api/past"}
 """What answers everybody who has a token, each with what that is for."""
 _ADDRESSES = ("127.0.0.1", "127.0.0.1", "127.0.0.1", "127.0.0.1", "127.0.0.2", "127.0.0.9")
 """From the last too many wrong tokens have come."""
@@ -70,7 +70,7 @@ class Strangers(Target):
     def __init__(self) -> None:
         self._folder = folder()
         tokens = Path(self._folder.name) / "tokens.yaml"
-        listed = [
+        listed: list[dict[str, object]] = [
             {"name": f"token {who}", "sha256": digest_of(SECRETS[who]), **rights}
             for who, rights in _RIGHTS.items()
         ]

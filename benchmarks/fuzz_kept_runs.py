@@ -16,7 +16,7 @@ from benchmarks.fuzz_site import CAMERAS, Fed, feed_epoch, site
 from benchmarks.fuzz_target import Target, folder
 from server.view.past.kept import kept_from, kept_until, known, shown
 from server.view.past.past import Past
-from server.view.past.play import CameraPast, ObjectPast, last_before, play, sounds
+from server.view.past.play import CameraPast, ObjectPast, Source, last_before, play, sounds
 from server.view.past.run import HEAD
 from server.view.past.store import Bounds
 from server.view.past.told import told
@@ -120,11 +120,8 @@ class Runs(Target):
     async def _asked(past: Past) -> int:
         assert past.run is not None
         lines = [it async for it in told(past, 0, _FAR)]
-        for source in (
-            *(CameraPast(past, it) for it in CAMERAS),
-            ObjectPast(past, (1,)),
-            ObjectPast(past, (2,)),
-        ):
+        sources: list[Source] = [*(CameraPast(past, it) for it in CAMERAS)]
+        for source in (*sources, ObjectPast(past, (1,)), ObjectPast(past, (2,))):
             known(source, 0, _FAR)
             shown(source)
             kept_from(source, 3)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from io import BufferedWriter
 from pathlib import Path
 from random import Random
-from typing import BinaryIO, ClassVar, Literal
+from typing import ClassVar, Literal
 
 from benchmarks.fuzz_media_made import stream, wrong
 from benchmarks.fuzz_mutate import damaged
@@ -47,7 +48,7 @@ class _Film(Target):
             return refused(error)
         return True
 
-    def record(self, pieces: Iterable[bytes], file: BinaryIO) -> None:
+    def record(self, pieces: Iterable[bytes], file: BufferedWriter) -> None:
         """Write what comes as it comes."""
         raise NotImplementedError
 
@@ -67,7 +68,7 @@ class ClientMp4(_Film):
     codec = "h264"
     error = Mp4Error
 
-    def record(self, pieces: Iterable[bytes], file: BinaryIO) -> None:
+    def record(self, pieces: Iterable[bytes], file: BufferedWriter) -> None:
         """Write what comes as it comes."""
         reader, taken = BoxReader(), Recording(file, 10.0)
         for piece in pieces:
@@ -86,7 +87,7 @@ class ClientWebm(_Film):
     codec = "vp8"
     error = WebmError
 
-    def record(self, pieces: Iterable[bytes], file: BinaryIO) -> None:
+    def record(self, pieces: Iterable[bytes], file: BufferedWriter) -> None:
         """Write what comes as it comes."""
         reader, taken = ElementReader(), WebmRecording(file, 10.0)
         for piece in pieces:

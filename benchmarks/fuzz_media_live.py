@@ -94,11 +94,12 @@ def _sent(form: str, codec: str) -> bytes:
     sent = io.BytesIO()
     with av.open(sent, "w", format=form) as out:
         stream = out.add_stream(codec, rate=FPS)
+        assert isinstance(stream, av.VideoStream)
         if codec == "libx264":
             stream.options = {"preset": "ultrafast", "g": str(STRIDE), "bf": "0", "sc_threshold": "0"}
         stream.width, stream.height = WIDTH, HEIGHT
         stream.pix_fmt = "yuvj420p" if codec == "mjpeg" else "yuv420p"
-        heard = out.add_stream("aac", rate=48_000) if form == "mpegts" else None
+        heard = out.add_stream("aac", 48_000) if form == "mpegts" else None
         rng = np.random.default_rng(1)
         for frame in range(_FRAMES):
             image = np.repeat(rng.integers(0, 255, (HEIGHT, WIDTH // 8, 3), dtype=np.uint8), 8, axis=1)

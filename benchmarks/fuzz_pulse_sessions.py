@@ -13,7 +13,7 @@ from benchmarks.fuzz_target import Target
 from camsync import ClientSettings, PulseClient, PulseServer
 from camsync.link import Link
 from camsync.protocol import parse_client_line, parse_server_line
-from server.wire.messages import Pulse
+from server.wire.numbers import Pulse
 
 _pulse = msgspec.json.Decoder(Pulse)
 Script = list[tuple[int, bytes]]

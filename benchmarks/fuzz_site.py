@@ -14,6 +14,7 @@ from server.camera.encode import AccessUnit, Encoder
 from server.view.service import BestViewService
 from server.wire.config import Config
 from server.wire.epochs import end_of_epoch
+from server.wire.help import Trouble
 from server.wire.inbox import Message
 from server.wire.loading import build_config
 from server.wire.messages import (
@@ -47,7 +48,11 @@ def site(*, codec: Literal["h264", "vp8"] = "h264", **changes: Any) -> Config:
         "site": {"name": "hall", "fps": FPS, "width": WIDTH, "height": HEIGHT},
         "encode": {"gop": GOP, "codec": codec},
         "cameras": [{"id": it, "source": "scene:room", "ground": _GROUND} for it in CAMERAS],
-        "track": {"window": {"window": 5, "stride": STRIDE, "birth_window": 5}, "backlog_s": 0.2},
+        "track": {
+            "window": {"window": 5, "stride": STRIDE, "birth_window": 5},
+            "backlog_s": 0.2,
+            "assist": {"enabled": True},
+        },
         "view": {"lookahead": 2 * GOP, "late_after_s": 0.1, "identity": {"confirm": 1, "regroup": 1}},
         **changes,
     }
@@ -98,6 +103,8 @@ def word(rng: Random, camera: str, epoch: int) -> CameraTracks:
         tracks=[_track(rng, person, first) for person in range(1, rng.randrange(1, 5))],
         solve=Solve(objective=1.0, bound=1.0, gap=0.0, integral=True, rounds=1),
         solved_at=(first + STRIDE) / FPS,
+        troubles=[Trouble(reason="alike", tracks=[1, 2], pulse=first + 9, margin=rng.random())],
+        mended_from=first if rng.random() < 0.1 else None,
     )
 
 

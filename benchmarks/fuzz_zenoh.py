@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from random import Random
-from typing import Any, cast
+from typing import Any
 
 import msgspec
 from prometheus_client import generate_latest
@@ -30,6 +30,7 @@ from benchmarks.fuzz_site import (
 from benchmarks.fuzz_target import Target
 from server.camera.earshot import Earshot
 from server.camera.exchange import Exchange
+from server.camera.pointed import Pointed as PointedAt
 from server.view.agreement import Agreement
 from server.view.align import Aligner
 from server.view.footage import Footage
@@ -40,6 +41,7 @@ from server.web.app import make_app
 from server.web.keys import METRICS
 from server.web.views import cameras_info, choice_info, objects_info, site_info
 from server.wire.epochs import end_of_epoch
+from server.wire.help import POINTS_MOST, Pointed, Pointings
 from server.wire.inbox import Message
 from server.wire.messages import Found
 from server.wire.sound import SoundFormat
@@ -151,6 +153,32 @@ class Words(Target):
         return self._exchange.bad_messages == bad
 
 
+class Places(Target):
+    """Where an operator points, as a camera hears it."""
+
+    name = "zenoh-pointing"
+
+    def make(self, rng: Random) -> bytes:
+        """Give some words of the best view."""
+        script: Script = []
+        for pulse in range(3):
+            place = Pointed(pulse=pulse, track=1, x=9.0, y=9.0, reach=rng.random() + 0.1)
+            points = [place] * rng.randrange(3)
+            payload = msgspec.json.encode(Pointings(boot=1, points=points))
+            message = Message(KEYS.camera("c0", "pointing"), payload, b"")
+            it = wrong(rng, message) if rng.random() < 0.7 else message
+            script.append((it.key, it.payload, b""))
+        return _packed(script)
+
+    def feed(self, data: bytes) -> bool:
+        """Hear them."""
+        heard = PointedAt("c0", 1)
+        for key, payload, _ in _script.decode(data):
+            heard.put(Message(key, payload, b""))
+            assert len(heard.take()) <= POINTS_MOST
+        return not heard.bad_messages
+
+
 class Sessions(Target):
     """A site over some epochs: messages wrong, lost, doubled and out of order; then all is asked of it."""
 
@@ -232,7 +260,7 @@ def drink(viewer: Any) -> None:
     for piece in list(viewer._queue):
         if isinstance(piece, Footage):
             assert piece.data
-            assert cast("bytes", piece.ts)
+            assert piece.ts
             assert piece.with_sound
     viewer._queue.clear()
 
@@ -241,4 +269,4 @@ def _plain(key: str) -> str:
     return key.encode("utf-8", "replace").decode()
 
 
-TARGETS = (Messages, Words, Sessions)
+TARGETS = (Messages, Words, Places, Sessions)

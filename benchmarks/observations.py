@@ -65,7 +65,9 @@ def rows_of(observer: Observer, seen: dict[str, Seen], peers: PeerEnvironment | 
         hypotheses = sure
         yield Row(f"  score from {SURE:g}", sure, tracks=False)
     yield Row("  MyView's tracks", {name: it.tracks for name, it in seen.items()}, tracks=True)
-    for peer in PEERS if peers is not None and observer.with_peers else ():
+    if peers is None or not observer.with_peers:
+        return
+    for peer in PEERS:
         if peer.name in TRACKERS:
             yield Row(f"  {peer.name}", peer_tracks(peers, peer, hypotheses), tracks=True, ours=False)
 

@@ -122,8 +122,10 @@ def rows_of(number: int, found: Detections) -> list[MotRow]:
 
 def final_rows(result: WindowResult | None) -> Iterable[MotRow]:
     """Give the rows of the frames that are final now."""
-    for track in result.tracks if result else ():
-        for number in range(result.first, result.final_to + 1) if result else ():
-            left, top, right, bottom = track.boxes[number - result.first].tolist() if result else ()
+    if result is None:
+        return
+    for track in result.tracks:
+        for number in range(result.first, result.final_to + 1):
+            left, top, right, bottom = track.boxes[number - result.first].tolist()
             if not np.isnan(left):
                 yield MotRow(number + 1, track.id, left, top, right - left, bottom - top)

@@ -68,7 +68,11 @@ class Stage:
         self._images = [scene.image(0, _START + place) for place in range(_DRAWN)]
         truth = [scene.truth(_START + place)[0] for place in range(_DRAWN)]
         self._boxes = [
-            [(int(who), *map(float, box)) for who, box in zip(it.ids, it.boxes, strict=True)] for it in truth
+            [
+                (int(who), float(x0), float(y0), float(x1), float(y1))
+                for who, (x0, y0, x1, y1) in zip(it.ids, it.boxes, strict=True)
+            ]
+            for it in truth
         ]
         self._encoder = Encoder(site, encode)
         self._pulse = 0

@@ -66,18 +66,25 @@ def tracks_of(
     yield OURS, track(sequence)
     if pictures and sequence.video is not None and sequence.video.is_file():
         yield PICTURES, track(sequence, pictures=True)
-    for peer in PEERS if peers is not None else ():
+    if peers is not None:
+        yield from _peers_tracks(sequence, peers, report)
+    yield CEILING, perfect_association(read_rows(sequence.detections), read_rows(sequence.truth))
+
+
+def _peers_tracks(
+    sequence: Recording, peers: PeerEnvironment, report: Report
+) -> Iterator[tuple[str, list[MotRow]]]:
+    for peer in PEERS:
         try:
             yield peer.name, peers.track(peer, sequence.detections)
         except PeersAwayError as problem:
             report.say(f"{sequence.name}: without {peer.name}: {problem}")
-    yield CEILING, perfect_association(read_rows(sequence.detections), read_rows(sequence.truth))
 
 
 def difference(peers: PeerEnvironment, sequence: Recording, tracks: list[MotRow], scores: Scores) -> float:
     """Give by how much the peers' own evaluation, which follows TrackEval, differs from ours at most."""
     theirs = peers.score(read_rows(sequence.truth), tracks)
-    return max(abs(getattr(scores, name) - value) for name, value in theirs.items())
+    return max(abs(float(getattr(scores, name)) - value) for name, value in theirs.items())
 
 
 def lead(table: Table) -> list[list[str]]:

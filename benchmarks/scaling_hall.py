@@ -56,7 +56,7 @@ class Hall:
     @cached_property
     def grounds(self) -> list[Floats]:
         """Each camera's homography from the picture to the floor, metres."""
-        return [np.linalg.inv(view) for view in self._views]
+        return [np.asarray(np.linalg.inv(view), dtype=np.float64) for view in self._views]
 
     @cached_property
     def _views(self) -> list[Floats]:

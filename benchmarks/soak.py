@@ -23,6 +23,7 @@ import csv
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -94,7 +95,7 @@ async def soak(hours: float, tempo: Tempo, folder: Path, out: Path) -> Soaked:
         began = time.monotonic()
         try:
             with (out / "soak.csv").open("w", encoding="ascii", newline="", buffering=1) as table:
-                await _sample(soaked, hours, folder, csv.writer(table), watching)
+                await _sample(soaked, hours, folder, csv.writer(table).writerow, watching)
         except BrokenError as problem:
             soaked.broken = str(problem)
         finally:
@@ -108,7 +109,11 @@ async def soak(hours: float, tempo: Tempo, folder: Path, out: Path) -> Soaked:
 
 
 async def _sample(
-    soaked: Soaked, hours: float, folder: Path, table: csv._writer, watching: asyncio.Task[None]
+    soaked: Soaked,
+    hours: float,
+    folder: Path,
+    write: Callable[[list[object]], object],
+    watching: asyncio.Task[None],
 ) -> None:
     tempo, visitors = soaked.tempo, soaked.visitors
     expected = tempo.seconds(3600.0 * hours)
@@ -117,7 +122,7 @@ async def _sample(
     missing = [name for name, found in pids.items() if len(found) != 1]
     if missing:
         raise BrokenError(f"not running: {', '.join(missing)}")
-    table.writerow(["hours", "process", "resident_mb", "descriptors", "threads", "tasks", "blocks"])
+    write(["hours", "process", "resident_mb", "descriptors", "threads", "tasks", "blocks"])
     while visitors.camera.pulse < tempo.pulse(hours):
         await asyncio.wait({watching}, timeout=every)
         if watching.done():
@@ -140,7 +145,7 @@ async def _sample(
                 raise BrokenError(f"{name} died in hour {now:.2f}") from None
             soaked.samples[name].append(sample)
             numbers = (sample.descriptors, sample.threads, sample.tasks, sample.blocks)
-            table.writerow([f"{now:.3f}", name, f"{sample.resident:.1f}", *numbers])
+            write([f"{now:.3f}", name, f"{sample.resident:.1f}", *numbers])
         _note_delay(soaked, now)
         soaked.recorded.append(await asyncio.to_thread(_megabytes, folder / "recorded"))
 

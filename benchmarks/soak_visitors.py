@@ -7,7 +7,7 @@ import contextlib
 import random
 import time
 from collections import Counter
-from collections.abc import AsyncIterator, Callable, Coroutine
+from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -156,7 +156,7 @@ class Visitors:
         return self._random.choice(people) if people else None
 
     async def _visit(self) -> None:
-        kinds = {
+        kinds: dict[str, Callable[[int], Awaitable[object]]] = {
             "film": lambda number: self._read(f"/objects/{number}/best.mp4"),
             "transport stream": lambda number: self._read(f"/objects/{number}/best.ts"),
             "camera": lambda _: self._read(f"/cameras/{self._random.choice(CAMERAS)}/live.mp4"),

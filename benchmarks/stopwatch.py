@@ -6,10 +6,11 @@ import functools
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from types import ModuleType
 from typing import Any
 
-Watched = tuple[type, str, str]
-"""A class, the name of its method, and the stage that the method is."""
+Watched = tuple[type | ModuleType, str, str]
+"""A class or a module, the name of its function, and the stage that this is."""
 
 
 class Stopwatch:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bestview.appearance import KNOWN_PAIRS, POINTS, Appearances, distances
-from bestview.episodes import Episode
+from bestview.episode import Episode
 from bestview.identity_settings import IdentitySettings
 from bestview.keys import EpisodeKey
 from bestview.likeness import appearance_scores

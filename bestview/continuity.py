@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview.episodes import Episode
+from bestview.episode import Episode
 from bestview.ground import feet
 from bestview.identity_settings import IdentitySettings
 
@@ -21,7 +21,12 @@ _TOO_FAR = 2.0
 
 
 def goes_on(episode: Episode, settings: IdentitySettings) -> float:
-    """Evidence that an episode is the same person as the one before it in its track."""
+    """Evidence that an episode is the same person as the one before it in its track.
+
+    Somebody's word is worth as much as the ground can say against it.
+    """
+    if episode.sure:
+        return settings.ground_cap
     worth = settings.goes_on * np.exp(-episode.crowded / settings.goes_on_frames)
     return float(worth if episode.gap <= settings.gap else worth * np.exp(-episode.gap / _UNSEEN))
 

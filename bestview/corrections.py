@@ -55,6 +55,11 @@ class Corrections:
         """Take over that tracks are said to stand for somebody else: who said so knows."""
         self._last.update((key, number) for key in keys if key in self._last)
 
+    def part_each(self, changed: Mapping[EpisodeKey, tuple[int, int]]) -> None:
+        """Take over, with the numbers before and after, which parts are said to stand for somebody else."""
+        for key, (_, number) in changed.items():
+            self.part([key], number)
+
     def keep_only(self, keys: Collection[EpisodeKey]) -> None:
         """Forget all other tracks."""
         self._last = {key: number for key, number in self._last.items() if key in keys}

@@ -7,15 +7,15 @@ or comes back after a while unseen, begins a new episode: who it is, is asked an
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
 from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bestview.episode import End, Episode
 from bestview.identity_settings import IdentitySettings
 from bestview.keys import EpisodeKey, TrackKey
-from bestview.looks import Look, Looks
+from bestview.looks import Look
 from bestview.runs import runs_of
 from bestview.sightings import Glimpse, Sightings
 
@@ -25,88 +25,6 @@ _ROOTED = 4
 """Frames outside crowds that an episode needs before the next crowd can end it."""
 _SURE = 2
 """Groupings for which an episode must have been told one number to be settled while it goes on."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class End:
-    """Where an episode begins or ends: frame, (4,) box in pixels, (2,) ground point (NaN: unknown)."""
-
-    frame: int
-    box: Floats
-    ground: Floats
-
-
-@dataclass(slots=True, eq=False)
-class Episode:
-    """Part of one camera's track.
-
-    Attributes:
-        key: camera, the camera's number for the track, and the first frame.
-        begin: first sighting.
-        end: last sighting.
-        before: the episode of the same track before this one.
-        crowded: frames of crowd between the two.
-        frames: sightings.
-        free: those outside crowds.
-        crowd: of the newest sightings, how many in a row are in a crowd.
-        looks: where nobody else was in the box.
-        untold: frames whose number has not been told yet.
-        told: frames by number told.
-        number: the person's; 0: nobody's yet.
-        firm: the person's number, if that was settled though the episode goes on; 0: it was not.
-    """
-
-    key: EpisodeKey
-    begin: End
-    end: End
-    before: Episode | None = None
-    crowded: int = 0
-    frames: int = 0
-    free: int = 0
-    crowd: int = 0
-    looks: Looks = field(default_factory=Looks)
-    untold: list[int] = field(default_factory=list)
-    told: dict[int, int] = field(default_factory=dict)
-    number: int = 0
-    firm: int = 0
-
-    @property
-    def gap(self) -> int:
-        """Frames from the end of the episode before; 0: there was none."""
-        return self.begin.frame - self.before.end.frame if self.before is not None else 0
-
-    @property
-    def mostly(self) -> int:
-        """The number it was told most often, 0 before the first; of equals the lowest."""
-        return max(sorted(self.told), key=self.told.__getitem__, default=0)
-
-    def sight(self, frames: range, *, crowded: bool) -> None:
-        """Count sightings one after the other, all in a crowd or none."""
-        self.frames += len(frames)
-        self.free += 0 if crowded else len(frames)
-        self.crowd = self.crowd + len(frames) if crowded else 0
-        if not self.firm:
-            self.untold.extend(frames)
-
-    def tell(self, upto: int) -> bool:
-        """Count the frames up to `upto` as told by today's number; say whether any was."""
-        told = [frame for frame in self.untold if frame <= upto]
-        if told and self.number:
-            self.told[self.number] = self.told.get(self.number, 0) + len(told)
-        self.untold = self.untold[len(told) :]
-        return bool(told and self.number)
-
-    def become(self, number: int) -> None:
-        """Count all that was told as told to be this person."""
-        self.told = {number: max(1, sum(self.told.values()))}
-        self.number = number
-        self.firm = number if self.firm else 0
-
-    def told_anew(self, lost: int, kept: int) -> None:
-        """Count what was told to be one person as told to be another: the two turned out to be one."""
-        frames = self.told.pop(lost, 0)
-        if frames:
-            self.told[kept] = self.told.get(kept, 0) + frames
 
 
 class Episodes:
@@ -122,6 +40,8 @@ class Episodes:
         self.open: list[Episode] = []
         self._current: dict[TrackKey, Episode] = {}
         self._row: dict[EpisodeKey, int] = {}
+        self._cut: dict[TrackKey, tuple[int, Episode]] = {}
+        """Tracks whose next sighting is said to begin an episode: whose it is, and what was before it."""
 
     def take(
         self, seen: Sightings, looks: Mapping[TrackKey, Sequence[Glimpse]]
@@ -143,7 +63,11 @@ class Episodes:
         for run in runs_of(seen.visible, crowded, whole=whole):
             key = seen.keys[run.track]
             episode, frame = self._current.get(key), seen.first + run.start
-            if episode is None or self._ends(episode, frame, crowded=run.crowded):
+            if key in self._cut:
+                number, before = self._cut.pop(key)
+                episode = self._begin(key, _end(seen, run.track, run.start), before)
+                episode.goes_on_as(number, before)
+            elif episode is None or self._ends(episode, frame, crowded=run.crowded):
                 episode = self._begin(key, _end(seen, run.track, run.start), episode)
             episode.sight(range(frame, seen.first + run.stop), crowded=run.crowded)
             episode.end = _end(seen, run.track, run.stop - 1)
@@ -181,11 +105,34 @@ class Episodes:
         now = [self._current[key] for key in sorted(set(tracks)) if key in self._current]
         return [it for it in now if (it.firm or it.number) in people]
 
+    def before(self, track: TrackKey, frame: int, number: int) -> Episode | None:
+        """Give the newest episode of a track that began before a frame; None: the track is not known.
+
+        Of what is settled and over nothing is kept but whose it was, which is to be given.
+        """
+        mine = [it for it in self.open if it.key.track == track and it.begin.frame < frame]
+        now = self._current.get(track)
+        if mine or now is None or now.begin.frame < frame:
+            return mine[-1] if mine else now
+        over = End(frame - 1, now.begin.box, now.begin.ground)
+        return Episode(EpisodeKey(*track, frame - 1), over, over, number=number, firm=number)
+
+    def since(self, track: TrackKey, frame: int) -> Episode | None:
+        """Give the newest episode of a track, if it is not settled and began in this frame or later."""
+        now = self._current.get(track)
+        return now if now is not None and not now.firm and now.begin.frame >= frame else None
+
+    def cut(self, track: TrackKey, number: int, before: Episode) -> None:
+        """Let a track's next sighting begin an episode of this person, which goes on from another one."""
+        self._cut[track] = number, before
+
     def told_anew(self, lost: int, kept: int) -> None:
         """Take over that two numbers turned out to be one person's."""
         for episode in chain(self.open, self._current.values()):
             episode.told_anew(lost, kept)
             episode.firm = kept if episode.firm == lost else episode.firm
+        for track, (number, before) in self._cut.items():
+            self._cut[track] = kept if number == lost else number, before
 
     def old(self, last_frame: int) -> list[int]:
         """Give the rows of episodes that are old enough to be settled by now, in order.

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bestview.continuity import Places, goes_on, lost_and_found
-from bestview.episodes import Episode
+from bestview.episode import Episode
 from bestview.identity_settings import IdentitySettings
 from bestview.pair_table import PairTable
 from bestview.pairs import PairTables

@@ -7,6 +7,8 @@ from numpy.typing import ArrayLike, NDArray
 
 _EDGE = 0.01
 """Share of the picture's height, on both sides of its lower edge, in which feet count as cut off."""
+_HEIGHT_OF_SPAN = 2.2
+"""How much taller people are than their box from above is wide: 1.7 m over shoulders, arms and steps."""
 _MAX_CONDITION = 1e12
 """Above this a 3x3 matrix, scaled by rows and columns, has no inverse worth the name in float64."""
 
@@ -42,6 +44,18 @@ def checked_homography(matrix: ArrayLike, name: str) -> NDArray[np.float64]:
 def feet(boxes: NDArray[np.float64]) -> NDArray[np.float64]:
     """Foot point of each box, the middle of its lower edge: (..., 4) -> (..., 2) in pixels."""
     return np.stack([(boxes[..., 0] + boxes[..., 2]) / 2.0, boxes[..., 3]], axis=-1)
+
+
+def as_standing(boxes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Turn boxes of people seen from straight above into those of people who stand upright there: (..., 4).
+
+    Who is seen from above stands in the middle of their box, not on its lower edge, and shows shoulders and
+    steps instead of their height. The box given back has its foot in the middle, and is as tall as they are.
+    """
+    left, top, right, bottom = np.moveaxis(boxes, -1, 0)
+    foot = (top + bottom) / 2.0
+    tall = _HEIGHT_OF_SPAN * np.sqrt((right - left) * (bottom - top))
+    return np.stack([left, foot - tall, right, foot], axis=-1)
 
 
 def to_ground(homography: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview.episodes import Episode
+from bestview.episode import Episode
 from bestview.looks import Looks
 from bestview.persons import Person
 

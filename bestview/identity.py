@@ -12,6 +12,7 @@ from bestview.between import LooksBetween
 from bestview.corrections import Corrections, Merge, Split
 from bestview.doubt import Doubt
 from bestview.episodes import Episodes
+from bestview.exchanging import exchange
 from bestview.ground import checked_homography
 from bestview.groups import Group, groups_of
 from bestview.heights import HeightScale
@@ -59,6 +60,7 @@ class IdentityRegistry:
     Args:
         settings: see there.
         homographies: by camera name, image pixels -> common ground plane; None: not calibrated.
+        overhead: the cameras that look straight down.
 
     Raises:
         ValueError: a homography that is none.
@@ -68,8 +70,9 @@ class IdentityRegistry:
         self,
         settings: IdentitySettings,
         homographies: Mapping[str, NDArray[np.float64] | None],
+        overhead: Collection[str] = (),
     ) -> None:
-        self._settings = settings
+        self._settings, self._overhead = settings, frozenset(overhead)
         self._foot_error = FootError(settings.foot_sideways, settings.foot_upwards)
         self._homographies = {
             camera: None if matrix is None else checked_homography(matrix, f"camera {camera}")
@@ -81,7 +84,10 @@ class IdentityRegistry:
         self._between = LooksBetween(settings, calibrated)
         self._episodes = Episodes(settings)
         self._people = People(settings, len(self._homographies))
-        self._doubt = Doubt(self._homographies)
+        # Who should be seen is only known of pictures in which people stand upright.
+        self._doubt = Doubt(
+            {it: None if it in self._overhead else matrix for it, matrix in self._homographies.items()}
+        )
         self._pictures: Mapping[str, tuple[int, int]] = {}
         self._tables = PairTables(settings)
         self._weighing = Weighing(settings, calibrated)
@@ -108,7 +114,7 @@ class IdentityRegistry:
             raise ValueError(f"the update for frame {last_frame} comes after that for {self._last_frame}")
         before, self._last_frame = self._last_frame, last_frame
         self._pictures = pictures or {}
-        seen = line_up(tracks, self._homographies, self._foot_error)
+        seen = line_up(tracks, self._homographies, self._foot_error, self._overhead)
         self._scale.learn(seen.heights)
         rows, firm = self._episodes.take(seen, {track.key: track.looks for track in tracks})
         self._here = np.unique(firm[firm > 0])
@@ -158,6 +164,28 @@ class IdentityRegistry:
         self._corrections.part(mine, new)
         self._tables.set_apart([new, *(it for it in rows if it in mine)], [*known, *others])
         return new
+
+    def exchange(
+        self, one: TrackKey, two: TrackKey, frame: int, numbers: tuple[int, int]
+    ) -> tuple[Split, ...]:
+        """Take somebody's word that in this frame two tracks of a camera took each other's person over.
+
+        So from it on each goes on from what the other one was before; and whoever other cameras have since
+        taken for them is taken for the other one of the two (`exchange`).
+
+        Args:
+            one: a track.
+            two: another one.
+            frame: the first in which each of them shows the other's person.
+            numbers: of whom they showed before it, where that is settled and over.
+
+        Returns:
+            What has turned out about numbers: nothing where the evidence has told it already, or where one
+            of them was nobody yet.
+        """
+        splits = exchange(self._episodes, self._people, (one, two), frame, numbers)
+        self._corrections.part_each(splits)
+        return tuple(sorted({Split(was, number, key.camera) for key, (was, number) in splits.items()}))
 
     @property
     def pairs(self) -> int:

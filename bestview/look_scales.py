@@ -7,7 +7,7 @@ from collections.abc import Collection, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview.episodes import Episode
+from bestview.episode import Episode
 from bestview.likelihood import LookScale, look_distances
 from bestview.looks import Look
 from bestview.pairs import PairTables

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 
 from bestview.between import LooksBetween
 from bestview.corrections import Merge
-from bestview.episodes import Episode
+from bestview.episode import Episode
 from bestview.groups import Group
 from bestview.identity_settings import IdentitySettings
 from bestview.naming import named
@@ -124,9 +124,13 @@ class People:
         self._persons[new.number] = new
         for camera in cameras:
             new.see(camera, frame)
-        for person in (new, *(self._persons[number] for number in people)):
-            person.settled = max(1, person.settled)  # so that it has a row, by which they are kept apart
+        self.root([new.number, *people])
         return new.number
+
+    def root(self, numbers: Iterable[int]) -> None:
+        """Let people have a row among those who are compared, by which they can be kept apart."""
+        for number in numbers:
+            self._persons[number].settled = max(1, self._persons[number].settled)
 
     def settle(self, episodes: Iterable[Episode]) -> None:
         """Take over episodes that stay whose they were told to be."""

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview.ground import feet, feet_cut_off, foot_spread, person_heights, to_ground
+from bestview.ground import as_standing, feet, feet_cut_off, foot_spread, person_heights, to_ground
 from bestview.keys import TrackKey
 
 
@@ -118,10 +118,12 @@ def line_up(
     tracks: Sequence[LocalTrack],
     homographies: Mapping[str, NDArray[np.float64] | None],
     foot_error: FootError,
+    overhead: Collection[str] = (),
 ) -> Sightings:
     """Put the tracks of one update on one time axis.
 
-    Feet on the lower edge of the picture are not the person's, and stand nowhere that is known.
+    Feet on the lower edge of the picture are not the person's, and stand nowhere that is known. In the boxes
+    of cameras that look straight down, `overhead`, people stand in the middle.
 
     Raises:
         ValueError: a track given twice, boxes that are not (M, 4), a camera without an entry in
@@ -148,7 +150,9 @@ def line_up(
     if rows:
         homography = np.array([matrices[i] for i in rows])[:, None]
         edge = np.array([ordered[i].picture_height for i in rows])[:, None]
-        whole = np.where(feet_cut_off(boxes[rows], edge)[..., None], np.nan, boxes[rows])
+        above = np.array([keys[i].camera in overhead for i in rows])[:, None, None]
+        upright = np.where(above, as_standing(boxes[rows]), boxes[rows])
+        whole = np.where(feet_cut_off(upright, edge)[..., None], np.nan, upright)
         ground[rows] = to_ground(homography, feet(whole))
         spread[rows] = foot_spread(homography, whole, foot_error.sideways, foot_error.upwards)
         heights[rows] = person_heights(homography, whole)

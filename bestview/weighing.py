@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bestview.clustering import cluster
-from bestview.episodes import Episode
+from bestview.episode import Episode
 from bestview.evidence import Evidence
 from bestview.identity_settings import IdentitySettings
 from bestview.likelihood import CameraLooks, LookWeights

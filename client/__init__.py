@@ -10,7 +10,20 @@ from client.http import (
     NotFoundError,
     RefusedError,
 )
-from client.model import Box, Camera, Cameras, Choice, Cut, Event, Gop, Objects, SeenObject, Site, Span
+from client.model import (
+    Box,
+    Camera,
+    Cameras,
+    Choice,
+    Cut,
+    Event,
+    Flag,
+    Gop,
+    Objects,
+    SeenObject,
+    Site,
+    Span,
+)
 from client.player import Watched, record, watch
 from client.session import Progress
 from client.status_asking import status
@@ -27,6 +40,7 @@ __all__ = [
     "ContractError",
     "Cut",
     "Event",
+    "Flag",
     "Gop",
     "HttpSettings",
     "NotFoundError",

@@ -90,6 +90,11 @@ class Choice(msgspec.Struct, frozen=True):
     """By camera: how well it shows the object, 0 to 1; None: it does not see it."""
     terms: dict[str, dict[str, float]] = {}
     """By camera: what the quality is made of, 0 to 1 each."""
+    unfound: dict[str, float] = {}
+    """By camera: the share of the look-ahead in which it does not find the object, which stands before it as
+    others know."""
+    unfound_quality: dict[str, float | None] = {}
+    """By camera: what such a view is taken to be worth, 0 to 1; None: there is none."""
     weights: dict[str, float] = {}
     """By term: the share of a view's worth that is lost where the term is 0."""
     before: str | None = None
@@ -150,6 +155,26 @@ class Gop(msgspec.Struct, frozen=True):
     split: tuple[Split, ...] = ()
 
 
+class Flag(msgspec.Struct, frozen=True):
+    """Event ``flag``: what an operator is asked to look at, as it is now."""
+
+    id: int
+    objects: tuple[int, ...]
+    """Whom it is about."""
+    cameras: tuple[str, ...]
+    """Where it is foreseen."""
+    reason: str
+    """alike, exchange, fading or gap."""
+    pulse: int
+    """When it is expected."""
+    raised: int
+    """The newest pulse when it was raised."""
+    margin: float
+    """How sure the tracker is, as a cost: 0 is undecided."""
+    state: str
+    """raised, followed, answered or expired."""
+
+
 class Span(msgspec.Struct, frozen=True):
     """Frames that can be seen again."""
 
@@ -178,6 +203,12 @@ class Cameras(msgspec.Struct, frozen=True):
     cameras: tuple[Camera, ...]
 
 
-Event = Site | Objects | Cameras | Gop
-EVENTS: dict[str, type[Event]] = {"site": Site, "objects": Objects, "cameras": Cameras, "gop": Gop}
+Event = Site | Objects | Cameras | Gop | Flag
+EVENTS: dict[str, type[Event]] = {
+    "site": Site,
+    "objects": Objects,
+    "cameras": Cameras,
+    "gop": Gop,
+    "flag": Flag,
+}
 """The type of an event's data, by its name."""

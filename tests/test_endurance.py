@@ -19,6 +19,7 @@ MOST_GROWTH = 200_000
 """Bytes; the detections of one window are about as much."""
 
 
+@pytest.mark.slow
 def test_the_tracker_holds_no_more_after_hundreds_of_frames() -> None:
     settings = WindowSettings(forget_after=50, most_objects=8)
     tracker = OnlineTracker(settings, CostSettings(), solver_named("columns"))

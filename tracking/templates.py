@@ -55,6 +55,13 @@ class RememberedObject:
         self.confirmed = False
         self.present = False
 
+    def copy(self) -> RememberedObject:
+        """Give what is remembered now, to go back to."""
+        other = RememberedObject(self.id, self.histogram, self.box, self.frame)
+        other._past.extend(self._past)
+        other.confirmed, other.present = self.confirmed, self.present
+        return other
+
     def template(self, first: int) -> Template:
         """Give the source node of a window that begins with the frame `first`.
 

@@ -13,9 +13,9 @@ from tracking.boxes import Floats, iou
 from tracking.bridges import bridged
 from tracking.detections import Detections
 from tracking.detectors.base import Image
-from tracking.duplicates import duplicates
+from tracking.ends import ended
 from tracking.glimpses import with_glimpses
-from tracking.network import CostSettings, build_network
+from tracking.network import CostSettings, Network, build_network
 from tracking.reach import reachable, within_reach
 from tracking.solvers.base import OCCLUDED, Solver, SolveReport, solver_named
 from tracking.states import boxes_of, confidence_of
@@ -25,8 +25,6 @@ from tracking.window import WindowResult, WindowSettings, WindowTrack, joined
 
 # Two boxes that overlap (IoU) by this much hold parts of each other's object.
 _CROWDED = 0.15
-# A new object that is on so few of the window's frames once all are solved together was none.
-_LEAST_SEEN = 3
 
 
 class OnlineTracker:
@@ -116,7 +114,7 @@ class OnlineTracker:
         if born:
             states, report = self._assign(first, frames)
         boxes = [boxes_of(row, frames) for row in states]
-        gone = self._gone(boxes)
+        gone = ended(self._objects, boxes, self._window.duplicate)
         shown = [
             n
             for n, (item, rows) in enumerate(zip(self._objects, boxes, strict=True))
@@ -139,24 +137,37 @@ class OnlineTracker:
     def _assign(self, first: int, frames: Sequence[Detections]) -> tuple[npt.NDArray[np.int64], SolveReport]:
         """Solve the window for all remembered objects: states `(n, F)`, -1 where hidden."""
         states = np.full((len(self._objects), len(frames)), OCCLUDED, dtype=np.int64)
-        allowed = [
-            [reachable(item, first + m, seen, self._window) for m, seen in enumerate(frames)]
-            if item.hidden_for(first - 1) <= self._window.long_hidden
-            else []
-            for item in self._objects
-        ]
+        allowed = [self._allowed(item, first, frames) for item in self._objects]
         # An object that nothing in the window can be is hidden throughout: it need not enter the program.
         inside = [n for n, places in enumerate(allowed) if any(place.any() for place in places)]
         if not inside:
             report = SolveReport(self._solver.name, 0.0, 0.0, integral=True, conflicts=0, rounds=0)
             return states, report
         templates = [self._objects[n].template(first) for n in inside]
-        network = within_reach(build_network(templates, frames, self._costs), [allowed[n] for n in inside])
         ids = [template.id for template in templates]
+        network = within_reach(build_network(templates, frames, self._costs), [allowed[n] for n in inside])
+        network = self._weighed(network, first, ids)
         solution = self._solver.solve(network, self._told.hint_for(first, ids) if self._told else None)
         self._told = Told(first, ids, solution.hint)
         states[inside] = solution.states
         return states, solution.report
+
+    def _allowed(
+        self, item: RememberedObject, first: int, frames: Sequence[Detections]
+    ) -> list[npt.NDArray[np.bool_]]:
+        """Say for each frame which detections the object can be, `(K_m,)` bool; nothing: none in any."""
+        if item.hidden_for(first - 1) > self._window.long_hidden:
+            return []
+        return [reachable(item, first + m, seen, self._window) for m, seen in enumerate(frames)]
+
+    def _weighed(self, network: Network, first: int, ids: list[int]) -> Network:  # noqa: ARG002
+        """Give the network of the objects `ids` as it is solved: here is where others add what they know."""
+        return network
+
+    def _number(self, birth: Birth, frame: int) -> int:  # noqa: ARG002
+        """Give somebody new, who begins in this frame, a number that nobody has had."""
+        self._next_id += 1
+        return self._next_id - 1
 
     def _give_birth(self, first: int, frames: list[Detections], states: npt.NDArray[np.int64]) -> bool:
         """Add new objects to the list; say whether there are any."""
@@ -172,8 +183,9 @@ class OnlineTracker:
             if self._come_back(first, frame, birth):
                 added = True
             elif self._make_room(first, states):
-                self._objects.append(RememberedObject(self._next_id, birth.histogram, birth.box, frame))
-                self._next_id += 1
+                self._objects.append(
+                    RememberedObject(self._number(birth, frame), birth.histogram, birth.box, frame)
+                )
                 added = True
         return added
 
@@ -200,15 +212,6 @@ class OnlineTracker:
             # `max` takes the first of equals: the lowest id.
             self._objects.remove(max(hidden, key=lambda item: item.hidden_for(frame)))
         return bool(hidden)
-
-    def _gone(self, boxes: Sequence[Floats]) -> set[int]:
-        """Give the ids that end with this window: a second track on somebody, a new one that was none."""
-        ids = [item.id for item in self._objects]
-        gone = set(duplicates(ids, boxes, self._window.duplicate))
-        for item, rows in zip(self._objects, boxes, strict=True):
-            if not item.confirmed and np.count_nonzero(~np.isnan(rows[:, 0])) < _LEAST_SEEN:
-                gone.add(item.id)
-        return gone
 
     def _track(
         self,

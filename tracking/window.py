@@ -8,6 +8,7 @@ import numpy as np
 
 from tracking.boxes import BOX_SIDES, Floats
 from tracking.solvers.base import SolveReport
+from tracking.troubles import Trouble
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,6 +104,9 @@ class WindowResult:
             An object of which no frame is final yet may still vanish.
         tracks: the objects that are seen in any of the frames, by ascending id.
         report: what the solver has proven about the last window.
+        troubles: what the newest window foresees, the worst first; only where the tracker is set to.
+        mended_from: the first frame that was final and has changed after all, since somebody was pointed at:
+            all frames from `first` on are to be taken anew. None: nothing that was final has changed.
     """
 
     first: int
@@ -110,6 +114,8 @@ class WindowResult:
     final_to: int
     tracks: tuple[WindowTrack, ...]
     report: SolveReport
+    troubles: tuple[Trouble, ...] = ()
+    mended_from: int | None = None
 
 
 def joined(results: list[WindowResult]) -> WindowResult | None:

@@ -10,7 +10,7 @@
  * @property {number} height
  * @property {number} gop frames between two moments at which the camera may change
  * @property {number} lookahead_frames
- * @property {string} codec RFC 6381, such as avc1.42C01F, or vp8
+ * @property {string | null} codec RFC 6381, such as avc1.42C01F, or vp8; null: no key frame has come yet
  * @property {'mp4' | 'webm'} [container] what streams are in; mp4 where it is not said
  * @property {string | null} [sound] the same of the sound, such as mp4a.40.2; null: the site has none
  * @property {number | null} pulse0 unix seconds at which pulse 0 was due; null before the first pulse
@@ -59,6 +59,16 @@
  * @property {Cut[]} cuts
  * @property {{kept: number, lost: number}[]} [merged] numbers that turned out to be one person
  * @property {{kept: number, parted: number, camera: string}[]} [split] whom a camera showed as another than they are
+ *
+ * @typedef {object} Flag what an operator is asked to look at
+ * @property {number} id
+ * @property {number[]} objects whom it is about: point at the first of them
+ * @property {string[]} cameras where it is foreseen
+ * @property {'alike' | 'exchange' | 'fading' | 'gap'} reason
+ * @property {number} pulse when it is expected
+ * @property {number} raised the newest pulse when it was raised
+ * @property {number} margin by how much the tracker is sure, as a cost
+ * @property {'raised' | 'followed' | 'answered' | 'expired'} state
  *
  * @typedef {object} Choice /api/objects/{k}/choice
  * @property {number} object

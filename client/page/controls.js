@@ -4,6 +4,7 @@ import { element } from './element.js';
 import { listenToKeys } from './keys.js';
 import { copy, pictureInPicture, saveSnapshot } from './tools.js';
 
+/** @import {Banner} from './banner.js' */
 /** @import {Explaining} from './explaining.js' */
 /** @import {Overlay} from './overlay.js' */
 /** @import {Painter} from './painter.js' */
@@ -20,8 +21,9 @@ const SKIP_S = 5;
  * @param {Overlay} parts.overlay
  * @param {Strip} parts.strip
  * @param {Explaining} parts.explaining
+ * @param {Banner} parts.banner
  */
-export function listenToControls({ video, viewer, painter, overlay, strip, explaining }) {
+export function listenToControls({ video, viewer, painter, overlay, strip, explaining, banner }) {
   const stage = element('stage');
   const more = /** @type {HTMLDetailsElement} */ (element('more'));
 
@@ -48,6 +50,7 @@ export function listenToControls({ video, viewer, painter, overlay, strip, expla
     ArrowLeft: () => viewer.step(-1),
     ',': () => viewer.travel.skip(-SKIP_S),
     '.': () => viewer.travel.skip(SKIP_S),
+    h: () => banner.toggle(),
     Escape: () => (more.open = false),
   });
 
@@ -99,6 +102,11 @@ export function listenToControls({ video, viewer, painter, overlay, strip, expla
     return viewer.site ? overlay.hit(viewer.now.boxes, viewer.site, event) : null;
   }
 
+  /** @param {Event} event */
+  function isInBanner({ target }) {
+    return target instanceof Element && target.closest('#flags') !== null;
+  }
+
   strip.surface.canvas.addEventListener('click', ({ offsetX }) => {
     const pulse = strip.pulseAt(offsetX);
     if (pulse === null) viewer.travel.live();
@@ -116,6 +124,7 @@ export function listenToControls({ video, viewer, painter, overlay, strip, expla
   });
   stage.addEventListener('mousemove', (event) => stage.classList.toggle('over-person', personAt(event) !== null));
   stage.addEventListener('click', (event) => {
+    if (banner.pointing.object !== null || isInBanner(event)) return;
     const object = personAt(event);
     if (object !== null) viewer.choose(object);
     else if (video.paused) viewer.travel.pause();

@@ -8,7 +8,7 @@
 import { Backoff } from './backoff.js';
 import { getJson } from './http.js';
 
-const NAMES = ['site', 'objects', 'cameras', 'gop'];
+const NAMES = ['site', 'objects', 'cameras', 'gop', 'flag'];
 const SILENCE_MS = 6000;
 const CHECK_MS = 2000;
 

@@ -1,5 +1,6 @@
 /** Puts the parts on the page. */
 
+import { Banner } from './banner.js';
 import { Cameras } from './cameras.js';
 import { listenToControls } from './controls.js';
 import { element } from './element.js';
@@ -9,6 +10,7 @@ import { person } from './names.js';
 import { Overlay } from './overlay.js';
 import { Painter } from './painter.js';
 import { People } from './people.js';
+import { Pointing } from './pointing.js';
 import { Reason } from './reason.js';
 import { SignIn } from './sign_in.js';
 import { Span } from './span.js';
@@ -42,7 +44,9 @@ const span = new Span(element('span'), element('strip'), readOut);
 const reason = new Reason(element('reason'));
 const explaining = new Explaining(viewer, strip, new Why(element('why')));
 const timekeeper = new Timekeeper(viewer);
-const painter = new Painter(video, viewer, overlay, markCamera);
+const painter = new Painter(video, viewer, overlay, markCamera, () => pointing.frame());
+const pointing = new Pointing(stage, element('cross'), viewer, overlay, tellPointing);
+const banner = new Banner(viewer, pointing);
 Object.assign(window, { myview: viewer.probe });
 
 /** Everything that does not change with every frame. */
@@ -80,6 +84,7 @@ function readOut() {
   write(title, status.title);
   write(text, status.text);
   write(element('notice'), viewer.notice.text);
+  banner.show();
   const delay = median(probe.delays.slice(-DELAY_FRAMES).map(({ delayMs }) => delayMs ?? NaN));
   element('delay').textContent = viewer.now.flowing && delay > 0 ? `${(delay / 1000).toFixed(1)} s` : MISSING;
   if (!viewer.now.mapped) reason.put('This browser does not say which moment it shows: no boxes, no past, no reasons.');
@@ -127,27 +132,37 @@ function tellSignIn(error) {
 }
 
 /** A server that needs a token looks like one that is away, to whom has none; one that is away says nothing. */
-function lookWhoMay() {
-  void signIn.look().catch(() => null);
+async function lookWhoMay() {
+  const session = await signIn.look().catch(() => null);
+  if (session?.role === 'operate') await pointing.look();
+  else pointing.possible = false;
+  banner.show();
 }
 
-listenToControls({ video, viewer, painter, overlay, strip, explaining });
+/** @param {unknown} error why the server does not take where the operator points; null: it does */
+function tellPointing(error) {
+  if (error instanceof Error) viewer.say(error.message);
+}
+
+listenToControls({ video, viewer, painter, overlay, strip, explaining, banner });
 await signIn.begin();
 new ServerEvents({
   opened: () => {
     viewer.setConnected(true);
     void timekeeper.begin();
-    lookWhoMay();
+    banner.flags.clear(); // those that are open are told again
+    void lookWhoMay();
   },
   lost: () => {
     viewer.setConnected(false);
-    lookWhoMay();
+    void lookWhoMay();
   },
   heard: (name, data) => {
     if (name === 'gop') viewer.addGop(data);
     else if (name === 'site') viewer.setSite(data);
     else if (name === 'objects') viewer.setPeople(data.objects);
-    else viewer.setCameras(data.cameras);
+    else if (name === 'cameras') viewer.setCameras(data.cameras);
+    else if (name === 'flag') banner.take(data);
   },
 });
 new ResizeObserver(() => {

@@ -50,7 +50,7 @@ export class NowShown {
     const said = this.viewer.said(pulse);
     const camera = cameraOf(player.shown, said, pulse);
     probe.view(object, camera, shownAt);
-    this.boxes = camera === null ? [] : said.boxes(camera, pulse);
+    this.boxes = probe.boxes = camera === null ? [] : said.boxes(camera, pulse);
     const box = this.boxes.find(([number]) => number === object);
     this.part = this.framing.step(`${object} ${camera}`, box, site, passed);
   }

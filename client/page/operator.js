@@ -8,6 +8,7 @@ import { ChoosingForm } from './operator_choosing.js';
 import { Configuration } from './operator_config.js';
 import { FloorPlan } from './operator_floor.js';
 import { Downloads } from './operator_downloads.js';
+import { FlagList } from './operator_flags.js';
 import { ask, Refused } from './operator_http.js';
 import { element } from './operator_parts.js';
 import { Marks } from './operator_marks.js';
@@ -69,6 +70,8 @@ function build(site) {
   sections.set('floor', floor);
   const known = new KnownPeople(site, tell);
   sections.set('known', known);
+  const flags = new FlagList(site, tell);
+  sections.set('flagged', flags);
   const downloads = new Downloads(site);
   sections.set('downloads', downloads);
   sections.set('marks', new Marks(site, tell));
@@ -80,6 +83,7 @@ function build(site) {
     lost: () => tell(new Error('The connection is lost; it is tried again.')),
     heard: (name, data) => {
       if (name === 'gop') floor.add(data);
+      if (name === 'flag') flags.take(data);
       if (name === 'objects') {
         learnNames(data.objects);
         known.show(data.objects);

@@ -13,6 +13,7 @@ const FIELDS = [
   ['switch_cost_s', 'Cut cost λ, s', 'How many seconds of not seeing the person are worth a cut.'],
   ['goes_on_s', 'Goes on, s', 'For how long the views at the end of the look-ahead are taken to go on.'],
   ['missed_s', 'Missed, s', 'For how long somebody who is not found any more is taken to be still there.'],
+  ['unfound', 'Unfound', 'What a view counts for of somebody whom only other cameras find, 0 to 1.'],
   ['min_shot_s', 'Shortest shot, s', 'For how long a camera is shown at least.'],
   ['quality.size', 'Size', 'How large the person is in the picture.'],
   ['quality.whole', 'Whole', "How much of the person the picture's edges leave."],

@@ -55,11 +55,32 @@ export class Overlay {
    * @returns {number | null} the smallest box's object at that point: who stands in front of a crowd
    */
   hit(boxes, picture, { offsetX, offsetY }) {
-    const { scale, left, top } = this.#place(picture);
-    const [x, y] = [(offsetX - left) / scale, (offsetY - top) / scale];
+    const { x, y } = this.inPicture(offsetX, offsetY, picture);
     const under = boxes.filter(([, l, t, r, b]) => l <= x && x < r && t <= y && y < b);
     under.sort((a, b) => area(a) - area(b));
     return under.length ? under[0][0] : null;
+  }
+
+  /**
+   * @param {number} x CSS pixels from the canvas's corner
+   * @param {number} y
+   * @param {Size} picture
+   * @returns {{x: number, y: number, scale: number}} that place in the picture, and CSS pixels for each of its pixels
+   */
+  inPicture(x, y, picture) {
+    const { scale, left, top } = this.#place(picture);
+    return { x: (x - left) / scale, y: (y - top) / scale, scale };
+  }
+
+  /**
+   * @param {number} x pixels of the picture
+   * @param {number} y
+   * @param {Size} picture
+   * @returns {{x: number, y: number}} that place in the canvas, CSS pixels from its corner
+   */
+  onScreen(x, y, picture) {
+    const { scale, left, top } = this.#place(picture);
+    return { x: left + x * scale, y: top + y * scale };
   }
 
   /**

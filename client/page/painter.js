@@ -14,8 +14,9 @@ export class Painter {
    * @param {Viewer} viewer
    * @param {Overlay} overlay
    * @param {(camera: string | null) => void} cut another camera is shown
+   * @param {() => void} shown a frame is
    */
-  constructor(video, viewer, overlay, cut) {
+  constructor(video, viewer, overlay, cut, shown) {
     this.video = video;
     this.viewer = viewer;
     this.overlay = overlay;
@@ -23,6 +24,7 @@ export class Painter {
       if (viewer.player.landing) return frame.image?.close(); // told of again, when it is known whose it is
       viewer.now.take(frame);
       this.#paint(frame.image);
+      shown();
       if (viewer.probe.camera === this.#camera) return;
       this.#camera = viewer.probe.camera;
       cut(this.#camera);

@@ -7,7 +7,7 @@
  * @property {number | null} delayMs from the moment the pulse was due to the moment its frame is shown
  */
 
-/** @import {Site} from './contract.js' */
+/** @import {Box, Flag, Site} from './contract.js' */
 /** @import {State} from './status.js' */
 
 const DELAYS_KEPT = 2048;
@@ -33,6 +33,12 @@ export class Probe {
   object = null;
   /** @type {string | null} the camera whose frame is shown */
   camera = null;
+  /** @type {Box[]} in it */
+  boxes = [];
+  /** @type {Flag[]} that can be answered, the most urgent first */
+  flags = [];
+  /** @type {{object: number | null, taken: number}} whom the operator points at, and how many places were taken */
+  pointing = { object: null, taken: 0 };
   /** @type {State} */
   state = 'starting';
   /** @type {Delay[]} of the last frames shown, oldest first */

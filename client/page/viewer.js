@@ -85,9 +85,10 @@ export class Viewer {
     this.override.configure(site.cameras);
     this.site = this.probe.site = site;
     this.palette = new Palette(site.cameras);
-    const codec = site.sound ? `${site.codec},${site.sound}` : site.codec;
+    const codec = [site.codec, site.sound].filter(Boolean).join(',');
     this.form = { container: site.container ?? 'mp4', codec, pulse0: site.pulse0 };
-    this.supported = this.player.configure(this.form);
+    // Before the first key frame nobody knows yet what there is to be played.
+    this.supported = site.codec === null || this.player.configure(this.form);
     this.#play();
     this.changed();
   }
@@ -283,7 +284,7 @@ export class Viewer {
   }
 
   #play() {
-    if (!this.site || !this.supported || !this.people) return;
+    if (!this.site?.codec || !this.supported || !this.people) return;
     if (this.object === null || !this.chosen) return this.player.stop();
     const past = this.travel.moment;
     const { held, preferred } = this.override;

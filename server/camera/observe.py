@@ -27,6 +27,7 @@ from tracking.detectors import (
     MotFileSettings,
     OnnxDetector,
     paper_boxes,
+    seen_from_above,
 )
 
 _NO_PICTURE = np.empty((0, 0, 3), dtype=np.uint8)
@@ -60,6 +61,8 @@ def make_detector(config: Config, camera: Camera, fit: Fit) -> Observer:
     ignore = tuple(tuple((float(x), float(y)) for x, y in polygon) for polygon in polygons)
     with _told(f"camera {camera.id}: detect"):
         settings = replace(config.detect, ignore=(*config.detect.ignore, *ignore))
+        if camera.kind == "overhead":
+            return _of_kind(seen_from_above(settings), None)
         return _of_kind(settings, _floor(config, camera, fit))
 
 

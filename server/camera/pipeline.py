@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from server.camera.ahead import ready_detector
 from server.camera.encode import AccessUnit, Encoder
 from server.camera.floor import check_floor
+from server.camera.following import ready_tracker
+from server.camera.mending import mended
+from server.camera.observe import make_detector
 from server.camera.own import Passing, open_own
 from server.camera.report import Reporter
 from server.camera.sharpness import Sharpness
@@ -16,9 +21,10 @@ from server.camera.stepping import Stepping
 from server.camera.witness import Heard, Witness
 from server.wire.config import Config
 from server.wire.fit import Fit
+from server.wire.help import POINTS_MOST
 from server.wire.messages import CameraTracks, Found
 from tracking import Detections, solver_named
-from tracking.yardsticks import tracker_named
+from tracking.assist import Pointing
 
 _BY_ITSELF = Heard()
 
@@ -58,12 +64,20 @@ class CameraPipeline:
 
     ``take`` and ``encode`` may run in one thread, ``search`` and ``follow`` in another: they share nothing.
 
+    ``ready``: for the first frame, which takes seconds; else it is only looked whether all can be opened.
+
     Raises:
         UserError: the source or the detections cannot be opened, or the homography is of no such picture.
     """
 
     def __init__(
-        self, config: Config, camera_id: str, boot: int = 0, listener: LiveSound | None = None
+        self,
+        config: Config,
+        camera_id: str,
+        boot: int = 0,
+        listener: LiveSound | None = None,
+        *,
+        ready: bool = True,
     ) -> None:
         camera, site = config.camera(camera_id), config.site
         own = open_own(config, camera, listener)
@@ -71,13 +85,25 @@ class CameraPipeline:
         """The source's own H.264 is passed on."""
         self.why_encoded = own.why
         """Why it is not, where it could have been; empty: nobody wished it."""
-        self.source: Source = own.source or open_source(camera, site, listener)
+        self.source: Source = own.source or open_source(camera, site, listener, ready=ready)
         self._fit = Fit(self.source.size, (site.width, site.height))
         check_floor(camera, self.source.size)
         self._encoder = Passing(own.source) if own.source else Encoder(site, config.encode)
-        self._detector = ready_detector(config, camera, self.source, self._fit)
+        self._detector = (
+            ready_detector(config, camera, self.source, self._fit)
+            if ready
+            else make_detector(config, camera, self._fit)
+        )
         track = config.track
-        tracker = tracker_named(track.tracker, track.window, track.costs, lambda: solver_named(track.solver))
+        tracker = ready_tracker(
+            config,
+            track.tracker,
+            camera,
+            self.source,
+            lambda: solver_named(track.solver),
+            self._fit.image,
+            ready=ready,
+        )
         self._tracker = Stepping(tracker, self._detector.bins, track.window.stride)
         self._reporter = Reporter(camera_id, boot, self.source.size, track.window.stride)
         self._sharpness = Sharpness() if config.view.quality.sharp > 0 else None
@@ -87,6 +113,7 @@ class CameraPipeline:
         self.begins = camera.offset if self.source.recorded else 0
         """The pulse at which the pictures begin."""
         self._last: int | None = None
+        self._pointings: deque[Pointing] = deque(maxlen=POINTS_MOST)
         self._without = 0
         """Pulses since the last picture."""
         self._patience = round(_WAITS_S * site.fps) + config.encode.gop
@@ -130,8 +157,12 @@ class CameraPipeline:
         word = self.witness.word(pulse, detections if looked else None) if self.witness else None
         return Searched(pulse, image, detections, looked, word, left_out=left_out)
 
-    def follow(self, searched: Searched, heard: Heard = _BY_ITSELF) -> CameraTracks | None:
+    def follow(
+        self, searched: Searched, heard: Heard = _BY_ITSELF, pointings: Sequence[Pointing] = ()
+    ) -> CameraTracks | None:
         """Follow everybody into a frame; give the tracks when a window has ended.
+
+        Where somebody points waits for that, and mends the past with it: there is one message of each epoch.
 
         A pulse that does not come, or has no image, is a frame in which nobody was seen; the camera's report
         says which those were, but for the time before a recording begins. It also says in which frames
@@ -152,7 +183,14 @@ class CameraPipeline:
             if searched.left_out
             else self._tracker.push(pulse, detections, searched.image)
         )
-        return None if result is None else self._measured(self._reporter.regular(result), searched.image)
+        self._pointings.extend(pointings)
+        if result is None:
+            return None
+        if self._pointings:
+            anew = self._tracker.point(list(self._pointings))
+            self._pointings.clear()
+            result = result if anew is None else mended(result, anew)
+        return self._measured(self._reporter.regular(result), searched.image)
 
     def last_word(self, end: int) -> Found | None:
         """Give what the other cameras are told when the recording has no frame ``end``."""

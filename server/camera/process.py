@@ -19,6 +19,7 @@ from server.camera.exchange import Exchange
 from server.camera.load import Load
 from server.camera.meter import Meter
 from server.camera.pipeline import CameraPipeline
+from server.camera.pointed import Pointed
 from server.camera.sound import LiveSound, open_sound, runs
 from server.camera.sources import Image, SourceEnded
 from server.camera.thumbs import thumbnails
@@ -83,6 +84,7 @@ class CameraProcess:
         live = not (self._pipeline.source.recorded or self._pipeline.passes)
         self._load = Load(config, camera_id, live=live)
         self._exchange = Exchange(config, camera_id, self._pipeline.witness, self._backlog.maxsize)
+        self._pointed = Pointed(camera_id, self._boot)
         self._meter = Meter(fps)
         self._state = "starting"
         self._end = 0
@@ -93,6 +95,8 @@ class CameraProcess:
         """Serve until the recording is over (a camera's never is)."""
         self._bus = bus = Bus.client(self._config.zenoh, self._id)
         try:
+            if self._config.track.assist.enabled:
+                bus.subscribe(self._keys.camera(self._id, "pointing"), self._pointed.put)
             await self._wait_for_bestview(bus)
             bus.declare_alive(self._keys.camera(self._id, "alive"))
             await self._exchange.join()
@@ -219,7 +223,8 @@ class CameraProcess:
             self._load.measured(now - item.due, now)
             heard = await self._exchange.of(pulse, searched.word, item.taken, needed=searched.asks)
             began = time.perf_counter()
-            tracks = await self._in(self._tracking, partial(self._pipeline.follow, searched, heard))
+            follow = partial(self._pipeline.follow, searched, heard, self._pointed.take())
+            tracks = await self._in(self._tracking, follow)
             if tracks is None:
                 continue
             search_s, solve_s = fmean(took) if took else None, time.perf_counter() - began
@@ -250,6 +255,7 @@ class CameraProcess:
         status: CameraStatus = self._meter.status(
             self._id, self._boot, self._state, self._backlog.qsize(), self._load
         )
+        status = msgspec.structs.replace(status, pointed=self._pointed.taken)
         self._publish("status", msgspec.json.encode(status))
 
     def _publish(self, what: str, payload: bytes, attachment: bytes | None = None) -> None:

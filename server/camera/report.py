@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 import tracking
 from server.wire.epochs import closing_epoch, epoch_of_window
+from server.wire.help import TROUBLES_MOST, Trouble
 from server.wire.messages import Box, CameraTracks, Glimpse, Solve, Track
-from tracking import SolveReport, WindowResult, WindowTrack
+from tracking import SolveReport, WindowResult, WindowTrack, troubles
 
 _LOOK_DIGITS = 5
 """Of a share of the pixels: more would only make messages longer."""
@@ -70,6 +71,8 @@ class Reporter:
             alone=self._taken_alone(),
             tracks=[_track(track) for track in result.tracks],
             solve=_solve(result.report),
+            troubles=[_trouble(it) for it in result.troubles[:TROUBLES_MOST]],
+            mended_from=result.mended_from,
         )
 
     def _taken_shed(self) -> list[int]:
@@ -88,6 +91,15 @@ def _track(track: WindowTrack) -> Track:
         boxes=[_box(row) for row in track.bridged],
         confidence=float(track.confidence),
         looks=[_glimpse(look) for look in track.looks],
+    )
+
+
+def _trouble(trouble: troubles.Trouble) -> Trouble:
+    return Trouble(
+        reason=trouble.reason,
+        tracks=list(trouble.objects),
+        pulse=max(trouble.frame, 0),
+        margin=float(trouble.margin),
     )
 
 

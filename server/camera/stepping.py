@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from tracking import Detections, WindowResult, between, joined
+from tracking.assist import AssistedTracker, Pointing
 from tracking.detectors import Image
 from tracking.yardsticks import Tracker
 
@@ -31,6 +34,10 @@ class Stepping:
         results = [self._release((pulse, detections)), self._tracker.push(pulse, detections, image)]
         self._before = pulse, detections
         return joined([it for it in results if it is not None])
+
+    def point(self, pointings: Sequence[Pointing]) -> WindowResult | None:
+        """Take in where somebody points; None: that changes nothing, or the tracker takes no pointings."""
+        return self._tracker.point(pointings) if isinstance(self._tracker, AssistedTracker) else None
 
     def flush(self) -> WindowResult | None:
         """End the recording."""

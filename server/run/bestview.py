@@ -51,6 +51,8 @@ async def _follow(running: Running, service: BestViewService) -> None:
             service.go_by(reload.now)
         except UserError as error:
             log.warning("%s: %s; the configuration as it was stays in force", running.path, error)
+        except Exception:
+            log.exception("%s: going by it failed; the next one that is read is tried again", running.path)
         else:
             running.now = reload.now
             log.info("%s", reload.line)

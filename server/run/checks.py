@@ -58,4 +58,4 @@ def check_recording(config: Config, camera: str) -> None:
         UserError: it cannot be opened, or its file of detections.
     """
     if kind_of(config.camera(camera).source) is not SourceKind.STREAM:
-        CameraPipeline(config, camera).close()
+        CameraPipeline(config, camera, ready=False).close()

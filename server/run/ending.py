@@ -8,6 +8,7 @@ import ctypes
 import logging
 import os
 import signal
+import sys
 import threading
 from collections.abc import Callable, Coroutine, Iterator
 from contextlib import contextmanager
@@ -17,6 +18,10 @@ log = logging.getLogger(__name__)
 
 _PR_SET_PDEATHSIG = 1
 _ENDING = (signal.SIGINT, signal.SIGTERM)
+SUPERVISED = "MYVIEW_SUPERVISED"
+"""Set in the environment of a process that a supervisor looks after."""
+OVER = 4
+"""The code by which such a process says that nothing is left to do; 0 is that of one told to end."""
 _LET_GO_S = 1.2
 """How long a process has to let go of everything; a camera that is silent is waited for longer."""
 
@@ -26,8 +31,11 @@ async def run_until_told(
     told: Callable[[], None] = lambda: None,
     *,
     hang_up: bool = True,
-) -> None:
+) -> bool:
     """Run a coroutine until it is over or a signal asks to end, when ``told`` is called first.
+
+    Returns:
+        Whether it was over by itself.
 
     ``hang_up``: SIGHUP asks for that, too.
     """
@@ -40,8 +48,11 @@ async def run_until_told(
 
     for number in (*_ENDING, signal.SIGHUP) if hang_up else _ENDING:
         loop.add_signal_handler(number, end)
-    with contextlib.suppress(asyncio.CancelledError):
+    try:
         await task
+    except asyncio.CancelledError:
+        return False
+    return True
 
 
 def end_with_parent() -> None:
@@ -60,7 +71,9 @@ def run_process(
     Who is told to end has so many seconds to let go of everything. Then the process ends all the same: a
     thread may be held up by a camera that says nothing, and whoever stops a site would wait for that, too.
     """
-    asyncio.run(run_until_told(main, lambda: _end_after(let_go_s), hang_up=hang_up))
+    over = asyncio.run(run_until_told(main, lambda: _end_after(let_go_s), hang_up=hang_up))
+    if over and os.environ.get(SUPERVISED):
+        sys.exit(OVER)
 
 
 def _end_after(seconds: float) -> None:

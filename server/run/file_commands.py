@@ -147,17 +147,25 @@ def evaluate(
 
 
 def scene(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="Which scene, e.g. room.")],
+    name: Annotated[str, typer.Argument(metavar="NAME", help="room, gallery, overhead, court or fish.")],
     out: OutFolder,
-    cameras: Annotated[int, typer.Option(min=1)] = 3,
-    objects: Annotated[int, typer.Option(min=1)] = 4,
+    cameras: Annotated[
+        int | None, typer.Option(min=1, show_default="as many as suit the scene", help="How many look.")
+    ] = None,
+    objects: Annotated[
+        int | None, typer.Option(min=1, show_default="as many as suit the scene", help="People, or fish.")
+    ] = None,
     seconds: Annotated[float, typer.Option(min=0.04)] = 20.0,
     seed: Annotated[int, typer.Option(min=0)] = 1,
     size: Annotated[str, typer.Option(help="WIDTHxHEIGHT in pixels.")] = "640x360",
     fps: Annotated[float, typer.Option(min=1.0)] = 25.0,
 ) -> None:
-    """Write a synthetic multi-view recording with ground truth."""
-    from server.camera.scene import Scene, write_recording
+    """Write a synthetic multi-view recording with ground truth.
+
+    room: people come and go. gallery: cameras without a floor in common. overhead: people meet and part, seen
+    from straight above. court: two teams play. fish: nine that look the same, in a murky tank.
+    """
+    from server.camera.scene import Scene, has_ground, write_recording
     from server.run.progress import bar
     from server.run.recorded import parse_size
 
@@ -170,4 +178,5 @@ def scene(
             )
     except (ValueError, OSError) as error:
         raise UserError(str(error)) from error
-    typer.echo(f"{out}: {cameras} views, gt/ and ground.json")
+    views = "1 view" if drawn.cameras == 1 else f"{drawn.cameras} views"
+    typer.echo(f"{out}: {views}, gt/{' and ground.json' if has_ground(drawn) else ''}")

@@ -16,9 +16,10 @@ _OF_A_CAMERA = ("source", "password", "offset", "at_end", "h264", "options", "ig
 _TRACK = tuple(name for name in Track.model_fields if name != "backlog_s")
 _OF_CAMERAS = ("detect", *(f"track.{name}" for name in _TRACK))
 """What all cameras' processes go by, and nobody else."""
-_WINDOW = ("track.window",)
 _EPOCHS = ("track.window.window", "track.window.stride")
 """But the best view lines windows up by these."""
+_BY_LAG = ("tracker", "temporal")
+"""And these may say how late a frame is final, which it goes by as well."""
 _OF_THE_BEST_VIEW = ("view", "http", "access", "record")
 
 
@@ -63,8 +64,8 @@ def reloaded(running: Config, wanted: Config) -> Reload:
     except ValueError:  # what makes a shorter one possible waits itself
         view = view.model_copy(update={"lookahead": running.view.lookahead})
         live = tuple(key for key in live if key != "view.lookahead")
-    kept_window = any(key in _EPOCHS for key in keys)
-    shared = tuple(key for key in _of(keys, _OF_CAMERAS) if not (kept_window and _of((key,), _WINDOW)))
+    kept = _kept(running, wanted, keys)
+    shared = tuple(key for key in _of(keys, _OF_CAMERAS) if not _of((key,), [f"track.{it}" for it in kept]))
     # Whose H.264 can pass depends on the site's codec: with another one, that waits, too.
     names_of_own = tuple(it for it in _OF_A_CAMERA if not (it == "h264" and "encode.codec" in keys))
     own = {it: _of(keys, [f"cameras.{it}.{name}" for name in names_of_own]) for it in running.camera_ids}
@@ -77,7 +78,7 @@ def reloaded(running: Config, wanted: Config) -> Reload:
         update={
             "view": view,
             "detect": wanted.detect,
-            "track": _track(running, wanted, kept_window=kept_window),
+            "track": _track(running, wanted, kept),
             "cameras": [_camera(running, wanted, it, names_of_own) for it in running.camera_ids],
         }
     )
@@ -89,9 +90,17 @@ def _of(keys: Sequence[str], sections: Sequence[str]) -> tuple[str, ...]:
     return tuple(key for key in keys if any(f"{key}.".startswith(f"{section}.") for section in sections))
 
 
-def _track(running: Config, wanted: Config, *, kept_window: bool) -> Track:
-    """Take over how people are followed, but not when windows end."""
-    names = [name for name in _TRACK if not (kept_window and name == "window")]
+def _kept(running: Config, wanted: Config, keys: Sequence[str]) -> tuple[str, ...]:
+    """Name what of `track` has to stay as it is, since it changes when windows end or frames are final."""
+    fps = running.site.fps
+    apart = running.track.model_copy(update={name: getattr(wanted.track, name) for name in _BY_LAG})
+    late = _BY_LAG if apart.lag(fps) != running.track.lag(fps) else ()
+    return (*late, "window") if any(key in _EPOCHS for key in keys) else late
+
+
+def _track(running: Config, wanted: Config, kept: Sequence[str]) -> Track:
+    """Take over how people are followed, but not when windows end and frames are final."""
+    names = [name for name in _TRACK if name not in kept]
     return running.track.model_copy(update={name: getattr(wanted.track, name) for name in names})
 
 

@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from server.run.ending import OVER, SUPERVISED
 from server.wire.config import Config
 from server.wire.errors import UserError
 
@@ -38,7 +39,7 @@ class Child:
 class Supervisor:
     """Starts one process each for the pulses, every camera and the best view; restarts what dies.
 
-    A camera whose recording is over ends with 0 and stays so; when the best-view service ends with 0,
+    A camera whose recording is over says so (`OVER`) and stays so; when the best-view service does,
     everything is over. ``before_start`` is called whenever a process is about to be started.
     """
 
@@ -51,7 +52,7 @@ class Supervisor:
         before_start: Callable[[], None] = lambda: None,
     ) -> None:
         self._before_start = before_start
-        self._environment = {**os.environ, **environment, "MYVIEW_SUPERVISED": "1"}
+        self._environment = {**os.environ, **environment, SUPERVISED: "1"}
         path = str(config_path)
         self._out = out
         self.children = [
@@ -99,7 +100,7 @@ class Supervisor:
                 process_group=0,  # Ctrl-C in a terminal is for the supervisor alone
             )
             code = await child.process.wait()
-            if code == 0:
+            if code == OVER:
                 log.info("%s has ended", child.name)
                 child.done.set()
                 return
@@ -107,7 +108,7 @@ class Supervisor:
                 raise UserError(f"{child.name} could not start")
             if loop.time() - started > _SETTLED_S:
                 pause = _RETRY_FIRST_S
-            log.warning("%s died (%s); starting it again in %.1f s", child.name, _cause(code), pause)
+            log.warning("%s %s; starting it again in %.1f s", child.name, _cause(code), pause)
             await asyncio.sleep(pause)
             pause = min(2 * pause, _RETRY_MAX_S)
             child.restarts += 1
@@ -140,4 +141,6 @@ class Supervisor:
 
 
 def _cause(code: int) -> str:
-    return f"killed by signal {-code}" if code < 0 else f"exit code {code}"
+    if code == 0:
+        return "was told to end by somebody else"
+    return f"died (killed by signal {-code})" if code < 0 else f"died (exit code {code})"

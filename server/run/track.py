@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import closing
 from dataclasses import dataclass, replace
 from itertools import count
 from pathlib import Path
@@ -10,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from server.camera.ahead import ready_detector
+from server.camera.following import ready_tracker
 from server.camera.sources import Image, Source, SourceEnded, open_source
 from server.run.setup import config_for_videos
 from server.wire.config import Config
@@ -20,7 +22,7 @@ from server.wire.output import whole_file
 from tracking import Detections, Solver, WindowResult, solver_named, solver_names
 from tracking.detectors import MotFileDetector
 from tracking.motchallenge import MotRow, write_rows
-from tracking.yardsticks import needs_pictures, tracker_named, tracker_names
+from tracking.yardsticks import Tracker, needs_pictures, tracker_names
 
 _NO_PICTURE = np.empty((0, 0, 3), dtype=np.uint8)
 
@@ -52,10 +54,8 @@ def track_one(
     if video is None and det is None:
         raise UserError("track: name a video, or its detections with --det, or both")
     loaded = loaded_for(video, det, config)
-    settings = loaded.track
     frames = _from_detections(det) if video is None and det is not None else searched(loaded)
-    name = _tracker_for(loaded, tracker, video)
-    follower = tracker_named(name, settings.window, settings.costs, lambda: solver_for(loaded, solver))
+    follower = _follower(loaded, _tracker_for(loaded, tracker, video), lambda: solver_for(loaded, solver))
     rows: list[MotRow] = []
     with whole_file(out) as draft:
         for frame in frames:
@@ -78,6 +78,15 @@ def _tracker_for(config: Config, name: str | None, video: Path | None) -> str:
     if video is None and needs_pictures(chosen):
         raise UserError(f"--tracker: {chosen} follows what pictures show: name a video, too")
     return chosen
+
+
+def _follower(config: Config, name: str, solver: Callable[[], Solver]) -> Tracker:
+    """Give the tracker, which has looked ahead where it goes by pictures."""
+    camera = config.cameras[0]
+    if not needs_pictures(name):
+        return ready_tracker(config, name, camera, None, solver)
+    with closing(open_source(camera, config.site)) as source:
+        return ready_tracker(config, name, camera, source, solver)
 
 
 def solver_for(config: Config, name: str | None) -> Solver:

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Container, Sequence
 from dataclasses import dataclass, field
 
 from server.wire.epochs import end_of_epoch
 from server.wire.messages import CameraTracks
+
+_MENDED_MOST = 16
+"""Words that have mended the past, and came too late, that are kept until the next epoch."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,6 +24,8 @@ class Epoch:
     """By camera, in the order of the configuration."""
     late: tuple[str, ...] = ()
     """Cameras that were waited for in vain, and cameras whose word on it was lost on the way."""
+    mended: tuple[CameraTracks, ...] = ()
+    """Words on earlier epochs that came too late for these, and say who was who before."""
 
 
 @dataclass(slots=True)
@@ -51,6 +57,7 @@ class Aligner:
         self._heard: int | None = None
         """The pulse at which somebody had spoken of the next epoch, or of a later one."""
         self.late_messages = dict.fromkeys(cameras, 0)
+        self._mended: deque[CameraTracks] = deque(maxlen=_MENDED_MOST)
 
     def come(self, camera: str) -> None:
         """A camera is there."""
@@ -77,6 +84,8 @@ class Aligner:
             self._next = message.epoch
         if message.epoch < self._next:
             self.late_messages[message.camera] += 1
+            if message.mended_from is not None:
+                self._mended.append(message)  # that the past was mended is not said again
             # It ended while nobody waited for it: that must not be lost, or its end is waited for.
             place.ended |= message.ended
             return
@@ -122,7 +131,8 @@ class Aligner:
             if message is not None:
                 taken[name] = message
                 place.ended |= message.ended
-        return Epoch(number, end, taken, (*late, *self._skipped(end, taken)))
+        mended, self._mended = tuple(self._mended), deque(maxlen=_MENDED_MOST)
+        return Epoch(number, end, taken, (*late, *self._skipped(end, taken)), mended)
 
     def _patience(self, end: int) -> int:
         """Give the last pulse at which an epoch with this end is waited for."""

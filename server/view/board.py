@@ -95,8 +95,16 @@ def reason(choice: ObjectChoice, why: Explanation) -> str:
     camera = choice.camera
     if camera is None:
         return "No camera's picture can be shown at the moment."
-    if choice.away or not any(view.seen for view in why.views.values()):
+    if choice.away or not any(view.seen or view.unfound for view in why.views.values()):
         return f"Nobody sees this person at the moment; {camera} saw them last."
+    return _compared(camera, why)
+
+
+def _compared(camera: str, why: Explanation) -> str:
+    """Say why this camera, of those that see the person or should."""
+    shown = why.views.get(camera)
+    if shown is not None and not shown.seen and shown.unfound:
+        return f"{camera} does not find this person, but others know that they stand before it."
     possible = {name: view.cost for name, view in why.views.items() if view.cost is not None}
     if len(possible) == 1:
         return f"{camera} is the only camera whose picture can be shown."

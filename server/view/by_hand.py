@@ -46,7 +46,6 @@ class ByHand:
             return update
         self._gone = ((self._gone | set(update.gone)) & self._spoken_of) - set(update.returned)
         merged = tuple(self._merged(update.merged))
-        splits = {Split(self.now(it.kept), self.now(it.parted), it.camera) for it in update.split}
         return replace(
             update,
             numbers={key: self.now(number) for key, number in update.numbers.items()},
@@ -54,8 +53,13 @@ class ByHand:
             returned=self._people(update.returned),
             gone=tuple(it for it in self._people(update.gone) if self._gone.issuperset(self.worked_out(it))),
             merged=merged,
-            split=tuple(sorted(it for it in splits if it.kept != it.parted)),
+            split=self.read_splits(update.split),
         )
+
+    def read_splits(self, splits: Iterable[Split]) -> tuple[Split, ...]:
+        """Read splits as what was said: of two numbers that are said to be one person's there are none."""
+        said = {Split(self.now(it.kept), self.now(it.parted), it.camera) for it in splits}
+        return tuple(sorted(it for it in said if it.kept != it.parted))
 
     @property
     def _spoken_of(self) -> set[int]:

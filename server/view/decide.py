@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from bestview import NO_CAMERA, Merge, Split, choose_by_gops
 from server.view.align import Epoch
+from server.view.elsewhere import Elsewhere
 from server.view.lately import Lately
 from server.view.outlook import Outlook
 from server.view.people import People
@@ -79,12 +80,15 @@ class Decider:
         self._cameras: Sequence[str] = config.camera_ids
         self._has = has
         size = (config.site.width, config.site.height)
-        lag, share = config.track.window.lag, config.view.share
-        self.people = People(config.view.identity, self._cameras, homographies, size, lag, share)
+        lag, share = config.track.lag(config.site.fps), config.view.share
+        self.people = People(
+            config.view.identity, self._cameras, homographies, size, lag, share, config.overhead
+        )
         stride, gop = config.track.window.stride, config.encode.gop
         self._at_once = -(-stride // gop) + 1
         """GOPs that an epoch decides at most: one more than it completes while the look-ahead stays."""
         self._sight = Sight(config, homographies, self.people.fits)
+        self._elsewhere = Elsewhere(config, self._sight)
         self._shots = Shots()
         self._lately = Lately()
         self._next_gop: int | None = None
@@ -131,6 +135,7 @@ class Decider:
         firsts = range(self._next_gop, last + 1, gop)[: self._at_once]
         decided = [self._decide(outlook, first, gop, weight) for first in firsts]
         self._lately = outlook.lately(self._next_gop)
+        self._elsewhere.learn(outlook.looked, self._next_gop - outlook.first)
         return decided
 
     def finish(self, last: int) -> list[GopDecision]:
@@ -158,6 +163,8 @@ class Decider:
             relative=self._config.view.quality.relative,
             lately=self._lately,
             lasts=self._config.view.missed_s * self._config.site.fps,
+            elsewhere=self._elsewhere if self._config.view.unfound else None,
+            unfound=self._config.view.unfound,
         )
 
     def _weight(self, lookahead: int) -> Floats:

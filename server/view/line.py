@@ -54,7 +54,7 @@ class Line:
         _, once, back = np.unique(tracks, return_index=True, return_inverse=True)
         keys = list(chain.from_iterable(it.keys for it in windows))
         numbers = people.numbers([keys[at] for at in once.tolist()], self._first, frames)
-        persons = np.ascontiguousarray(_indices(numbers, everybody).T)
+        persons = np.ascontiguousarray(_over_frames(numbers, everybody).T)
         each = np.split(back, np.cumsum(self._tracks)[:-1])
         return _joined(
             [
@@ -62,6 +62,18 @@ class Line:
                 for it, own in zip(self._stretches, each, strict=True)
             ]
         )
+
+    def boxes(self, places: Ints) -> Floats:
+        """Give the boxes at places in line, (P,) rising: (P, 4) pixels of the site's picture."""
+        boxes = np.empty((len(places), 4))
+        ends = np.searchsorted(places, self._begins)
+        for stretch, begin, start, end in zip(
+            self._stretches, self._begins.tolist(), ends.tolist(), ends[1:].tolist(), strict=False
+        ):
+            own = stretch.window.window
+            frame, track = np.divmod(places[start:end] - begin, max(len(own.keys), 1))
+            boxes[start:end] = own.boxes[track, frame + stretch.first - own.first]
+        return boxes
 
     def terms(self, place: int) -> Floats:
         """Give what the quality at a place in line is made of, (terms,)."""
@@ -82,16 +94,19 @@ def _quality(stretch: Stretch[SeenWindow]) -> Floats:
     return seen.quality[stretch.first - first : stretch.last - first + 1].reshape(-1)
 
 
-def _indices(numbers: Ints, everybody: Ints) -> Ints:
-    """Find numbers (T, N) among everybody's (K,), rising: their indices, -1 where they are not among them."""
+def indices_of(numbers: Ints, everybody: Ints) -> Ints:
+    """Find numbers (T,) among everybody's (K,), rising: their indices, -1 where they are not among them."""
+    if not len(everybody):
+        return np.full(numbers.shape, -1)
+    at = np.minimum(np.searchsorted(everybody, numbers), len(everybody) - 1)
+    return np.where(everybody[at] == numbers, at, -1)
 
-    def found(values: Ints) -> Ints:
-        at = np.minimum(np.searchsorted(everybody, values), len(everybody) - 1)
-        return np.where(everybody[at] == values, at, -1)
 
+def _over_frames(numbers: Ints, everybody: Ints) -> Ints:
+    """Do so for numbers (T, N)."""
     # Hardly any track becomes another person on the way.
     changing = (numbers != numbers[:, :1]).any(axis=1)
-    indices = np.repeat(found(numbers[:, 0])[:, None], numbers.shape[1], axis=1)
+    indices = np.repeat(indices_of(numbers[:, 0], everybody)[:, None], numbers.shape[1], axis=1)
     if changing.any():
-        indices[changing] = found(numbers[changing])
+        indices[changing] = indices_of(numbers[changing], everybody)
     return indices

@@ -46,6 +46,12 @@ class LocalNumbers:
         """Say what the camera calls a track that is not forgotten."""
         return Followed(key.camera, *self._origin[key])
 
+    def exchange(self, one: TrackKey, two: TrackKey) -> None:
+        """Let two tracks of one run of a camera take each other's name here from now on."""
+        (boot, first), (_, second) = self._origin[one], self._origin[two]
+        self._origin[one], self._origin[two] = (boot, second), (boot, first)
+        self._keys[one.camera, boot] |= {first: two, second: one}
+
     def forget(self, key: TrackKey) -> None:
         """Let go of a track; should it come back it has a new number."""
         origin = self._origin.pop(key, None)

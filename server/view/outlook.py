@@ -8,12 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview import NO_VIEW_COST, Gops, SeenViews, with_missed
+from bestview import NO_VIEW_COST, Gops, SeenViews, with_expected, with_missed
 from bestview.quality import compared_views
+from server.view.elsewhere import Elsewhere
 from server.view.lately import Lately
-from server.view.line import Line
+from server.view.line import Line, indices_of
 from server.view.people import People
 from server.view.sight import Sight
+from server.view.unfound import Unfound
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -42,6 +44,8 @@ class Outlook:
         relative: bool,
         lately: Lately = NOTHING,
         lasts: float = 0.0,
+        elsewhere: Elsewhere | None = None,
+        unfound: float = 0.0,
     ) -> None:
         self.cameras, self.first = cameras, first
         self.numbers: Ints = np.array(people.known, dtype=np.int64)
@@ -49,7 +53,11 @@ class Outlook:
         line = Line([sight.over(camera, first, last) for camera in cameras], first)
         pulses, everybody = range(first, last + 1), len(self.numbers)
         shown = np.array([[has(camera, it) for camera in cameras] for it in pulses], dtype=np.bool_)
-        person = line.persons(people, self.numbers, len(pulses))
+        numbers: Ints = np.array(people.everybody, dtype=np.int64)
+        anybody, mine = line.persons(people, numbers, len(pulses)), indices_of(numbers, self.numbers)
+        self.looked = Unfound.nobody() if elsewhere is None else elsewhere.look(line, anybody, len(pulses))
+        """For all people, also those whom another service decides for."""
+        person = np.append(mine, -1)[anybody]
         there = np.flatnonzero((line.quality >= 0.0) & (person >= 0))
         row, person = line.row[there], person[there]
         cell = (line.frame * len(cameras) + line.camera)[row]
@@ -60,13 +68,20 @@ class Outlook:
         """(R,) of each view by itself."""
         row, person = row[counts], person[counts]
         frame, worth = line.frame[row], np.minimum(self.quality, 1.0)
+        found = (frame * len(cameras) + line.camera[row]) * everybody + person
+        self.unfound = other = self.looked.of(mine, everybody, shown, found, unfound)
+        """This outlook's people's views that are worth something though the camera does not find them."""
+        extra = np.minimum(other.quality, 1.0)
         if relative:
-            worth = compared_views(worth, frame * everybody + person, len(pulses) * everybody)
+            moment = np.concatenate([frame * everybody + person, other.frame * everybody + other.person])
+            both = compared_views(np.concatenate([worth, extra]), moment, len(pulses) * everybody)
+            worth, extra = both[: len(worth)], both[len(worth) :]
         self.views = SeenViews(frame, line.camera[row], person, worth, shown, everybody)
         self.before = lately.of(self.numbers, len(cameras), first)
         """How everybody was seen before the first frame."""
-        self.taken = with_missed(self.views, self.before, lasts)
-        """The views, and those that are taken to be there though somebody was missed for a moment."""
+        missed = with_missed(self.views, self.before, lasts)
+        self.taken = with_expected(missed, other.frame, other.camera, other.person, extra)
+        """The views, and those that are taken to be there though somebody was missed, or is not found."""
 
     def lately(self, pulse: int) -> Lately:
         """Tell how everybody was seen before a pulse, for the next outlook."""
@@ -115,6 +130,14 @@ class Part:
         """
         return self._rows(self.outlook.views, number)
 
+    def unfound(self, number: int) -> Ints:
+        """Give one person's views in which they are not found, (V,) indices into the outlook's.
+
+        Raises:
+            KeyError: this part is not about that person.
+        """
+        return self._rows(self.outlook.unfound, number)
+
     def cost(self, number: int) -> Floats:
         """Give one person's c(n, b), (N, C); infinite where a camera cannot be shown.
 
@@ -126,7 +149,7 @@ class Part:
         cost[views.frame[rows] - self.first, views.camera[rows]] -= views.worth[rows]
         return cost
 
-    def _rows(self, views: SeenViews, number: int) -> Ints:
+    def _rows(self, views: SeenViews | Unfound, number: int) -> Ints:
         person = self.people[self.numbers == number]
         if not person.size:
             raise KeyError(number)

@@ -13,10 +13,12 @@ from server.view.align import Epoch
 from server.view.by_hand import ByHand
 from server.view.history import History
 from server.view.locals import Followed
+from server.view.mended import Mending
 from server.view.numbered import numbered_boxes
 from server.view.parts import NOBODY_YET, UNKNOWN, Part, numbers_over, parts_of, with_settled
 from server.view.reading import CameraWindow, Reader
 from server.view.share import served
+from server.view.told_tracks import ToldTracks
 from server.wire.fit import Fit
 from server.wire.messages import NumberedBox
 from server.wire.sections import Share
@@ -30,7 +32,8 @@ class People:
 
     ``homographies`` map each camera's own picture to the ground; None where there is none. ``share`` says
     whom this service decides for; who is who is worked out for everybody, the same in every service. ``lag``
-    frames before an epoch's end tracks are final: who is who is worked out up to there.
+    frames before an epoch's end tracks are final: who is who is worked out up to there. ``overhead`` are the
+    cameras that look straight down.
     """
 
     def __init__(
@@ -41,13 +44,17 @@ class People:
         site_size: tuple[int, int],
         lag: int,
         share: Share = ALL,
+        overhead: Collection[str] = (),
     ) -> None:
-        self._registry = IdentityRegistry(settings, homographies)
+        self._registry = IdentityRegistry(settings, homographies, overhead)
         self._remembered = settings.forget_after
         self._share = share
         self._histories = {camera: History[CameraWindow]() for camera in cameras}
         self._reader = Reader(site_size)
         self._lag = lag
+        self._mending = Mending(self._registry, self._reader)
+        self.told = ToldTracks()
+        """By which tracks people were shown in GOPs that are told."""
         self._parts: dict[TrackKey, Sequence[Part]] = {}
         self._heard: dict[TrackKey, int] = {}
         self._asked_from = 0
@@ -67,15 +74,15 @@ class People:
 
     def update(self, epoch: Epoch) -> Sequence[CameraWindow]:
         """Take over what all cameras said about an epoch; give it as it was read."""
-        windows = self._reader.read(epoch)
-        for window in windows:
-            self._histories[window.message.camera].put(window, window.first, window.message.last)
+        late = [self._taken(window) for window in self._reader.read_late(epoch)]
+        windows = [self._taken(window) for window in self._reader.read(epoch)]
         tracks = [track for window in windows for track in window.local_tracks()]
         pictures = {window.message.camera: window.message.size for window in windows}
         self._now = epoch.last
         update = self._by_hand.read(self._registry.update(tracks, epoch.last - self._lag, pictures))
         for key, parts in parts_of(update.numbers).items():
             self._parts[key] = with_settled(self._parts.get(key, ()), parts, self._asked_from)
+        self._mending.overlay(self._parts)
         keys = chain.from_iterable(window.keys for window in windows)
         seen = chain.from_iterable(window.seen() for window in windows)
         for key, (first, last) in zip(keys, seen, strict=True):
@@ -86,7 +93,7 @@ class People:
             self._merge(merge.kept, merge.lost)
         self._corrections += [*update.merged, *update.split]
         self._forget(epoch.last)
-        return windows
+        return [*late, *windows]
 
     @property
     def fits(self) -> Mapping[str, Fit]:
@@ -94,15 +101,20 @@ class People:
         return self._reader.fits
 
     @property
+    def everybody(self) -> list[int]:
+        """Everybody's number, in order, whichever service decides for them."""
+        return sorted(self.first_seen)
+
+    @property
     def known(self) -> list[int]:
         """Everybody's number whom this service decides for, in order; those who are away too."""
-        return served(sorted(self.first_seen), self.merged, self._share)
+        return served(self.everybody, self.merged, self._share)
 
     @property
     def elsewhere(self) -> list[int]:
         """The other people's numbers, in order: another service decides for them."""
         mine = set(self.known)
-        return [number for number in sorted(self.first_seen) if number not in mine]
+        return [number for number in self.everybody if number not in mine]
 
     def call(self, number: int, name: str) -> None:
         """Give somebody a name; an empty one takes it back."""
@@ -187,9 +199,24 @@ class People:
 
     def forget_boxes_before(self, pulse: int) -> None:
         """Let go of the boxes before a pulse, and of who they were."""
+        if self.told.frames:
+            said = [it for history in self._histories.values() for it in history.over(0, pulse - 1)]
+            for it in sorted(said, key=lambda it: it.last):
+                self.told.note(it, self.numbers(it.window.keys, it.last, 1)[:, 0])
         self._asked_from = max(self._asked_from, pulse)
+        self._mending.keep_only(self._parts, self._asked_from)
         for history in self._histories.values():
             history.forget_before(pulse)
+
+    def _taken(self, window: CameraWindow) -> CameraWindow:
+        """Take a window over, by what its tracks are called if its past was mended."""
+        history = self._histories[window.message.camera]
+        if window.message.mended_from is not None:
+            before = history.over(window.first, window.fresh - 1)
+            window, splits = self._mending.read(window, before, self._parts)
+            self._corrections += self._by_hand.read_splits(splits)
+        history.put(window, window.first, window.message.last)
+        return window
 
     def _note_seen(self, parts: Sequence[Part], first: int, last: int) -> None:
         for place, part in enumerate(parts):
@@ -204,6 +231,7 @@ class People:
         name = self.names.pop(lost, "")
         if name:
             self.names.setdefault(kept, name)
+        self._mending.merge({lost: kept})
         self._parts = {
             key: [Part(part.first, kept) if part.number == lost else part for part in parts]
             for key, parts in self._parts.items()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +29,7 @@ class CameraWindow:
         locals: (T,) their numbers.
         fit: how the camera's own picture lies in the site's.
         boxes: (T, F, 4) pixels of the site's picture, NaN where hidden.
+        fresh: the first frame that was not final before: the first of all, unless the past was mended.
     """
 
     message: CameraTracks
@@ -36,6 +37,7 @@ class CameraWindow:
     locals: NDArray[np.int64]
     fit: Fit
     boxes: Floats
+    fresh: int
 
     @property
     def first(self) -> int:
@@ -45,16 +47,16 @@ class CameraWindow:
     def local_tracks(self) -> list[LocalTrack]:
         """Give what is final of the tracks, where it is anything, boxes in the camera's own picture."""
         _, height = self.message.size
-        frames = max(0, self.message.final_to - self.first + 1)
-        hidden = np.isnan(self.boxes[:, :frames, 0])
-        own = self.fit.boxes_to_own(self.boxes[:, :frames])
+        known = slice(self.fresh - self.first, max(0, self.message.final_to - self.first + 1))
+        hidden = np.isnan(self.boxes[:, known, 0])
+        own = self.fit.boxes_to_own(self.boxes[:, known])
         return [
             LocalTrack(
                 camera=key.camera,
                 local=key.local,
-                first=self.first,
+                first=self.fresh,
                 boxes=boxes,
-                looks=_glimpses(track.looks),
+                looks=_glimpses(track.looks, self.fresh),
                 picture_height=float(height),
             )
             for key, track, boxes, gone in zip(self.keys, self.message.tracks, own, hidden, strict=True)
@@ -72,8 +74,13 @@ class CameraWindow:
         return list(zip(begins.tolist(), ends.tolist(), strict=True))
 
 
-def _glimpses(looks: Sequence[messages.Glimpse]) -> tuple[Glimpse, ...]:
-    return tuple(Glimpse(it.first, it.last, np.array(it.histogram, dtype=np.float64)) for it in looks)
+def _glimpses(looks: Sequence[messages.Glimpse], first: int) -> tuple[Glimpse, ...]:
+    """Give the looks in the frames from `first` on."""
+    return tuple(
+        Glimpse(max(it.first, first), it.last, np.array(it.histogram, dtype=np.float64))
+        for it in looks
+        if it.last >= first
+    )
 
 
 class Reader:
@@ -84,10 +91,18 @@ class Reader:
         self.locals = LocalNumbers()
         self.fits: dict[str, Fit] = {}
         """Of each camera, known from its first word on."""
+        self._final: dict[str, int] = {}
+        """By camera, the last frame that was final."""
 
     def read(self, epoch: Epoch) -> Sequence[CameraWindow]:
         """Give what all cameras said, in the order of the epoch."""
-        return [self._window(message) for message in epoch.tracks.values()]
+        windows = [self._window(message) for message in epoch.tracks.values()]
+        self._final |= {it.message.camera: it.message.final_to for it in windows}
+        return windows
+
+    def read_late(self, epoch: Epoch) -> Sequence[CameraWindow]:
+        """Give what has mended the past, and came too late for its own epoch."""
+        return [self._window(message) for message in epoch.mended]
 
     def _window(self, message: CameraTracks) -> CameraWindow:
         fit = self.fits.get(message.camera)
@@ -97,4 +112,12 @@ class Reader:
         frames = max(0, message.last - message.first + 1)
         boxes = boxes_array(track.boxes for track in message.tracks)
         locals_ = np.array([key.local for key in keys], dtype=np.int64)
-        return CameraWindow(message, keys, locals_, fit, boxes.reshape(len(keys), frames, 4))
+        fresh = message.first
+        if message.mended_from is not None:
+            fresh = max(fresh, min(self._final.get(message.camera, -1), message.final_to) + 1)
+        return CameraWindow(message, keys, locals_, fit, boxes.reshape(len(keys), frames, 4), fresh)
+
+    def read_again(self, window: CameraWindow) -> CameraWindow:
+        """Give a window by what its tracks are called now."""
+        keys = self.locals.of(window.message)
+        return replace(window, keys=keys, locals=np.array([key.local for key in keys], dtype=np.int64))

@@ -23,5 +23,6 @@ def makes_sense(message: CameraTracks, stride: int) -> bool:
         and len(ids) == len(dict.fromkeys(ids))
         and all(count == bins[0] > 0 for count in bins)
         and all(len(track.boxes) == frames for track in message.tracks)
+        and (message.mended_from is None or message.first <= message.mended_from <= message.final_to)
         and all(message.first <= look.first <= look.last <= message.final_to for look in looks)
     )

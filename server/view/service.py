@@ -12,6 +12,7 @@ import msgspec
 
 from camsync import PulseClient
 from server.view.align import Aligner, Epoch
+from server.view.assist import Assist
 from server.view.board import Board
 from server.view.by_hand_file import ByHandFile
 from server.view.calibrate.walking import Walking
@@ -68,6 +69,7 @@ class BestViewService:
             config, homographies(config), lambda camera, pulse: self.shelves[camera].has(pulse)
         )
         self.board = Board(config.site.fps)
+        self.assist = Assist(config, self.decider.people, self._send_pointing)
         self.walking = Walking(config)
         kept = None if config.view.share.of > 1 else config.record.folder
         self.by_hand = ByHandFile(kept, config.site.name, fps)
@@ -241,6 +243,11 @@ class BestViewService:
         self.by_hand.take(self.decider.people, epoch.last)  # names are there with the first decision
         for decision in decisions:
             self._publish(decision)
+        self.assist.step(epoch, self.config)
+
+    def _send_pointing(self, camera: str, payload: bytes) -> None:
+        if self._bus is not None:
+            self._bus.publish(self._keys.camera(camera, "pointing"), payload)
 
     def _publish(self, decision: GopDecision) -> None:
         """Say which boxes go with the frames before the frames are sent."""

@@ -44,10 +44,11 @@ class Sight:
     def __init__(
         self, config: Config, homographies: Mapping[str, Floats | None], fits: Mapping[str, Fit]
     ) -> None:
-        self._settings: QualitySettings = config.view.quality
+        self.settings: QualitySettings = config.view.quality
         self._size = (float(config.site.width), float(config.site.height))
         self._fps = config.site.fps
-        self._homographies, self._fits = homographies, fits
+        self._homographies, self.fits = homographies, fits
+        self._overhead = config.overhead
         self._histories = {camera: History[SeenWindow]() for camera in config.camera_ids}
 
     def put(self, windows: Sequence[CameraWindow]) -> None:
@@ -58,7 +59,7 @@ class Sight:
 
     def weigh_anew(self, settings: QualitySettings) -> None:
         """Go by other settings from now on, also of what was said already."""
-        self._settings = settings
+        self.settings = settings
         for history in self._histories.values():
             for said in history.over(0, _FOR_EVER):
                 (seen,) = self._seen([said.window.window])
@@ -99,26 +100,26 @@ class Sight:
                 # None becomes NaN: nobody has measured it.
                 np.array([it.sharpness for it in tracks], dtype=np.float64),
             ),
-            Looks(
-                self._size,
-                np.array([self._picture(window.message.camera) for window in windows]),
-                [self._ground(window.message.camera) for window in windows],
-                self._fps,
-            ),
-            self._settings,
+            self.looks([window.message.camera for window in windows]),
+            self.settings,
         )
+
+    def looks(self, cameras: Sequence[str]) -> Looks:
+        """Give what view quality asks of cameras that have spoken."""
+        pictures = np.array([self._picture(camera) for camera in cameras]).reshape(-1, 4)
+        return Looks(self._size, pictures, [self._ground(camera) for camera in cameras], self._fps)
 
     def _picture(self, camera: str) -> tuple[float, float, float, float]:
         """Say where a camera's own picture lies in the site's: in its middle."""
-        left, top = (float(side) for side in self._fits[camera].to_site(np.zeros(2)))
+        left, top = (float(side) for side in self.fits[camera].to_site(np.zeros(2)))
         return left, top, self._size[0] - left, self._size[1] - top
 
     def _ground(self, camera: str) -> Floats | None:
-        """Give the homography from the site's picture."""
+        """Give the homography from the site's picture; none of a camera that nobody can walk towards."""
         own = self._homographies[camera]
-        if own is None:
+        if own is None or camera in self._overhead:
             return None
-        (left, top), scale = self._fits[camera].to_site(np.zeros(2)), self._fits[camera].scale
+        (left, top), scale = self.fits[camera].to_site(np.zeros(2)), self.fits[camera].scale
         to_own = np.array([[1.0, 0.0, -left], [0.0, 1.0, -top], [0.0, 0.0, scale]]) / scale
         return np.asarray(own @ to_own)
 

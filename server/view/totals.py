@@ -20,12 +20,13 @@ class Totals:
         windows: how many programs were solved.
         certified: how many answers of them are proven to be the best there is.
         gap: the sum of the gaps of the others.
+        mended: how many windows have changed what was final, as an operator pointed at somebody.
     """
 
     def __init__(self) -> None:
         self.take, self.encode = Histogram(), Histogram()
         self.search, self.solve, self.track = Histogram(), Histogram(), Histogram()
-        self.windows = self.certified = 0
+        self.windows = self.certified = self.mended = 0
         self.gap = 0.0
 
     @property
@@ -40,6 +41,7 @@ class Totals:
 
     def window(self, tracks: CameraTracks, due: float | None, *, proven: bool) -> None:
         """Count a window; ``due`` is when its last frame was, None: not known."""
+        self.mended += tracks.mended_from is not None
         if tracks.search_s is not None:
             self.search.observe(tracks.search_s)
         if tracks.solve is not None:

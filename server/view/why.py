@@ -12,6 +12,7 @@ from bestview.quality import QualitySettings
 from server.view.outlook import Part
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,6 +27,10 @@ class ViewReason:
     """Mean over these; None: there are none."""
     terms: dict[str, float]
     """What the quality is made of: mean of each term that weighs something; empty where there are none."""
+    unfound: float
+    """Share of the frames in which it does not find the person, who stands before it as others know."""
+    unfound_quality: float | None
+    """What those views are taken to be worth, likewise; None: there are none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +65,7 @@ class Why:
     """
 
     part: Part
-    before: NDArray[np.int64]
+    before: Ints
     weight: Floats
     switch_cost: float
     settings: QualitySettings
@@ -73,6 +78,8 @@ class Why:
         """
         views, cameras = self.part.views(number), self.part.outlook.cameras
         columns = self.part.outlook.views.camera[views]
+        unfound = self.part.unfound(number)
+        others = self.part.outlook.unfound.camera[unfound]
         each = self.part.cost(number)
         cost, mean = (each * self.weight[:, None]).sum(axis=0), each.mean(axis=0)
         before = int(self.before[self.part.numbers == number][0])
@@ -83,7 +90,8 @@ class Why:
         return Explanation(
             frames=self.part.frames,
             views={
-                name: self._view(views[columns == place], mean[place]) for place, name in enumerate(cameras)
+                name: self._view(views[columns == place], unfound[others == place], mean[place])
+                for place, name in enumerate(cameras)
             },
             weights={name: self.settings.weights[name] for name in self.settings.terms},
             stay=_finite(stay),
@@ -92,8 +100,8 @@ class Why:
             switch_cost=self.switch_cost,
         )
 
-    def _view(self, views: NDArray[np.int64], mean: float) -> ViewReason:
-        """Tell what one camera had to say of a person in these views."""
+    def _view(self, views: Ints, unfound: Ints, mean: float) -> ViewReason:
+        """Tell what one camera had to say of a person: where it finds them, and where it does not."""
         outlook = self.part.outlook
         terms = [outlook.terms(int(view)) for view in views]
         return ViewReason(
@@ -103,6 +111,8 @@ class Why:
             terms=dict(zip(self.settings.terms, np.mean(terms, axis=0).tolist(), strict=True))
             if terms
             else {},
+            unfound=len(unfound) / self.part.frames,
+            unfound_quality=float(np.mean(outlook.unfound.quality[unfound])) if unfound.size else None,
         )
 
 

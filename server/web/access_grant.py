@@ -43,6 +43,7 @@ _NEEDS = {
     "/api/objects": Need.TOKEN,
     "/api/cameras": Need.TOKEN,
     "/api/events": Need.TOKEN,
+    "/api/flags": Need.TOKEN,
     "/api/past": Need.TOKEN,
     "/metrics": Need.ALL,
 }

@@ -11,9 +11,10 @@ from typing import Any
 import msgspec
 
 from server.view.channel import Channel, Chunk, Viewer
+from server.view.flags import Flag
 from server.view.service import BestViewService
 from server.web.access_grant import Scope
-from server.web.narrow import cameras_for, choices_for, objects_for, site_for
+from server.web.narrow import cameras_for, choices_for, flag_for, objects_for, site_for
 from server.web.views import cameras_info, objects_info, site_info
 from server.wire.messages import GopChoices
 
@@ -52,6 +53,7 @@ class Events:
         self._recent: deque[GopChoices] = deque(maxlen=_GOPS_KEPT)
         self._closed = False
         service.on_decision.append(self._on_decision)
+        service.assist.flags.on_flag.append(self._on_flag)
 
     @property
     def viewers(self) -> int:
@@ -62,6 +64,10 @@ class Events:
         """Let a reader in; what it should know first comes first."""
         line = self._lines.get(sees) or self._new_line(sees)
         viewer = line.channel.join()
+        for flag in self._service.assist.flags.open:
+            chunk = self._flag(sees, flag)
+            if chunk is not None:
+                viewer.put_first(chunk)
         for name, content in self._lists(sees).items():
             viewer.put_first(Chunk(event(name, content), start=True))
         return viewer
@@ -115,6 +121,16 @@ class Events:
     def _gop(self, sees: Scope, choices: GopChoices) -> Chunk:
         content = choices_for(choices, sees, self._service.board.resolve)
         return Chunk(event("gop", content, choices.first), start=True)
+
+    def _flag(self, sees: Scope, flag: Flag) -> Chunk | None:
+        narrowed = flag_for(flag, sees, self._service.board.resolve)
+        return None if narrowed is None else Chunk(event("flag", narrowed), start=True)
+
+    def _on_flag(self, flag: Flag) -> None:
+        for sees, line in self._lines.items():
+            chunk = self._flag(sees, flag)
+            if chunk is not None:
+                line.channel.tell(chunk)
 
     def _on_decision(self, choices: GopChoices) -> None:
         self._recent.append(choices)

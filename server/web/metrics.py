@@ -47,8 +47,22 @@ class ServiceCollector(Collector):
             "The configuration's file is not what runs: wrong, not read again, or waiting for a restart.",
             value=float(self._on_disk().differs),
         )
+        yield from self._flags()
         yield from self._recording()
         yield from self._cameras()
+
+    def _flags(self) -> Iterable[Metric]:
+        assist = self._service.assist
+        flags = CounterMetricFamily("myview_flags", "Flags for the operator.", labels=["state"])
+        for state, count in assist.flags.counts.items():
+            flags.add_metric([state], count)
+        yield flags
+        yield GaugeMetricFamily(
+            "myview_flags_open", "Flags that can be answered now.", value=len(assist.flags.open)
+        )
+        yield CounterMetricFamily(
+            "myview_pointings", "Places that the operator pointed at.", value=assist.points
+        )
 
     def _recording(self) -> Iterable[Metric]:
         past = self._service.past

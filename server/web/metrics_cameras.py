@@ -53,6 +53,16 @@ class CameraStages(Collector):
             "Windows whose answer is proven to be the best there is.",
             lambda _, it: it.gauge.totals.certified,
         )
+        yield self._counter(
+            "pointings",
+            "Places that an operator pointed at and the tracker was given, since its start.",
+            _of_status(lambda it: it.pointed),
+        )
+        yield self._counter(
+            "mended_windows",
+            "Windows that have changed what was final, by where an operator pointed.",
+            lambda _, it: it.gauge.totals.mended,
+        )
         yield self._counter("gap", "Sum of the gaps of all other windows.", lambda _, it: it.gauge.totals.gap)
 
     def _stages(self) -> Metric:

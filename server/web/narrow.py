@@ -6,6 +6,7 @@ from collections.abc import AsyncIterator, Callable
 
 import msgspec
 
+from server.view.flags import Flag
 from server.web.access_grant import Scope
 from server.web.schema import Cameras, Objects, SiteInfo
 from server.wire.messages import GopChoices
@@ -59,6 +60,18 @@ def choices_for(choices: GopChoices, sees: Scope, resolve: Resolve) -> GopChoice
         merged=[it for it in choices.merged if it.kept in theirs],
         split=[it for it in choices.split if it.kept in theirs],
     )
+
+
+def flag_for(flag: Flag, sees: Scope, resolve: Resolve) -> Flag | None:
+    """Tell of a flag to who may see the person, or the camera, that it is about, and of nobody else; None."""
+    if sees.is_all:
+        return flag
+    if sees.object is not None:
+        person = resolve(sees.object)
+        return msgspec.structs.replace(flag, objects=[person]) if person in flag.objects else None
+    if sees.camera not in flag.cameras:
+        return None
+    return msgspec.structs.replace(flag, cameras=[it for it in flag.cameras if it == sees.camera])
 
 
 async def told_for(lines: AsyncIterator[bytes], sees: Scope, resolve: Resolve) -> AsyncIterator[bytes]:

@@ -14,7 +14,7 @@ from aiohttp import web
 from server.web.access_grant import Need, need_of
 from server.web.operator_schema import OPERATOR, OPERATOR_FILES, OPERATOR_RESULTS
 from server.web.queries import HELD, OVERLAY, PAST
-from server.web.schema import Cameras, Choice, Objects, Past, Problem, SessionInfo, SiteInfo
+from server.web.schema import Cameras, Choice, FlagList, Objects, Past, Problem, SessionInfo, SiteInfo
 
 routes = web.RouteTableDef()
 
@@ -23,6 +23,7 @@ _JSON: dict[str, type[msgspec.Struct]] = {
     "/api/session": SessionInfo,
     "/api/objects": Objects,
     "/api/cameras": Cameras,
+    "/api/flags": FlagList,
     "/api/objects/{object}/choice": Choice,
     "/api/objects/{object}/past": Past,
     "/api/cameras/{camera}/past": Past,

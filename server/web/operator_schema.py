@@ -187,12 +187,30 @@ class PeopleByHand(msgspec.Struct, frozen=True):
     """Why nothing can be said here; empty: it can."""
 
 
+class Pointing(msgspec.Struct, frozen=True):
+    """What becomes of it where the operator points."""
+
+    memory: int
+    """How many frames back somebody can be pointed at."""
+    most: int
+    """Places in one request at most."""
+    cannot: str
+    """Why nobody can be pointed at here; empty: they can."""
+    taken: int
+    """Of the places that were just sent, those that the camera is told."""
+    left_out: int
+    """Those that it is not told: too far back."""
+    flags: list[int]
+    """The flags that are followed by them."""
+
+
 OPERATOR: dict[str, type[msgspec.Struct]] = {
     "/api/operator/cameras": OperatorCameras,
     "/api/operator/pulses": Pulses,
     "/api/operator/floor": Floor,
     "/api/operator/walk": OperatorWalk,
     "/api/operator/people": PeopleByHand,
+    "/api/operator/pointing": Pointing,
     "/api/operator/config": Settings,
     "/api/operator/choosing": Choosing,
 }

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import msgspec
 
+from server.view.flags import Flag
+
 
 class SiteInfo(msgspec.Struct, frozen=True):
     """The site, and how pulse numbers map to time."""
@@ -109,6 +111,11 @@ class Choice(msgspec.Struct, frozen=True):
     """How well each camera shows the person where it sees them, 0 to 1; null: it does not."""
     terms: dict[str, dict[str, float]]
     """By camera: the terms of that quality, likewise; empty where it does not see the person."""
+    unfound: dict[str, float]
+    """Share of the look-ahead in which each camera does not find the person, who stands before it as the
+    others know."""
+    unfound_quality: dict[str, float | None]
+    """What such a view is taken to be worth: quality, times how surely they show; null: there is none."""
     weights: dict[str, float]
     """By term: the share of a view's worth that is lost where the term is 0."""
     before: str | None
@@ -152,6 +159,13 @@ class Past(msgspec.Struct, frozen=True):
     spans: list[PastSpan]
     views: list[PastView]
     """By which camera, in order."""
+
+
+class FlagList(msgspec.Struct, frozen=True):
+    """What an operator is asked to look at."""
+
+    flags: list[Flag]
+    """Those that can be answered, the most urgent first, and then those that are over, the newest first."""
 
 
 class SessionInfo(msgspec.Struct, frozen=True):

@@ -8,7 +8,8 @@ from server.web.access import ACCESS
 from server.web.api import answer
 from server.web.events import Events
 from server.web.keys import EVENTS, SERVICE
-from server.web.narrow import cameras_for, objects_for, site_for
+from server.web.narrow import cameras_for, flag_for, objects_for, site_for
+from server.web.schema import FlagList
 from server.web.streams import send_viewer
 from server.web.views import cameras_info, objects_info, site_info
 
@@ -32,6 +33,15 @@ async def get_objects(request: web.Request) -> web.Response:
 async def get_cameras(request: web.Request) -> web.Response:
     """List the cameras and how they are."""
     return answer(cameras_for(cameras_info(request.app[SERVICE]), request.app[ACCESS].grant(request).sees))
+
+
+@routes.get("/api/flags")
+async def get_flags(request: web.Request) -> web.Response:
+    """List what an operator is asked to look at, and what they were asked lately."""
+    service, sees = request.app[SERVICE], request.app[ACCESS].grant(request).sees
+    flags = service.assist.flags
+    told = (flag_for(flag, sees, service.board.resolve) for flag in [*flags.open, *flags.ended])
+    return answer(FlagList([flag for flag in told if flag is not None]))
 
 
 @routes.get("/api/events")

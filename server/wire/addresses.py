@@ -8,7 +8,7 @@ HIDDEN = "(not shown)"
 SECRET_WORDS = "pas|pwd|psw|token|secret|key|auth"  # noqa: S105 — parts of names
 """What a name has in it whose value is a password or as good as one."""
 _LOGIN = re.compile(r"(?<=://)[^/\s]+@")
-_QUERY = re.compile(rf"((?:{SECRET_WORDS})[^=&?/#\s]*=)[^&#\s]*", re.IGNORECASE)
+_QUERY = re.compile(rf"((?:(?:{SECRET_WORDS})[^=&?/#\s]*|(?<![a-z])pw)=)[^&#\s]*", re.IGNORECASE)
 """Some cameras have their password in the path, as ``user=…_password=…_channel=1``."""
 
 

@@ -69,7 +69,8 @@ def access_rules(
 ) -> dict[str, Any]:
     """Give what each user may, as zenoh's ``access_control``: what is not said is denied.
 
-    A camera sends under its own key, and the site's sound if it is the one, and hears what the others found.
+    A camera sends under its own key, and the site's sound if it is the one, and hears what the others found
+    and where the operator points in its own picture: that, the best-view services alone say.
     Further best-view services may everything. Any other user may hear everything, and send nothing.
     """
     keys = Keys(site)
@@ -82,6 +83,8 @@ def access_rules(
         _rule("others are asked for", "ingress", _ASKS, [found, hears, services]),
         _rule("others are told", "egress", _SENDS, [found, hears, services]),
         _rule("is asked for", "egress", ["declare_subscriber"], [everything]),
+        _rule("points", "ingress", ["put", "delete"], [keys.camera("*", "pointing")])
+        | {"permission": "deny"},
     ]
     further = [pulse_client(index) for index in range(1, _SERVICES)]
     listeners = [it for it in users if it not in {*cameras, *further, pulse_client(0)}]
@@ -93,8 +96,12 @@ def access_rules(
     for camera in cameras:
         own = [keys.camera(camera, "**"), *([keys.sound] if camera == sounding else [])]
         rules.append(_rule(f"camera {camera}", "ingress", _SENDS, own))
+        pointing = [keys.camera(camera, "pointing")]
+        rules.append(_rule(f"camera {camera} asks", "ingress", ["declare_subscriber"], pointing))
+        rules.append(_rule(f"camera {camera} is told", "egress", ["put"], pointing))
         subjects.append({"id": f"camera {camera}", "usernames": [camera]})
-        theirs = [f"camera {camera}", "others are asked for", "others are told", "is asked for"]
+        theirs = [f"camera {camera}{what}" for what in ("", " asks", " is told")]
+        theirs += ["points", "others are asked for", "others are told", "is asked for"]
         policies.append({"rules": theirs, "subjects": [f"camera {camera}"]})
     return {
         "enabled": True,
@@ -105,6 +112,8 @@ def access_rules(
     }
 
 
-def _rule(name: str, way: str, messages: Sequence[str], keys: Sequence[str]) -> dict[str, Any]:
+def _rule(
+    name: str, way: str, messages: Sequence[str], keys: Sequence[str], permission: str = "allow"
+) -> dict[str, Any]:
     flows = ["ingress", "egress"] if way == "both" else [way]
-    return {"id": name, "permission": "allow", "flows": flows, "messages": messages, "key_exprs": keys}
+    return {"id": name, "permission": permission, "flows": flows, "messages": messages, "key_exprs": keys}

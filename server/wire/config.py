@@ -16,6 +16,7 @@ from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, Settings
 from server.wire.detect import DetectSettings
 from server.wire.library import validated
 from server.wire.sections import Access, Camera, Encode, Http, Record, Site, Sound, Sync, Track, View, Zenoh
+from tracking.yardsticks import TEMPORAL
 
 
 class Config(BaseSettings):
@@ -73,7 +74,7 @@ class Config(BaseSettings):
     @property
     def least_lookahead(self) -> int:
         """The frames that a view must be looked ahead for at least: its tracks no longer change then."""
-        return self.encode.gop + self.track.window.window - self.track.window.stride
+        return self.encode.gop + self.track.lag(self.site.fps)
 
     def check_lookahead(self, view: View) -> None:
         """Check that these settings look far enough ahead.
@@ -82,9 +83,12 @@ class Config(BaseSettings):
             ValueError: they do not.
         """
         if view.lookahead < self.least_lookahead:
+            lag = "track.window.window - track.window.stride"
+            if self.track.tracker == TEMPORAL:
+                lag = "the frames of all stages of track.temporal, less one"
             raise ValueError(
                 f"view.lookahead: is {view.lookahead} frames but must be at least {self.least_lookahead} "
-                "(encode.gop + track.window.window - track.window.stride), "
+                f"(encode.gop + {lag}), "
                 "so that a view is chosen on tracks that no longer change"
             )
 
@@ -118,9 +122,15 @@ class Config(BaseSettings):
 
     def witnesses(self, camera_id: str) -> Sequence[str]:
         """Give the cameras that may look at the same ground as this one, if it goes by what others find."""
-        if not self.track.witness.use or self.camera(camera_id).ground is None:
+        looks = {it.id for it in self.cameras if it.ground is not None} - self.overhead
+        if not self.track.witness.use or camera_id not in looks:
             return ()
-        return tuple(it.id for it in self.cameras if it.ground is not None and it.id != camera_id)
+        return tuple(it for it in self.camera_ids if it in looks and it != camera_id)
+
+    @property
+    def overhead(self) -> frozenset[str]:
+        """The cameras that look straight down."""
+        return frozenset(it.id for it in self.cameras if it.kind == "overhead")
 
     def camera(self, camera_id: str) -> Camera:
         """Give one camera.

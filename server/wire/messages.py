@@ -12,6 +12,7 @@ key                                       payload                               
 ``myview/SITE/camera/ID/status``          :class:`CameraStatus`
 ``myview/SITE/camera/ID/thumbs/LOCAL``    JPEG of one person                       :class:`ThumbHead`
 ``myview/SITE/camera/ID/found``           :class:`Found`
+``myview/SITE/camera/ID/pointing``        :class:`server.wire.help.Pointings`
 ``myview/SITE/camera/ID/hears``           liveliness token: it hears what the other cameras find
 ``myview/SITE/camera/ID/alive``           liveliness token
 ``myview/SITE/sound``                     frames of sound, one after the other     :class:`SoundHead`
@@ -29,18 +30,11 @@ from typing import Annotated
 
 import msgspec
 
+from server.wire.help import TROUBLES_MOST, Trouble
+from server.wire.numbers import Coordinate, Duration, Number, Pixels, Pulse
+
 UNREADABLE = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
 """What a decoder raises: it is no JSON or other JSON, it is no text, it is nested without end."""
-
-Pulse = Annotated[int, msgspec.Meta(ge=0, le=2**40)]
-"""A frame number; the bound is a thousand years at 25 frames a second, and keeps times within 64 bits."""
-
-Pixels = Annotated[int, msgspec.Meta(ge=1, le=2**16)]
-
-Number = Annotated[int, msgspec.Meta(ge=0, le=2**62)]
-
-Duration = Annotated[float, msgspec.Meta(ge=0, le=1e6)]
-"""Seconds."""
 
 Box = tuple[float, float, float, float]
 """Left, top, right, bottom in pixels of the site's picture."""
@@ -137,9 +131,11 @@ class CameraTracks(msgspec.Struct, frozen=True, kw_only=True):
     """Seconds that it took to look for people in a frame, the mean of this epoch's; null offline."""
     solve_s: Duration | None = None
     """Seconds that it took to follow everybody to the end of the window; null offline."""
+    troubles: Annotated[list[Trouble], msgspec.Meta(max_length=TROUBLES_MOST)] = []
+    """What the tracker foresees, where it is set to."""
+    mended_from: Pulse | None = None
+    """The first frame, final before, that somebody's pointing has changed; null: none has."""
 
-
-Coordinate = Annotated[float, msgspec.Meta(ge=-1e6, le=1e6)]
 
 ScoredBox = tuple[Coordinate, Coordinate, Coordinate, Coordinate, Annotated[float, msgspec.Meta(ge=0, le=1)]]
 """Left, top, right, bottom in pixels of the camera's own picture, and how sure the detector is."""
@@ -182,6 +178,8 @@ class CameraStatus(msgspec.Struct, frozen=True, kw_only=True):
     """How much is left out because the machine has too much to do; 0: nothing."""
     load: Annotated[str, msgspec.Meta(max_length=200, pattern=r"^[ -~]*\Z")] = ""
     """What is left out, for people: printable, since it stands on pages and in terminals."""
+    pointed: Number = 0
+    """Places that an operator pointed at and the tracker was given, since the start."""
     in_step: bool
     """Pulses come from the server; otherwise the camera goes on at its own rate."""
     clock_offset: float

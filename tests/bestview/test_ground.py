@@ -22,7 +22,7 @@ from bestview import (
     to_ground,
     turns,
 )
-from bestview.ground import feet_cut_off, from_ground
+from bestview.ground import as_standing, feet_cut_off, from_ground
 
 
 def looking_along(height: float = 3.0, focal: float = 400.0) -> NDArray[np.float64]:
@@ -160,3 +160,13 @@ def test_feet_on_the_lower_edge_are_cut_off_and_boxes_that_reach_beyond_it_are_b
     boxes = np.stack([np.zeros(7), np.zeros(7), np.full(7, 50.0), bottoms], axis=-1)
     assert feet_cut_off(boxes, 480.0).tolist() == [False, False, True, True, True, False, False]
     assert not feet_cut_off(boxes, float("inf")).any()
+
+
+def test_who_is_seen_from_above_stands_in_the_middle_and_is_as_tall_as_others() -> None:
+    from_above = np.array([[100.0, 200.0, 140.0, 240.0], [np.nan] * 4])
+    upright = as_standing(from_above)
+    assert feet(upright)[0].tolist() == [120.0, 220.0]
+    plan = np.diag([0.02, 0.02, 1.0])  # metres a pixel
+    assert 1.5 < person_heights(plan, upright)[0] < 2.0
+    assert np.isnan(upright[1]).all()
+    assert not feet_cut_off(as_standing(np.array([[10.0, 440.0, 50.0, 480.0]])), 480.0).any()

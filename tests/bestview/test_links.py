@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from bestview import IdentitySettings
 from bestview.clustering import cluster
-from bestview.episodes import End, Episode
+from bestview.episode import End, Episode
 from bestview.evidence import Evidence
 from bestview.keys import EpisodeKey
 from bestview.likelihood import CameraLooks, LookScale, LookWeights, look_distances, look_evidence

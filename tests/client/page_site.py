@@ -39,6 +39,7 @@ class FakeSite:
         split: What every GOP says about numbers that turned out to be somebody else's.
         first_pulse: Pulse of about the moment at which the site is made.
         skipped: Pulses whose frames are missing from every stream.
+        codec: What is in the streams; None: no key frame has come yet.
         opened: Whose stream was asked for, in order.
         listed: Playlists of HLS that were asked for, in order.
         fetched: First pulses of the segments of HLS that were asked for, in order.
@@ -46,6 +47,9 @@ class FakeSite:
         recorded: Seconds of the past that are recorded.
         ahead: Seconds that the streams run ahead of the clock: minutes pass in no time.
         blind: Pulses, from GOP to GOP, at which the first camera finds nobody.
+        operates: Whoever looks at the page may operate.
+        flags: What an operator is asked to look at.
+        pointed: Where the operator pointed, as it was sent.
         pulse0: Unix seconds at which pulse 0 was due.
     """
 
@@ -55,6 +59,7 @@ class FakeSite:
     split: list[dict[str, Any]] = field(default_factory=list)
     first_pulse: int = STARTS_AT
     skipped: range = range(0)
+    codec: str | None = "avc1.42C01F"
     opened: list[int] = field(default_factory=list)
     listed: list[str] = field(default_factory=list)
     fetched: list[int] = field(default_factory=list)
@@ -62,6 +67,9 @@ class FakeSite:
     recorded: int = 0
     ahead: float = 0.0
     blind: range = range(0)
+    operates: bool = False
+    flags: list[dict[str, Any]] = field(default_factory=list)
+    pointed: list[dict[str, Any]] = field(default_factory=list)
     pulse0: float = field(init=False)
 
     def __post_init__(self) -> None:
@@ -92,7 +100,7 @@ class FakeSite:
             "height": HEIGHT,
             "gop": GOP,
             "lookahead_frames": LOOKAHEAD,
-            "codec": "avc1.42C01F",
+            "codec": self.codec,
             "pulse0": self.pulse0,
             "now": time.time(),
             "cameras": list(CAMERAS),
@@ -229,7 +237,9 @@ class SiteServer:
         app.router.add_get("/", _file)
         app.router.add_get("/page/{name}", _file)
         app.router.add_get("/api/site", self._site)
-        app.router.add_get("/api/session", _session)
+        app.router.add_get("/api/session", self._session)
+        app.router.add_get("/api/operator/pointing", self._pointing)
+        app.router.add_post("/api/operator/pointing", self._pointing)
         app.router.add_get("/api/events", self._events)
         app.router.add_get("/api/objects/{k}/choice", self._choice)
         app.router.add_get("/api/objects/{k}/past", self._past)
@@ -264,6 +274,21 @@ class SiteServer:
 
     async def _site(self, _: web.Request) -> web.Response:
         return web.json_response(self.site.site())
+
+    async def _session(self, _: web.Request) -> web.Response:
+        """Say that anybody may watch, and who looks at the page maybe operate."""
+        role = "operate" if self.site.operates else "watch"
+        return web.json_response(
+            {"by_token": False, "name": None, "role": role, "object": None, "camera": None}
+        )
+
+    async def _pointing(self, request: web.Request) -> web.Response:
+        taken = 0
+        if request.method == "POST":
+            said = await request.json()
+            self.site.pointed.append(said)
+            taken = len(said["points"])
+        return web.json_response({"cannot": "", "taken": taken, "left_out": 0, "flags": []})
 
     async def _choice(self, request: web.Request) -> web.Response:
         k, pulse = int(request.match_info["k"]), int(request.query.get("at", f"p{self.site.edge}")[1:])
@@ -341,25 +366,22 @@ class SiteServer:
         with contextlib.suppress(ConnectionError):
             for name in ("site", "objects", "cameras"):
                 await response.write(_event(name, getattr(site, name)()))
-            said = dict(site.people)
+            said, flags = dict(site.people), list[dict[str, Any]]()
             async for pulse in site.released(site.boundary() - 2 * GOP):
                 if site.people != said:
                     said = dict(site.people)
                     await response.write(_event("objects", site.objects()))
                 if pulse % GOP == 0:
                     await response.write(_event("gop", site.gop(pulse)))
+                for flag in site.flags:
+                    if flag not in flags:
+                        flags.append(flag)
+                        await response.write(_event("flag", flag))
         return response
 
 
 def _event(name: str, data: dict[str, Any]) -> bytes:
     return f"event: {name}\ndata: {json.dumps(data)}\n\n".encode()
-
-
-async def _session(_: web.Request) -> web.Response:
-    """Say that anybody may watch."""
-    return web.json_response(
-        {"by_token": False, "name": None, "role": "watch", "object": None, "camera": None}
-    )
 
 
 async def _file(request: web.Request) -> web.StreamResponse:

@@ -13,6 +13,11 @@ from site_by_hand import CAMERAS, OBJECTS, PATIENCE, SITE, HandMadeSite, gop, no
 import client
 from client.sse import MAX_EVENT, EventStreamError, SentEvent, SseParser
 
+FLAG = {"id": 1, "objects": [7, 9], "cameras": ["c0"], "reason": "alike", "pulse": 80} | {
+    "raised": 50,
+    "margin": 0.5,
+    "state": "raised",
+}
 HASTY = client.HttpSettings(retries=2, backoff_first=0.01, backoff_most=0.01)
 
 
@@ -75,16 +80,18 @@ async def take(url: str, count: int) -> list[client.Event]:
 async def test_events_come_as_what_they_are(hand_made_site: HandMadeSite, site_url: str) -> None:
     async def tell(response: web.StreamResponse) -> None:
         stream = sent("site", SITE) + sent("objects", OBJECTS) + sent("cameras", CAMERAS)
-        stream += sent("weather", {"rain": True}) + sent("gop", gop(50, "c1"))
+        stream += sent("weather", {"rain": True}) + sent("flag", FLAG) + sent("gop", gop(50, "c1"))
         for at in range(0, len(stream), 100):
             await response.write(stream[at : at + 100])
         await nothing_more(response)
 
     hand_made_site.tells.append(tell)
-    site, objects, cameras, last = await take(site_url, 4)
+    site, objects, cameras, flag, last = await take(site_url, 5)
     assert isinstance(site, client.Site)
     assert isinstance(objects, client.Objects)
     assert isinstance(cameras, client.Cameras)
+    assert isinstance(flag, client.Flag)
+    assert (flag.objects, flag.pulse, flag.state) == ((7, 9), 80, "raised")
     assert isinstance(last, client.Gop)
     assert (last.first, last.choices) == (50, {1: "c1", 2: None})
     assert last.boxes["c0"][0] == (client.Box(1, 10.0, 20.0, 30.5, 80.0),)

@@ -200,6 +200,7 @@ async def test_what_is_not_kept_is_said_and_live_goes_on(browser: Browser) -> No
         await visit.until(f"myview.pulse > {seen + GOP} && {LIVE}")
 
 
+@pytest.mark.slow
 async def test_another_person_is_watched_at_the_same_moment_of_the_past(browser: Browser) -> None:
     async with visiting(browser) as visit:
         back = await some_seconds_back(visit)

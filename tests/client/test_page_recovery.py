@@ -39,6 +39,17 @@ async def test_a_site_whose_pulses_begin_anew_plays_on(browser: Browser, first: 
         assert 0 < delay < 30_000
 
 
+async def test_before_the_first_picture_nobody_is_told_that_the_browser_cannot_play_it(
+    browser: Browser,
+) -> None:
+    site = FakeSite(codec=None)
+    async with visiting(browser, site) as visit:
+        await visit.until("myview.state === 'waiting'")
+        assert site.opened == []
+        await visit.server.restart_as(FakeSite())
+        await visit.playing(1)
+
+
 async def test_a_hole_in_the_stream_is_jumped_over(browser: Browser) -> None:
     site = FakeSite()
     site.skipped = range(site.edge + 2 * FPS, site.edge + 2 * FPS + 8)

@@ -71,6 +71,7 @@ async def test_the_best_view_plays_across_a_cut_and_the_frames_go_on(page: Page)
     assert around == sorted(around)
 
 
+@pytest.mark.slow
 async def test_the_sound_goes_on_across_cuts_and_choices_in_step(
     page: Page, site: RunningSite, tmp_path: Path
 ) -> None:

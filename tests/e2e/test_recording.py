@@ -19,6 +19,7 @@ from spliced import FPS, pictures
 
 pytestmark = [
     pytest.mark.live,
+    pytest.mark.slow,
     pytest.mark.timeout(300),
     pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="needs ffmpeg"),
 ]

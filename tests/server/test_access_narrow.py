@@ -10,9 +10,11 @@ from typing import Any
 
 import aiohttp
 import pytest
-from cameras_by_hand import LARGE, SMALL
+from cameras_by_hand import LARGE, SMALL, tracks, word
 from halls import A, B, Hall, see
 from tokens_by_hand import bearer, locked, token_of
+
+from server.wire.help import Trouble
 
 
 @pytest.fixture
@@ -95,6 +97,32 @@ async def test_events_are_of_one_camera_alone(site: Hall) -> None:
         gops = [content for name, content in await events(answer, 0) if name == "gop"]
     assert all(set(gop["boxes"]) == {A} for gop in gops)
     assert not any(gop["choices"] or gop["cuts"] for gop in gops)
+
+
+async def test_flags_are_of_who_may_be_seen_alone(site: Hall) -> None:
+    troubles = [
+        Trouble(reason="alike", tracks=[1, 2], pulse=19, margin=0.5),
+        Trouble(reason="fading", tracks=[2], pulse=19, margin=0.5),
+    ]
+    said = word(A, 3, {1: SMALL, 2: SMALL}, troubles=troubles)
+    async with site.session.get("/api/events", headers=bearer("family")) as theirs:
+        site.service.intake.tracks(tracks(said))
+        site.service.intake.tracks(tracks(word(B, 3, {1: LARGE})))
+        site.service.decide()
+        everything = (await get(site, "/api/flags", "desk"))["flags"]
+        assert [(it["objects"], it["cameras"], it["state"]) for it in everything] == [
+            ([1, 2], [A], "raised"),
+            ([2], [A], "raised"),
+        ]
+        flag = {**everything[0], "objects": [1]}
+        assert (await get(site, "/api/flags", "family"))["flags"] == [flag]
+        site.service.feed(4, {A: {1: LARGE, 2: SMALL}, B: {1: None}})
+        told = await events(theirs, site.service.board.end - 5)
+        assert [content for name, content in told if name == "flag"] == [flag]
+    assert len((await get(site, "/api/flags", "door"))["flags"]) == 2
+    async with site.session.get("/api/events", headers=bearer("family")) as later:
+        names = [name for name, _ in await events(later, 0)]
+        assert names.index("flag") < names.index("gop"), "who comes is told what is open"
 
 
 async def test_the_past_is_of_one_person_alone(site: Hall) -> None:

@@ -39,6 +39,7 @@ WHO = {
     "/api/objects": ALL,
     "/api/cameras": ALL,
     "/api/events": ALL,
+    "/api/flags": ALL,
     "/api/past": ALL,
     "/api/objects/{object}/choice": FAMILY,
     "/api/objects/{object}/past": FAMILY,

@@ -13,6 +13,8 @@ from command_line import Run, refusal
 from free_port import free
 from videos_by_hand import write_video
 
+from server.camera.scene import scene_names
+
 
 @pytest.fixture
 def run(myview: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Run:
@@ -134,6 +136,15 @@ def test_an_output_folder_with_something_in_it_is_refused(run: Run, tmp_path: Pa
     (tmp_path / "out" / "mine.txt").write_text("mine")
     line = refusal(run(command, site(tmp_path), "--out", "out"))
     assert "out: is there already and is not an empty folder" in line
+
+
+def test_scene_says_which_there_are_and_how_many_look_where_nobody_says(run: Run, tmp_path: Path) -> None:
+    shown = run("scene", "--help").out
+    assert all(f"{name}:" in shown for name in scene_names())
+    ended = run("scene", "fish", "--out", "fish", "--seconds", 0.2, "--size", "128x72")
+    assert (ended.code, ended.err) == (0, "")
+    assert ended.out.splitlines()[-1] == "fish: 1 view, gt/"
+    assert written(tmp_path / "fish") == {"c0.mp4", "gt"}
 
 
 def test_scene_writes_a_recording_or_refuses(run: Run, tmp_path: Path) -> None:

@@ -123,6 +123,14 @@ def test_a_floor_that_one_camera_has_mirrored_is_refused_with_its_camera() -> No
     )
 
 
+def test_with_temporal_consistency_the_lookahead_covers_its_stages() -> None:
+    track = {"tracker": "temporal", "temporal": {"stages": 2, "stage_s": 0.4}}
+    wrong = complaint(site(view={"lookahead": 28}, track=track))
+    assert "must be at least 29 (encode.gop + the frames of all stages of track.temporal, less one)" in wrong
+    enough = build_config(site(view={"lookahead": 29}, track=track), where="", folder=Path())
+    assert enough.track.lag(25.0) == 19
+
+
 def test_lookahead_shorter_than_the_trackers_lag_is_refused_with_the_least_that_would_do() -> None:
     assert "must be at least 20" in complaint(site(view={"lookahead": 19}))
 

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 import pytest_asyncio
 import yaml
-from cameras_by_hand import CAMERAS, LARGE, SMALL, small_config, status
+from cameras_by_hand import CAMERAS, FPS, LARGE, SMALL, small_config, status, tracks, word
 from halls import A, B, Hall, opened, see
 from playwright.async_api import Browser, Page, Route, expect
 from tokens_by_hand import line_of, token_of, write_tokens
@@ -25,11 +25,12 @@ from walk_by_hand import SITE, curved, errors_on_floor, words
 from benchmarks.browser import CHROMIUM, chromium
 from bestview import IdentityRegistry
 from server.run.calibrate_points import read_points
+from server.wire.help import Trouble
 from server.wire.messages import Keys
 
 PAGE = Path(__file__).parents[2] / "client" / "page"
 AXE = PAGE.parents[1] / "node_modules/axe-core/axe.min.js"
-SECTIONS = ["cameras", "floor", "known", "downloads", "marks", "walk", "choosing", "configuration"]
+SECTIONS = ["cameras", "floor", "known", "flagged", "downloads", "marks", "walk", "choosing", "configuration"]
 PLAN = [[0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 1.0]]
 """Of a camera that looks straight down: ten pixels are one unit of the floor."""
 
@@ -175,6 +176,25 @@ async def test_people_are_named_merged_and_parted_and_the_viewers_page_says_so(b
         await page.goto(f"http://127.0.0.1:{hall.port}/?object={first}")
         await expect(page.locator("#people .number").first).to_have_text(f"{first} Ann")
         await expect(page).to_have_title(f"Person {first}, Ann · MyView")
+
+
+async def test_flags_are_listed_with_what_has_become_of_them(browser: Browser) -> None:
+    async with operating(browser, "#flagged") as (hall, page):
+        await expect(page.locator("#flag-none")).to_have_text("None so far.")
+        see(hall)
+        hall.service.decider.people.call(1, "Ann")
+        trouble = Trouble(reason="alike", tracks=[2, 1], pulse=29, margin=0.1)
+        hall.service.intake.tracks(tracks(word(A, 3, {1: SMALL, 2: SMALL}, troubles=[trouble])))
+        hall.service.intake.tracks(tracks(word(B, 3, {1: LARGE})))
+        hall.service.pulse = 19
+        hall.service.decide()
+        line = page.locator("#flag-list li")
+        await expect(line).to_have_text(re.compile(r"2 and 1.*, cross .* \(c0\): waits to be answered"))
+        await expect(page.locator("#flag-none")).to_have_text("")
+        hall.service.assist.flags.step(29 + 8 * FPS + 1, [], int)
+        await expect(line).to_have_text(re.compile(r": was not answered"))
+        await page.reload()
+        await expect(line).to_have_text(re.compile(r": was not answered"))
 
 
 async def test_a_span_of_the_past_is_downloaded(browser: Browser) -> None:

@@ -240,3 +240,13 @@ async def test_a_process_says_what_waits_and_what_is_wrong_and_ends_with_its_ter
         os.close(terminal)
         process.send_signal(signal.SIGHUP)
         assert await process.wait() == 0
+
+
+def test_a_tracker_by_which_frames_are_final_later_waits_for_a_restart() -> None:
+    running = small_config(view={"lookahead": 200})
+    for track in ({"tracker": "temporal"}, {"tracker": "temporal", "temporal": {"stages": 2}}):
+        reload = reloaded(running, small_config(view={"lookahead": 200}, track=track))
+        assert reload.now.track == running.track
+        assert "track.tracker" in reload.site
+    quicker = reloaded(running, small_config(view={"lookahead": 200}, track={"tracker": "kalman"}))
+    assert quicker.now.track.tracker == "kalman"

@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from server.camera.scene import Scene, scene_names
+from server.camera.scene.hall import Hall
 
 SIZE = (320, 180)
 
@@ -108,7 +109,9 @@ def test_the_names_are_those_that_can_be_built() -> None:
 @settings(deadline=None, max_examples=40)
 @given(camera=st.integers(0, 1), x=st.floats(1.5, 8.0), y=st.floats(1.5, 6.0))
 def test_the_homography_undoes_the_projection_of_the_floor(camera: int, x: float, y: float) -> None:
-    view = scene()._view(camera)
+    world = scene().world
+    assert isinstance(world, Hall)
+    view = world.view(camera)
     pixels, _ = view.project(np.array([[x, y, 0.0]]))
     ground = view.homography() @ (*pixels[0], 1.0)
     assert np.allclose(ground[:2] / ground[2], (x, y), atol=1e-6)

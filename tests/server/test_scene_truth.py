@@ -8,6 +8,7 @@ import pytest
 from numpy.typing import NDArray
 
 from server.camera.scene import CameraTruth, Scene
+from server.camera.scene.hall import Hall
 from server.camera.scene.outfits import outfit
 from server.camera.scene.room import ROOM
 from server.camera.scene.stroll import Pose
@@ -21,9 +22,14 @@ def crowd() -> Scene:
     return Scene("room", 3, 4, 0, *SIZE)
 
 
+def hall(scene: Scene) -> Hall:
+    assert isinstance(scene.world, Hall)
+    return scene.world
+
+
 def stand(scene: Scene, camera: int, *places: tuple[float, float]) -> CameraTruth:
     """Judge people who stand at given places."""
-    stage = scene._stage(camera)
+    stage = hall(scene).stage(camera)
     poses = [Pose(x, y, 0.0, 0.0, 0.0) for x, y in places]
     return judge(stage, stage.actors(poses, [outfit(walker, 0) for walker in range(len(places))]))
 
@@ -71,6 +77,7 @@ def test_the_homography_takes_the_feet_to_the_ground_position(crowd: Scene) -> N
         where = crowd.ground_position(frame)
         for camera, truth in enumerate(crowd.truth(frame)):
             matrix = crowd.homography(camera)
+            assert matrix is not None
             for number, box, visible in zip(truth.ids, truth.boxes, truth.visible, strict=True):
                 if visible < 0.99:
                     continue
@@ -87,14 +94,14 @@ def test_one_person_is_the_same_height_above_the_floor_from_every_side(crowd: Sc
     where = (4.5, 4.0)
     for camera in range(3):
         truth = stand(crowd, camera, where)
-        top, _ = crowd._view(camera).project(np.array([[*where, outfit(0, 0).height]]))
+        top, _ = hall(crowd).view(camera).project(np.array([[*where, outfit(0, 0).height]]))
         assert truth.boxes[0, 1] == pytest.approx(
             top[0, 1], abs=0.06 * (truth.boxes[0, 3] - truth.boxes[0, 1])
         )
 
 
 def test_less_shows_of_someone_the_more_someone_else_stands_in_front(crowd: Scene) -> None:
-    camera = np.array(crowd._view(0).centre[:2])
+    camera = np.array(hall(crowd).view(0).centre[:2])
     behind = np.array([4.2, 5.2])
     ahead = (camera - behind) / np.linalg.norm(camera - behind)
     aside = np.array([-ahead[1], ahead[0]])
@@ -118,7 +125,7 @@ def test_the_order_of_the_people_does_not_matter_to_what_shows(crowd: Scene) -> 
 
 
 def test_furniture_hides_who_stands_behind_it_and_nobody_in_front(crowd: Scene) -> None:
-    camera = crowd._view(0).centre[:2]
+    camera = hall(crowd).view(0).centre[:2]
     (piece,) = (piece for piece in ROOM.furniture if piece.name == "pillar")
     west, south, east, north = piece.footprint
     pillar = np.array([(west + east) / 2, (south + north) / 2])

@@ -12,6 +12,8 @@ import pytest
 from server.camera.scene import Scene
 from server.camera.sources.opening import open_video
 from server.camera.sources.stage import Stage
+from server.run.scene_ground import with_scene_ground
+from server.wire.config import Config
 from server.wire.errors import UserError
 from server.wire.sections import Site
 from server.wire.sources import SourceKind, kind_of
@@ -45,7 +47,7 @@ def test_defaults_are_the_demos() -> None:
         (f"scene:room?seed={'9' * 5000}", "is not a whole number"),
         ("scene:room?people=3", "people=3 is not a whole number for one of camera, cameras, objects, seed"),
         ("scene:room?cameras=1000", "cameras must be"),
-        ("scene:room?cameras=0", "they count from 0"),
+        ("scene:room?cameras=0", "cameras must be"),
     ],
 )
 def test_a_wrong_address_is_refused_with_the_reason(source: str, why: str) -> None:
@@ -82,3 +84,14 @@ def test_a_recording_in_memory_is_one_though_it_is_below_dev() -> None:
         assert kind_of(folder) is SourceKind.FOLDER
         with pytest.raises(UserError, match="cannot open this video"):
             open_video(str(recording))
+
+
+def test_a_scene_without_a_floor_gives_its_cameras_none() -> None:
+    cameras = [
+        {"id": f"c{number}", "source": f"scene:{name}"} for number, name in enumerate(("fish", "court"))
+    ]
+    site = Config.model_validate({"site": {"width": 128, "height": 72}, "cameras": cameras})
+    tank, court = with_scene_ground(site).cameras
+    assert tank.ground is None
+    assert court.ground is not None
+    assert Stage("scene:fish?camera=1&cameras=2", SITE).take(3) is not None

@@ -11,6 +11,7 @@ import pytest
 from cameras_by_hand import small_config
 
 from server.run import supervise
+from server.run.ending import OVER
 from server.run.supervise import Supervisor
 from server.wire.errors import UserError
 
@@ -88,8 +89,8 @@ async def test_everything_is_started_and_ended_together(machine: Machine) -> Non
     assert all(process.returncode == -15 for process in processes.values())
 
 
-@pytest.mark.parametrize("code", [-9, 1])
-async def test_what_dies_is_started_again_alone(machine: Machine, code: int) -> None:
+@pytest.mark.parametrize("code", [-9, 1, 0])
+async def test_what_dies_or_is_told_to_end_is_started_again_alone(machine: Machine, code: int) -> None:
     machine.run()
     processes = await machine.processes(4)
     for _ in range(3):
@@ -114,8 +115,8 @@ async def test_a_camera_whose_recording_is_over_stays_so_and_the_best_views_end_
 ) -> None:
     task = machine.run()
     processes = await machine.processes(4)
-    processes["c0"].end(0)
-    processes["bestview"].end(0)
+    processes["c0"].end(OVER)
+    processes["bestview"].end(OVER)
     await task
     assert machine.started.empty()
     assert processes["c1"].returncode == processes["sync"].returncode == -15

@@ -113,6 +113,8 @@ async def test_a_choice_is_explained(busy: Hall) -> None:
         "camera": B,
         "since": 0,
         "seen": {A: 1.0, B: 1.0},
+        "unfound": {A: 0.0, B: 0.0},
+        "unfound_quality": {A: None, B: None},
         "before": B,
         "lookahead": 2 * GOP,
         "cut_to": A,

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from bestview import to_ground
 from server.camera.scene import Scene
+from server.camera.scene.hall import Hall
+from server.camera.scene.perspective import Perspective
 from server.view.align import Epoch
 from server.wire.config import Config
 from server.wire.messages import Box, CameraTracks, Track
@@ -71,9 +73,14 @@ def _word(camera: str, boxes: list[Box | None], epoch: int, boot: int) -> Camera
     )
 
 
+def _view(scene: Scene, camera: int) -> Perspective:
+    assert isinstance(scene.world, Hall)
+    return scene.world.view(camera)
+
+
 def _box(scene: Scene, camera: int, place: Floats) -> Box | None:
     """Give the box of somebody in the camera's picture; None: not all of them is in it."""
-    ends, depth = scene._view(camera).project(np.array([[*place, 0.0], [*place, TALL]]))
+    ends, depth = _view(scene, camera).project(np.array([[*place, 0.0], [*place, TALL]]))
     (x, bottom), (_, top) = ends.tolist()
     half = (bottom - top) / 5
     whole = depth.min() > 0.3 and x - half > 0 and x + half < WIDTH and top > 0 and bottom < HEIGHT
@@ -87,7 +94,7 @@ def errors_on_floor(found: Sequence[Floats]) -> Floats:
     random = np.random.default_rng(0)
     places = random.uniform((0.3 * width, 0.3 * depth), (0.7 * width, 0.7 * depth), (50, 2))
     standing = np.column_stack([places, np.zeros(len(places))])
-    seen = [to_ground(it, scene._view(at).project(standing)[0]) for at, it in enumerate(found)]
+    seen = [to_ground(it, _view(scene, at).project(standing)[0]) for at, it in enumerate(found)]
     x = np.concatenate(seen) @ np.array([1, 1j])
     y = np.tile(places @ np.array([1, 1j]), len(found))
     x, y = x - x.mean(), y - y.mean()

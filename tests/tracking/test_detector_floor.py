@@ -10,6 +10,7 @@ from pathlib import Path
 import av
 import numpy as np
 import numpy.typing as npt
+import pytest
 from scipy.optimize import linear_sum_assignment
 
 from server.camera.scene import Scene
@@ -62,6 +63,7 @@ def quality(truth: Mapping[int, tuple[Boxes, npt.NDArray[np.bool_]]], found: Map
     return Quality(hit / there, right / given)
 
 
+@pytest.mark.slow
 def test_people_of_the_room_are_tracked_two_seconds_after_the_start() -> None:
     scene = Scene("room", 3, 4, 1, 640, 360, 25)
     found = tracked(scene.image(0, frame) for frame in range(FRAMES_OF_SCENE))

@@ -13,10 +13,19 @@ from strolls import Stroll, final_boxes, seen_at
 from tracking import CostSettings, Detections, WindowResult, WindowSettings, solver_named
 from tracking.boxes import Floats, iou
 from tracking.detectors.base import Image
-from tracking.yardsticks import StepwiseSettings, Tracker, needs_pictures, tracker_named, tracker_names
+from tracking.yardsticks import (
+    TEMPORAL,
+    StepwiseSettings,
+    Tracker,
+    needs_pictures,
+    tracker_named,
+    tracker_names,
+)
 from tracking.yardsticks.colour_field import BINS, ColourField
 
 WINDOW = WindowSettings(window=6, stride=3, birth_window=6)
+BY_DETECTIONS = [it for it in tracker_names() if it != TEMPORAL]
+"""Temporal consistency goes by blobs alone, and learns the room first: it has tests of its own."""
 SIZE = (120, 200)
 _TALL, _WIDE = 40, 18
 _COLOURS = ((40, 40, 220), (220, 60, 30))
@@ -57,7 +66,7 @@ def _follow(tracker: Tracker, frames: int, people: int, blind: range = range(0))
     return [it for it in (*told, tracker.flush()) if it is not None]
 
 
-@pytest.mark.parametrize("name", tracker_names())
+@pytest.mark.parametrize("name", BY_DETECTIONS)
 def test_two_people_who_pass_each_other_apart_keep_their_numbers(name: str) -> None:
     results = _follow(_tracker(name), 45, 2)
     boxes = final_boxes(results)
@@ -72,7 +81,7 @@ def test_two_people_who_pass_each_other_apart_keep_their_numbers(name: str) -> N
     assert sum(len(row) for row in boxes.values()) > 2 * 45 - 12
 
 
-@pytest.mark.parametrize("name", [it for it in tracker_names() if it != "lp" and needs_pictures(it)])
+@pytest.mark.parametrize("name", [it for it in BY_DETECTIONS if it != "lp" and needs_pictures(it)])
 def test_who_looks_at_the_picture_follows_where_nothing_was_detected(name: str) -> None:
     blind = range(20, 24)
     boxes = final_boxes(_follow(_tracker(name), 45, 1, blind))
@@ -88,7 +97,7 @@ def test_the_filter_goes_on_as_it_went_and_says_nothing_meanwhile() -> None:
     assert set(boxes[30]) == {1}, "found again where it was expected"
 
 
-@pytest.mark.parametrize("name", [it for it in tracker_names() if needs_pictures(it)])
+@pytest.mark.parametrize("name", [it for it in BY_DETECTIONS if needs_pictures(it)])
 def test_a_frame_without_a_picture_begins_nobody_and_ends_nobody(name: str) -> None:
     tracker = _tracker(name)
     told = []
@@ -100,7 +109,7 @@ def test_a_frame_without_a_picture_begins_nobody_and_ends_nobody(name: str) -> N
     assert set(boxes[44]) == {1}
 
 
-@pytest.mark.parametrize("name", [it for it in tracker_names() if it != "lp"])
+@pytest.mark.parametrize("name", [it for it in BY_DETECTIONS if it != "lp"])
 def test_the_same_pictures_give_the_same_tracks(name: str) -> None:
     def shown(results: list[WindowResult]) -> list[bytes]:
         return [track.boxes.tobytes() for result in results for track in result.tracks]
@@ -160,7 +169,7 @@ def test_every_frame_is_told_once_and_no_number_is_used_twice(stream: list[tuple
     assert sorted(begins) == list(range(1, len(begins) + 1))
 
 
-@pytest.mark.parametrize("name", tracker_names())
+@pytest.mark.parametrize("name", BY_DETECTIONS)
 def test_no_result_spans_a_long_gap_and_nobody_is_known_after_it(name: str) -> None:
     tracker, later = _tracker(name), WINDOW.forget_after + 12
     before = _follow(tracker, 8, 1)

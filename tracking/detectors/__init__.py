@@ -1,6 +1,12 @@
 """Detectors: where objects might be in a frame."""
 
-from tracking.detectors.background import PAPER_BOXES, BackgroundDetector, BackgroundSettings, paper_boxes
+from tracking.detectors.background import (
+    PAPER_BOXES,
+    BackgroundDetector,
+    BackgroundSettings,
+    paper_boxes,
+    seen_from_above,
+)
 from tracking.detectors.base import Detector, Image
 from tracking.detectors.boxfilter import BoxFilterSettings
 from tracking.detectors.explain import ExplainSettings
@@ -41,4 +47,5 @@ __all__ = [
     "TemplateSettings",
     "colour_histograms",
     "paper_boxes",
+    "seen_from_above",
 ]

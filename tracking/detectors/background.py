@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
-from typing import Literal, Protocol
+from typing import Literal, Protocol, TypeVar
 
 import cv2
 import numpy as np
@@ -80,6 +80,22 @@ def paper_boxes(settings: BackgroundSettings) -> BackgroundSettings:
         heights=replace(settings.heights, use=False),
         hypotheses=replace(settings.hypotheses, use=False),
     )
+
+
+_SPAN = 0.5
+"""Of a person's height, about what they are wide and deep from above."""
+
+
+S = TypeVar("S", bound=BackgroundSettings)
+
+
+def seen_from_above(settings: S) -> S:
+    """Give the settings for a camera that looks straight down: people are as wide as long, and have no line.
+
+    Their least size is half of what they are tall where they stand upright.
+    """
+    boxes = replace(settings.boxes, body="box", aspect=1.0, least_height=_SPAN * settings.boxes.least_height)
+    return replace(settings, boxes=boxes, heights=replace(settings.heights, use=False))
 
 
 PAPER_BOXES = paper_boxes(BackgroundSettings())

@@ -2,6 +2,8 @@
 
 from tracking.yardsticks.catalogue import (
     DEFAULT_TRACKER,
+    TEMPORAL,
+    Preparing,
     Tracker,
     needs_pictures,
     tracker_named,
@@ -11,6 +13,8 @@ from tracking.yardsticks.stepwise import StepwiseSettings, StepwiseTracker
 
 __all__ = [
     "DEFAULT_TRACKER",
+    "TEMPORAL",
+    "Preparing",
     "StepwiseSettings",
     "StepwiseTracker",
     "Tracker",

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from importlib import import_module
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
+from tracking.assist import AssistedTracker, AssistSettings
 from tracking.costs import CostSettings
 from tracking.detections import Detections
 from tracking.detectors.base import Image
 from tracking.solvers.base import Solver
+from tracking.temporal import TemporalSettings
 from tracking.tracker import OnlineTracker
 from tracking.window import WindowResult, WindowSettings
 from tracking.yardsticks.method import Method
@@ -18,14 +20,21 @@ from tracking.yardsticks.stepwise import StepwiseTracker
 DEFAULT_TRACKER = "lp"
 """Multiple object tracking as one linear program in a moving window: MyView's own."""
 
+TEMPORAL = "temporal"
+"""Person-to-blob matching over a window of samples: it has settings of its own."""
+
 # Imported when asked for: a camera with the default tracker loads none of them.
 _METHODS = {
     "kalman": ("tracking.yardsticks.kalman", "Kalman"),
     "klt": ("tracking.yardsticks.flow", "OpticalFlow"),
     "mcmc": ("tracking.yardsticks.mcmc", "Mcmc"),
     "mean-shift": ("tracking.yardsticks.mean_shift", "MeanShift"),
+    "separated-particles": ("tracking.yardsticks.separated", "SeparatedParticles"),
+    "occlusion-cues": ("tracking.yardsticks.occlusion_cues", "OcclusionCues"),
     "particle": ("tracking.yardsticks.particles", "ParticleFilters"),
 }
+
+_GRAPH = "track-graph"
 
 
 class Tracker(Protocol):
@@ -44,9 +53,18 @@ class Tracker(Protocol):
         ...
 
 
+@runtime_checkable
+class Preparing(Protocol):
+    """A tracker that learns the room from pictures of a recording, before its first frame."""
+
+    def prepare(self, images: Iterable[Image]) -> None:
+        """Learn from some pictures; from none as it goes."""
+        ...
+
+
 def tracker_names() -> tuple[str, ...]:
     """Give the names of all trackers."""
-    return (DEFAULT_TRACKER, *sorted(_METHODS))
+    return (DEFAULT_TRACKER, *sorted((*_METHODS, TEMPORAL, _GRAPH)))
 
 
 def needs_pictures(name: str) -> bool:
@@ -55,19 +73,37 @@ def needs_pictures(name: str) -> bool:
     Raises:
         ValueError: no tracker has that name.
     """
-    return name != DEFAULT_TRACKER and bool(_method_of(name).sees)
+    return name == TEMPORAL or (name not in {DEFAULT_TRACKER, _GRAPH} and bool(_method_of(name).sees))
 
 
 def tracker_named(
-    name: str, window: WindowSettings, costs: CostSettings, solver: Callable[[], Solver]
+    name: str,
+    window: WindowSettings,
+    costs: CostSettings,
+    solver: Callable[[], Solver],
+    temporal: TemporalSettings | None = None,
+    fps: float = 25.0,
+    assist: AssistSettings | None = None,
 ) -> Tracker:
-    """Give a new tracker; only the network program has costs and a solver.
+    """Give a new tracker for `fps` frames a second.
+
+    Only the network program has costs, a solver and an operator's help (where `assist` is enabled it is an
+    `AssistedTracker`), and only temporal consistency `temporal`.
 
     Raises:
         ValueError: no tracker has that name.
     """
     if name == DEFAULT_TRACKER:
+        if assist is not None and assist.enabled:
+            return AssistedTracker(window, costs, solver(), assist)
         return OnlineTracker(window, costs, solver())
+    if name == TEMPORAL:
+        made: Tracker = import_module("tracking.temporal.tracker").TemporalTracker(window, temporal, fps)
+        return made
+    if name == _GRAPH:
+        from tracking.yardsticks.track_graph import TrackGraph  # noqa: PLC0415 — loaded when asked for
+
+        return TrackGraph(window)
     return StepwiseTracker(_method_of(name)(), window)
 
 

@@ -16,6 +16,7 @@ import numpy as np
 from tracking.boxes import BOX_SIDES, Floats
 from tracking.detectors.base import Image
 from tracking.yardsticks.colour_field import ColourFields, halves, unlike
+from tracking.yardsticks.resampling import drawn_anew
 
 _LAMBDA = 20.0
 _STEP, _GROW = 0.04, 0.01
@@ -86,9 +87,7 @@ class ParticleFilters:
         for row, item in enumerate(objects):
             self._go_on(item)
             distance = unlike(self._colours.of(image), particle_boxes(item.states, item.aspect), item.colours)
-            # Relative to the nearest: what all of them lack, a shadow or a passer-by, is no weight.
-            weights = item.weights * np.exp(-_LAMBDA * (distance - distance.min()))
-            item.weights = weights / weights.sum()
+            item.weights = weighed(item.weights, distance, _LAMBDA)
             item.box = particle_boxes(item.weights @ item.states, item.aspect)
             if float(item.weights @ distance) <= _LOST:
                 boxes[row] = item.box
@@ -100,13 +99,8 @@ class ParticleFilters:
 
     def _go_on(self, item: Swarm) -> None:
         """Draw anew where few particles count, and move all of them."""
-        count = len(item.weights)
-        if 1.0 / float(np.square(item.weights).sum()) < count / 2:
-            # Systematic: one draw for all (Kitagawa 1996).
-            marks = (self._rng.random() + np.arange(count)) / count
-            chosen = np.minimum(np.searchsorted(np.cumsum(item.weights), marks), count - 1)
-            item.states, item.weights = item.states[chosen], np.full(count, 1.0 / count)
-        item.states = stepped(self._rng, item.states)
+        states, item.weights = drawn_anew(self._rng, item.states, item.weights)
+        item.states = stepped(self._rng, states)
 
 
 def standing(box: Floats) -> tuple[Floats, float]:
@@ -114,6 +108,13 @@ def standing(box: Floats) -> tuple[Floats, float]:
     tall = max(box[3] - box[1], 1.0)
     state = np.array([(box[0] + box[2]) / 2, (box[1] + box[3]) / 2, tall, 0.0, 0.0])
     return state, (box[2] - box[0]) / tall
+
+
+def weighed(weights: Floats, distance: Floats, sharpness: float) -> Floats:
+    """Weigh particles `(P,)` anew by how unlike they are, `(P,)`; the weights sum to 1."""
+    # Relative to the nearest: what all of them lack, a shadow or a passer-by, is no weight.
+    anew = weights * np.exp(-sharpness * (distance - distance.min()))
+    return np.asarray(anew / anew.sum())
 
 
 def stepped(rng: np.random.Generator, states: Floats) -> Floats:

@@ -8,6 +8,7 @@ matched with the detections by one assignment over the overlaps (IoU). Who is ma
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
@@ -52,12 +53,15 @@ class StepwiseSettings:
 
 
 @dataclass(slots=True)
-class _Object(Generic[S]):
+class Followed(Generic[S]):
     """Somebody who is followed."""
 
     number: int
+    """0: not told of yet."""
     known: S
     box: Floats
+    serial: int
+    """Nobody else has it, whether they are told of or not."""
     matches: int = 1
     away: int = 0
     """Frames since the last match."""
@@ -73,10 +77,10 @@ class StepwiseTracker(Generic[S]):
     ) -> None:
         self._method, self._window = method, window
         self._settings = settings or StepwiseSettings()
-        self._objects: list[_Object[S]] = []
-        self._ended: list[_Object[S]] = []
+        self._objects: list[Followed[S]] = []
+        self._ended: list[Followed[S]] = []
         """Those who are gone since the last result."""
-        self._numbers = 0
+        self._numbers = self._serials = 0
         self._seen: dict[int, Detections] = {}
         self._first: int | None = None
         self._last: int | None = None
@@ -170,7 +174,8 @@ class StepwiseTracker(Generic[S]):
             near = [item.box for item in self._objects]
             if near and float(iou(box[None], np.stack(near)).max()) > self._settings.apart:
                 continue
-            item = _Object(0, self._method.begin(image, box), box)
+            self._serials += 1
+            item = Followed(0, self._method.begin(image, box), box, self._serials)
             item.shown[frame] = (box, place)
             self._objects.append(item)
 
@@ -183,7 +188,7 @@ class StepwiseTracker(Generic[S]):
         """Tell of all frames that were not told of yet."""
         first = last if self._first is None else self._first
         frames = range(first, last + 1)
-        told = [item for item in (*self._ended, *self._objects) if item.matches >= self._settings.confirm]
+        told = [item for item in self._everybody() if self._counts(item)]
         for item in told:
             if not item.number:
                 self._numbers += 1
@@ -197,16 +202,24 @@ class StepwiseTracker(Generic[S]):
         ]
         report = SolveReport(self._method.name, 0.0, 0.0, integral=False, conflicts=0, rounds=0)
         result = WindowResult(first, last, last, with_glimpses(tracks, states, first, seen), report)
-        for item in self._objects:
+        for item in self._everybody():
             # Who does not count yet is not told of; when they do, it is from the next window on.
             item.shown = {}
         self._ended, self._seen, self._first = [], {}, last + 1
         return result
 
+    def _everybody(self) -> Iterable[Followed[S]]:
+        """Give all of whom there may be something to tell."""
+        return (*self._ended, *self._objects)
+
+    def _counts(self, item: Followed[S]) -> bool:
+        """Whether somebody is surely somebody."""
+        return item.matches >= self._settings.confirm
+
     def _bins(self) -> int:
         return next((seen.histograms.shape[1] for seen in self._seen.values()), 0)
 
-    def _track(self, item: _Object[S], frames: range, seen: list[Detections]) -> WindowTrack:
+    def _track(self, item: Followed[S], frames: range, seen: list[Detections]) -> WindowTrack:
         boxes = np.full((len(frames), BOX_SIDES), np.nan)
         looks, scores = [], 0.0
         for row, frame in enumerate(frames):

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from server.camera.scene import surfaces
+from server.camera.scene import gym, surfaces
 from server.camera.scene.perspective import Floats, Perspective
 from server.camera.scene.room import Block, Door, Room
 from server.camera.scene.solids import FAR, hit, may_hit
@@ -17,6 +17,7 @@ _FINE = 2  # rays per pixel and direction
 _BAND = 24  # picture rows cast at a time: bounds the memory
 _CORRIDOR = 1.5  # metres from a doorway to the wall behind it
 _FLOOR, _DOOR, _PIECE = 1, 2, 16  # labels: the floor, the first door, the first piece of furniture
+_RAISED = 1.0  # metres above the floor from which a piece does not darken it
 _SUN = np.array([-0.55, -0.45, 0.70])  # towards the light
 
 Bytes = NDArray[np.uint8]
@@ -100,6 +101,8 @@ def _shell(room: Room, origin: Floats, rays: Floats) -> tuple[Floats, NDArray[np
 
 
 def _surface(room: Room, points: Floats, axis: int, *, upper: bool) -> Floats:
+    if room.style == "court":
+        return gym.paint(room, points, axis, upper=upper)
     if axis == 2:  # noqa: PLR2004 — the z axis
         return surfaces.ceiling(points) if upper else surfaces.floor(room, points)
     return surfaces.wall(room, points, axis, far=upper)
@@ -123,6 +126,8 @@ def _contact(room: Room, points: Floats) -> Floats:
     """Darken the floor close to and beneath furniture."""
     shade = np.ones(len(points))
     for piece in room.furniture:
+        if min(block.low[2] for block in piece.blocks) > _RAISED:
+            continue
         west, south, east, north = piece.footprint
         dx = np.maximum(np.maximum(west - points[:, 0], points[:, 0] - east), 0)
         dy = np.maximum(np.maximum(south - points[:, 1], points[:, 1] - north), 0)

@@ -32,6 +32,27 @@ class Figure:
     patch: Bytes  # (h, w, 4) blue, green, red times alpha, and alpha
 
 
+@dataclass(frozen=True, slots=True)
+class Part:
+    """The part of a figure's patch that lies within the picture."""
+
+    area: tuple[slice, slice]  # of the picture
+    patch: tuple[slice, slice]  # of the patch
+
+
+def clip(figure: Figure, view: Perspective) -> Part | None:
+    """Cut a figure to the picture, or give None where nothing of it is left."""
+    high, wide = figure.patch.shape[:2]
+    left, top = max(figure.left, 0), max(figure.top, 0)
+    right, bottom = min(figure.left + wide, view.width), min(figure.top + high, view.height)
+    if left >= right or top >= bottom:
+        return None
+    return Part(
+        (slice(top, bottom), slice(left, right)),
+        (slice(top - figure.top, bottom - figure.top), slice(left - figure.left, right - figure.left)),
+    )
+
+
 def draw_figure(view: Perspective, body: Body, joints: Floats, light: float) -> Figure | None:
     """Draw a body by its joints ``(J, 3)`` in metres; `light` scales its colours.
 

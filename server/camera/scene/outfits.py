@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -41,6 +41,9 @@ _BLACK, _BRUNETTE, _GINGER, _BLOND, _GREY = (
 )
 _INK, _SNOW, _LEATHER = _rgb(0x1E2027), _rgb(0xE6E4DF), _rgb(0x4A2E1E)
 
+_SHIRTS = ((_rgb(0xD8342B), _rgb(0xF0EDE6)), (_rgb(0x2450B4), _rgb(0x1B2440)))
+_ALIKE = 0.3  # of the seeds have two people in nearly the same clothes
+
 # The first eight differ in every piece: no two uppers and no two lowers are less than 30 apart in CIE L*a*b*.
 _WARDROBE = (
     Outfit(_rgb(0xC8322D), _rgb(0x15161B), _BRUNETTE, _PALE, _SNOW, 1.82),
@@ -76,6 +79,33 @@ def outfit(walker: int, seed: int) -> Outfit:
         sleeves=like.sleeves,
         legs=like.legs,
     )
+
+
+def casual(walker: int, seed: int) -> Outfit:
+    """Give walker 0, 1, … any outfit of the catalogue; with some seeds two people dress alike."""
+    rng = np.random.default_rng([seed, 0xCA50])
+    order = rng.permutation(len(_WARDROBE)).tolist()
+    alike = rng.random() < _ALIKE
+    worn = _WARDROBE[order[walker % len(order)]]
+    if walker == 1 and alike:
+        first = _WARDROBE[order[0]]
+        return replace(worn, upper=_faded(first.upper), lower=first.lower, legs=first.legs)
+    return worn
+
+
+def shirt(player: int, team: int) -> Outfit:
+    """Give a player what their team plays in: only hair, skin and height tell its players from each other."""
+    who = _WARDROBE[(player * 5 + team * 3) % len(_WARDROBE)]
+    upper, lower = _SHIRTS[team]
+    return Outfit(
+        upper, lower, who.hair, who.skin, _SNOW, who.height + 0.08, 0.96, "short", "short", "shorts"
+    )
+
+
+def _faded(colour: Colour) -> Colour:
+    """Give nearly the same colour: washed more often."""
+    red, green, blue = (0.9 * part + 0.05 for part in colour)
+    return (red, green, blue)
 
 
 def _dye(rng: np.random.Generator, vivid: float = 0.75) -> Colour:

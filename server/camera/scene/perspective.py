@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 Floats: TypeAlias = NDArray[np.float64]
 
+_PLUMB = 0.999  # of a direction's length that is vertical: from there on, no horizon says what is level
+
 
 @dataclass(frozen=True, slots=True)
 class Viewpoint:
@@ -36,15 +38,21 @@ class Perspective:
 
     @classmethod
     def of(cls, view: Viewpoint, width: int, height: int) -> Perspective:
-        """Hang a camera at a viewpoint, its horizon level."""
+        """Hang a camera at a viewpoint, its horizon level; one that looks straight down has north on top."""
         centre = np.array(view.position, dtype=np.float64)
         forward = np.array(view.target, dtype=np.float64) - centre
         forward /= np.linalg.norm(forward)
-        right = np.cross(forward, (0.0, 0.0, 1.0))
+        plumb = abs(forward[2]) > _PLUMB
+        right = np.cross(forward, (0.0, 1.0, 0.0) if plumb else (0.0, 0.0, 1.0))
         right /= np.linalg.norm(right)
         axes = np.stack([right, np.cross(forward, right), forward])
         focal = 0.5 * width / math.tan(math.radians(view.field_of_view) / 2)
         return cls(centre, axes, focal, width, height)
+
+    @property
+    def overhead(self) -> bool:
+        """Whether it looks straight down."""
+        return bool(self.axes[2, 2] < -_PLUMB)
 
     def project(self, points: Floats) -> tuple[Floats, Floats]:
         """Project ``(N, 3)`` world points to ``(N, 2)`` pixels and their ``(N,)`` depths in metres.

@@ -1,7 +1,8 @@
 """A scene written to disk: one video per camera, ground truth, and the cameras' homographies.
 
 The formats are those of the field's recordings: `c0.mp4` …, `gt/c0.txt` with MOTChallenge rows
-`frame,id,left,top,width,height,1,class,visible` (frames count from 1), and `ground.json`.
+`frame,id,left,top,width,height,1,class,visible` (frames count from 1), and, where the scene has a floor,
+`ground.json`.
 """
 
 from __future__ import annotations
@@ -50,9 +51,10 @@ def write_recording(scene: Scene, out: Path, seconds: float, progress: Progress 
 
 def _write(scene: Scene, folder: Path, frames: int, progress: Progress | None) -> None:
     (folder / "gt").mkdir()
-    matrices = {f"c{camera}": scene.homography(camera).tolist() for camera in range(scene.cameras)}
-    ground = json.dumps({"unit": "m", "homography": matrices}, indent=1)
-    (folder / "ground.json").write_text(ground + "\n", encoding="ascii")
+    matrices = _homographies(scene)
+    if matrices:
+        ground = json.dumps({"unit": "m", "homography": matrices}, indent=1)
+        (folder / "ground.json").write_text(ground + "\n", encoding="ascii")
     with ExitStack() as stack:
         videos = [
             stack.enter_context(_Video(folder / f"c{camera}.mp4", scene)) for camera in range(scene.cameras)
@@ -67,6 +69,16 @@ def _write(scene: Scene, folder: Path, frames: int, progress: Progress | None) -
                 tables[camera].writelines(_rows(truth, frame))
             if progress is not None:
                 progress(frame + 1, frames)
+
+
+def has_ground(scene: Scene) -> bool:
+    """Say whether a scene has a floor, and so a `ground.json`."""
+    return bool(_homographies(scene))
+
+
+def _homographies(scene: Scene) -> dict[str, list[list[float]]]:
+    found = {f"c{camera}": scene.homography(camera) for camera in range(scene.cameras)}
+    return {camera: matrix.tolist() for camera, matrix in found.items() if matrix is not None}
 
 
 def _rows(truth: CameraTruth, frame: int) -> list[str]:

@@ -8,9 +8,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from server.camera.scene.figure import Figure, clip
 from server.camera.scene.perspective import Perspective
 from server.camera.scene.shadow import cast_shadow
-from server.camera.scene.stage import Actor, Stage, clip
+from server.camera.scene.stage import Actor, Stage
 
 Bytes = NDArray[np.uint8]
 
@@ -22,17 +23,18 @@ def compose(stage: Stage, actors: Sequence[Actor]) -> Bytes:
         if actor.inside:
             cast_shadow(image, stage.backdrop.floor, stage.view, actor.joints)
     for actor in actors:
-        _paste(image, stage.view, actor)
+        paste(image, stage.view, actor.figure, actor.curtain)
     return image
 
 
-def _paste(image: Bytes, view: Perspective, actor: Actor) -> None:
-    part = clip(actor.figure, view)
+def paste(image: Bytes, view: Perspective, figure: Figure, curtain: Bytes | None = None) -> None:
+    """Lay a figure over a picture ``(H, W, 3)``, in place; a curtain is the share of its part that shows."""
+    part = clip(figure, view)
     if part is None:
         return
-    patch = actor.figure.patch[part.patch]
-    if actor.curtain is not None:
-        shown = cv2.multiply(patch, cv2.merge([actor.curtain] * 4), scale=1 / 255)
+    patch = figure.patch[part.patch]
+    if curtain is not None:
+        shown = cv2.multiply(patch, cv2.merge([curtain] * 4), scale=1 / 255)
         patch = np.asarray(shown, dtype=np.uint8)
     through = cv2.cvtColor(255 - patch[:, :, 3], cv2.COLOR_GRAY2BGR)
     behind = cv2.multiply(image[part.area], through, scale=1 / 255)

@@ -66,6 +66,7 @@ class Room:
     furniture: tuple[Furniture, ...]
     rug: tuple[float, float, float, float]  # west, south, east and north bound
     viewpoints: tuple[Viewpoint, ...]
+    style: Literal["house", "court"] = "house"  # what floor, walls and light are like
 
     def beyond(self, door: Door, along: float, out: float) -> Point:
         """Give the floor point `out` metres beyond a door's wall, `along` from the opening's middle."""
@@ -122,7 +123,8 @@ def plant(x: float, y: float) -> Furniture:
     return Furniture("plant", (pot, *leaves))
 
 
-def _sofa(x: float, y: float) -> Furniture:
+def sofa(x: float, y: float) -> Furniture:
+    """Give a sofa along the western wall, by its south-western corner."""
     cloth, cushion = (0.25, 0.31, 0.38), (0.30, 0.37, 0.44)
     return Furniture(
         "sofa",
@@ -137,7 +139,8 @@ def _sofa(x: float, y: float) -> Furniture:
     )
 
 
-def _sideboard(x: float, y: float) -> Furniture:
+def sideboard(x: float, y: float) -> Furniture:
+    """Give a sideboard along the eastern wall, by its south-western corner."""
     doors = tuple(
         Block((x - 0.015, y + 0.03 + 0.6 * k, 0.16), (x, y + 0.57 + 0.6 * k, 0.72), (0.47, 0.35, 0.25))
         for k in range(3)
@@ -164,8 +167,8 @@ ROOM = Room(
     furniture=(
         _pillar(5.6, 6.0, 3.4),
         bench(4.75, 0.45),
-        _sofa(0.08, 2.95),
-        _sideboard(10.54, 2.3),
+        sofa(0.08, 2.95),
+        sideboard(10.54, 2.3),
         plant(0.6, 0.6),
         plant(10.4, 0.6),
         plant(0.6, 7.4),

@@ -2,32 +2,26 @@
 
 from __future__ import annotations
 
-from functools import cached_property, lru_cache
-
 import numpy as np
 from numpy.typing import NDArray
 
-from server.camera.scene.catalogue import scene_room
+from server.camera.scene.catalogue import scene_entry
 from server.camera.scene.noise import expose
-from server.camera.scene.outfits import outfit
-from server.camera.scene.perspective import Floats, Perspective
-from server.camera.scene.render import compose
-from server.camera.scene.stage import Actor, Stage
-from server.camera.scene.stroll import Pose
-from server.camera.scene.truth import CameraTruth, judge
-from server.camera.scene.walkers import Walkers
+from server.camera.scene.perspective import Floats
+from server.camera.scene.truth import CameraTruth
+from server.camera.scene.world import Asked
 
 
 class Scene:
-    """Walkers in a room under several cameras: a pure function of its arguments, endless in time.
+    """Objects that move before several cameras: a pure function of its arguments, endless in time.
 
-    Any frame may be asked for in any order in any process and is equal to the byte. A camera's empty
-    room is painted when the camera is first asked for.
+    Any frame may be asked for in any order in any process and is equal to the byte. What does not move
+    before a camera is painted when the camera is first asked for.
 
     Args:
         name: one of `scene_names()`.
-        cameras: how many cameras look, at most as many as the room has places for.
-        objects: how many people come and go; their ids count from 1.
+        cameras: how many cameras look, at most as many as the scene has places for; None: as many as suit it.
+        objects: how many people or fish there are; their ids count from 1; None: as many as suit the scene.
         seed: of everything random, not negative.
         width: of a picture, pixels.
         height: of a picture, pixels.
@@ -40,82 +34,70 @@ class Scene:
     def __init__(
         self,
         name: str = "room",
-        cameras: int = 3,
-        objects: int = 4,
+        cameras: int | None = None,
+        objects: int | None = None,
         seed: int = 0,
         width: int = 640,
         height: int = 360,
         fps: float = 25.0,
     ) -> None:
-        self._room = scene_room(name)
-        _check("cameras", cameras, 1, len(self._room.viewpoints))
-        _check("objects", objects, 0, 64)
+        entry = scene_entry(name)
+        cameras = entry.cameras if cameras is None else cameras
+        objects = entry.objects if objects is None else objects
+        _check("cameras", cameras, 1, entry.most_cameras)
+        _check("objects", objects, 0, entry.most_objects)
         _check("seed", seed, 0, 2**63 - 1)
         _check("width", width, 64, 4096)
         _check("height", height, 36, 4096)
         _check("fps", fps, 1, 240)
         self.name, self.cameras, self.objects, self.seed = name, cameras, objects, seed
         self.width, self.height, self.fps = width, height, float(fps)
-        self._walkers = Walkers(self._room, objects, seed)
-        self._outfits = [outfit(walker, seed) for walker in range(objects)]
-        self._stage = lru_cache(maxsize=None)(self._set_stage)
-        # A recording asks for the picture and the truth of a frame: its figures are drawn once for both.
-        self._actors = lru_cache(maxsize=cameras)(self._act)
+        self.world = entry.world(Asked(cameras, objects, seed, width, height))
 
     def image(self, camera: int, frame: int) -> NDArray[np.uint8]:
         """Give a camera's picture ``(H, W, 3)``, blue, green, red. Cameras and frames count from 0."""
-        self._check_frame(frame)
-        stage = self._stage(camera)
-        clean = compose(stage, self._actors(camera, frame))
-        return expose(clean, camera, frame, frame / self.fps, self.seed)
+        seconds = self._seconds(frame)
+        clean = self.world.picture(self._known(camera), seconds)
+        return expose(clean, camera, frame, seconds, self.seed)
 
-    def empty(self, camera: int) -> NDArray[np.uint8]:
-        """Give a camera's picture ``(H, W, 3)`` of the room without people, noise and drift."""
-        return self._stage(camera).backdrop.image.copy()
+    def empty(self, camera: int, frame: int = 0) -> NDArray[np.uint8]:
+        """Give a camera's picture ``(H, W, 3)`` without the objects, noise and drift."""
+        return self.world.empty(self._known(camera), self._seconds(frame))
 
     def truth(self, frame: int) -> tuple[CameraTruth, ...]:
         """Say for every camera who is in its picture, where, and how much of them shows."""
-        self._check_frame(frame)
-        return tuple(
-            judge(self._stage(camera), self._actors(camera, frame)) for camera in range(self.cameras)
-        )
+        seconds = self._seconds(frame)
+        return tuple(self.world.truth(camera, seconds) for camera in range(self.cameras))
 
     def ground_position(self, frame: int) -> Floats:
-        """Say where everyone stands: ``(objects, 2)`` metres; in a corridor that is off the room's floor."""
-        self._check_frame(frame)
-        return np.array([(pose.x, pose.y) for pose in self._poses(frame)], dtype=np.float64).reshape(-1, 2)
+        """Say where everyone is: ``(objects, 2)`` metres; in a corridor that is off the room's floor."""
+        return self.world.positions(self._seconds(frame))
 
     def inside(self, frame: int) -> NDArray[np.bool_]:
         """Say who is in the room: ``(objects,)``."""
-        where = self.ground_position(frame)
-        return np.array([self._room.outside(x, y) <= 0 for x, y in where.tolist()], dtype=np.bool_)
+        return self.world.inside(self._seconds(frame))
 
-    def homography(self, camera: int) -> Floats:
-        """Give the ``(3, 3)`` map from a camera's pixels (homogeneous) to the floor, in metres."""
-        return self._view(camera).homography()
+    def homography(self, camera: int) -> Floats | None:
+        """Give the ``(3, 3)`` map from a camera's pixels (homogeneous) to the floor, in metres.
 
-    @cached_property
+        None in a scene without a floor to stand on.
+        """
+        return self.world.homography(self._known(camera))
+
+    @property
     def floor(self) -> tuple[float, float]:
         """The room's extent, west to east and south to north, metres."""
-        return (self._room.width, self._room.depth)
+        return self.world.extent
 
-    def _check_frame(self, frame: int) -> None:
+    def _seconds(self, frame: int) -> float:
         if frame < 0:
             raise ValueError(f"scene {self.name}: frame {frame} is before the first, 0")
+        return frame / self.fps
 
-    def _poses(self, frame: int) -> list[Pose]:
-        return self._walkers.poses(frame / self.fps)
-
-    def _act(self, camera: int, frame: int) -> tuple[Actor, ...]:
-        return tuple(self._stage(camera).actors(self._poses(frame), self._outfits))
-
-    def _view(self, camera: int) -> Perspective:
+    def _known(self, camera: int) -> int:
         if not 0 <= camera < self.cameras:
             raise ValueError(f"scene {self.name}: there is no camera {camera} among {self.cameras}")
-        return Perspective.of(self._room.viewpoints[camera], self.width, self.height)
-
-    def _set_stage(self, camera: int) -> Stage:
-        return Stage(self._room, self._view(camera))
+        return camera
 
 
 def _check(what: str, value: float, low: float, high: float) -> None:

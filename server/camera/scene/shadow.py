@@ -45,7 +45,7 @@ def cast_shadow(image: Bytes, floor: Bytes, view: Perspective, joints: Floats) -
     wide, tall = (high - low).tolist()
     size = ((tall + _COARSE - 1) // _COARSE, (wide + _COARSE - 1) // _COARSE)
     local, scale = (points - low) / _COARSE, reach / _COARSE
-    dark = np.maximum(_body_shadow(size, local, scale), _contact(size, local, scale))
+    dark = np.maximum(_body_shadow(size, local, scale), _contact(size, local, scale, round_=view.overhead))
     full = cv2.resize(dark, None, fx=_COARSE, fy=_COARSE, interpolation=cv2.INTER_LINEAR)[:tall, :wide]
     area = (slice(low[1], high[1]), slice(low[0], high[0]))
     kept = cv2.cvtColor(255 - cv2.multiply(full, floor[area], scale=1 / 255), cv2.COLOR_GRAY2BGR)
@@ -62,11 +62,14 @@ def _body_shadow(size: tuple[int, int], points: Floats, scale: Floats) -> Bytes:
     return np.asarray(soft, dtype=np.uint8)
 
 
-def _contact(size: tuple[int, int], points: Floats, scale: Floats) -> Bytes:
-    """Draw the small dark places under the feet, which make them stand on the floor."""
+def _contact(size: tuple[int, int], points: Floats, scale: Floats, *, round_: bool) -> Bytes:
+    """Draw the small dark places under the feet, which make them stand on the floor.
+
+    They are `round_` from straight above, and flat from elsewhere.
+    """
     dark = np.zeros(size, dtype=np.uint8)
     spread = float(scale[Joint.ANKLE_L])
-    axes = (int(0.13 * spread * (1 << _SHIFT)), int(0.055 * spread * (1 << _SHIFT)))
+    axes = (int(0.13 * spread * (1 << _SHIFT)), int((0.13 if round_ else 0.055) * spread * (1 << _SHIFT)))
     for ankle, toe in ((Joint.ANKLE_L, Joint.TOE_L), (Joint.ANKLE_R, Joint.TOE_R)):
         x, y = ((points[ankle] + points[toe]) / 2 * (1 << _SHIFT)).astype(int).tolist()
         cv2.ellipse(dark, (x, y), axes, 0, 0, 360, (_FEET,), -1, cv2.LINE_AA, _SHIFT)

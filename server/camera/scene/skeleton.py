@@ -18,6 +18,7 @@ _HIP_SIDE, _SHOULDER_SIDE = 0.050, 0.104
 _UPPER_ARM, _FOREARM, _FOOT = 0.168, 0.165, 0.125
 _STANCE = 0.6  # the share of a stride in which a foot stands
 _BRISK = 0.75  # metres per second: the pace of a full swing
+_RUN = (2.6, 4.6)  # metres per second: from the first on somebody runs, from the second as hard as they can
 
 
 class Joint(IntEnum):
@@ -75,7 +76,8 @@ def _local(pose: Pose, height: float) -> Floats:
     phase = pose.walked / (STRIDE * height) % 1.0
     swing = min(pose.speed / _BRISK, 1.0)
     bob = -0.015 * swing * (1 + math.cos(4 * math.pi * (phase - 0.05)))
-    lean = 0.022 * swing
+    run = min(max((pose.speed - _RUN[0]) / (_RUN[1] - _RUN[0]), 0.0), 1.0)
+    lean = 0.022 * swing + 0.055 * run
     body = np.zeros((len(Joint), 3))
     body[Joint.NECK] = (lean, 0, _NECK + bob)
     body[Joint.THROAT] = (lean + 0.004, 0, 0.862 + bob)
@@ -90,16 +92,16 @@ def _local(pose: Pose, height: float) -> Floats:
     body[Joint.PACK_LOW] = (lean - 0.09, 0, 0.645 + bob)
     for side, sign in ((0, 1.0), (1, -1.0)):
         turn = (phase + side * 0.5) % 1.0
-        _leg(body, side, sign, _step(turn, swing), bob)
+        _leg(body, side, sign, _step(turn, swing, run), bob)
         body[Joint.SHOULDER_L + side] = (lean, sign * _SHOULDER_SIDE, _SHOULDER + bob)
-        _arm(body, side, sign, turn, swing)
+        _arm(body, side, sign, turn, swing, run)
         knee = body[Joint.KNEE_L + side]
         body[Joint.HEM_L + side] = (knee[0] * 0.8, sign * 0.062, knee[2] + 0.01)
     return body
 
 
-def _step(turn: float, swing: float) -> _Step:
-    reach = STRIDE * _STANCE / 2 * swing
+def _step(turn: float, swing: float, run: float) -> _Step:
+    reach = STRIDE * _STANCE / 2 * swing * (1 + 0.2 * run)
     if turn < _STANCE:
         ahead = reach * (1 - 2 * turn / _STANCE)
         late = max(turn - 0.42, 0.0) / (_STANCE - 0.42)  # the heel rises before the foot leaves the floor
@@ -108,7 +110,7 @@ def _step(turn: float, swing: float) -> _Step:
         )
     share = (turn - _STANCE) / (1 - _STANCE)
     smooth = share * share * (3 - 2 * share)
-    lift = (0.035 * (1 - share) + 0.050 * math.sin(math.pi * math.sqrt(share))) * swing
+    lift = (0.035 * (1 - share) + (0.050 + 0.13 * run) * math.sin(math.pi * math.sqrt(share))) * swing
     return _Step(reach * (2 * smooth - 1), lift, (0.55 * (1 - 1.6 * share)) * swing)
 
 
@@ -128,11 +130,11 @@ def _leg(body: Floats, side: int, sign: float, step: _Step, bob: float) -> None:
     body[Joint.TOE_L + side] = ankle + foot
 
 
-def _arm(body: Floats, side: int, sign: float, turn: float, swing: float) -> None:
-    """Hang an arm from its shoulder, which is in place, and swing it against its leg."""
+def _arm(body: Floats, side: int, sign: float, turn: float, swing: float, run: float) -> None:
+    """Hang an arm from its shoulder, which is in place, and swing it against its leg; runners bend theirs."""
     back = math.cos(2 * math.pi * (turn - 0.05))
-    angle = -0.42 * swing * back + 0.03
-    bent = angle + 0.22 + 0.28 * swing * (1 - back) / 2
+    angle = -(0.42 + 0.25 * run) * swing * back + 0.03 - 0.15 * run
+    bent = angle + 0.22 + 0.28 * swing * (1 - back) / 2 + 1.15 * run
     out = sign * 0.030
     upper = np.array([_UPPER_ARM * math.sin(angle), out, -_UPPER_ARM * math.cos(angle)])
     fore = np.array([_FOREARM * math.sin(bent), -out * 0.2, -_FOREARM * math.cos(bent)])

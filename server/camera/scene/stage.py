@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from server.camera.scene.backdrop import Backdrop, paint
 from server.camera.scene.body import body
-from server.camera.scene.figure import Figure, draw_figure
+from server.camera.scene.figure import Figure, clip, draw_figure
 from server.camera.scene.outfits import Outfit
 from server.camera.scene.perspective import Floats, Perspective
 from server.camera.scene.room import Furniture, Room
@@ -91,7 +91,12 @@ class Stage:
         return shown
 
     def _hides(self, piece: Furniture, pose: Pose) -> bool:
-        """Say whether furniture stands before a walker: not if both are beyond the same side of it."""
+        """Say whether furniture stands before a walker: not if both are beyond the same side of it.
+
+        From straight above all furniture is beside or below who stands.
+        """
+        if self.view.overhead:
+            return False
         west, south, east, north = piece.footprint
         x, y = self.view.centre[:2].tolist()
         apart = (
@@ -101,24 +106,3 @@ class Stage:
             or (y >= north and pose.y >= north)
         )
         return not apart
-
-
-@dataclass(frozen=True, slots=True)
-class Part:
-    """The part of a figure's patch that lies within the picture."""
-
-    area: tuple[slice, slice]  # of the picture
-    patch: tuple[slice, slice]  # of the patch
-
-
-def clip(figure: Figure, view: Perspective) -> Part | None:
-    """Cut a figure to the picture, or give None where nothing of it is left."""
-    high, wide = figure.patch.shape[:2]
-    left, top = max(figure.left, 0), max(figure.top, 0)
-    right, bottom = min(figure.left + wide, view.width), min(figure.top + high, view.height)
-    if left >= right or top >= bottom:
-        return None
-    return Part(
-        (slice(top, bottom), slice(left, right)),
-        (slice(top - figure.top, bottom - figure.top), slice(left - figure.left, right - figure.left)),
-    )

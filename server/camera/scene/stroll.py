@@ -12,8 +12,8 @@ from server.camera.scene.perspective import Floats
 from server.camera.scene.route import Route
 
 SAMPLES_PER_SECOND = 20
-_ROUNDING = 0.32  # seconds: corners are cut, starts and stops softened over this time
-_TURNING = 0.22  # seconds
+ROUNDING = 0.32  # seconds: corners are cut, starts and stops softened over this time
+TURNING = 0.22  # seconds
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,8 +45,8 @@ class Stroll:
         places = np.column_stack([np.interp(clock, times, points[:, axis]) for axis in range(2)])
         leg = np.clip(np.searchsorted(times, clock, side="right") - 1, 0, len(moves) - 1)
         headings = np.unwrap(np.unwrap(moves)[leg])
-        places = np.column_stack([_soften(places[:, axis], _ROUNDING) for axis in range(2)])
-        return cls._through(places, _soften(headings, _TURNING))
+        places = np.column_stack([soften(places[:, axis], ROUNDING) for axis in range(2)])
+        return cls._through(places, soften(headings, TURNING))
 
     @classmethod
     def _through(cls, places: Floats, headings: Floats) -> Stroll:
@@ -58,7 +58,7 @@ class Stroll:
         whole, coarse = np.arange(len(self.places)), np.arange(len(places)) * every
         was = self.places[coarse]
         shift = [np.interp(whole, coarse, (places - was)[:, axis]) for axis in range(2)]
-        soft = np.column_stack([_soften(axis, 1 / SAMPLES_PER_SECOND) for axis in shift])
+        soft = np.column_stack([soften(axis, 1 / SAMPLES_PER_SECOND) for axis in shift])
         return Stroll._through(self.places + soft, self.headings)
 
     def at(self, seconds: float) -> Pose:
@@ -96,7 +96,8 @@ def _keyframes(route: Route, delay: float) -> tuple[Floats, Floats, Floats]:
     return np.array(times), np.array(points), np.array(faces)
 
 
-def _soften(values: Floats, seconds: float) -> Floats:
+def soften(values: Floats, seconds: float) -> Floats:
+    """Smooth samples ``(S,)`` over some seconds."""
     radius = int(3 * seconds * SAMPLES_PER_SECOND)
     kernel = cv2.getGaussianKernel(2 * radius + 1, seconds * SAMPLES_PER_SECOND, cv2.CV_64F).ravel()
     smooth: Floats = np.convolve(np.pad(values, radius, mode="edge"), kernel, mode="valid")

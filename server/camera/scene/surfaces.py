@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from server.camera.scene import gym
 from server.camera.scene.perspective import Floats
 from server.camera.scene.room import Room
 
@@ -36,6 +37,8 @@ def lattice(a: Floats, b: Floats) -> Floats:
 
 def daylight(room: Room, x: Floats, y: Floats) -> Floats:
     """Say how bright a floor point is, about 0.6 .. 1.1: windows in the west and south, soft lamps within."""
+    if room.style == "court":
+        return gym.light(room, x, y)
     lamps = np.exp(-((x - room.width * 0.5) ** 2 + (y - room.depth * 0.55) ** 2) / 9.0)
     windows = 0.20 * np.exp(-np.maximum(x, 0) / 2.6) + 0.17 * np.exp(-np.maximum(y, 0) / 2.2)
     beyond = np.maximum(np.maximum(x - room.width, y - room.depth), 0)

@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from server.camera.scene.perspective import Floats
-from server.camera.scene.stage import Actor, Stage, clip
+from server.camera.scene.stage import Actor, Stage
+from server.camera.scene.survey import Piece, survey
 
-_COVERED = 128  # alpha from which a pixel belongs to a figure
 _GLIMPSE = 0.1  # of a walker in a corridor that must show for it to be part of the truth
-_SMALLEST = 4.0  # pixels
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,45 +24,20 @@ class CameraTruth:
         Floats  # (N, 4) left, top, right, bottom in pixels: the whole figure, hidden or not, cut at the edge
     )
     visible: Floats  # (N,) share of the whole figure that shows: not hidden, not beyond the edge; 0..1
+    away: Floats  # (N,) metres from the camera
 
 
 def judge(stage: Stage, actors: Sequence[Actor]) -> CameraTruth:
     """Measure boxes and visible shares of the actors, which come furthest first."""
-    view = stage.view
-    owner = np.full((view.height, view.width), -1, dtype=np.int16)
-    whole: dict[int, int] = {}
-    boxes: dict[int, Floats] = {}
-    for actor in actors:
-        alpha = actor.figure.patch[:, :, 3]
-        covered = alpha >= _COVERED
-        whole[actor.walker] = max(int(np.count_nonzero(covered)), 1)
-        part = clip(actor.figure, view)
-        if part is None:
-            continue
-        shown = covered[part.patch]
-        boxes[actor.walker] = _box(shown, part.area)
-        if actor.curtain is not None:
-            shown = shown & (actor.curtain >= _COVERED)
-        owner[part.area][shown] = actor.walker
-    counts = np.bincount(owner[owner >= 0], minlength=max(whole, default=0) + 1)
-    share = {walker: float(counts[walker]) / area for walker, area in whole.items()}
+    found = survey(stage.view, [Piece(actor.walker, actor.figure, actor.curtain) for actor in actors])
     kept = [
-        actor.walker
+        actor
         for actor in sorted(actors, key=lambda actor: actor.walker)
-        if (actor.inside or share[actor.walker] >= _GLIMPSE) and _large(boxes[actor.walker])
+        if (actor.inside or found[actor.walker].share >= _GLIMPSE) and found[actor.walker].large
     ]
     return CameraTruth(
-        np.array([walker + 1 for walker in kept], dtype=np.int64),
-        np.array([boxes[walker] for walker in kept], dtype=np.float64).reshape(-1, 4),
-        np.array([share[walker] for walker in kept], dtype=np.float64),
+        np.array([actor.walker + 1 for actor in kept], dtype=np.int64),
+        np.array([found[actor.walker].box for actor in kept], dtype=np.float64).reshape(-1, 4),
+        np.array([found[actor.walker].share for actor in kept], dtype=np.float64),
+        np.array([np.linalg.norm(actor.joints.mean(axis=0) - stage.view.centre) for actor in kept]),
     )
-
-
-def _box(shown: NDArray[np.bool_], area: tuple[slice, slice]) -> Floats:
-    x, y, width, height = cv2.boundingRect(shown.astype(np.uint8))
-    left, top = area[1].start + x, area[0].start + y
-    return np.array([left, top, left + width, top + height], dtype=np.float64)
-
-
-def _large(box: Floats) -> bool:
-    return bool((box[2:] - box[:2] >= _SMALLEST).all())

@@ -15,8 +15,12 @@ from server.wire.sources import SourceKind, kind_of
 __all__ = ["Image", "Recording", "Source", "SourceEnded", "open_source"]
 
 
-def open_source(camera: Camera, site: Site, listener: LiveSound | None = None) -> Source:
+def open_source(
+    camera: Camera, site: Site, listener: LiveSound | None = None, *, ready: bool = True
+) -> Source:
     """Open a camera's source; a network camera's sound is handed to ``listener``, if there is one.
+
+    ``ready``: for the first pulse; else it is only looked whether it can be opened.
 
     Raises:
         UserError: it cannot be opened; the text says which camera and why.
@@ -25,7 +29,8 @@ def open_source(camera: Camera, site: Site, listener: LiveSound | None = None) -
     try:
         match kind_of(camera.source):
             case SourceKind.SCENE:
-                return Stage(camera.source, site).warm_up()
+                stage = Stage(camera.source, site)
+                return stage.warm_up() if ready else stage
             case SourceKind.STREAM:
                 return Stream(camera.source, camera.options, listener)
             case SourceKind.FOLDER:

@@ -13,7 +13,7 @@ from server.wire.errors import UserError
 from server.wire.sections import Site
 
 _WHOLE = re.compile(r"[0-9]{1,18}")
-_DEFAULTS = {"camera": 0, "cameras": 3, "objects": 4, "seed": 1}
+_DEFAULTS = {"camera": 0, "cameras": None, "objects": None, "seed": 1}  # None: as many as suit the scene
 
 
 class Stage:
@@ -27,21 +27,23 @@ class Stage:
 
     def __init__(self, source: str, site: Site) -> None:
         name, _, query = source.removeprefix("scene:").partition("?")
-        values = dict(_DEFAULTS)
+        values: dict[str, int | None] = dict(_DEFAULTS)
         for key, value in parse_qsl(query, keep_blank_values=True):
             if key not in values or not _WHOLE.fullmatch(value):
                 raise UserError(
                     f"{source}: {key}={value} is not a whole number for one of {', '.join(values)}"
                 )
             values[key] = int(value)
-        if values["camera"] >= values["cameras"]:
-            raise UserError(f"{source}: camera {values['camera']} of {values['cameras']}: they count from 0")
-        self._camera = values.pop("camera")
+        camera, seed = values["camera"] or 0, values["seed"] or 0
+        size = (site.width, site.height)
         try:
-            self._scene = Scene(name=name, width=site.width, height=site.height, fps=site.fps, **values)
+            self._scene = Scene(name, values["cameras"], values["objects"], seed, *size, site.fps)
         except ValueError as error:
             raise UserError(f"{source}: {error}") from error
-        self.size = (site.width, site.height)
+        if camera >= self._scene.cameras:
+            raise UserError(f"{source}: camera {camera} of {self._scene.cameras}: they count from 0")
+        self._camera = camera
+        self.size = size
 
     def warm_up(self) -> Self:
         """Draw once: painting the room takes a second, which must not be while pulses go by."""
@@ -57,9 +59,10 @@ class Stage:
         return (self._scene.image(self._camera, place) for place in places)
 
     @property
-    def ground(self) -> list[list[float]]:
-        """The homography from the picture to the floor in metres, as a configuration holds it."""
-        return [[float(entry) for entry in row] for row in self._scene.homography(self._camera)]
+    def ground(self) -> list[list[float]] | None:
+        """The homography from the picture to the floor in metres, as in a configuration; None: no floor."""
+        homography = self._scene.homography(self._camera)
+        return None if homography is None else [[float(entry) for entry in row] for row in homography]
 
     def close(self) -> None:
         """Nothing is held open."""

@@ -7,7 +7,7 @@ from server.wire.sections.encode import Encode
 from server.wire.sections.serve import Http, Record, Tls
 from server.wire.sections.site import Site, Sync, Zenoh, ZenohTls
 from server.wire.sections.sound import Sound
-from server.wire.sections.view import TUNED, Share, View
+from server.wire.sections.view import TUNED, Flags, Share, View
 
 __all__ = [
     "TUNED",
@@ -15,6 +15,7 @@ __all__ = [
     "Camera",
     "Encode",
     "Endpoint",
+    "Flags",
     "Http",
     "Name",
     "Polygon",

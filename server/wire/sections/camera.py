@@ -12,7 +12,9 @@ from server.wire.ground_unit import checked_unit
 from server.wire.library import validated
 from server.wire.sections.base import Name, Polygon, Section
 from tracking import DEFAULT_SOLVER, CostSettings, WindowSettings, solver_named
-from tracking.yardsticks import DEFAULT_TRACKER, tracker_names
+from tracking.assist import AssistSettings
+from tracking.temporal import TemporalSettings
+from tracking.yardsticks import DEFAULT_TRACKER, TEMPORAL, tracker_names
 
 
 class Camera(Section):
@@ -23,6 +25,8 @@ class Camera(Section):
     """A file, a folder of images, a URL that FFmpeg opens, /dev/video0, or scene:NAME?camera=0&…"""
     password: Path | None = None
     """A file whose one line, the camera's password, goes where `source` says `{password}`."""
+    kind: Literal["upright", "overhead"] = "upright"
+    """People stand upright in its picture, or it looks straight down on them."""
     offset: int = 0
     """A recording shows its frame n - offset at pulse n."""
     at_end: Literal["stop", "loop"] = "stop"
@@ -69,10 +73,18 @@ class Track(Section):
     """On a machine with too much to do search every 2nd frame, every 3rd and so on, before much is late."""
     window: Annotated[WindowSettings, validated(WindowSettings)] = WindowSettings()
     costs: Annotated[CostSettings, validated(CostSettings)] = CostSettings()
+    temporal: Annotated[TemporalSettings, validated(TemporalSettings)] = TemporalSettings()
+    """The tracker of that name: person-to-blob matching over some seconds."""
+    assist: Annotated[AssistSettings, validated(AssistSettings)] = AssistSettings()
+    """What is foreseen for an operator to look at, and what their pointing weighs."""
     witness: Annotated[WitnessSettings, validated(WitnessSettings)] = WitnessSettings()
     """How a camera goes by what others find that look at the same ground."""
     witness_wait_s: NonNegativeFloat = 0.3
     """Seconds after a frame was taken until which it waits for what the others found in it."""
+
+    def lag(self, fps: float) -> int:
+        """Give the frames that follow a final frame at most when a window ends."""
+        return self.temporal.lag(fps) if self.tracker == TEMPORAL else self.window.lag
 
     @field_validator("tracker")
     @classmethod

@@ -8,10 +8,11 @@ from typing import Annotated, Self
 from pydantic import Field, NonNegativeInt, PositiveFloat, PositiveInt, model_validator
 
 from bestview import IdentitySettings, QualitySettings
+from server.wire.help import TroubleReason
 from server.wire.library import validated
 from server.wire.sections.base import Section
 
-TUNED = ("lookahead", "switch_cost_s", "goes_on_s", "missed_s", "min_shot_s", "quality")
+TUNED = ("lookahead", "switch_cost_s", "goes_on_s", "missed_s", "unfound", "min_shot_s", "quality")
 """Settings of the choice that can be changed while it runs."""
 
 Seconds = Annotated[float, Field(ge=0, le=3600)]
@@ -39,6 +40,17 @@ class Share(Section):
         return self
 
 
+class Flags(Section):
+    """What an operator is asked to look at."""
+
+    per_minute: Annotated[int, Field(ge=0, le=600)] = 2
+    """Flags raised in any minute at most, the most urgent first."""
+    reasons: list[TroubleReason] = ["alike", "exchange", "fading", "gap"]
+    """For which of the troubles that are foreseen one is raised."""
+    answer_s: Annotated[float, Field(gt=0, le=600)] = 8.0
+    """Seconds after what was expected in which a flag can be answered; cameras keep `track.assist.memory`."""
+
+
 class View(Section):
     """The best-view service."""
 
@@ -51,6 +63,9 @@ class View(Section):
     """For how long the views at the end of the look-ahead are taken to go on as they are."""
     missed_s: Seconds = 1.0
     """Who is not found any more is taken to be still there, less and less, for so long; 0: not at all."""
+    unfound: Annotated[float, Field(ge=0, le=1)] = 1.0
+    """What a view of somebody counts for whom the camera does not find, though they stand before it as others
+    know: this share of what it is worth by how surely people show there; 0: nothing."""
     min_shot_s: Annotated[float, Field(ge=0, le=600)] = 0.0
     """A camera is shown for so long at least, in whole GOPs; one that sees nobody may be left sooner."""
     late_after_s: PositiveFloat = 0.5
@@ -60,5 +75,7 @@ class View(Section):
     quality: Annotated[QualitySettings, validated(QualitySettings)] = QualitySettings()
     """What makes a view good."""
     identity: Annotated[IdentitySettings, validated(IdentitySettings)] = IdentitySettings()
+    flags: Flags = Flags()
+    """Where a camera's tracker may go wrong, of what `track.assist` foresees."""
     share: Share = Share()
     """With other best-view services of the site."""

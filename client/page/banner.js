@@ -1,0 +1,97 @@
+/** The quiet line at the top of every view: what may go wrong soon, and whom to point at. */
+
+import { element } from './element.js';
+import { Flags, when, words } from './flags.js';
+import { label } from './names.js';
+
+/** @import {Flag} from './contract.js' */
+/** @import {Pointing} from './pointing.js' */
+/** @import {Viewer} from './viewer.js' */
+
+export class Banner {
+  flags = new Flags();
+  #banner = element('flags');
+  #words = element('flag-words');
+  #when = element('flag-when');
+  #point = element('flag-point');
+  #toggle = element('point');
+  /** @type {string | null} the camera that is held to point in its picture */
+  #held = null;
+
+  /**
+   * @param {Viewer} viewer
+   * @param {Pointing} pointing
+   */
+  constructor(viewer, pointing) {
+    this.viewer = viewer;
+    this.pointing = pointing;
+    this.#point.addEventListener('click', () => this.toggle());
+    this.#toggle.addEventListener('click', () => this.toggle());
+  }
+
+  /** @param {Flag} flag */
+  take(flag) {
+    this.flags.take(flag);
+    const { object } = this.pointing;
+    const more = this.flags.all.some(({ objects }) => object !== null && objects.includes(object));
+    if (flag.state === 'answered' && object !== null && flag.objects.includes(object) && !more) this.#leave();
+    this.show();
+  }
+
+  /** Point at whom the most urgent flag is about, or at who is watched; once more: no more. */
+  toggle() {
+    if (this.pointing.object !== null) return this.#leave();
+    const [flag] = this.flags.all;
+    if (flag) this.#answer(flag);
+    else if (this.viewer.object !== null) this.pointing.begin(this.viewer.object);
+    this.show();
+  }
+
+  show() {
+    const { flags, pointing, viewer } = this;
+    const [flag] = flags.all;
+    const { site, probe } = viewer;
+    this.#banner.hidden = !flag && pointing.object === null;
+    const target = pointing.object ?? flag?.objects[0] ?? null;
+    const on = pointing.object !== null;
+    const follow = on && target !== null ? `Follow ${label(target)}` : '';
+    write(this.#words, [follow, flag ? words(flag, label) : ''].filter(Boolean).join(': '));
+    write(this.#when, flag && site && probe.pulse !== null ? ` ${when(flag, probe.pulse, site.fps)}` : '');
+    this.#point.hidden = this.#toggle.hidden = !pointing.possible;
+    write(this.#point, on ? 'Done' : `Point at ${target === null ? '' : label(target)}`);
+    this.#toggle.setAttribute('aria-pressed', String(on));
+    probe.flags = flags.all;
+    probe.pointing = { object: pointing.object, taken: pointing.taken };
+    if (!on && this.#held !== null) this.#leave();
+  }
+
+  /** @param {Flag} flag to be answered in the picture of the camera that has raised it */
+  #answer({ objects: [object], cameras: [camera] }) {
+    const { viewer, pointing } = this;
+    pointing.begin(object);
+    if (pointing.object === null) return;
+    viewer.choose(object);
+    if (viewer.override.camera === camera) return; // as the operator wished
+    viewer.hold(camera);
+    this.#held = camera;
+  }
+
+  /** What was held to point is let go, unless somebody has held another meanwhile. */
+  #leave() {
+    const held = this.#held;
+    this.#held = null;
+    if (this.pointing.object !== null) this.pointing.end();
+    if (held !== null && this.viewer.override.camera === held) this.viewer.hold(null);
+    this.show();
+  }
+}
+
+/**
+ * Only where it is another: what is written is read out.
+ *
+ * @param {HTMLElement} place
+ * @param {string} text
+ */
+function write(place, text) {
+  if (place.textContent !== text) place.textContent = text;
+}

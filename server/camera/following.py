@@ -1,0 +1,54 @@
+"""A camera's tracker, set up from the configuration, and ready for the first frame of a recording."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from bestview import to_ground
+from server.camera.sources import Image, Source
+from server.wire.config import Config
+from server.wire.ground_unit import METRES
+from server.wire.sections import Camera
+from tracking import Solver
+from tracking.temporal import TemporalSettings
+from tracking.yardsticks import Preparing, Tracker, tracker_named
+
+
+def ready_tracker(
+    config: Config,
+    name: str,
+    camera: Camera,
+    source: Source | None,
+    solver: Callable[[], Solver],
+    picture: Callable[[Image], Image] = lambda image: image,
+    *,
+    ready: bool = True,
+) -> Tracker:
+    """Give the tracker of that name; what has to learn the room has done so where the source is a recording.
+
+    ``picture`` makes the tracker's pictures of the source's. Not ``ready``: it looks at none ahead.
+    """
+    track = config.track
+    settings = track.temporal if source is None else _measured(track.temporal, camera, source.size)
+    tracker = tracker_named(
+        name, track.window, track.costs, solver, settings, config.site.fps, assist=track.assist
+    )
+    if ready and source is not None and isinstance(tracker, Preparing):
+        places = range(0, config.detect.ahead_frames, config.detect.ahead_every)
+        tracker.prepare(picture(image) for image in source.ahead(places))
+    return tracker
+
+
+def _measured(settings: TemporalSettings, camera: Camera, size: tuple[int, int]) -> TemporalSettings:
+    """Take how much floor the picture is wide from the camera's ground, where that is in metres."""
+    per_metre = METRES.get(camera.ground_unit or "")
+    if camera.ground is None or per_metre is None:
+        return settings
+    width, height = size
+    ends = np.array([[0.0, height / 2.0], [width, height / 2.0]])
+    left, right = to_ground(np.array(camera.ground, dtype=np.float64), ends)
+    across = float(np.hypot(*(right - left))) / per_metre
+    return replace(settings, room_m=across) if np.isfinite(across) else settings

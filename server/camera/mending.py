@@ -1,0 +1,44 @@
+"""What is told of a window that somebody's pointing has mended: no more than what is new or has changed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from tracking import WindowResult, WindowTrack, joined
+
+
+def mended(result: WindowResult, anew: WindowResult) -> WindowResult:
+    """Give what is to be told where a window's result has just been solved anew, by what somebody points at.
+
+    It begins with the first frame that was told as final and has changed, or where nothing has with the first
+    frame that was not final; ``mended_from`` says which.
+
+    Args:
+        result: of the window, which nobody was told of yet.
+        anew: the same frames solved anew, and maybe more before them.
+    """
+    changed = anew.mended_from
+    if changed is not None and changed < result.first:
+        return _from(anew, changed)
+    if anew.first <= result.first:
+        return replace(_from(anew, result.first), mended_from=None)
+    both = joined([result, anew])
+    assert both is not None  # noqa: S101 — two make one
+    return replace(both, mended_from=None)
+
+
+def _from(result: WindowResult, first: int) -> WindowResult:
+    """Leave out the frames before this one, and who is in none of the others."""
+    if first <= result.first:
+        return result
+    tracks = [_cut(it, result.first, first) for it in result.tracks]
+    seen = tuple(it for it in tracks if not np.isnan(it.boxes).all())
+    return replace(result, first=first, tracks=seen)
+
+
+def _cut(track: WindowTrack, begins: int, first: int) -> WindowTrack:
+    looks = tuple(replace(it, first=max(it.first, first)) for it in track.looks if it.last >= first)
+    rows = slice(first - begins, None)
+    return replace(track, boxes=track.boxes[rows], bridged=track.bridged[rows], looks=looks)

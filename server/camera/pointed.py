@@ -1,0 +1,46 @@
+"""Where an operator points in a camera's picture: what comes over the bus, until the tracker takes it."""
+
+from __future__ import annotations
+
+import logging
+from collections import deque
+
+import msgspec
+
+from server.wire.help import POINTS_MOST, Pointings
+from server.wire.inbox import Message
+from server.wire.messages import UNREADABLE
+from tracking.assist import Pointing
+
+log = logging.getLogger(__name__)
+
+_DECODER = msgspec.json.Decoder(Pointings)
+
+
+class Pointed:
+    """Keeps the newest that was pointed at in one run of a camera. What cannot be understood is counted."""
+
+    def __init__(self, camera: str, boot: int) -> None:
+        self._camera, self._boot = camera, boot
+        self._waiting: deque[Pointing] = deque(maxlen=POINTS_MOST)
+        self.taken = 0
+        """Places that the tracker was given."""
+        self.bad_messages = 0
+
+    def put(self, message: Message) -> None:
+        """Take a message in; what is said of another run's tracks is of nobody here."""
+        try:
+            said = _DECODER.decode(message.payload)
+        except UNREADABLE as error:
+            self.bad_messages += 1
+            log.warning("camera %s: a message on %s is none: %s", self._camera, message.key, error)
+            return
+        if said.boot == self._boot:
+            self._waiting.extend(Pointing(it.pulse, it.track, it.x, it.y, it.reach) for it in said.points)
+
+    def take(self) -> list[Pointing]:
+        """Give what has come since this was last asked, in its order."""
+        taken = list(self._waiting)
+        self._waiting.clear()
+        self.taken += len(taken)
+        return taken

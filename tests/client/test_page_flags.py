@@ -1,0 +1,130 @@
+"""Flags on the page: everybody sees what may go wrong, and the operator's pointer says who is where."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from page_browser import Visit, needs_chromium, visiting
+from page_pattern import CAMERAS, HEIGHT, WIDTH
+from page_site import FakeSite
+from playwright.async_api import Browser, expect
+from test_page_accessible import AXE, faults
+
+pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="session")]
+
+
+def flag(site: FakeSite, seconds: float = 60.0, **changes: Any) -> dict[str, Any]:
+    pulse = site.edge + round(25 * seconds)
+    told = {"objects": [2, 1], "cameras": [CAMERAS[2]], "reason": "alike", "pulse": pulse}
+    return {"id": 1, "raised": site.edge, "margin": 0.5, "state": "raised", **told, **changes}
+
+
+def points(site: FakeSite) -> list[dict[str, float]]:
+    return [point for said in site.pointed for point in said["points"]]
+
+
+async def middle(visit: Visit, person: int) -> tuple[float, float, float, float]:
+    """Give the middle of a person's box: on the page, and in the picture."""
+    await visit.until(f"myview.boxes.some(([it]) => it === {person})")
+    left, top, right, bottom = await visit.get(f"myview.boxes.find(([it]) => it === {person}).slice(1)")
+    x, y = (left + right) / 2, (top + bottom) / 2
+    box = await visit.page.locator("#boxes").bounding_box()
+    assert box is not None
+    return box["x"] + x * box["width"] / WIDTH, box["y"] + y * box["height"] / HEIGHT, x, y
+
+
+async def test_whoever_watches_sees_a_flag_and_when_and_no_button(browser: Browser) -> None:
+    site = FakeSite()
+    site.flags.append(flag(site))
+    async with visiting(browser, site) as visit:
+        await visit.playing(1)
+        await expect(visit.page.locator("#flag-words")).to_have_text("2 and 1, alike, cross")
+        await visit.until("/ in [0-9.]+ s/.test(document.querySelector('#flag-when').textContent)")
+        await expect(visit.page.locator("#flag-point")).to_be_hidden()
+        await expect(visit.page.locator("#point")).to_be_hidden()
+        await visit.page.keyboard.press("h")
+        assert await visit.get("myview.pointing.object") is None
+        site.flags.append(flag(site, state="expired"))
+        await expect(visit.page.locator("#flags")).to_be_hidden()
+
+
+async def test_the_pointer_is_followed_in_the_picture_of_the_camera_in_doubt(browser: Browser) -> None:
+    site = FakeSite(operates=True)
+    site.flags.append(flag(site))
+    async with visiting(browser, site) as visit:
+        await visit.playing(1)
+        await visit.page.locator("#flag-point").click()
+        await visit.playing(2)
+        await visit.until(f"myview.camera === '{CAMERAS[2]}'")
+        there, down, x, y = await middle(visit, 2)
+        await visit.page.mouse.move(there, down)
+        await visit.until("myview.pointing.taken >= 5")
+        assert {(it["object"], it["camera"]) for it in site.pointed} == {(2, CAMERAS[2])}
+        told = [it["pulse"] for it in points(site)]
+        assert told == sorted(set(told)), "every frame once"
+        last = points(site)[-1]
+        assert (last["x"], last["y"]) == pytest.approx((x, y), abs=1.0)
+        assert 0 < last["reach"] < WIDTH / 4
+        await visit.page.mouse.click(there, down)
+        assert await visit.get("myview.object") == 2, "a press says where they are, and chooses nobody"
+        site.flags.append(flag(site, state="answered"))
+        await visit.until("myview.pointing.object === null")
+        await expect(visit.page.locator("#automatic")).to_be_hidden()
+        await expect(visit.page.locator("#cross")).to_be_hidden()
+
+
+async def test_by_keyboard_one_can_point_at_whoever_is_watched(browser: Browser) -> None:
+    site = FakeSite(operates=True)
+    async with visiting(browser, site) as visit:
+        await visit.playing(1)
+        await visit.until("!document.querySelector('#point').hidden")
+        await visit.page.keyboard.press("h")
+        await expect(visit.page.locator("#flag-words")).to_have_text("Follow 1")
+        await visit.page.keyboard.press("Space")
+        await visit.until("document.querySelector('video').paused && myview.boxes.length > 0")
+        *_, x, y = await middle(visit, 1)
+        await visit.page.keyboard.press("ArrowRight")
+        await visit.page.keyboard.press("ArrowLeft")
+        before = len(site.pointed)
+        await visit.page.keyboard.press("Enter")
+        await visit.until(f"myview.pointing.taken > {before}")
+        assert await visit.get("myview.object") == 1, "arrows move the cross"
+        last = points(site)[-1]
+        assert (last["x"], last["y"]) == pytest.approx((x, y), abs=WIDTH / 8)
+        await visit.page.keyboard.press("Escape")
+        await visit.until("myview.pointing.object === null")
+
+
+async def test_a_finger_points_while_it_is_down(browser: Browser) -> None:
+    site = FakeSite(operates=True)
+    async with visiting(browser, site) as visit:
+        await visit.playing(1)
+        await visit.until("!document.querySelector('#point').hidden")
+        await visit.page.locator("#point").click()
+
+        async def touch(kind: str, buttons: int) -> None:
+            at = f"clientX: 300, clientY: 200, buttons: {buttons}, bubbles: true"
+            event = f"new PointerEvent('{kind}', {{ pointerType: 'touch', {at} }})"
+            await visit.get(f"void document.querySelector('#boxes').dispatchEvent({event})")
+
+        await touch("pointermove", 0)
+        await expect(visit.page.locator("#cross")).to_be_hidden()
+        await touch("pointerdown", 1)
+        await visit.until("myview.pointing.taken >= 2")
+        await touch("pointerup", 0)
+        await expect(visit.page.locator("#cross")).to_be_hidden()
+
+
+@pytest.mark.skipif(not AXE.exists(), reason="needs axe-core: make node_modules/.installed")
+@pytest.mark.parametrize("width", [360, 1600])
+async def test_a_flag_is_no_obstacle(browser: Browser, width: int) -> None:
+    site = FakeSite(operates=True)
+    site.flags.append(flag(site))
+    async with visiting(browser, site, width=width) as visit:
+        await visit.playing(1)
+        await expect(visit.page.locator("#flag-point")).to_be_visible()
+        assert await faults(visit) == []
+        await visit.page.locator("#flag-point").click()
+        await visit.until("myview.pointing.object === 2")
+        assert await faults(visit) == []

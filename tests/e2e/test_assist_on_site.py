@@ -1,0 +1,113 @@
+"""The operator helps on the running demo: a flag is raised, a pointer follows, the camera takes it."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+
+import aiohttp
+import pytest
+import pytest_asyncio
+import yaml
+from playwright.async_api import Page
+from running_site import RunningSite, running
+
+from benchmarks.browser import CHROMIUM, chromium
+from server.run.setup import DEMO, free_port
+
+pytestmark = [
+    pytest.mark.live,
+    pytest.mark.asyncio(loop_scope="module"),
+    pytest.mark.timeout(200),
+    pytest.mark.skipif(not CHROMIUM.exists(), reason=f"needs a Chromium at {CHROMIUM}"),
+]
+PATIENCE_MS = 60_000
+
+
+@pytest_asyncio.fixture(scope="module", loop_scope="module")
+async def site(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[RunningSite]:
+    """The demo, at a rate that a busy machine can do; whoever come near each other is a trouble."""
+    bus = f"tcp/127.0.0.1:{free_port()}"
+    content = {
+        **DEMO,
+        "site": {"name": "demo", "fps": 10, "width": 320, "height": 180},
+        "sync": {"port": free_port(), "start_timeout_s": 60},
+        "zenoh": {"connect": bus, "listen": bus},
+        "http": {"port": free_port()},
+        "track": {"assist": {"enabled": True, "alike": 1000.0, "margin": 100.0}},
+        "view": {"flags": {"per_minute": 60}},
+    }
+    path = tmp_path_factory.mktemp("demo") / "demo.yaml"
+    path.write_text(yaml.safe_dump(content), encoding="utf-8")
+    async with running(path) as site:
+        await site.until(lambda: bool(site.gops and site.gops[-1].choices), "somebody is shown")
+        yield site
+
+
+@pytest_asyncio.fixture(loop_scope="module")
+async def page(site: RunningSite) -> AsyncIterator[Page]:
+    """The page, opened; an error in it fails the test."""
+    errors: list[str] = []
+    async with chromium() as browser:
+        page = await browser.new_page(bypass_csp=True)
+        page.on("pageerror", lambda error: errors.append(str(error)))
+        page.set_default_timeout(PATIENCE_MS)
+        await page.goto(site.url)
+        yield page
+    assert errors == []
+
+
+PLACE = """() => {
+  const box = myview.boxes.find(([object]) => object === myview.pointing.object);
+  if (!box) return null;
+  const { left, top, width } = document.querySelector('#boxes').getBoundingClientRect();
+  const scale = width / myview.site.width;
+  return [left + scale * (box[1] + box[3]) / 2, top + scale * (box[2] + box[4]) / 2];
+}"""
+
+
+async def follow(page: Page, until: str) -> None:
+    """Keep the pointer on whom it is to point at, as a hand or an eye would; answer what comes next."""
+    async with asyncio.timeout(PATIENCE_MS / 1000):
+        while not await page.evaluate(until):
+            if await page.evaluate("myview.pointing.object === null && myview.flags.length > 0"):
+                await page.keyboard.press("h")
+            place = await page.evaluate(PLACE)
+            if place is not None:
+                await page.mouse.move(*place)
+            pulse = await page.evaluate("myview.pulse")
+            await page.wait_for_function(f"myview.pulse !== {pulse} || ({until})")
+
+
+async def metric(site: RunningSite, name: str) -> float:
+    async with aiohttp.ClientSession() as session, session.get(f"{site.url}metrics") as answer:
+        lines = (await answer.text()).splitlines()
+    return sum(float(line.split()[-1]) for line in lines if line.startswith(name))
+
+
+async def test_a_scripted_pointer_follows_a_flag_through_and_the_stream_goes_on(
+    site: RunningSite, page: Page
+) -> None:
+    await page.wait_for_function("myview.state === 'playing'")
+    await page.evaluate("document.querySelector('video').dataset.same = 'yes'")
+    point = page.locator("#flag-point")
+    await page.wait_for_function("myview.flags.length && !document.querySelector('#flag-point').hidden")
+    assert (await page.locator("#flag-words").inner_text()).strip()
+    await point.click()
+    await page.wait_for_function("myview.pointing.object !== null")
+    await follow(page, "myview.pointing.taken >= 20")
+    sent = await metric(site, "myview_pointings_total")
+    assert sent >= 20
+    async with asyncio.timeout(PATIENCE_MS / 1000):  # the camera says so once a second
+        while await metric(site, "myview_camera_pointings_total") < 1:
+            await page.wait_for_function(f"myview.pulse > {await page.evaluate('myview.pulse')} + 5")
+    async with aiohttp.ClientSession() as session, session.get(f"{site.url}api/flags") as answer:
+        states = {it["state"] for it in (await answer.json())["flags"]}
+    assert states & {"followed", "answered"}
+    await page.keyboard.press("Escape")
+    await page.wait_for_function("myview.pointing.object === null")
+    pulse = await page.evaluate("myview.pulse")
+    await page.wait_for_function(f"myview.state === 'playing' && myview.pulse > {pulse} + 10")
+    assert await page.evaluate("document.querySelector('video').dataset.same") == "yes"
+    firsts = [gop.first for gop in site.gops]
+    assert firsts == list(range(firsts[0], firsts[0] + 10 * len(firsts), 10)), "every GOP, each once"

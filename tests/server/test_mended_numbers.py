@@ -1,0 +1,134 @@
+"""Where somebody points mends a camera's past, and numbers follow the people; a stream never goes back."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from bestview import IdentitySettings, Split
+from server.camera.mending import mended
+from server.camera.report import Reporter
+from server.view.align import Epoch
+from server.view.people import People
+from server.view.pointing import Place, pointings
+from server.wire.messages import CameraTracks
+from tracking import CostSettings, Detections, WindowSettings, solver_named
+from tracking.assist import AssistedTracker, AssistSettings, Pointing
+
+WIDTH, HEIGHT = 640, 360
+WINDOW = WindowSettings()
+ASSIST = AssistSettings(enabled=True)
+MET = 60
+"""The frame in which two who are dressed alike meet, and turn back."""
+FRAMES = 150
+
+
+def places(frame: int) -> list[float]:
+    """Where the two are, left of their boxes: they come, meet, and go back where they came from."""
+    off = 4.0 * abs(frame - MET)
+    return [300.0 - off, 300.0 + off]
+
+
+def found(frame: int) -> Detections:
+    left = np.clip(np.array(places(frame)), 0, WIDTH - 40)
+    boxes = np.stack([left, np.full(2, 100.0), left + 40.0, np.full(2, 220.0)], axis=1)
+    if abs(frame - MET) < 6:
+        boxes = boxes[:1]  # one hides the other
+    looks = np.full((len(boxes), 4), 0.25)
+    return Detections(boxes, np.ones(len(boxes)), looks)
+
+
+class Camera:
+    """One camera's tracker, and what it says."""
+
+    def __init__(self) -> None:
+        solver = solver_named("columns")
+        self._tracker = AssistedTracker(WINDOW, CostSettings(), solver, ASSIST)
+        self._reporter = Reporter("c0", 1, (WIDTH, HEIGHT), WINDOW.stride)
+
+    def take(self, frame: int, said: Sequence[Pointing] = ()) -> CameraTracks | None:
+        result = self._tracker.push(frame, found(frame))
+        if result is None:
+            return None
+        anew = self._tracker.point(said) if said else None
+        return self._reporter.regular(result if anew is None else mended(result, anew))
+
+
+def at(people: People, pulse: int) -> dict[int, float]:
+    """Give where everybody is shown, by number: the left side."""
+    [rows] = people.boxes("c0", pulse, 1)
+    return {number: left for number, left, *_ in rows}
+
+
+def played(
+    said_at: int, of: Sequence[int], *, late: bool = False
+) -> tuple[People, dict[int, dict[int, float]]]:
+    """Let the two meet; say at a window's end where the first was in some frames.
+
+    Returns:
+        Who is who, and by pulse who was shown where when that frame was told, 20 frames later.
+    """
+    people = People(IdentitySettings(), ["c0"], {"c0": None}, (WIDTH, HEIGHT), WINDOW.lag)
+    people.told.frames = ASSIST.memory
+    camera, told, first = Camera(), {}, 0
+    held: list[CameraTracks] = []
+    for frame in range(FRAMES):
+        said: list[Pointing] = []
+        if frame == said_at:
+            [left] = [number for number, where in told[20].items() if where < 300]
+            asked = pointings(people, "c0", left, [Place(it, places(it)[0] + 20, 160, 10) for it in of])
+            assert asked is not None
+            said = [Pointing(it.pulse, it.track, it.x, it.y, it.reach) for it in asked.points]
+        message = camera.take(frame, said)
+        if message is None:
+            continue
+        assert (message.mended_from is not None) == bool(said), "only then the past has changed"
+        missed = late and bool(said)
+        tracks, came = {} if missed else {"c0": message}, tuple(held)
+        held = [message] if missed else []
+        people.update(Epoch(message.epoch, frame, tracks, mended=came))
+        for pulse in range(first, frame - 19):
+            told[pulse] = at(people, pulse)
+        first = max(first, frame - 19)
+        people.forget_boxes_before(first)
+    return people, told
+
+
+def sides(told: dict[int, dict[int, float]], pulse: int) -> list[int]:
+    """Give who is shown left and right."""
+    return sorted(told[pulse], key=told[pulse].__getitem__)
+
+
+def test_alike_who_meet_and_turn_back_are_taken_for_each_other() -> None:
+    people, told = played(said_at=-1, of=[])
+    assert sides(told, 30) == list(reversed(sides(told, 110)))
+    assert people.take_corrections() == ()
+
+
+@pytest.mark.parametrize("late", [False, True], ids=["in time", "too late for its epoch"])
+@pytest.mark.parametrize("said_at", [84, 99, 124])
+def test_numbers_follow_from_what_is_told_next(said_at: int, *, late: bool) -> None:
+    people, told = played(said_at, range(MET + 8, MET + 14), late=late)
+    left, right = sides(told, 30)
+    behind = WINDOW.stride if late else 0
+    if said_at - 20 > MET + 10:
+        assert sides(told, said_at - 20 - WINDOW.stride) == [right, left], "what was told before stays"
+    for pulse in range(max(said_at - 19 + behind, MET + 10), FRAMES - 20):
+        assert sides(told, pulse) == [left, right]
+    splits, all_ = people.take_corrections(), (Split(left, right, "c0"), Split(right, left, "c0"))
+    assert splits == all_ or (splits == () and said_at == 84), "soon after, nobody was told to be anybody"
+
+
+def test_who_points_again_after_it_was_mended_still_means_the_same() -> None:
+    people, told = played(99, range(MET + 8, MET + 14))
+    left, right = sides(told, 30)
+    before, after = (people.told.of("c0", [left], it) for it in (40, 120))
+    assert before is not None
+    assert after is not None
+    assert before.track == after.track, "the tracker's own number stays with the person"
+    assert pointings(people, "c0", left, [Place(-1, 0, 0, 1)]) is None
+    assert pointings(people, "c0", 99, [Place(120, 0, 0, 1)]) is None
+    assert pointings(people, "c1", left, [Place(120, 0, 0, 1)]) is None
+    assert right != left

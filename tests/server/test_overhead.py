@@ -1,0 +1,136 @@
+"""Cameras that look straight down: people are found in them, and are the same in two of them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from bestview import IdentityRegistry, IdentitySettings, LocalTrack
+from server.camera.observe import make_detector
+from server.camera.scene import Scene, write_recording
+from server.run.track import track_one
+from server.wire.config import Config
+from server.wire.fit import Fit
+from server.wire.loading import build_config
+from tracking.boxes import iou
+from tracking.detectors import BackgroundDetector
+from tracking.motchallenge import read_rows
+
+SIZE = (640, 480)
+_STRIDE = 5
+_TURNED = np.array([[-1.0, 0.0, SIZE[0]], [0.0, -1.0, SIZE[1]], [0.0, 0.0, 1.0]])
+"""The second camera hangs the other way round."""
+
+
+def _config(kind: str, **camera: object) -> Config:
+    site = {"width": SIZE[0], "height": SIZE[1]}
+    cameras = [
+        {"id": name, "source": "scene:overhead", "kind": kind, "ground": np.eye(3).tolist(), **camera}
+        for name in ("c0", "c1")
+    ]
+    return build_config({"site": site, "cameras": cameras}, where="site.yaml", folder=Path())
+
+
+def _recall(kind: str) -> float:
+    """Give the share of people whom the detector surely finds in the room from above."""
+    config, scene = _config(kind), Scene("overhead", 1, 2, 4, *SIZE, 2.0)
+    detector = make_detector(config, config.cameras[0], Fit(SIZE, SIZE))
+    assert isinstance(detector, BackgroundDetector)
+    detector.prepare([scene.image(0, frame) for frame in range(0, 80, 8)], 10)
+    found = []
+    for frame in range(0, 60, 3):
+        seen = detector.detect(scene.image(0, frame))
+        sure = seen.boxes[seen.scores > 0.5]
+        boxes = scene.truth(frame)[0].boxes
+        overlaps = iou(boxes[:, None], sure[None]) if len(sure) else np.zeros((len(boxes), 1))
+        found += (overlaps.max(axis=1) > 0.4).tolist()
+    return float(np.mean(found))
+
+
+def test_people_are_found_from_straight_above() -> None:
+    assert _recall("overhead") > 0.5
+    assert _recall("upright") < 0.25
+
+
+def _turned(boxes: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.array(SIZE * 2) - boxes[..., [2, 3, 0, 1]]
+
+
+@pytest.fixture(scope="module")
+def seen_by_two() -> NDArray[np.float64]:
+    """Where three people are in both cameras' pictures, frame by frame: `(2, 3, F, 4)`."""
+    scene = Scene("overhead", 2, 3, 2, *SIZE, 25.0)
+    boxes = np.full((2, 3, 300, 4), np.nan)
+    for frame in range(boxes.shape[2]):
+        for camera, truth in enumerate(scene.truth(frame)):
+            boxes[camera, truth.ids - 1, frame] = _turned(truth.boxes) if camera else truth.boxes
+    return boxes
+
+
+def _agreement(boxes: NDArray[np.float64], overhead: tuple[str, ...]) -> float:
+    """Give the share of the time in which people have one number in both cameras, by where they are."""
+    scene = Scene("overhead", 2, 3, 2, *SIZE, 25.0)
+    registry = IdentityRegistry(
+        IdentitySettings(), {"c0": scene.homography(0), "c1": scene.homography(1) @ _TURNED}, overhead
+    )
+    same = []
+    for last in range(_STRIDE - 1, boxes.shape[2], _STRIDE):
+        first = last - _STRIDE + 1
+        # Their numbers in the second camera are others.
+        tracks = [
+            LocalTrack(f"c{camera}", (person + camera) % 3, first, boxes[camera, person, first : last + 1])
+            for camera in range(2)
+            for person in range(3)
+        ]
+        update = registry.update(tracks, last)
+        numbers = {(key.camera, key.local): number for key, number in update.numbers.items()}
+        if last > 100:
+            pairs = [(numbers.get(("c0", it)), numbers.get(("c1", (it + 1) % 3))) for it in range(3)]
+            same += [one is not None and one == other for one, other in pairs]
+    return float(np.mean(same))
+
+
+def test_people_are_the_same_in_two_cameras_that_look_straight_down(
+    seen_by_two: NDArray[np.float64],
+) -> None:
+    assert _agreement(seen_by_two, ("c0", "c1")) > 0.95
+    assert _agreement(seen_by_two, ()) < 0.9
+
+
+def test_who_stands_upright_and_who_is_seen_from_above_do_not_vouch_for_each_other() -> None:
+    assert _config("upright").witnesses("c0") == ("c1",)
+    assert not _config("overhead").witnesses("c0")
+    assert _config("overhead").overhead == {"c0", "c1"}
+
+
+def test_another_kind_is_refused() -> None:
+    with pytest.raises(Exception, match="kind"):
+        _config("sideways")
+
+
+def test_two_people_are_tracked_from_above_by_command_line(tmp_path: Path) -> None:
+    scene = Scene("overhead", 1, 2, 4, 320, 240, 25.0)
+    write_recording(scene, tmp_path / "room", 8.0)
+    assert scene.homography(0) is not None
+    camera = {"id": "c0", "source": "none", "kind": "overhead", "ground": scene.homography(0).tolist()}
+    site = tmp_path / "site.yaml"
+    site.write_text(json.dumps({"cameras": [{**camera, "ground_unit": "m"}]}), encoding="utf-8")
+    out = tmp_path / "c0.txt"
+    people = track_one(
+        tmp_path / "room" / "c0.mp4", None, out, site, None, lambda _: None, tracker="temporal"
+    )
+    assert people == 2
+    told: dict[int, list[list[float]]] = {}
+    for row in read_rows(out):
+        box = [row.left, row.top, row.left + row.width, row.top + row.height]
+        told.setdefault(row.frame - 1, []).append(box)
+    near = [
+        float(iou(box, np.array(told[frame])).max())
+        for frame in range(0, 200, 5)
+        for box in scene.truth(frame)[0].boxes
+    ]
+    assert np.median(near) > 0.5

@@ -1,0 +1,133 @@
+"""A game: two teams run about a court, and whoever is in one team looks like the rest of it."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from server.camera.scene import Scene
+from server.camera.scene.court import COURT, HALL
+from server.camera.scene.game import Game
+from server.camera.scene.gym import floor
+from server.camera.scene.hall import Hall
+from server.camera.scene.mingle import Mingle
+from server.camera.scene.outfits import shirt
+from server.camera.scene.skeleton import Joint, joints
+from server.camera.scene.stroll import Pose
+from server.camera.scene.truth import judge
+from server.camera.scene.way import ROUND
+
+RATE = 10  # samples a second
+SIZE = (320, 180)
+PLAYERS = 10
+
+
+@pytest.fixture(scope="module", params=range(3))
+def ways(request: pytest.FixtureRequest) -> np.ndarray:
+    """Two minutes of a game: ``(T, PLAYERS, 2)`` metres."""
+    company = Mingle(Game(COURT, PLAYERS, request.param), [1.85] * PLAYERS)
+    return np.array([[(it.x, it.y) for it in company.poses(t / RATE)] for t in range(120 * RATE)])
+
+
+def test_players_sprint_and_turn_and_stand(ways: np.ndarray) -> None:
+    step = np.diff(ways, axis=0)
+    speed = np.hypot(*step.transpose(2, 0, 1)) * RATE
+    assert 4.5 < speed.max() < 7.0
+    assert 0.8 < np.median(speed) < 2.5
+    assert np.mean(speed > 3) > 0.12
+    fast = speed > 1.0
+    heading = np.arctan2(step[..., 1], step[..., 0])
+    turned = np.abs(np.angle(np.exp(1j * np.diff(heading, axis=0))))
+    assert np.degrees(turned[fast[1:] & fast[:-1]]).max() > 10  # in a tenth of a second
+
+
+def test_nobody_runs_through_anybody_or_off_the_floor(ways: np.ndarray) -> None:
+    gaps = np.linalg.norm(ways[:, :, None] - ways[:, None], axis=3)[:, *np.triu_indices(PLAYERS, 1)]
+    assert np.mean(gaps < 0.45) < 0.001
+    west, south, east, north = COURT.bounds
+    assert (ways > (west - 1, south - 1)).all()
+    assert (ways < (east + 1, north + 1)).all()
+    for piece in HALL.furniture:
+        low, high = np.array(piece.footprint[:2]), np.array(piece.footprint[2:])
+        if piece.name != "board":  # players do run below the boards
+            assert not ((ways > low) & (ways < high)).all(axis=2).any()
+
+
+def test_the_game_goes_to_and_fro(ways: np.ndarray) -> None:
+    """At the end of each round everybody is before the basket that is attacked."""
+    for number in range(1, 12):
+        east = ways[int(number * ROUND * RATE) - 1, :, 0] > HALL.width / 2
+        assert east.mean() == (1.0 if (number - 1) % 2 == 0 else 0.0)
+
+
+def test_defenders_stay_close_to_whom_they_mark(ways: np.ndarray) -> None:
+    reds, blues = ways[:, ::2], ways[:, 1::2]
+    nearest = np.linalg.norm(reds[:, :, None] - blues[:, None], axis=3).min(axis=2)
+    assert np.median(nearest) < 2.0
+    assert np.mean(nearest < 1.0) > 0.05
+
+
+def test_a_team_plays_in_one_shirt_and_the_other_in_another() -> None:
+    first, second = ([shirt(player, team) for player in range(team, PLAYERS, 2)] for team in range(2))
+    assert len({(look.upper, look.lower) for look in first}) == 1
+    assert len({(look.upper, look.lower) for look in second}) == 1
+    colours = np.array([[first[0].upper, second[0].upper]], dtype=np.float32)
+    red, blue = cv2.cvtColor(colours, cv2.COLOR_RGB2LAB)[0]
+    assert np.linalg.norm(red - blue) > 60
+
+
+def test_boxes_end_at_the_feet_on_the_floor() -> None:
+    scene = Scene("court", 4, PLAYERS, 1, *SIZE)
+    errors = []
+    for frame in range(10, 900, 90):
+        where = scene.ground_position(frame)
+        for camera, truth in enumerate(scene.truth(frame)):
+            matrix = scene.homography(camera)
+            assert matrix is not None
+            whole = (truth.visible > 0.99) & (truth.boxes[:, 3] < SIZE[1])
+            for number, box in zip(truth.ids[whole], truth.boxes[whole], strict=True):
+                foot = matrix @ ((box[0] + box[2]) / 2, box[3], 1.0)
+                errors.append(np.hypot(*(foot[:2] / foot[2] - where[number - 1])))
+    assert len(errors) > 60
+    assert np.median(errors) < 0.5
+
+
+def test_everybody_is_seen_by_some_camera() -> None:
+    scene = Scene("court", 4, PLAYERS, 2, *SIZE)
+    for frame in range(0, 1500, 125):
+        best = np.zeros(PLAYERS)
+        for truth in scene.truth(frame):
+            best[truth.ids - 1] = np.maximum(best[truth.ids - 1], truth.visible)
+        assert best.min() > 0.5
+
+
+def test_a_board_hides_who_is_behind_it() -> None:
+    world = Scene("court", 1, 1, 1, *SIZE).world
+    assert isinstance(world, Hall)
+    view = world.view(0)
+    (board,) = (piece for piece in HALL.furniture if piece.name == "board" and piece.footprint[0] < 12)
+    _, south, east, north = board.footprint
+    middle = np.array([east - 0.45, (south + north) / 2, 3.4])
+    sight = middle - view.centre
+    floor_point = view.centre + sight * (view.centre[2] - 1.2) / -sight[2]
+    stage = world.stage(0)
+    pose = Pose(float(floor_point[0]), float(floor_point[1]), 0.0, 0.0, 0.0)
+    truth = judge(stage, stage.actors([pose], [shirt(0, 0)]))
+    assert truth.visible[0] < 0.6
+
+
+def test_who_runs_leans_and_bends_their_arms() -> None:
+    walks, runs = (joints(Pose(0.0, 0.0, 0.0, 0.4, speed), 1.8) for speed in (1.2, 4.6))
+    assert runs[Joint.HEAD, 0] - runs[Joint.BELLY, 0] > walks[Joint.HEAD, 0] - walks[Joint.BELLY, 0]
+    hands = (Joint.HAND_L, Joint.HAND_R)
+    assert min(runs[hand, 2] for hand in hands) > min(walks[hand, 2] for hand in hands) + 0.1
+    assert (runs[:, 2] > 0).all()
+
+
+def test_the_lines_are_where_the_court_is() -> None:
+    points = np.array([[12.0, 5.0, 0.0], [12.0 + 1.8, 7.25, 0.0], [2.0, 4.0, 0.0], [10.0, 4.0, 0.0]])
+    centre, circle, end, bare = floor(HALL, points)
+    for line in (centre, circle, end):
+        assert line.min() > 0.7
+    assert bare.min() < 0.45

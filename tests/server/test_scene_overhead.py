@@ -1,0 +1,166 @@
+"""From straight above: people meet, stand together so that they look like one, and part."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from server.camera.scene import Scene
+from server.camera.scene.gathering import Gatherings, gather
+from server.camera.scene.giveway import give_way
+from server.camera.scene.mingle import Mingle
+from server.camera.scene.outfits import casual
+from server.camera.scene.overhead import FREE, OVERHEAD
+from server.camera.scene.perspective import Perspective, Viewpoint
+from server.camera.scene.way import ROUND, compared
+
+RATE = 10  # samples a second
+SIZE = (320, 180)
+
+
+def company(people: int, seed: int) -> Mingle:
+    return Mingle(Gatherings(FREE, people, seed), [1.65 + 0.05 * walker for walker in range(people)])
+
+
+def ways(people: int, seed: int, seconds: int = 120) -> np.ndarray:
+    """Sample a company: ``(T, people, 2)`` metres."""
+    those = company(people, seed)
+    return np.array([[(it.x, it.y) for it in those.poses(t / RATE)] for t in range(seconds * RATE)])
+
+
+def gaps(those: np.ndarray) -> np.ndarray:
+    """Give the distances of all pairs: ``(T, pairs)`` metres."""
+    apart = np.linalg.norm(those[:, :, None] - those[:, None], axis=3)
+    return apart[:, *np.triu_indices(those.shape[1], 1)]
+
+
+@pytest.mark.parametrize("people", [2, 3, 4])
+@pytest.mark.parametrize("seed", range(2))
+def test_people_meet_and_part_again_several_times_a_minute(people: int, seed: int) -> None:
+    together = gaps(ways(people, seed)) < 0.6
+    meetings = (np.diff(together.astype(int), axis=0) == 1).sum()
+    partings = (np.diff(together.astype(int), axis=0) == -1).sum()
+    assert meetings >= 2 * 4  # in two minutes
+    assert partings >= meetings - 1
+    assert 0.05 < together.any(axis=1).mean() < 0.8
+
+
+@pytest.mark.parametrize("people", [2, 3, 4])
+@pytest.mark.parametrize("seed", range(2))
+def test_nobody_walks_through_anybody_or_leaves(people: int, seed: int) -> None:
+    those = ways(people, seed)
+    assert gaps(those).min() > 0.2  # metres: bodies are about as deep
+    assert np.mean(gaps(those) < 0.4) < 0.02
+    assert (those > (FREE[0] - 0.4, FREE[1] - 0.4)).all()
+    assert (those < (FREE[2] + 0.4, FREE[3] + 0.4)).all()
+    for west, south, east, north in OVERHEAD.footprints():
+        assert not ((those > (west, south)) & (those < (east, north))).all(axis=2).any()
+
+
+def test_the_beginning_of_a_round_joins_the_end_of_the_one_before() -> None:
+    those = company(4, 2)
+    for number in range(1, 6):
+        before, after = those.poses(number * ROUND - 1e-6), those.poses(number * ROUND)
+        for one, other, height in zip(before, after, (1.65, 1.7, 1.75, 1.8), strict=True):
+            assert np.hypot(one.x - other.x, one.y - other.y) < 1e-3
+            assert abs(np.sin((one.heading - other.heading) / 2)) < 0.02
+            steps = (one.walked - other.walked) / (0.69 * height)
+            assert abs(steps - round(steps)) < 0.01  # the legs are where they were
+
+
+def test_people_walk_at_people_s_pace() -> None:
+    those = ways(3, 5)
+    speed = np.hypot(*np.diff(those, axis=0).transpose(2, 0, 1)) * RATE
+    assert speed.max() < 2.0
+    assert 0.3 < np.median(speed) < 1.2
+
+
+def test_everybody_is_apart_at_the_beginning() -> None:
+    assert min(gaps(ways(4, seed, 1))[0].min() for seed in range(5)) > 1.2
+
+
+@settings(deadline=None, max_examples=30)
+@given(people=st.integers(0, 8), seed=st.integers(0, 1000))
+def test_a_round_leads_everybody_from_start_to_end(people: int, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    starts, ends = rng.uniform(FREE[:2], FREE[2:], (2, people, 2))
+    plan = gather(rng, starts, ends, FREE)
+    assert len(plan) == people
+    for way, start, end in zip(plan, starts, ends, strict=True):
+        assert (np.diff(way.times) >= -1e-9).all()
+        assert np.allclose(way.at(compared()[[0, -1]]), [start, end])
+
+
+@settings(deadline=None, max_examples=40)
+@given(aside=st.floats(-0.5, 0.5), speed=st.floats(0.4, 1.4))
+def test_two_who_meet_head_on_pass_each_other(aside: float, speed: float) -> None:
+    clock = np.arange(60) / 5 - 6
+    one = np.column_stack([speed * clock, np.zeros(60)])
+    other = np.column_stack([-speed * clock, np.full(60, aside)])
+    keep = np.full((2, 2), 0.7)
+    bent = give_way(np.array([one, other]), keep, 5.0)
+    apart = np.linalg.norm(bent[0] - bent[1], axis=1)
+    assert apart.min() > 0.6
+    assert np.array_equal(bent[:, [0, -1]], np.array([one, other])[:, [0, -1]])
+
+
+def test_a_camera_that_looks_straight_down_has_north_on_top() -> None:
+    view = Perspective.of(Viewpoint((2.0, 3.0, 5.0), (2.0, 3.0, 0.0)), *SIZE)
+    pixels, depth = view.project(np.array([[2.0, 3.0, 0.0], [2.0, 4.0, 0.0], [3.0, 3.0, 0.0]]))
+    assert np.allclose(depth, 5.0)
+    middle, north, east = pixels
+    assert np.allclose(middle, (160, 90))
+    assert north[0] == pytest.approx(160) and north[1] < 90  # noqa: PT018 — one place
+    assert east[1] == pytest.approx(90) and east[0] > 160  # noqa: PT018
+    assert np.allclose(view.homography() @ (*east, 1.0), (3.0, 3.0, 1.0))
+
+
+def test_boxes_are_where_the_picture_differs_and_people_lean_outwards() -> None:
+    scene = Scene("overhead", 1, 1, 4, *SIZE)
+    empty = scene.empty(0).astype(np.int16)
+    matrix = scene.homography(0)
+    assert matrix is not None
+    outwards = []
+    for frame in range(0, 1500, 50):
+        (truth,) = scene.truth(frame)
+        assert truth.ids.tolist() == [1]
+        changed = np.abs(scene.image(0, frame).astype(np.int16) - empty).max(axis=2) > 50
+        x, y, width, height = cv2.boundingRect(cv2.medianBlur(changed.astype(np.uint8), 3))
+        left, top, right, bottom = truth.boxes[0]
+        assert x >= left - 6 and y >= top - 6  # noqa: PT018 — one corner
+        assert x + width <= right + 6 and y + height <= bottom + 6  # noqa: PT018 — the shadow is fainter
+        assert width * height > 0.5 * (right - left) * (bottom - top)
+        floor = matrix @ ((left + right) / 2, (top + bottom) / 2, 1.0)
+        middle = np.array(scene.floor) / 2
+        where = scene.ground_position(frame)[0]
+        outwards.append(np.linalg.norm(floor[:2] - middle) - np.linalg.norm(where - middle))
+    assert np.mean(outwards) > 0.1
+
+
+def test_who_stand_together_are_one_blob_and_who_are_apart_are_several() -> None:
+    """Two people: the picture's difference from the empty room, as a background model would see it."""
+    scene = Scene("overhead", 1, 2, 1)
+    empty = scene.empty(0).astype(np.int16)
+    near, far = [], []
+    for frame in range(0, 1500, 15):
+        gap = np.linalg.norm(np.subtract(*scene.ground_position(frame)))
+        if not (gap < 0.55 or gap > 1.6):
+            continue
+        changed = np.abs(scene.image(0, frame).astype(np.int16) - empty).max(axis=2) > 25
+        closed = cv2.morphologyEx(changed.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((5, 5), np.uint8))
+        areas = cv2.connectedComponentsWithStats(closed)[2][1:, cv2.CC_STAT_AREA]
+        (near if gap < 0.55 else far).append(int((areas > 200).sum()))
+    assert len(near) > 5 and len(far) > 5  # noqa: PT018
+    assert np.mean(np.array(near) == 1) > 0.8
+    assert np.mean(np.array(far) >= 2) > 0.8
+
+
+def test_some_people_dress_alike_and_most_do_not() -> None:
+    alike = [
+        np.linalg.norm(np.subtract(casual(0, seed).upper, casual(1, seed).upper)) < 0.15
+        for seed in range(200)
+    ]
+    assert 0.2 < np.mean(alike) < 0.45

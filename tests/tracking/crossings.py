@@ -1,0 +1,99 @@
+"""People in drawn pictures who are hidden by each other for a while."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tracking.boxes import Floats, iou
+from tracking.detectors.base import Image
+from tracking.yardsticks.method import Method
+
+SIZE = (120, 200)
+FRAMES = 58
+_TALL, _WIDE = 44, 18
+
+Clothes = tuple[tuple[int, int, int], tuple[int, int, int]]
+"""Colours of the upper and the lower half."""
+
+RED: Clothes = ((40, 40, 220), (90, 40, 30))
+BLUE: Clothes = ((220, 60, 30), (40, 40, 160))
+GREEN: Clothes = ((50, 190, 60), (40, 90, 40))
+GREY: Clothes = ((120, 110, 90), (100, 90, 70))
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """The first person walks right, behind the second, who walks left."""
+
+    clothes: tuple[Clothes, ...]
+    """Of everybody, from the back to the front."""
+    seed: int = 0
+
+    def left(self, person: int, frame: int) -> float:
+        """Give where somebody's box begins, in pixels."""
+        return 20.0 + 2.5 * frame if person == 0 else 160.0 - 2.5 * frame
+
+    def where(self, person: int, frame: int) -> Floats:
+        left = self.left(person, frame)
+        return np.array([left, 40.0, left + _WIDE, 40.0 + _TALL])
+
+    def picture(self, frame: int) -> Image:
+        rng = np.random.default_rng(self.seed)
+        image = rng.integers(90, 130, (*SIZE, 3)).astype(np.uint8)
+        texture = rng.integers(-25, 25, (_TALL, _WIDE, 1))
+        self.furnish(image, texture)
+        for person, clothes in enumerate(self.clothes):
+            left, top = np.rint(self.where(person, frame)[:2]).astype(int).tolist()
+            _dress(image, left, top, np.array(clothes), texture)
+        return image
+
+    def furnish(self, image: Image, texture: Floats) -> None:
+        """Draw what stands around."""
+
+
+@dataclass(frozen=True)
+class WalkTogether(Crossing):
+    """The first one catches up with the second, goes on behind them and falls back, all to the right.
+
+    Something of nearly the first one's colours stands where they are hidden.
+    """
+
+    def left(self, person: int, frame: int) -> float:
+        if person == 1:
+            return 60.0 + 2.0 * frame
+        return float(np.interp(frame, [0, 25, 40, 58], [20, 110, 140, 147]))
+
+    def furnish(self, image: Image, texture: Floats) -> None:
+        dulled = 0.6 * np.array(self.clothes[0]) + 0.4 * 110
+        _dress(image, 125, 66, dulled, texture)
+
+
+@dataclass(frozen=True)
+class ThreeMeet(Crossing):
+    """Two pass each other behind a third, who stands."""
+
+    def left(self, person: int, frame: int) -> float:
+        return 90.0 if person == 2 else super().left(person, frame)
+
+
+def _dress(image: Image, left: int, top: int, clothes: Floats, texture: Floats) -> None:
+    colours = np.repeat(clothes, _TALL // 2, axis=0)[:, None]
+    image[top : top + _TALL, left : left + _WIDE] = np.clip(colours + texture, 0, 255)
+
+
+def followed(method: Method[Any], scene: Crossing) -> list[bool]:
+    """Follow all from the first picture to the last; say of each whether they are found there."""
+    image = scene.picture(0)
+    people = [method.begin(image, scene.where(person, 0)) for person in range(len(scene.clothes))]
+    for frame in range(1, FRAMES):
+        method.move(scene.picture(frame), people)
+    return [float(iou(it.box, scene.where(person, FRAMES - 1))) > 0.4 for person, it in enumerate(people)]
+
+
+def times_kept(methods: Sequence[Method[Any]], scenes: Sequence[Crossing]) -> int:
+    """Count the scenes after which all are found, each by a method of its own."""
+    return sum(all(followed(method, scene)) for method, scene in zip(methods, scenes, strict=True))

@@ -1,0 +1,195 @@
+"""What a step between two blobs costs, and how colours are compared: the formulas of the report."""
+
+from __future__ import annotations
+
+import math
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tracking.temporal import BlobSettings, TemporalSettings
+from tracking.temporal.background import YuvBackground
+from tracking.temporal.blobs import Blob, Blobs
+from tracking.temporal.colours import BINS, mismatch, uv_histogram
+from tracking.temporal.distance import distance_score, gap, penalties, penalty
+from tracking.temporal.places import Places
+
+METRE = 50.0
+SETTINGS = TemporalSettings()
+
+
+def _blob(left: float, top: float, right: float, bottom: float, shape: np.ndarray | None = None) -> Blob:
+    filled = np.full((int(bottom - top), int(right - left)), 255, dtype=np.uint8)
+    shape = filled if shape is None else shape
+    return Blob(np.array([left, top, right, bottom]), shape, int((shape > 0).sum()), np.full(BINS, 1 / BINS))
+
+
+def test_a_blob_within_another_is_no_distance_away() -> None:
+    outer, inner = _blob(0, 0, 40, 40), _blob(10, 10, 30, 40)
+    assert distance_score(outer, inner, METRE, SETTINGS) == 0.0
+    assert distance_score(inner, outer, METRE, SETTINGS) == 0.0
+
+
+def test_blobs_that_overlap_in_part_are_six_centimetres_apart() -> None:
+    assert distance_score(_blob(0, 0, 40, 40), _blob(20, 20, 60, 60), METRE, SETTINGS) == 0.06
+
+
+def test_blobs_apart_have_the_gap_between_their_edges_and_sixteen_centimetres() -> None:
+    left, right = _blob(0, 0, 20, 20), _blob(70, 0, 100, 20)
+    assert gap(left, right) == pytest.approx(50.0, abs=1.5)
+    assert distance_score(left, right, METRE, SETTINGS) == pytest.approx(0.16 + 1.0, abs=0.03)
+
+
+def test_the_gap_is_between_what_is_filled_and_not_between_boxes() -> None:
+    disc = np.hypot(*np.mgrid[-19.5:20:1, -19.5:20:1]) <= 20
+    round_ = _blob(0, 0, 40, 40, np.where(disc, 255, 0).astype(np.uint8))
+    other = _blob(60, 60, 100, 100, np.where(disc, 255, 0).astype(np.uint8))
+    assert gap(round_, other) == pytest.approx(math.hypot(60, 60) - 40, abs=2.5)
+
+
+def test_the_penalty_is_the_share_of_the_way_that_is_walked_and_beyond_it_a_sigmoid() -> None:
+    assert penalty(0.0) == 0.0
+    assert penalty(0.7) == 0.7
+    assert penalty(1.0) == 1.0
+    assert penalty(2.0) == pytest.approx(26.0)
+    assert penalty(1.7) == pytest.approx(50 / (math.exp(2) + 1) + 1)
+    assert penalty(5.0) == pytest.approx(51.0)
+
+
+@given(st.floats(0, 6), st.floats(0, 6))
+def test_farther_never_costs_less(one: float, other: float) -> None:
+    near, far = sorted((one, other))
+    assert penalty(near) <= penalty(far)
+
+
+def test_the_penalty_goes_by_the_time_between_the_samples() -> None:
+    blobs = [_blob(0, 0, 20, 20)], [_blob(70, 0, 100, 20)]
+    short, long = (float(penalties(*blobs, seconds, METRE, SETTINGS)[0, 0]) for seconds in (0.5, 2.0))
+    assert short > 1.0
+    assert long == pytest.approx((0.16 + 1.0) / (1.45 * 2.0), abs=0.02)
+
+
+@given(st.integers(0, 10_000), st.integers(1, 400), st.integers(1, 400))
+def test_the_intersection_of_shares_is_that_of_counts(seed: int, size: int, model_size: int) -> None:
+    rng = np.random.default_rng(seed)
+    found = np.bincount(rng.integers(0, 6, size), minlength=BINS)
+    model = np.bincount(rng.integers(2, 8, model_size), minlength=BINS)
+    scaled = found * model.sum() / found.sum()
+    expected = 1 - np.minimum(scaled, model).sum() / model.sum()
+    assert float(mismatch(found / found.sum(), model / model.sum())) == pytest.approx(expected)
+
+
+def test_colours_count_and_brightness_does_not() -> None:
+    mask = np.full((10, 10), 255, dtype=np.uint8)
+
+    def look(*bgr: int) -> np.ndarray:
+        return uv_histogram(np.full((10, 10, 3), bgr, dtype=np.uint8), mask)
+
+    assert float(mismatch(look(60, 60, 60), look(200, 200, 200))) == 0.0
+    assert float(mismatch(look(40, 40, 180), look(180, 40, 40))) == 1.0
+
+
+def test_only_the_pixels_of_the_mask_count() -> None:
+    image = np.zeros((4, 4, 3), dtype=np.uint8)
+    image[:2] = (40, 40, 180)
+    mask = np.zeros((4, 4), dtype=np.uint8)
+    mask[:2] = 255
+    assert uv_histogram(image, mask).max() == 1.0
+    assert not uv_histogram(image, np.zeros_like(mask)).any()
+
+
+def test_somebody_is_compared_with_how_they_looked_nearest_by() -> None:
+    places = Places(3, (300, 300))
+    red, blue = np.eye(BINS)[0], np.eye(BINS)[1]
+    here, there = np.array([[40.0, 40.0]]), np.array([[250.0, 250.0]])
+    assert places.costs(here, red[None], 0.5) == [0.5]
+    places.learn(here[0], red)
+    places.learn(there[0], blue)
+    assert places.costs(here + 20, red[None], 0.5) == [0.0]
+    assert places.costs(there - 20, red[None], 0.5) == [1.0]
+    for step in range(40):
+        places.learn(np.array([float(step * 7 % 300), float(step * 13 % 300)]), red)
+    assert len(places) <= 9
+    places.learn(here[0], blue)
+    assert places.costs(here, blue[None], 0.5) == [0.0], "what was known of that part of the room is replaced"
+
+
+def _room(rng: np.random.Generator) -> np.ndarray:
+    shade = np.linspace(90, 150, 120)[None, :, None] + np.zeros((90, 120, 3))
+    return np.clip(shade + rng.normal(0, 2, shade.shape), 0, 255).astype(np.uint8)
+
+
+def test_what_is_not_of_the_room_is_foreground_and_noise_is_not() -> None:
+    rng = np.random.default_rng(1)
+    background = YuvBackground([_room(rng) for _ in range(20)], BlobSettings())
+    image = _room(rng)
+    image[30:60, 40:60] = (60, 60, 170)
+    found = background.foreground(image) > 0
+    assert found[32:58, 42:58].mean() > 0.98
+    found[28:62, 38:62] = False
+    assert found.mean() < 0.005
+
+
+def test_the_distance_is_that_of_mahalanobis_in_yuv() -> None:
+    rng = np.random.default_rng(2)
+    room = rng.integers(80, 160, (30, 40, 3))
+    # Most pixels are as they were, so that no exposure is told from the rest.
+    images = [
+        (room + rng.choice([-3, 0, 3], room.shape, p=[0.15, 0.7, 0.15])).astype(np.uint8) for _ in range(30)
+    ]
+    settings = BlobSettings()
+    background = YuvBackground(images, settings)
+    levels = np.stack([cv2.cvtColor(image, cv2.COLOR_BGR2YUV) for image in images]).astype(float)
+    mean = levels.mean(axis=0)
+    off = levels - mean
+    floors = np.diag([settings.brightness_floor, settings.colour_floor, settings.colour_floor]) ** 2
+    covariance = np.einsum("nhwi,nhwj->hwij", off, off) / len(images) + floors
+    image = images[0].copy()
+    image[5:15, 5:15] = (60, 60, 170)
+    offset = cv2.cvtColor(image, cv2.COLOR_BGR2YUV) - mean
+    expected = np.einsum("hwi,hwij,hwj->hw", offset, np.linalg.inv(covariance), offset)
+    np.testing.assert_allclose(background.distance(image), expected, rtol=1e-3, atol=1e-3)
+
+
+def test_who_walks_through_while_it_is_learned_is_no_part_of_the_room() -> None:
+    rng = np.random.default_rng(3)
+    images = []
+    for step in range(20):
+        image = _room(rng)
+        image[30:60, 5 * step : 5 * step + 15] = (60, 60, 170)
+        images.append(image)
+    background = YuvBackground(images, BlobSettings())
+    assert (background.foreground(_room(rng)) > 0).mean() < 0.005
+
+
+def test_a_room_that_changes_slowly_is_learned_where_nobody_is() -> None:
+    rng = np.random.default_rng(4)
+    finder = Blobs((120, 90), 6.0, BlobSettings(learn_rate=0.3))
+    finder.prepare([_room(rng) for _ in range(20)])
+    person = slice(30, 60), slice(40, 60)
+    for step in range(40):
+        image = _room(rng)
+        image[:, 80:] = np.clip(image[:, 80:] + 1.5 * step, 0, 255).astype(np.uint8)
+        image[person] = (60, 60, 170)
+        found = finder.find(image, learn=True)
+        assert len(found) == 1, f"step {step}"
+    box = found[0].box
+    assert np.abs(box - [40, 30, 60, 60]).max() <= 3
+
+
+def test_blobs_are_whole_and_specks_are_none() -> None:
+    rng = np.random.default_rng(5)
+    finder = Blobs((120, 90), 6.0, BlobSettings())
+    finder.prepare([_room(rng) for _ in range(20)])
+    image = _room(rng)
+    image[20:40, 20:34] = (60, 60, 170)
+    image[41:55, 20:34] = (170, 60, 60)
+    image[70:72, 100:102] = 0
+    (only,) = finder.find(image, learn=False)
+    assert only.box[1] <= 20
+    assert only.box[3] >= 55
+    assert only.colours.sum() == pytest.approx(1.0)
+    assert (only.colours > 0.3).sum() == 2

@@ -1,0 +1,164 @@
+"""The best joint path is the best of all of them; pruning leaves out what nobody can have walked."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise, product
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tracking.temporal.edges import cheapest_by_edges
+from tracking.temporal.graph import Graph, all_edges, edges, merge_costs, ways
+from tracking.temporal.groups import joint_path
+from tracking.temporal.sweep import cheapest
+
+_MANY = 100_000
+
+
+def _cost(graph: Graph, path: np.ndarray) -> float:
+    """Eq. (1) by itself, summed over the stages; infinite along a link that is pruned."""
+    total = 0.0
+    for before, now, step, looks, shared in zip(
+        [graph.start, *path[:-1]], path, graph.steps, graph.looks, graph.shared, strict=True
+    ):
+        steps = [step[a, b] for a, b in zip(before, now, strict=True)]
+        total += sum(cost if cost <= graph.longest else np.inf for cost in steps)
+        total += sum(looks[person, blob] for person, blob in enumerate(now))
+        here = [blob for blob in now.tolist() if shared[blob]]
+        total += graph.merge * (len(here) - len(set(here)))
+    return total / graph.people
+
+
+def _best(graph: Graph) -> float:
+    """The cheapest of all joint paths, one after the other."""
+    nodes = [list(product(range(step.shape[1]), repeat=graph.people)) for step in graph.steps]
+    return min(_cost(graph, np.array(path)) for path in product(*nodes))
+
+
+@st.composite
+def graphs(draw: st.DrawFn, most_people: int = 3, most_stages: int = 3, most_blobs: int = 3) -> Graph:
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    people, stages = draw(st.integers(1, most_people)), draw(st.integers(1, most_stages))
+    blobs = [draw(st.integers(1, most_blobs)) for _ in range(stages + 1)]
+    steps = tuple(np.round(rng.exponential(0.7, pair), 2) for pair in pairwise(blobs))
+    looks = tuple(np.round(rng.random((people, count)), 2) for count in blobs[1:])
+    shared = tuple(rng.random(count) < 0.8 for count in blobs[1:])
+    return Graph(rng.integers(0, blobs[0], people), steps, looks, shared, 0.35, np.inf)
+
+
+@given(graphs(most_people=2))
+@settings(deadline=None, max_examples=80)
+def test_the_joint_path_is_the_cheapest_of_all(graph: Graph) -> None:
+    found = joint_path(graph, ways(graph), _MANY)
+    assert found.exact
+    assert found.cost == pytest.approx(_best(graph))
+    assert _cost(graph, found.blobs) == pytest.approx(found.cost)
+
+
+@given(graphs(most_stages=2))
+@settings(deadline=None, max_examples=30)
+def test_so_it_is_for_three_people(graph: Graph) -> None:
+    assert joint_path(graph, ways(graph), _MANY).cost == pytest.approx(_best(graph))
+
+
+@given(graphs(most_people=4, most_stages=6, most_blobs=4), st.sampled_from([0.6, 1.5, np.inf]))
+@settings(deadline=None, max_examples=60)
+def test_person_by_person_is_as_cheap_as_edge_by_edge(graph: Graph, longest: float) -> None:
+    graph = replace(graph, longest=longest)
+    left = ways(graph)
+    nobody = [np.zeros(len(it), dtype=np.int64) for it in graph.shared]
+    path, cost = cheapest(left, graph.shared, nobody, graph.merge)
+    by_edges, same = cheapest_by_edges(left, graph.shared, graph.merge)
+    assert cost == pytest.approx(same)
+    # People who cannot meet are decided apart, and nothing is lost by it.
+    apart = joint_path(graph, left, _MANY)
+    assert apart.cost == pytest.approx(cost / graph.people)
+    for found in (path, by_edges, apart.blobs):
+        unpruned = replace(graph, longest=np.inf)
+        assert _cost(unpruned, found) == pytest.approx(cost / graph.people)
+
+
+@given(graphs(most_people=3, most_stages=4, most_blobs=4))
+@settings(deadline=None, max_examples=80)
+def test_pruning_keeps_the_best_path_where_nobody_goes_too_far_on_it(graph: Graph) -> None:
+    whole = joint_path(graph, ways(graph), _MANY)
+    taken = [
+        step[a, b]
+        for before, now, step in zip([graph.start, *whole.blobs[:-1]], whole.blobs, graph.steps, strict=True)
+        for a, b in zip(before, now, strict=True)
+    ]
+    pruned = replace(graph, longest=max(taken))
+    left = ways(pruned)
+    assert joint_path(pruned, left, _MANY).cost == pytest.approx(whole.cost)
+    assert all(some <= every for some, every in zip(edges(left), all_edges(graph), strict=True))
+
+
+def test_without_pruning_there_are_as_many_edges_as_pairs_of_nodes() -> None:
+    graph = Graph(
+        np.array([0, 1, 2]),
+        (np.zeros((3, 3)), np.zeros((3, 2))),
+        (np.zeros((3, 3)), np.zeros((3, 2))),
+        (np.ones(3, dtype=bool), np.ones(2, dtype=bool)),
+        0.35,
+        np.inf,
+    )
+    # 27 nodes, then 8, as in the report's own example; the first stage is met from one node.
+    assert all_edges(graph) == [27, 27 * 8]
+
+
+def test_pruning_leaves_a_chain_where_everybody_is_far_from_everybody() -> None:
+    far = np.where(np.eye(3, dtype=bool), 0.0, 30.0)
+    graph = Graph(
+        np.arange(3),
+        (far, far),
+        (np.full((3, 3), 0.5),) * 2,
+        (np.ones(3, dtype=bool),) * 2,
+        0.35,
+        2.0,
+    )
+    assert edges(ways(graph)) == [1, 1]
+    assert joint_path(graph, ways(graph), _MANY).blobs.tolist() == [[0, 1, 2], [0, 1, 2]]
+
+
+def test_who_can_get_to_no_blob_is_somewhere_all_the_same() -> None:
+    graph = Graph(
+        np.array([0]), (np.array([[40.0, 30.0]]),), (np.zeros((1, 2)),), (np.ones(2, dtype=bool),), 0.35, 2.0
+    )
+    assert joint_path(graph, ways(graph), _MANY).blobs.tolist() == [[1]]
+
+
+def test_a_merge_costs_for_everybody_in_it_but_one() -> None:
+    blobs = [np.array([0, 1]), np.array([0, 1]), np.array([1])]
+    shared, nobody = np.ones(2, dtype=bool), np.zeros(2, dtype=np.int64)
+    costs = merge_costs(blobs, shared, nobody, 0.35)
+    for a, b in product(range(2), repeat=2):
+        here = [a, b, 1]
+        assert costs[a, b, 0] == pytest.approx(0.35 * (3 - len(set(here))))
+    # Where somebody else is already, everybody is one too many; where being several is free, nobody is.
+    assert merge_costs(blobs, shared, np.array([1, 0]), 0.35)[0, 0, 0] == pytest.approx(0.7)
+    assert not merge_costs(blobs, np.zeros(2, dtype=bool), nobody, 0.35).any()
+
+
+@given(graphs(most_people=4, most_stages=3, most_blobs=3))
+@settings(deadline=None, max_examples=40)
+def test_too_many_people_for_one_table_are_decided_one_after_the_other(graph: Graph) -> None:
+    found = joint_path(graph, ways(graph), 1)
+    whole = joint_path(graph, ways(graph), _MANY)
+    assert _cost(graph, found.blobs) == pytest.approx(found.cost)
+    assert found.cost >= whole.cost - 1e-9
+    assert not found.exact or found.cost == pytest.approx(whole.cost)
+
+
+def test_evidence_that_comes_later_corrects_an_earlier_match() -> None:
+    # Two people meet in one blob and part; at first each looks like the other, then like themselves.
+    near = np.full((1, 2), 0.22)
+    apart = np.array([[0.0, 9.0], [9.0, 0.0]])
+    alone = (np.ones(2, dtype=bool),)
+    wrong, right = np.array([[0.6, 0.4], [0.4, 0.6]]), np.array([[0.1, 0.9], [0.9, 0.1]])
+    at_once = Graph(np.zeros(2, dtype=np.int64), (near,), (wrong,), alone, 0.35, 2.0)
+    assert joint_path(at_once, ways(at_once), _MANY).blobs[0].tolist() == [1, 0]
+    later = replace(at_once, steps=(near, apart), looks=(wrong, right), shared=alone * 2)
+    assert joint_path(later, ways(later), _MANY).blobs.tolist() == [[0, 1], [0, 1]]

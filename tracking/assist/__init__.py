@@ -1,0 +1,20 @@
+"""The operator who helps: troubles are foreseen, and a pointing is taken (Todor 2009, chapter 8)."""
+
+from tracking.assist.exchange import Exchanges, exchange_margins, exchanges
+from tracking.assist.foresight import Foresight
+from tracking.assist.pointing import Pointing
+from tracking.assist.settings import AssistSettings
+from tracking.assist.tracker import AssistedTracker
+from tracking.troubles import Reason, Trouble
+
+__all__ = [
+    "AssistSettings",
+    "AssistedTracker",
+    "Exchanges",
+    "Foresight",
+    "Pointing",
+    "Reason",
+    "Trouble",
+    "exchange_margins",
+    "exchanges",
+]

@@ -1,0 +1,90 @@
+"""How nearly two objects of a window could have each other's identity."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracking.boxes import Floats
+from tracking.network import Network
+from tracking.solvers.base import OCCLUDED
+from tracking.solvers.objective import nodes_of
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Exchanges:
+    """The cheapest exchange of every two objects of a window.
+
+    Attributes:
+        margins: (n, n) symmetric, what it costs more than the answer; infinite where no arcs lead over, and
+            on the diagonal. Negative only where the answer was not the best one.
+        frames: (n, n) index of the first frame of the window in which the two have changed places.
+    """
+
+    margins: Floats
+    frames: NDArray[np.int64]
+
+
+def exchange_margins(network: Network, states: NDArray[np.int64]) -> Floats:
+    """Give the margins of `exchanges`, (n, n)."""
+    return exchanges(network, states).margins
+
+
+def exchanges(network: Network, states: NDArray[np.int64]) -> Exchanges:
+    """Price the exchange of every two objects from some frame on, for all pairs and frames at once.
+
+    From frame f on, a goes where b went and b where a went; everybody else stays, so nothing new conflicts.
+    What a's path costs then is a head of its own path, one arc over, and b's tail at a's prices: sums
+    from the front and from the back over the frames, O(n² M). The least over f is exact for paths
+    through these nodes; the layout term is not in it. From f on at least one of the two must be seen.
+
+    Args:
+        network: whose objects share their observations.
+        states: (n, M) the answer, -1 where hidden.
+
+    Raises:
+        ValueError: objects have observations of their own.
+    """
+    if not network.shared:
+        raise ValueError("objects with observations of their own have nothing to exchange")
+    n = network.objects
+    if not n:
+        return Exchanges(np.empty((0, 0)), np.empty((0, 0), dtype=np.int64))
+    own, crossed = _ways(network, nodes_of(network, states))
+    both = crossed + crossed.transpose(1, 0, 2)
+    # Two who stay hidden to the end have exchanged nothing that could be seen.
+    shown = (states != OCCLUDED)[:, ::-1].cumsum(axis=1)[:, ::-1] > 0
+    both[~(shown[:, None] | shown[None])] = np.inf
+    frames = both.argmin(axis=2)
+    # A rounded answer may hold an arc that is gated: who has it has no margin.
+    least, now = both.min(axis=2), own[:, None] + own[None]
+    margins = np.subtract(least, now, out=np.full((n, n), np.inf), where=np.isfinite(now))
+    np.fill_diagonal(margins, np.inf)
+    return Exchanges(margins, frames)
+
+
+def _ways(network: Network, nodes: NDArray[np.int64]) -> tuple[Floats, Floats]:
+    """Give the costs of the paths, (n,), and of a's with b's tail from each frame on, (n, n, M)."""
+    frames, sets = np.arange(network.frames), network.pair_sets
+    n = len(nodes)
+    # All of them: what the path of b (second axis) costs at the prices of a (first axis).
+    visits = network.node[:, frames, nodes]
+    arcs = network.pair[:, frames[:-1], nodes[:, :-1], nodes[:, 1:]][sets]
+    over = network.pair[sets[:, None, None], frames[:-1], nodes[:, None, :-1], nodes[None, :, 1:]]
+    begins, ends = network.source[:, nodes[:, 0]], network.sink[:, nodes[:, -1]]
+    tails = visits.copy()
+    tails[:, :, :-1] += arcs
+    tails[:, :, -1] += ends
+    tails = tails[:, :, ::-1].cumsum(axis=2)[:, :, ::-1]
+    mine = np.arange(n)
+    steps = visits[mine, mine].copy()
+    steps[:, 0] += begins[mine, mine]
+    steps[:, 1:] += arcs[mine, mine]
+    heads = steps.cumsum(axis=1)
+    crossed = tails
+    crossed[:, :, 1:] += heads[:, None, :-1] + over
+    own = heads[:, -1] + ends[mine, mine]
+    crossed[:, :, 0] += begins
+    return own, crossed

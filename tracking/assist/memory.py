@@ -1,0 +1,139 @@
+"""The past seconds of a tracker: what was seen in them, and where it stood before each of its windows."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from tracking.assist.pointing import Pointing, farness
+from tracking.assist.settings import AssistSettings
+from tracking.boxes import BOX_SIDES, Floats, iou
+from tracking.detections import Detections
+from tracking.solvers.base import OCCLUDED
+from tracking.templates import RememberedObject
+from tracking.told import Told
+
+_SAME_PLACE = 0.5
+"""Overlap (IoU) from which somebody new is the one who began in that frame before."""
+
+_SAME_TIME = 5
+"""Frames by which somebody new may begin earlier or later than before."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Step:
+    """A window about to be solved.
+
+    Attributes:
+        first: its first frame.
+        end: its last frame.
+        final_to: the last frame that becomes final.
+        objects: the object list before it.
+        told: what the window before it has told.
+    """
+
+    first: int
+    end: int
+    final_to: int
+    objects: tuple[RememberedObject, ...]
+    told: Told | None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Began:
+    """Somebody new: where and when, and the number that they were given."""
+
+    frame: int
+    box: Floats
+    id: int
+
+
+class Memory:
+    """What a tracker needs to go back by up to `frames` frames. Bounded by them.
+
+    Attributes:
+        seen: the detections, by frame; a frame that is not there showed nothing.
+        where: who was in which of them in the end, by frame: the observation's index by id.
+        steps: the windows, oldest first.
+    """
+
+    def __init__(self, frames: int) -> None:
+        self._frames = frames
+        self._births: list[Began] = []
+        self.seen: dict[int, Detections] = {}
+        self.where: dict[int, Mapping[int, int]] = {}
+        self.steps: deque[Step] = deque()
+
+    def look(self, frame: int, detections: Detections) -> None:
+        """Take the detections of a frame, and forget what is too long ago."""
+        self.seen[frame] = detections
+        oldest = frame - self._frames
+        # Of a window that reaches back beyond the memory, the detections are needed, too.
+        while self.steps and self.steps[0].end < oldest:
+            self.steps.popleft()
+        oldest = min(oldest, self.steps[0].first if self.steps else frame)
+        self.seen = {number: it for number, it in self.seen.items() if number >= oldest}
+        self.where = {number: it for number, it in self.where.items() if number >= oldest}
+        self._births = [it for it in self._births if it.frame >= oldest - _SAME_TIME]
+
+    def step(self, step: Step) -> None:
+        """Take down that a window is solved; later ones are not valid any more."""
+        while self.steps and (self.steps[-1].end, self.steps[-1].final_to) >= (step.end, step.final_to):
+            self.steps.pop()
+        self.steps.append(step)
+
+    def found(self, first: int, ids: Sequence[int], states: npt.NDArray[np.int64]) -> None:
+        """Take down a window's answer, `(n, M)` from the frame `first` on, -1 where hidden."""
+        for m, column in enumerate(states.T.tolist()):
+            self.where[first + m] = {
+                number: state for number, state in zip(ids, column, strict=True) if state != OCCLUDED
+            }
+
+    def settle(self, first: int, ids: set[int]) -> None:
+        """From the frame `first` on, leave out who is none of `ids`: their tracks have ended."""
+        for frame in [it for it in self.where if it >= first]:
+            self.where[frame] = {number: it for number, it in self.where[frame].items() if number in ids}
+
+    def trail(self, ids: Sequence[int], last: int, frames: int) -> Floats:
+        """Give where these were in so many frames up to `last`, `(n, frames, 4)` pixels, NaN where hidden."""
+        boxes = np.full((len(ids), frames, BOX_SIDES), np.nan)
+        for place, frame in enumerate(range(last - frames + 1, last + 1)):
+            there = self.where.get(frame, {})
+            for n, number in enumerate(ids):
+                if number in there:
+                    boxes[n, place] = self.seen[frame].boxes[there[number]]
+        return boxes
+
+    def since(self, frame: int) -> Sequence[Step]:
+        """Give the windows from the first one that this frame is in; none where that is forgotten."""
+        if not self.steps or frame < self.steps[0].first:
+            return ()
+        return [it for it in self.steps if it.end >= frame]
+
+    def doubt(self, pointing: Pointing, settings: AssistSettings) -> float:
+        """Give what an answer that follows the pointing saves in its frame; 0 where it does already."""
+        if pointing.frame not in self.where or pointing.frame not in self.seen:
+            return 0.0
+        far = farness(pointing, self.seen[pointing.frame].boxes)
+        state = self.where[pointing.frame].get(pointing.object)
+        now = settings.hidden if state is None else float(far[state])
+        return settings.weight * (now - min(float(far.min(initial=1.0)), settings.hidden))
+
+    def began(self, frame: int, box: Floats, taken: set[int]) -> int | None:
+        """Give the number of who began there before, and is none of `taken`; `None`: nobody did."""
+        found = [
+            (float(iou(it.box, box)), -it.id)
+            for it in self._births
+            if it.id not in taken and abs(it.frame - frame) <= _SAME_TIME
+        ]
+        if not found or max(found)[0] < _SAME_PLACE:
+            return None
+        return -max(found)[1]
+
+    def born(self, began: Began) -> None:
+        """Take down who has begun."""
+        self._births.append(began)

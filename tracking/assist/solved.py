@@ -1,0 +1,57 @@
+"""A window that has been solved, with all that the answer was chosen by."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracking.boxes import Floats
+from tracking.detections import Detections
+from tracking.network import Network
+from tracking.solvers.base import OCCLUDED, SolveReport
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Solved:
+    """One window.
+
+    Attributes:
+        first: its first frame.
+        ids: the tracks that were in the program, in the order of the network's objects.
+        network: what it was solved on.
+        states: `(n, M)`, -1 where hidden.
+        frames: its M frames.
+        report: what is proven.
+        final_to: the last frame that becomes final with it.
+        known: all tracks that are remembered, those that nothing in the window can be, too.
+        trail: `(k, T, 4)` pixels, where those were in the T frames up to the last one, NaN where hidden.
+        looks: `(k, B)`, their templates.
+    """
+
+    first: int
+    ids: tuple[int, ...]
+    network: Network
+    states: NDArray[np.int64]
+    frames: Sequence[Detections]
+    report: SolveReport
+    final_to: int
+    known: tuple[int, ...]
+    trail: Floats
+    looks: Floats
+
+    @property
+    def last(self) -> int:
+        """The newest frame."""
+        return self.first + len(self.frames) - 1
+
+    @property
+    def scores(self) -> Floats:
+        """How sure the detector is of them, `(n, M)`, NaN where hidden."""
+        found = np.full(self.states.shape, np.nan)
+        for m, seen in enumerate(self.frames):
+            there = self.states[:, m] != OCCLUDED
+            found[there, m] = seen.scores[self.states[there, m]]
+        return found

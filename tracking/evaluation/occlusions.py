@@ -1,0 +1,112 @@
+"""Who is hidden for a while and comes back: whether their number is the same before and after."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tracking.boxes import BOX_SIDES, areas, intersections
+from tracking.evaluation.frames import line_up
+from tracking.evaluation.matching import matched
+from tracking.evaluation.scores import DEFAULT_IOU
+from tracking.motchallenge import MotRow
+
+HIDDEN_BELOW = 0.25
+"""Visible share of somebody below which they are hidden."""
+COVERED_ABOVE = 0.5
+"""Share of a box that somebody nearer covers above which its person is hidden, where shares are not known."""
+_LEAST_SEEN = 3
+"""Frames in which somebody must be seen before and after; two that are nearer than this are one occlusion."""
+
+
+@dataclass(frozen=True, slots=True)
+class Occlusion:
+    """One person, hidden from the frame `first` to the frame `last`."""
+
+    person: int
+    first: int
+    last: int
+
+
+def occlusions(truth: Iterable[MotRow], around: int) -> list[Occlusion]:
+    """Find who is hidden and comes back, by the visible shares of the truth.
+
+    Truth without shares between 0 and 1 only says whom its annotator called hidden, or nothing at all (-1).
+    There somebody is hidden by their box, too; of two boxes the one that ends lower is the nearer person's.
+
+    Args:
+        truth: rows of ground truth; those of confidence 0 do not count.
+        around: frames before, and after, in some of which somebody must be seen.
+    """
+    seen: dict[int, dict[int, bool]] = {}
+    for row, hidden in _hidden([row for row in truth if row.confidence != 0.0]):
+        seen.setdefault(row.id, {})[row.frame] = not hidden
+    return [found for person, frames in seen.items() for found in _of(person, frames, around)]
+
+
+def survived(
+    found: Sequence[Occlusion],
+    truth: Iterable[MotRow],
+    tracks: Iterable[MotRow],
+    around: int,
+    least_iou: float = DEFAULT_IOU,
+) -> list[bool]:
+    """Say of each occlusion whether its person's number is the same before and after.
+
+    That is the number they are most often matched with in the `around` frames before, and in those after;
+    somebody who has none on either side did not keep it.
+    """
+    truth, tracks = list(truth), list(tracks)
+    lined = line_up(truth, tracks, least_iou)
+    numbers: dict[int, dict[int, int]] = {}
+    order = sorted({row.frame for row in (*truth, *tracks)})
+    for number, frame, pairs in zip(order, lined, matched(lined, least_iou), strict=True):
+        for person, track in np.argwhere(pairs).tolist():
+            numbers.setdefault(int(frame.truth[person]), {})[number] = int(frame.tracks[track])
+    return [_same(numbers.get(it.person, {}), it, around) for it in found]
+
+
+def _same(numbers: dict[int, int], it: Occlusion, around: int) -> bool:
+    before = _most(numbers, range(it.first - around, it.first))
+    return before is not None and before == _most(numbers, range(it.last + 1, it.last + 1 + around))
+
+
+def _most(numbers: dict[int, int], frames: range) -> int | None:
+    counts = Counter(numbers[frame] for frame in frames if frame in numbers)
+    return min(counts, key=lambda number: (-counts[number], number)) if counts else None
+
+
+def _hidden(rows: Sequence[MotRow]) -> Iterable[tuple[MotRow, bool]]:
+    """Say of each row whether its person is hidden."""
+    has_shares = any(0.0 < row.visible < 1.0 for row in rows)
+    frames: dict[int, list[MotRow]] = {}
+    for row in rows:
+        frames.setdefault(row.frame, []).append(row)
+    for there in frames.values():
+        boxes = np.array([row.box for row in there], dtype=np.float64).reshape(-1, BOX_SIDES)
+        nearer = boxes[None, :, 3] > boxes[:, None, 3]
+        shared = np.where(nearer, intersections(boxes[:, None], boxes[None]), 0.0).max(axis=1, initial=0.0)
+        shares = shared / np.maximum(areas(boxes), 1e-9)
+        for row, share in zip(there, shares.tolist(), strict=True):
+            covered = not has_shares and share > COVERED_ABOVE
+            yield row, covered or 0.0 <= row.visible < HIDDEN_BELOW
+
+
+def _of(person: int, frames: dict[int, bool], around: int) -> Iterable[Occlusion]:
+    """Give one person's occlusions from whether they are seen, by frame."""
+    hidden = sorted(frame for frame, seen in frames.items() if not seen)
+    runs: list[list[int]] = []
+    for frame in hidden:
+        together = runs and sum(frames.get(it, False) for it in range(runs[-1][1] + 1, frame)) < _LEAST_SEEN
+        if together:
+            runs[-1][1] = frame
+        else:
+            runs.append([frame, frame])
+    for first, last in runs:
+        before = sum(frames.get(it, False) for it in range(first - around, first))
+        after = sum(frames.get(it, False) for it in range(last + 1, last + 1 + around))
+        if before >= _LEAST_SEEN and after >= _LEAST_SEEN:
+            yield Occlusion(person, first, last)

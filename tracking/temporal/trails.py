@@ -1,0 +1,75 @@
+"""Where everybody is in every frame: in their blobs at the samples, and along them in between."""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+
+import numpy as np
+
+from tracking.boxes import BOX_SIDES, Floats, iou
+
+_SAME = 0.2
+"""Overlap (IoU) from which a blob of a frame between two samples is the one that is followed."""
+
+
+Stops = dict[int, list[tuple[int, Floats | None]]]
+"""By number: frames of samples, and the box `(4,)` there; None: nowhere."""
+
+
+class Trails:
+    """The boxes of the blobs of every frame that is not final yet."""
+
+    def __init__(self) -> None:
+        self._boxes: dict[int, Floats] = {}
+
+    def add(self, frame: int, boxes: Floats) -> None:
+        """Take the boxes `(B, 4)` of a frame in."""
+        self._boxes[frame] = boxes
+
+    def forget_to(self, frame: int) -> None:
+        """Forget all frames up to this one."""
+        self._boxes = {it: boxes for it, boxes in self._boxes.items() if it > frame}
+
+    def along(self, stops: list[tuple[int, Floats | None]], first: int, last: int) -> Floats:
+        """Give somebody's boxes in the frames `first`..`last`, `(F, 4)`, NaN where they are nowhere.
+
+        Args:
+            stops: frames and their blob's boxes `(4,)` at samples, ascending; None: nowhere.
+            first: the first frame.
+            last: the last frame.
+        """
+        boxes = np.full((last - first + 1, BOX_SIDES), np.nan)
+        frames = [frame for frame, _ in stops]
+        for row, frame in enumerate(range(first, last + 1)):
+            place = bisect_left(frames, frame)
+            if place < len(stops) and stops[place][0] == frame:
+                box = stops[place][1]
+            elif place == 0:
+                continue
+            elif place == len(stops):
+                # After the newest sample: on from frame to frame.
+                before = boxes[row - 1] if row else stops[-1][1]
+                box = None if before is None or np.isnan(before[0]) else self._blob(frame, before)
+            else:
+                box = self._between(frame, stops[place - 1], stops[place])
+            if box is not None:
+                boxes[row] = box
+        return boxes
+
+    def _between(
+        self, frame: int, before: tuple[int, Floats | None], after: tuple[int, Floats | None]
+    ) -> Floats | None:
+        """Give the blob on the straight way from one sample to the next, or the way where none is there."""
+        if before[1] is None or after[1] is None:
+            return None
+        share = (frame - before[0]) / (after[0] - before[0])
+        return self._blob(frame, (1.0 - share) * before[1] + share * after[1])
+
+    def _blob(self, frame: int, expected: Floats) -> Floats:
+        """Give the box of a frame's blob that is nearest to a box, or that box if none is near."""
+        boxes = self._boxes.get(frame)
+        if boxes is None or not len(boxes):
+            return expected
+        overlaps = iou(expected[None], boxes)
+        best = int(overlaps.argmax())
+        return boxes[best] if overlaps[best] >= _SAME else expected
