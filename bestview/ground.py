@@ -54,7 +54,8 @@ def as_standing(boxes: NDArray[np.float64]) -> NDArray[np.float64]:
     """
     left, top, right, bottom = np.moveaxis(boxes, -1, 0)
     foot = (top + bottom) / 2.0
-    tall = _HEIGHT_OF_SPAN * np.sqrt((right - left) * (bottom - top))
+    # A box that was predicted or measured badly may be inside out: nobody stands there, no taller than zero.
+    tall = _HEIGHT_OF_SPAN * np.sqrt(np.maximum((right - left) * (bottom - top), 0.0))
     return np.stack([left, foot - tall, right, foot], axis=-1)
 
 

@@ -150,8 +150,9 @@ def line_up(
     if rows:
         homography = np.array([matrices[i] for i in rows])[:, None]
         edge = np.array([ordered[i].picture_height for i in rows])[:, None]
-        above = np.array([keys[i].camera in overhead for i in rows])[:, None, None]
-        upright = np.where(above, as_standing(boxes[rows]), boxes[rows])
+        above = np.array([keys[i].camera in overhead for i in rows])
+        upright = boxes[rows]
+        upright[above] = as_standing(upright[above])
         whole = np.where(feet_cut_off(upright, edge)[..., None], np.nan, upright)
         ground[rows] = to_ground(homography, feet(whole))
         spread[rows] = foot_spread(homography, whole, foot_error.sideways, foot_error.upwards)

@@ -170,3 +170,8 @@ def test_who_is_seen_from_above_stands_in_the_middle_and_is_as_tall_as_others() 
     assert 1.5 < person_heights(plan, upright)[0] < 2.0
     assert np.isnan(upright[1]).all()
     assert not feet_cut_off(as_standing(np.array([[10.0, 440.0, 50.0, 480.0]])), 480.0).any()
+
+
+def test_a_box_from_above_that_is_inside_out_is_nobody_and_no_fault() -> None:
+    inside_out = np.array([[140.0, 200.0, 100.0, 240.0]])  # warnings are errors in tests
+    assert as_standing(inside_out).tolist() == [[140.0, 220.0, 100.0, 220.0]]
