@@ -20,6 +20,17 @@ log = logging.getLogger(__name__)
 Check = Callable[[Config, Reload], None]
 """Looks whether what is wanted can be; raises UserError where it cannot."""
 
+_early: list[int] = []
+"""The signals that came before anybody waited for them."""
+
+
+def mind_hang_ups() -> None:
+    """Keep in mind each SIGHUP from now on, for :func:`hang_ups`; only in the main thread.
+
+    Called before the configuration is read: what is written while the process starts is then read again.
+    """
+    signal.signal(signal.SIGHUP, lambda number, _: _early.append(number))
+
 
 async def hang_ups() -> AsyncIterator[None]:
     """Give a turn for each time that SIGHUP has come; those that come meanwhile are one.
@@ -29,6 +40,9 @@ async def hang_ups() -> AsyncIterator[None]:
     came = asyncio.Event()
     at_terminal = _has_terminal()
     asyncio.get_running_loop().add_signal_handler(signal.SIGHUP, came.set)
+    if _early:  # only now: what comes from here on sets it by itself
+        _early.clear()
+        came.set()
     while True:
         await came.wait()
         came.clear()

@@ -12,6 +12,7 @@ from typing import Annotated
 import typer
 
 from server.run.ending import run_process
+from server.run.hang_up import mind_hang_ups
 from server.run.logs import log_to_stderr
 from server.wire.errors import UserError
 from server.wire.output import check_new_folder
@@ -25,12 +26,22 @@ LogFolder = Annotated[
 ]
 
 
+def _read(config: Path) -> Running:
+    """Read the configuration that a process runs by, which may be asked for again from then on.
+
+    Raises:
+        UserError: it cannot be read, or something in it is wrong.
+    """
+    mind_hang_ups()
+    return Running(config)
+
+
 def sync(config: ConfigPath) -> None:
     """Send frame pulses over TCP: one process of a site."""
     from server.run.sync import sync_process
 
     log_to_stderr("sync")
-    running = Running(config)
+    running = _read(config)
     run_process(lambda: sync_process(running))
 
 
@@ -41,7 +52,7 @@ def camera(
     from server.run.camera import camera_process
 
     log_to_stderr(camera_id)
-    running = Running(config)
+    running = _read(config)
     if camera_id not in running.now.camera_ids:
         raise UserError(
             f"{config}: there is no camera {camera_id!r}; there are {', '.join(running.now.camera_ids)}"
@@ -54,7 +65,7 @@ def bestview(config: ConfigPath, out: LogFolder = None) -> None:
     from server.run.bestview import bestview_process
 
     log_to_stderr("bestview")
-    running = Running(config)
+    running = _read(config)
     if out is not None:
         check_new_folder(out)
     run_process(lambda: bestview_process(running, out))
@@ -74,7 +85,7 @@ def up(
     log_to_stderr("up")
     environment = {} if port is None else {"MYVIEW_HTTP__PORT": str(port)}
     os.environ.update(environment)
-    running = Running(config)
+    running = _read(config)
     if out is not None:
         check_new_folder(out)
     check_exposed(running.now)

@@ -36,7 +36,7 @@ Run = Callable[..., Ended]
 @pytest.fixture
 def myview(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Iterator[Run]:
     """Give a function that runs `myview` with some arguments."""
-    before = signal.getsignal(signal.SIGTERM)
+    before = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGHUP)}
 
     def command(*arguments: object) -> Ended:
         monkeypatch.setattr(sys, "argv", ["myview", *map(str, arguments)])
@@ -50,4 +50,5 @@ def myview(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) 
         return Ended(code, told.out, told.err)
 
     yield command
-    signal.signal(signal.SIGTERM, before)
+    for number, handler in before.items():
+        signal.signal(number, handler)

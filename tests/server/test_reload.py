@@ -19,7 +19,6 @@ from cameras_by_hand import CAMERAS, FedService, small_config
 from halls import PATIENCE
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from test_ending import caught
 
 from server.run.reload import reloaded
 from server.run.setup import free_port
@@ -208,7 +207,7 @@ async def until_said(terminal: int, text: bytes) -> None:
 
 @asynccontextmanager
 async def sync_at_a_terminal(path: Path) -> AsyncIterator[tuple[asyncio.subprocess.Process, int]]:
-    """Run pulses whose log goes to a terminal; give the terminal's other end, too, once it minds SIGHUP."""
+    """Run pulses whose log goes to a terminal; give the terminal's other end, too, once they are sent."""
     port = free_port()
     write(path, sync={"port": port})
     ours, theirs = pty.openpty()
@@ -218,9 +217,6 @@ async def sync_at_a_terminal(path: Path) -> AsyncIterator[tuple[asyncio.subproce
     os.close(theirs)
     try:
         await until_said(ours, b"pulses at")
-        status = Path(f"/proc/{process.pid}/status")
-        while not caught(status.read_text(encoding="ascii"), signal.SIGHUP):  # noqa: ASYNC110
-            await asyncio.sleep(0.01)
         yield process, ours
     finally:
         if process.returncode is None:
