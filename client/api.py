@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import AsyncIterator
 
-import msgspec
-
-from client.http import ContractError, HttpSettings, get, get_json, server_url
+from client.http import ContractError, HttpSettings, decoded, get, get_json, read_lines, server_url
 from client.model import Camera, Cameras, Choice, Gop, Objects, Past, SeenObject, Site, Span
+from client.sse import MAX_EVENT
 
 _DEFAULT = HttpSettings()
 
@@ -67,11 +66,8 @@ async def past(
     async with get(
         (server_url(url) / "api/past").with_query(query), settings, "application/x-ndjson"
     ) as answer:
-        rest = b""
-        async for data in answer.content.iter_any():  # lines of a crowd are longer than aiohttp's
-            *lines, rest = (rest + data).split(b"\n")
-            for line in lines:
-                try:
-                    yield msgspec.json.decode(line, type=Gop)
-                except msgspec.DecodeError as error:
-                    raise ContractError(f"/api/past is not understood: {error}") from error
+        async for line in read_lines(answer, MAX_EVENT):
+            try:
+                yield decoded(line, Gop)
+            except ValueError as error:
+                raise ContractError(f"/api/past is not understood: {error}") from error

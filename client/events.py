@@ -5,10 +5,9 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncIterator
 
-import msgspec
 from yarl import URL
 
-from client.http import AwayError, ContractError, HttpSettings, get, server_url
+from client.http import AwayError, ContractError, HttpSettings, decoded, get, server_url
 from client.model import EVENTS, Event
 from client.sse import EventStreamError, SentEvent, SseParser
 
@@ -62,6 +61,6 @@ def _decode(sent: SentEvent) -> Event | None:
     if kind is None:
         return None
     try:
-        return msgspec.json.decode(sent.data, type=kind)
-    except msgspec.DecodeError as error:
+        return decoded(sent.data, kind)
+    except ValueError as error:
         raise ContractError(f"event {sent.name}: {error}") from error

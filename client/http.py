@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
@@ -11,6 +12,12 @@ import aiohttp
 import msgspec
 from yarl import URL
 
+MAX_BODY = 64_000_000
+"""Bytes of an answer that is read as a whole: everybody whom a large site has seen takes some millions."""
+_MAX_WORDS = 64_000
+"""Bytes of an answer that refuses."""
+_MAX_SHOWN = 300
+"""Characters of a library's own words."""
 _NOT_FOUND = 404
 _CLIENT_ERRORS = range(400, 500)
 _ANSWER = TypeVar("_ANSWER")
@@ -44,6 +51,8 @@ class HttpSettings:
     """Seconds until a connection must stand."""
     read_timeout: float = 15.0
     """Seconds without a byte until the server is taken for gone."""
+    answer_timeout: float = 60.0
+    """Seconds until an answer must have begun; and until one that is read as a whole must be there."""
     retries: int = 26
     """Attempts in a row that bring nothing until a stream is given up; 0: no second attempt."""
     backoff_first: float = 0.25
@@ -80,20 +89,76 @@ async def get(url: URL, settings: HttpSettings, accept: str) -> AsyncIterator[ai
     Raises:
         NotFoundError, RefusedError, AwayError: with the server's own words where it gave some.
     """
+    async with get_any(url, settings, accept) as answer:
+        await _check(answer, settings)
+        yield answer
+
+
+@asynccontextmanager
+async def get_any(url: URL, settings: HttpSettings, accept: str) -> AsyncIterator[aiohttp.ClientResponse]:
+    """Open an answer for reading, a refusal too.
+
+    Raises:
+        AwayError: there is none, or something goes wrong with it inside the block.
+    """
     timeout = aiohttp.ClientTimeout(
         total=None, sock_connect=settings.connect_timeout, sock_read=settings.read_timeout
     )
     try:
-        async with (
-            aiohttp.ClientSession(timeout=timeout) as session,
-            session.get(url, headers=_headers(settings, accept)) as answer,
-        ):
-            await _check(answer)
-            yield answer
+        async with aiohttp.ClientSession(timeout=timeout) as session:
+            async with asyncio.timeout(settings.answer_timeout):
+                opening = await session.get(url, headers=_headers(settings, accept))
+            async with opening as answer:
+                yield answer
+    except aiohttp.TooManyRedirects as error:
+        raise AwayError(f"{url.origin()}: leads on and on, and nowhere") from error
     except aiohttp.ClientError as error:
-        raise AwayError(f"{url.origin()}: {error}") from error
+        raise AwayError(f"{url.origin()}: {_one_line(error)}") from error
     except TimeoutError as error:
         raise AwayError(f"{url.origin()}: no answer") from error
+
+
+async def get_body(url: URL, settings: HttpSettings, accept: str) -> bytes:
+    """Get an answer as a whole.
+
+    Raises:
+        ClientError: it cannot be had, or is larger than MAX_BODY.
+    """
+    async with get(url, settings, accept) as answer:
+        return await read_body(answer, settings)
+
+
+async def read_body(answer: aiohttp.ClientResponse, settings: HttpSettings, most: int = MAX_BODY) -> bytes:
+    """Read an answer as a whole.
+
+    Raises:
+        ContractError: it is larger than ``most`` bytes.
+        TimeoutError: it takes longer than ``settings.answer_timeout``.
+    """
+    body = bytearray()
+    async with asyncio.timeout(settings.answer_timeout):
+        async for data in answer.content.iter_any():
+            body += data
+            if len(body) > most:
+                raise ContractError(f"{answer.url}: the answer is larger than {most} bytes")
+    return bytes(body)
+
+
+async def read_lines(answer: aiohttp.ClientResponse, most: int) -> AsyncIterator[bytes]:
+    """Read an answer line by line, without the line ends; what is no whole line at its end is dropped.
+
+    Raises:
+        ContractError: a line is larger than ``most`` bytes.
+    """
+    rest = bytearray()
+    async for data in answer.content.iter_any():
+        *lines, last = data.split(b"\n")
+        for line in lines:
+            yield bytes(rest + line)
+            rest.clear()
+        rest += last
+        if len(rest) > most:
+            raise ContractError(f"{answer.url}: a line of the answer is larger than {most} bytes")
 
 
 async def get_json(url: URL, kind: type[_ANSWER], settings: HttpSettings) -> _ANSWER:
@@ -102,12 +167,23 @@ async def get_json(url: URL, kind: type[_ANSWER], settings: HttpSettings) -> _AN
     Raises:
         ClientError: it cannot be had, or is not of that kind.
     """
-    async with get(url, settings, "application/json") as answer:
-        body = await answer.read()
+    body = await get_body(url, settings, "application/json")
     try:
-        return msgspec.json.decode(body, type=kind)
-    except msgspec.DecodeError as error:
+        return decoded(body, kind)
+    except ValueError as error:
         raise ContractError(f"{url} does not answer like MyView: {error}") from error
+
+
+def decoded(text: bytes | str, kind: type[_ANSWER]) -> _ANSWER:
+    """Read JSON.
+
+    Raises:
+        ValueError: it is none, or not of that kind.
+    """
+    try:
+        return msgspec.json.decode(text, type=kind)
+    except RecursionError as error:
+        raise ValueError("it is nested beyond all measure") from error
 
 
 def _headers(settings: HttpSettings, accept: str) -> dict[str, str]:
@@ -115,10 +191,14 @@ def _headers(settings: HttpSettings, accept: str) -> dict[str, str]:
     return heads if settings.token is None else {**heads, "Authorization": f"Bearer {settings.token}"}
 
 
-async def _check(answer: aiohttp.ClientResponse) -> None:
+async def _check(answer: aiohttp.ClientResponse, settings: HttpSettings) -> None:
     if answer.ok:
         return
-    words = _error_text(await answer.read()) or f"{answer.status} {answer.reason}"
+    try:
+        words = _error_text(await read_body(answer, settings, _MAX_WORDS))
+    except ContractError:
+        words = None
+    words = words or f"{answer.status} {answer.reason}"
     if answer.status == _NOT_FOUND:
         raise NotFoundError(words)
     if answer.status in _CLIENT_ERRORS:
@@ -133,7 +213,13 @@ class _ErrorBody(msgspec.Struct):
 def _error_text(body: bytes) -> str | None:
     """Give the first line of the server's own words."""
     try:
-        words = msgspec.json.decode(body, type=_ErrorBody).error
-    except msgspec.DecodeError:
+        words = decoded(body, _ErrorBody).error
+    except ValueError:
         return None
     return words.splitlines()[0] if words.strip() else None
+
+
+def _one_line(error: Exception) -> str:
+    """Give a library's words, which may be several lines and quote what came."""
+    words = error.message if isinstance(error, aiohttp.ClientResponseError) else str(error)
+    return " ".join(words.split())[:_MAX_SHOWN] or type(error).__name__

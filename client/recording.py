@@ -34,6 +34,7 @@ class Recording:
         self._timescale = 0
         self._sound: int | None = None  # the track of sound
         self._fragment: list[bytes] = []
+        self._waiting = 0  # bytes of it
         self._time: int | None = None
         self._first: int | None = None
         self._last = 0
@@ -60,7 +61,7 @@ class Recording:
     def reconnected(self) -> None:
         """Begin with a new connection: what was not whole is dropped."""
         self._arriving = b""
-        self._fragment = []
+        self._drop()
         self._time = None
 
     def take(self, box: Mp4Box) -> bool:
@@ -80,14 +81,23 @@ class Recording:
                 self._is_sound = self._sound is not None and track_of(box) == self._sound
                 if not self._is_sound and self._is_full(self._time):
                     return False
-                self._fragment.append(box.data)
+                self._keep(box)
             case b"mdat":
                 self._finish_fragment(box.data)
             case _:  # styp, sidx, emsg, or what a later server adds: part of the fragment after it
-                self._fragment.append(box.data)
-                if sum(map(len, self._fragment)) > MAX_BOX:
-                    raise Mp4Error("boxes without media")
+                self._keep(box)
         return True
+
+    def _keep(self, box: Mp4Box) -> None:
+        """Keep a box until its media come."""
+        self._fragment.append(box.data)
+        self._waiting += len(box.data)
+        if self._waiting > MAX_BOX:
+            raise Mp4Error("boxes without media")
+
+    def _drop(self) -> None:
+        self._fragment = []
+        self._waiting = 0
 
     def _take_header(self, moov: Mp4Box) -> None:
         header = self._arriving + moov.data
@@ -97,7 +107,7 @@ class Recording:
             self._timescale, self._sound = timescale(moov), sound_track(moov)
             self._header = header
             self._write(header)
-        self._fragment = []
+        self._drop()
 
     def _is_full(self, time: int) -> bool:
         if not self._timescale:
@@ -110,7 +120,8 @@ class Recording:
         time, self._time = self._time, None
         if time is None:
             raise Mp4Error("media without a fragment header")
-        fragment, self._fragment = b"".join(self._fragment) + mdat, []
+        fragment = b"".join(self._fragment) + mdat
+        self._drop()
         if self._is_sound:
             self._take_sound(time, fragment)
             return

@@ -61,7 +61,7 @@ class SseParser:
         elif field == "id" and "\0" not in value:
             self._last_id = value
         elif field == "data":
-            self._size += len(value)
+            self._size += len(value) + 1  # the line end, too: lines of nothing are something to keep
             if self._size > MAX_EVENT:
                 raise EventStreamError(f"an event is larger than {MAX_EVENT} bytes")
             self._data.append(value)

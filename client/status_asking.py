@@ -4,11 +4,19 @@ from __future__ import annotations
 
 import asyncio
 
-import aiohttp
 from yarl import URL
 
 from client.api import choice, objects
-from client.http import AwayError, HttpSettings, NotFoundError, RefusedError, get, get_json, server_url
+from client.http import (
+    HttpSettings,
+    NotFoundError,
+    RefusedError,
+    get_any,
+    get_body,
+    get_json,
+    read_body,
+    server_url,
+)
 from client.model import SeenObject, Site
 from client.status_metrics import Metrics, service_of
 from client.status_model import CameraNow, PersonNow, SiteNow
@@ -16,6 +24,8 @@ from client.status_model import CameraNow, PersonNow, SiteNow
 _DEFAULT = HttpSettings()
 _ASKED_MOST = 12
 """People of whom it is asked since when their camera shows them."""
+_WORDS_MOST = 64_000
+"""Bytes of the line that says whether a best view can be served."""
 
 
 async def status(url: str, settings: HttpSettings = _DEFAULT) -> SiteNow:
@@ -47,20 +57,19 @@ async def status(url: str, settings: HttpSettings = _DEFAULT) -> SiteNow:
 
 async def _ready(base: URL, settings: HttpSettings) -> tuple[bool, str]:
     """Ask whether a best view can be served: 503 is an answer, too."""
-    timeout = aiohttp.ClientTimeout(sock_connect=settings.connect_timeout, sock_read=settings.read_timeout)
-    try:
-        async with aiohttp.ClientSession(timeout=timeout) as session, session.get(base / "readyz") as answer:
-            return answer.ok, " ".join((await answer.text()).split())
-    except (aiohttp.ClientError, TimeoutError) as error:
-        raise AwayError(f"{base.origin()}: {error or 'no answer'}") from error
+    async with get_any(base / "readyz", settings, "text/plain") as answer:
+        return answer.ok, " ".join(_text(await read_body(answer, settings, _WORDS_MOST)).split())
 
 
 async def _metrics(base: URL, settings: HttpSettings) -> Metrics | None:
     try:
-        async with get(base / "metrics", settings, "text/plain") as answer:
-            return Metrics(await answer.text())
+        return Metrics(_text(await get_body(base / "metrics", settings, "text/plain")))
     except RefusedError:
         return None  # a token for one person or camera
+
+
+def _text(body: bytes) -> str:
+    return body.decode(errors="replace")
 
 
 async def _cameras(base: URL, settings: HttpSettings) -> list[CameraNow]:

@@ -11,7 +11,7 @@ TICKS = 1000
 EBML, SEGMENT, INFO, TRACKS, CLUSTER = 0x1A45DFA3, 0x18538067, 0x1549A966, 0x1654AE6B, 0x1F43B675
 _TIMESTAMP, _SIMPLE_BLOCK = 0xE7, 0xA3
 _KEY = 0x80
-_LARGEST = 64_000_000  # bytes; a cluster of one picture has some thousand
+LARGEST = 64_000_000  # bytes; a cluster of one picture has some thousand
 _LONGEST_NUMBER = 8
 
 
@@ -109,7 +109,7 @@ def _first(data: bytes | bytearray) -> Element | None:
         return None
     if name == SEGMENT:
         return Element(name, bytes(data[:end]), end)
-    if size > _LARGEST:
+    if size > LARGEST:
         raise WebmError(f"an element of {size} bytes")
     return None if end + size > len(data) else Element(name, bytes(data[: end + size]), end)
 

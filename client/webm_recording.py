@@ -11,6 +11,7 @@ from typing import BinaryIO
 from client.webm import (
     CLUSTER,
     INFO,
+    LARGEST,
     SEGMENT,
     TICKS,
     Element,
@@ -76,6 +77,8 @@ class WebmRecording:
         """
         if element.name != CLUSTER:
             self._arriving += element.data
+            if len(self._arriving) > LARGEST:
+                raise WebmError("elements without pictures")
             return True
         self._begin()
         time = cluster_time(element)
