@@ -5,5 +5,6 @@ from __future__ import annotations
 from benchmarks.fuzz_pulse_lines import Lines
 from benchmarks.fuzz_pulse_sessions import ClientSessions, ServerSessions
 from benchmarks.fuzz_pulse_sockets import Sockets
+from benchmarks.fuzz_pulse_strangers import Between, Strangers
 
-TARGETS = (Lines, ServerSessions, ClientSessions, Sockets)
+TARGETS = (Lines, ServerSessions, ClientSessions, Strangers, Between, Sockets)

@@ -7,7 +7,21 @@ from typing import Any, cast
 
 from benchmarks.fuzz_mutate import damaged
 from benchmarks.fuzz_target import Target, refused
-from camsync.messages import Beat, Clients, Greeting, Hello, Known, Listener, Ping, Pong, Refusal, Wait, Who
+from camsync.messages import (
+    Beat,
+    Challenge,
+    Clients,
+    Greeting,
+    Hello,
+    Known,
+    Listener,
+    Ping,
+    Pong,
+    Prove,
+    Refusal,
+    Wait,
+    Who,
+)
 from camsync.protocol import MAX_LINE, ProtocolError, encode, parse_client_line, parse_server_line
 
 CLIENT_LINES = tuple(
@@ -18,6 +32,7 @@ CLIENT_LINES = tuple(
         Hello("c0", Known(2**39, 4.0)),
         Ping(1732159201.5),
         Who(),
+        Prove("c0", "5b" * 16),
     )
 )
 SERVER_LINES = tuple(
@@ -31,6 +46,7 @@ SERVER_LINES = tuple(
         Pong(1000.0, 1000.01),
         Clients((Listener("c0", 0), Listener(None, 7))),
         Refusal("malformed", "say something else"),
+        Challenge("0f" * 16, 1000.0),
     )
 )
 WORDS = (

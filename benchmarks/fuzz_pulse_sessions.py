@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import asyncio
 from random import Random
-from typing import Any
 
 import msgspec
 
 from benchmarks.fuzz_pulse_lines import CLIENT_LINES, SERVER_LINES, some_line
+from benchmarks.fuzz_pulse_wire import Clock, Wire
 from benchmarks.fuzz_target import Target
 from camsync import ClientSettings, PulseClient, PulseServer
 from camsync.link import Link
@@ -19,45 +19,6 @@ _pulse = msgspec.json.Decoder(Pulse)
 Script = list[tuple[int, bytes]]
 """Who says what: the number of a connection, and bytes in one piece."""
 _script = msgspec.msgpack.Decoder(Script)
-
-
-class _Clock:
-    def __init__(self) -> None:
-        self.now = 1000.0
-
-    def __call__(self) -> float:
-        return self.now
-
-
-class _Wire(asyncio.Transport):
-    """Keeps what is written instead of sending it."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.written = b""
-        self.closed = False
-
-    def write(self, data: bytes | bytearray | memoryview) -> None:
-        self.written += bytes(data)
-
-    def get_write_buffer_size(self) -> int:
-        return 0
-
-    def is_closing(self) -> bool:
-        return self.closed
-
-    def close(self) -> None:
-        self.closed = True
-
-    abort = close
-
-    def get_extra_info(self, name: str, default: Any = None) -> Any:
-        return _NoSocket() if name == "socket" else ("client", id(self)) if name == "peername" else default
-
-
-class _NoSocket:
-    def setsockopt(self, *_: object) -> None:
-        """Have no options."""
 
 
 def _scripted(rng: Random, lines: tuple[bytes, ...], connections: int) -> bytes:
@@ -87,10 +48,10 @@ class ServerSessions(Target):
         return self._loop.run_until_complete(self._session(_script.decode(data)))
 
     async def _session(self, script: Script) -> bool:
-        clock = _Clock()
+        clock = Clock()
         server = PulseServer(25.0, expect=("c0",), clock=clock)
         hub = server._hub
-        wires = [_Wire() for _ in range(3)]
+        wires = [Wire() for _ in range(3)]
         peers = [hub.new_peer() for _ in wires]
         for peer, wire in zip(peers, wires, strict=True):
             peer.connection_made(wire)
@@ -104,7 +65,7 @@ class ServerSessions(Target):
             server._tick()
         errors = sum(it.errors for it in server.clients())
         for wire in wires:
-            self._spoken(wire.written)
+            self._spoken(wire)
         if server.pulse is not None:
             _pulse.decode(str(server.pulse).encode())  # a number that cameras can say in turn
         await server.stop()
@@ -113,10 +74,8 @@ class ServerSessions(Target):
         return errors == 0 and not any(wire.closed for wire in wires)
 
     @staticmethod
-    def _spoken(written: bytes) -> None:
-        *lines, rest = written.split(b"\n")
-        assert not rest, rest
-        for line in lines:
+    def _spoken(wire: Wire) -> None:
+        for line in wire.lines:
             assert parse_server_line(line) is not None, line
 
     def close(self) -> None:
@@ -144,11 +103,11 @@ class ClientSessions(Target):
         return self._loop.run_until_complete(self._session(_script.decode(data)))
 
     async def _session(self, script: Script) -> bool:
-        clock = _Clock()
+        clock = Clock()
         client = PulseClient("nowhere", 1, "c0", settings=ClientSettings(queue=10_000), clock=clock)
         link = Link(client._heard, client._hello, clock, 1.0, 5.0)
         client._link = link
-        wire = _Wire()
+        wire = Wire()
         link.connection_made(wire)
         for _, said in script:
             if not wire.closed:

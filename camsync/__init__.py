@@ -5,6 +5,7 @@ from camsync.client import PulseClient
 from camsync.limits import ServerLimits
 from camsync.messages import Listener
 from camsync.peer import ClientInfo
+from camsync.proof import Login
 from camsync.protocol import VERSION
 from camsync.pulse import (
     AxisLostError,
@@ -23,6 +24,7 @@ __all__ = [
     "ClientInfo",
     "ClientSettings",
     "Listener",
+    "Login",
     "Pulse",
     "PulseClient",
     "PulseServer",

@@ -11,8 +11,9 @@ from typing import Self
 from camsync.clock import Clock, steady_unix_clock
 from camsync.follower import Follower
 from camsync.link import Link
-from camsync.messages import Beat, Greeting, Hello, Pong, Refusal, ServerLine, Wait
+from camsync.messages import Beat, Challenge, Greeting, Hello, Pong, Refusal, ServerLine, Wait
 from camsync.offset import ClockOffset
+from camsync.proof import Login
 from camsync.protocol import VERSION, is_name
 from camsync.pulse import (
     AxisLostError,
@@ -42,11 +43,13 @@ class PulseClient:
     silent, the client counts on at the server's rate by its own clock (``Pulse.own``), reconnects by itself,
     and falls back into step. A consumer that is slow loses the oldest pulses and is told how many.
 
+    With a ``login``, whose user is ``name``, it believes a closed server that knows it, and nobody else.
+
     ``name`` is 1 to 64 letters, digits, ``.``, ``_``, ``-``; ``fps_hint`` is the rate (pulses per second)
     for counting alone before any server was heard. Not thread-safe: one event loop, one consumer.
 
     Raises:
-        ValueError: a name that the protocol cannot carry, or a rate not above zero.
+        ValueError: a name that the protocol cannot carry, or another's login, or a rate not above zero.
         ReplacedError, VersionError, AxisLostError: while iterating; starting anew is the only remedy.
     """
 
@@ -59,14 +62,16 @@ class PulseClient:
         fps_hint: float = 25.0,
         settings: ClientSettings | None = None,
         clock: Clock | None = None,
+        login: Login | None = None,
     ) -> None:
-        if not is_name(name):
+        if not is_name(name) or (login is not None and login.user != name):
             raise ValueError(f"{name!r} cannot be a client's name: letters, digits, '.', '_', '-'")
         if not fps_hint > 0.0:
             raise ValueError(f"fps_hint must be above zero, not {fps_hint}")
         self._host = host
         self._port = port
         self._name = name
+        self._login = login
         self._fps = fps_hint
         self._settings = settings or ClientSettings()
         self._clock = clock or steady_unix_clock()
@@ -175,7 +180,8 @@ class PulseClient:
     async def _connection(self) -> tuple[bool, str]:
         """Connect once and stay; give whether it was a pulse server, and why it ended."""
         settings = self._settings
-        link = Link(self._heard, self._hello, self._clock, settings.ping_interval, settings.silence)
+        pings = settings.ping_interval
+        link = Link(self._heard, self._hello, self._clock, pings, settings.silence, self._login)
         loop = asyncio.get_running_loop()
         try:
             async with asyncio.timeout(settings.connect_timeout):
@@ -200,6 +206,8 @@ class PulseClient:
                 self._offset.ponged(sent, server, now)
             case Greeting():
                 self._greeted(message, now)
+            case Challenge():
+                self._fail(VersionError("the pulse server asks for a password, and this client has none"))
             case Wait(names):
                 self._waiting_for = names
             case Refusal(code, text):

@@ -6,6 +6,7 @@ import logging
 from collections.abc import Callable
 
 from camsync.clock import Clock
+from camsync.door import Door
 from camsync.limits import ServerLimits
 from camsync.messages import Hello
 from camsync.peer import ClientInfo, Peer
@@ -17,8 +18,9 @@ _log = logging.getLogger(__name__)
 class Hub:
     """The connected clients.
 
-    ``greet`` gives the lines a new client is met with; ``heard`` is told every HELLO that was accepted;
-    ``changed`` is called when somebody came, got a name or left.
+    ``door`` lets them in, where the server is closed; ``greet`` gives the lines a new client is met with;
+    ``heard`` is told every HELLO that was accepted; ``changed`` is called when somebody came, got a name or
+    left.
     """
 
     def __init__(
@@ -28,7 +30,9 @@ class Hub:
         greet: Callable[[], bytes],
         heard: Callable[[Hello], None],
         changed: Callable[[], None],
+        door: Door | None = None,
     ) -> None:
+        self._door = door
         self._clock = clock
         self._limits = limits
         self._greet = greet
@@ -39,7 +43,7 @@ class Hub:
 
     def new_peer(self) -> Peer:
         """Make the protocol object of a new connection (asyncio's factory)."""
-        return Peer(self, self._clock, self._limits)
+        return Peer(self, self._clock, self._limits, self._door)
 
     def clients(self) -> tuple[ClientInfo, ...]:
         """Give all clients in the order in which they joined."""
@@ -62,6 +66,8 @@ class Hub:
     def close(self) -> None:
         """End all connections, those included that are just being made."""
         self._closed = True
+        if self._door is not None:
+            self._door.close()
         for peer in tuple(self._peers.values()):
             peer.end("stopped", "the server stops")
 
@@ -83,6 +89,8 @@ class Hub:
 
     def hello(self, peer: Peer, hello: Hello) -> None:
         """Name a client; an older client of the same name makes way, so a restart is never locked out."""
+        if peer.user not in {None, hello.name}:
+            raise ProtocolError("name", f"this connection is for {peer.user} alone")
         if peer.name not in {None, hello.name}:
             raise ProtocolError("malformed", f"this connection is {peer.name} already")
         older = [other for other in self._peers.values() if other.name == hello.name and other is not peer]

@@ -20,6 +20,10 @@ class ServerLimits:
     """Seconds a client may stay behind, or not acknowledge what was sent, before it is cut off."""
     clients: int = 256
     """Connections at once; more are refused."""
+    strangers: int = 256
+    """Connections to a closed server that have not proven who they are; more take the oldest ones' places."""
+    prove_within: float = 5.0
+    """Seconds that they have for it."""
     line_burst: float = 100.0
     """Lines that a client may send at once."""
     line_rate: float = 20.0

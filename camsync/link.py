@@ -8,7 +8,8 @@ from typing import cast
 
 from camsync.clock import Clock
 from camsync.lines import LineBuffer, OverlongLineError
-from camsync.messages import ClientLine, Greeting, Ping, Refusal, ServerLine
+from camsync.messages import Challenge, ClientLine, Greeting, Ping, Refusal, ServerLine
+from camsync.proof import Login, NotProvenError, Proof
 from camsync.protocol import MAX_SERVER_LINE, ProtocolError, encode, parse_server_line
 
 _QUICK_PINGS = 5  # at the beginning, so that the offset is good within a fraction of a second
@@ -19,7 +20,7 @@ class Link(asyncio.Protocol):
     """One connection. ``heard`` gets every message from the greeting on, with its time of arrival.
 
     ``ping_interval`` is in seconds; after ``silence`` seconds without a byte the server is taken for gone.
-    ``hello`` gives the line to open with.
+    ``hello`` gives the line to open with. With a ``login`` it speaks to a closed server, and to no other.
     """
 
     def __init__(
@@ -29,7 +30,9 @@ class Link(asyncio.Protocol):
         clock: Clock,
         ping_interval: float,
         silence: float,
+        login: Login | None = None,
     ) -> None:
+        self._proof = None if login is None else Proof(login)
         self._heard = heard
         self._hello = hello
         self._clock = clock
@@ -48,7 +51,8 @@ class Link(asyncio.Protocol):
         """Say HELLO, begin to ping (called by asyncio)."""
         self._transport = cast("asyncio.Transport", transport)
         self._last_heard = self._clock()
-        self._transport.write(encode(self._hello()))
+        if self._proof is None:
+            self._say(self._hello())
         self._ping()
 
     def data_received(self, data: bytes) -> None:
@@ -61,6 +65,8 @@ class Link(asyncio.Protocol):
                     return
         except (ProtocolError, OverlongLineError) as error:
             self.end(f"it does not speak the pulse protocol ({error})")
+        except NotProvenError as error:
+            self.end(str(error))
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Note the end (called by asyncio)."""
@@ -77,13 +83,29 @@ class Link(asyncio.Protocol):
             self._transport.abort()
 
     def _take(self, line: bytes, now: float) -> None:
+        if self._proof is not None:
+            if not self._proof.begun:
+                self._prove(self._proof, line)
+                return
+            line = self._proof.opened(line)
         message = parse_server_line(line)
         if isinstance(message, Greeting):
             self.greeted = True
-        elif not self.greeted and not isinstance(message, Refusal):
+        elif not self.greeted and not isinstance(message, Refusal | Challenge):
             raise ProtocolError("malformed", "the first line is not a greeting")
         if message is not None:
             self._heard(message, now)
+
+    def _prove(self, proof: Proof, line: bytes) -> None:
+        proving = proof.proven(parse_server_line(line))
+        if self._transport is not None:
+            self._transport.write(proving)
+            self._say(self._hello())
+
+    def _say(self, message: ClientLine) -> None:
+        if self._transport is not None:
+            line = encode(message)
+            self._transport.write(line if self._proof is None else self._proof.sealed(line))
 
     def _ping(self) -> None:
         now = self._clock()
@@ -92,7 +114,8 @@ class Link(asyncio.Protocol):
         if now - self._last_heard > self._silence:
             self.end(f"nothing heard for {self._silence:g} seconds")
             return
-        self._transport.write(encode(Ping(now)))
+        if self._proof is None or self._proof.begun:
+            self._say(Ping(now))
         self._pings += 1
         wait = _QUICK_INTERVAL if self._pings < _QUICK_PINGS else self._ping_interval
         self._timer = asyncio.get_running_loop().call_later(min(wait, self._ping_interval), self._ping)

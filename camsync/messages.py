@@ -37,8 +37,27 @@ class Who:
 
 
 @dataclass(frozen=True, slots=True)
+class Prove:
+    """A client of a closed server says who it is, its line sealed: the proof. ``nonce`` is its own."""
+
+    user: str
+    nonce: str
+
+
+@dataclass(frozen=True, slots=True)
+class Challenge:
+    """A closed server's first line: who comes has to prove who they are; ``now`` is the server clock."""
+
+    nonce: str
+    now: float
+
+
+@dataclass(frozen=True, slots=True)
 class Greeting:
-    """The server's first line; ``pulse`` is the last pulse sent, None before the first."""
+    """An open server's first line, or a closed one's to who has proven themselves.
+
+    ``pulse`` is the last pulse sent, None before the first.
+    """
 
     version: int
     fps: float
@@ -92,5 +111,5 @@ class Refusal:
     text: str
 
 
-ClientLine = Hello | Ping | Who
-ServerLine = Greeting | Wait | Beat | Pong | Clients | Refusal
+ClientLine = Hello | Ping | Who | Prove
+ServerLine = Challenge | Greeting | Wait | Beat | Pong | Clients | Refusal

@@ -9,10 +9,12 @@ from dataclasses import dataclass
 from typing import Protocol, cast
 
 from camsync.clock import Clock
+from camsync.door import Door
 from camsync.limits import ServerLimits
 from camsync.lines import LineBuffer, OverlongLineError, RateLimit
-from camsync.messages import Clients, Hello, Listener, Ping, Pong, Refusal, Who
+from camsync.messages import Clients, Hello, Listener, Ping, Pong, Prove, Refusal, Who
 from camsync.protocol import MAX_LINE, ProtocolError, encode, parse_client_line
+from camsync.seal import SealError, Seals
 
 _log = logging.getLogger(__name__)
 _SEND_BUFFER = 4096  # bytes in the kernel: a slow client is to be seen within seconds, not an hour of pulses
@@ -56,10 +58,15 @@ class PeerHub(Protocol):
 
 
 class Peer(asyncio.Protocol):
-    """One client: never waited for, bounded in what it may send and in what waits for it."""
+    """One client: never waited for, bounded in what it may send and in what waits for it.
 
-    def __init__(self, hub: PeerHub, clock: Clock, limits: ServerLimits) -> None:
+    Where there is a ``door`` it joins the others once it has proven who it is.
+    """
+
+    def __init__(self, hub: PeerHub, clock: Clock, limits: ServerLimits, door: Door | None = None) -> None:
         self._hub = hub
+        self._door = door
+        self._seals: Seals | None = None
         self._clock = clock
         self._limits = limits
         self._lines = LineBuffer(MAX_LINE)
@@ -67,23 +74,28 @@ class Peer(asyncio.Protocol):
         self._rate = RateLimit(limits.line_burst, limits.line_rate, self._joined)
         self._kept_up = self._joined  # when a pulse last went out to it
         self._transport: asyncio.Transport | None = None
-        self._address = "?"
         self._sent = self._dropped = self._behind = self._errors = 0
+        self.address = "?"
         self.name: str | None = None
+        self.user: str | None = None
+        """Who it has proven to be; None: it was not asked."""
 
     def info(self) -> ClientInfo:
         """Give what is known of this client now."""
         return ClientInfo(
-            self.name, self._address, self._joined, self._sent, self._dropped, self._behind, self._errors
+            self.name, self.address, self._joined, self._sent, self._dropped, self._behind, self._errors
         )
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Start serving the client (called by asyncio)."""
         self._transport = cast("asyncio.Transport", transport)
         host, port, *_ = transport.get_extra_info("peername") or ("?", 0)
-        self._address = f"{host}:{port}"
+        self.address = f"{host}:{port}"
         _tune(transport.get_extra_info("socket"), self._limits.cut_off)
-        self._hub.joined(self)
+        if self._door is None:
+            self._hub.joined(self)
+        else:
+            self._door.knock(self)
 
     def data_received(self, data: bytes) -> None:
         """Answer what the client says (called by asyncio)."""
@@ -108,8 +120,10 @@ class Peer(asyncio.Protocol):
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Forget the client (called by asyncio)."""
-        _log.debug("client %s (%s) left: %s", self.name, self._address, exc or "closed")
+        _log.debug("client %s (%s) left: %s", self.name, self.address, exc or "closed")
         self._transport = None
+        if self._door is not None:
+            self._door.left(self)
         self._hub.left(self)
 
     def say(self, line: bytes) -> bool:
@@ -119,7 +133,7 @@ class Peer(asyncio.Protocol):
             return False
         if transport.get_write_buffer_size() + len(line) > self._limits.backlog:
             return False
-        transport.write(line)
+        self._write(transport, line)
         return True
 
     def pulse(self, line: bytes) -> None:
@@ -137,7 +151,7 @@ class Peer(asyncio.Protocol):
         self._dropped += 1
         self._behind += 1
         if now - self._kept_up > self._limits.cut_off:
-            _log.warning("client %s (%s) does not read its pulses: cut off", self.name, self._address)
+            _log.warning("client %s (%s) does not read its pulses: cut off", self.name, self.address)
             self.end("slow", "pulses were not read")
 
     def end(self, code: str, text: str) -> None:
@@ -148,7 +162,7 @@ class Peer(asyncio.Protocol):
         if transport.get_write_buffer_size():
             transport.abort()  # it does not read: a polite close would wait for it
         else:
-            transport.write(encode(Refusal(code, text)))
+            self._write(transport, encode(Refusal(code, text)))
             transport.close()
 
     @property
@@ -156,6 +170,16 @@ class Peer(asyncio.Protocol):
         return self._transport is None or self._transport.is_closing()
 
     def _take(self, line: bytes) -> None:
+        if self._seals is not None:
+            try:
+                line = self._seals.client.opened(line)
+            except SealError as error:
+                self._errors += 1
+                self.end("sealed", str(error))
+                return
+        elif self._door is not None:
+            self._prove(self._door, line)
+            return
         try:
             match parse_client_line(line):
                 case Ping(sent):
@@ -164,16 +188,28 @@ class Peer(asyncio.Protocol):
                     self._tell_who()
                 case Hello() as hello:
                     self._hub.hello(self, hello)
+                case Prove():
+                    self._errors += 1
+                    self.say(encode(Refusal("malformed", "nobody has asked who you are")))
         except ProtocolError as error:
             self._errors += 1
             self.say(encode(Refusal(error.code, str(error))))
 
+    def _prove(self, door: Door, line: bytes) -> None:
+        proven = door.prove(self, line)
+        if proven is not None:
+            self.user, self._seals = proven
+            self._hub.joined(self)
+
     def _tell_who(self) -> None:
         """Say who else is there: a long line, and so only to who has read all that was said."""
-        others = [it for it in self._hub.clients() if it.address != self._address]
+        others = [it for it in self._hub.clients() if it.address != self.address]
         line = encode(Clients(tuple(Listener(it.name, it.behind) for it in others)))
         if self._transport is not None and not self._transport.get_write_buffer_size():
-            self._transport.write(line)
+            self._write(self._transport, line)
+
+    def _write(self, transport: asyncio.Transport, lines: bytes) -> None:
+        transport.write(lines if self._seals is None else self._seals.server.sealed(lines))
 
 
 def _tune(connection: socket.socket, cut_off: float) -> None:

@@ -14,6 +14,13 @@ A client may say, and the server answers::
     WHO                    CLIENTS c0:0,-:7       who else is there, and how many pulses behind
     anything else          ERROR malformed ...                           a code, then a sentence
 
+A closed server tells nothing to who has not proven to know a password. Its first line is of another version,
+so that older clients say so and end; from PROVE on every line is sealed (``seal``) and else as above::
+
+    MYVIEW-SYNC 2 nonce=9f… now=1732159200.000000
+    PROVE c0 nonce=41… mac=…
+    HELLO 1 c0 mac=…       MYVIEW-SYNC 1 fps=25 now=1732159200.250000 pulse=- mac=…
+
 All times are unix seconds. ``ago`` is a span, not a time, so that it means the same on a server whose clock
 differs. Unknown ``key=value`` words and unknown words of the server are passed over: room for later versions.
 """
@@ -25,6 +32,7 @@ from collections.abc import Callable
 
 from camsync.messages import (
     Beat,
+    Challenge,
     ClientLine,
     Clients,
     Greeting,
@@ -33,6 +41,7 @@ from camsync.messages import (
     Listener,
     Ping,
     Pong,
+    Prove,
     Refusal,
     ServerLine,
     Wait,
@@ -40,14 +49,17 @@ from camsync.messages import (
 )
 
 VERSION = 1
+CLOSED = 2  # the version of a closed server's first line
 MAX_LINE = 256  # bytes, without the line end
 MAX_SERVER_LINE = 32768  # bytes: WAIT and CLIENTS name every camera of a site
 _GREETING = "MYVIEW-SYNC"
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
 _NUMBER = re.compile(r"\d{1,13}")  # pulses: enough for centuries at any rate
 _TIME = re.compile(r"-?\d{1,12}(\.\d{1,20})?")  # seconds
+_NONCE = re.compile(r"[0-9a-f]{32}")
 _CODE = re.compile(r"[a-z]{1,20}")
 _FPS = re.compile(r"\d{1,6}(\.\d{1,20})?")  # pulses per second; no exponent: people read it
+_NONCE_IS = "nonce="
 _UNNAMED = "-"  # stands for a client without a name, which no name can be
 _SHOWN = 40  # characters of a wrong word that an error repeats
 MIN_FPS, MAX_FPS = 1e-6, 10_000.0  # pulses per second that a server may have as its rate
@@ -68,10 +80,11 @@ def is_name(text: str) -> bool:
 
 def encode(message: ClientLine | ServerLine) -> bytes:
     """Give the line of a message, line end included."""
-    return _text(message).encode("ascii", "replace") + b"\n"
+    text = _client_text(message) if isinstance(message, ClientLine) else _server_text(message)
+    return text.encode("ascii", "replace") + b"\n"
 
 
-def _text(message: ClientLine | ServerLine) -> str:  # noqa: PLR0911 — one return per message
+def _client_text(message: ClientLine) -> str:
     match message:
         case Hello(name, known):
             counted = "" if known is None else f" last={known.number} ago={known.ago:.6f}"
@@ -80,6 +93,14 @@ def _text(message: ClientLine | ServerLine) -> str:  # noqa: PLR0911 — one ret
             return f"PING {sent:.6f}"
         case Who():
             return "WHO"
+        case Prove(user, nonce):
+            return f"PROVE {user} {_NONCE_IS}{nonce}"
+
+
+def _server_text(message: ServerLine) -> str:  # noqa: PLR0911 — one return per message
+    match message:
+        case Challenge(nonce, now):
+            return f"{_GREETING} {CLOSED} {_NONCE_IS}{nonce} now={now:.6f}"
         case Greeting(version, fps, now, pulse):
             last = "-" if pulse is None else pulse
             return f"{_GREETING} {version} fps={_plain(fps)} now={now:.6f} pulse={last}"
@@ -99,7 +120,7 @@ def parse_client_line(line: bytes) -> ClientLine:
     """Read a line that a client sent, without its line end.
 
     Raises:
-        ProtocolError: the line is none of HELLO, PING and WHO, or its words are wrong.
+        ProtocolError: the line is none of HELLO, PING, WHO and PROVE, or its words are wrong.
     """
     match _words(line):
         case ["HELLO", version, name, *rest]:
@@ -112,6 +133,8 @@ def parse_client_line(line: bytes) -> ClientLine:
             return Ping(_time(sent))
         case ["WHO"]:
             return Who()
+        case ["PROVE", user, nonce, *_] if nonce.startswith(_NONCE_IS):
+            return Prove(_match(_NAME, user, "name"), _match(_NONCE, nonce.removeprefix(_NONCE_IS), "nonce"))
         case _:
             raise ProtocolError(
                 "malformed", "say HELLO 1 <name> [last=<pulse> ago=<seconds>], PING <time> or WHO"
@@ -134,9 +157,11 @@ def parse_server_line(line: bytes) -> ServerLine | None:
         raise ProtocolError("malformed", f"{words[0]}: {error}") from error
 
 
-def _greeting(words: list[str]) -> Greeting:
+def _greeting(words: list[str]) -> Challenge | Greeting:
     version = int(_match(_NUMBER, words[0] if words else "", "version"))
     keys = _keys(words[1:])
+    if version == CLOSED:
+        return Challenge(_match(_NONCE, keys["nonce"], "nonce"), _time(keys["now"]))
     if version != VERSION:  # only the version itself is sure to mean the same in all versions
         return Greeting(version, 1.0, 0.0, None)
     fps = float(_match(_FPS, keys["fps"], "rate"))

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from types import TracebackType
 from typing import Self
 
 from camsync.axis import PulseAxis
 from camsync.clock import Clock, steady_unix_clock
+from camsync.door import Door
 from camsync.hub import Hub
 from camsync.limits import ServerLimits
 from camsync.messages import Beat, Greeting, Hello, Wait
@@ -30,6 +31,9 @@ class PulseServer:
     (no burst of old pulses), and when a client that has counted further returns to a restarted server:
     the first such client ends the wait, and the axis goes on where the clients' own count has got to.
 
+    With ``users``, passwords by name, the server is closed: who comes has to prove that they know one, before
+    they are told anything, and can say HELLO under that name alone. What is said then is sealed (``seal``).
+
     ``host`` None listens on all interfaces; ``port`` 0 takes a free one (see ``port``). With ``max_pulses``
     the server falls silent before that pulse number. Not thread-safe: one event loop.
 
@@ -48,6 +52,7 @@ class PulseServer:
         max_pulses: int | None = None,
         limits: ServerLimits | None = None,
         clock: Clock | None = None,
+        users: Mapping[str, str] | None = None,
     ) -> None:
         if not MIN_FPS <= fps <= MAX_FPS:
             raise ValueError(f"fps must be between {MIN_FPS:g} and {MAX_FPS:g}, not {fps}")
@@ -62,7 +67,8 @@ class PulseServer:
         self._max_pulses = max_pulses
         self._limits = limits or ServerLimits()
         self._clock = clock or steady_unix_clock()
-        self._hub = Hub(self._clock, self._limits, self._greet, self._heard, self._changed)
+        self._door = None if users is None else Door(users, self._limits, self._clock)
+        self._hub = Hub(self._clock, self._limits, self._greet, self._heard, self._changed, self._door)
         self._server: asyncio.Server | None = None
         self._timer: asyncio.TimerHandle | None = None
         self._axis: PulseAxis | None = None
@@ -98,6 +104,11 @@ class PulseServer:
     def skipped(self) -> int:
         """Pulse numbers never sent because the server was stalled or moved its axis forward."""
         return self._skipped
+
+    @property
+    def refused(self) -> int:
+        """How many have come to a closed server and did not know a password."""
+        return 0 if self._door is None else self._door.refused
 
     def clients(self) -> tuple[ClientInfo, ...]:
         """Give everybody connected, in the order of joining."""

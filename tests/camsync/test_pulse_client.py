@@ -276,10 +276,10 @@ async def test_something_else_on_that_port_is_not_a_server(noise: bytes) -> None
 
 async def test_a_server_of_another_version_is_an_error() -> None:
     async with (
-        pretended_server(lambda: b"MYVIEW-SYNC 2 rate:25\n") as (port, _),
+        pretended_server(lambda: b"MYVIEW-SYNC 3 rate:25\n") as (port, _),
         PulseClient("127.0.0.1", port, "c0") as client,
     ):
-        with pytest.raises(VersionError, match="version 2"):
+        with pytest.raises(VersionError, match="version 3"):
             await take(client, 1)
 
 
