@@ -9,8 +9,11 @@
 #   authority.key            makes the certificates below; keep it elsewhere, no process needs it
 #   public/                  certificates: the authority's, the router's, and https.pem, which yours may replace
 #   web/                     tokens.yaml, who may watch and operate, and https.key
+#   web/pulses               the best view's own password of the pulses
 #   router.key, bus          the router's key, and who may come to the bus: name:password
-#   cameras/ID/bus, token    a camera's own password of the bus, and a token to see whether it is well
+#   pulses                   who may follow the pulses, in the same way
+#   cameras/ID/bus, pulses   a camera's own passwords
+#   cameras/ID/token         a token to see whether it is well
 set -eu
 [ $# -ge 2 ] || { sed -n '2,7s/^# \{0,1\}//p' "$0" >&2; exit 2; }
 command -v openssl > /dev/null || { echo "secrets.sh: needs openssl, which is not there" >&2; exit 1; }
@@ -56,6 +59,12 @@ token() {
     printf '%s\n' "$made"
 }
 
+# password NAME ALL OWN: a line name:password of the file of all, and of a file of its own
+password() {
+    [ ! -e "$3" ] || return 0
+    printf '%s:%s\n' "$1" "$(openssl rand -hex 32)" | tee -a "$2" > "$3"
+}
+
 if [ ! -e public/authority.pem ]; then
     certify req -x509 -newkey ec -pkeyopt ec_paramgen_curve:P-256 -nodes -days 3650 -subj "/CN=MyView authority" \
         -out public/authority.pem -keyout authority.key
@@ -63,14 +72,14 @@ if [ ! -e public/authority.pem ]; then
 fi
 pair public/router.pem router.key "$also,DNS:bestview"
 pair public/https.pem web/https.key "$also"
-[ -e bus ] || : > bus
+password bestview pulses web/pulses
 if [ ! -e web/tokens.yaml ]; then
     echo 'tokens:' > web/tokens.yaml
     echo "A token to operate, which is not kept anywhere: $(token operator 'role: operate')"
 fi
 for camera in "$@"; do
-    [ ! -e "cameras/$camera" ] || continue
-    mkdir "cameras/$camera"
-    printf '%s:%s\n' "$camera" "$(openssl rand -hex 32)" | tee -a bus > "cameras/$camera/bus"
-    token "health of $camera" "role: watch, camera: $camera" > "cameras/$camera/token"
+    mkdir -p "cameras/$camera"
+    password "$camera" bus "cameras/$camera/bus"
+    password "$camera" pulses "cameras/$camera/pulses"
+    [ -e "cameras/$camera/token" ] || token "health of $camera" "role: watch, camera: $camera" > "cameras/$camera/token"
 done

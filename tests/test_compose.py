@@ -107,11 +107,14 @@ def test_no_file_gives_a_service_more_than_it_needs(file: str) -> None:
 
 def test_each_service_has_its_own_secrets_alone() -> None:
     services, secrets = content(SECURE)["services"], content(SECURE)["secrets"]
-    used = {name: [it["source"] for it in service.get("secrets", ())] for name, service in services.items()}
+    used = {
+        name: [it if isinstance(it, str) else it["source"] for it in service.get("secrets", ())]
+        for name, service in services.items()
+    }
     assert used["bestview"] == ["bus", "router_key"]
-    assert not used["sync"]
+    assert used["sync"] == ["pulses"]
     for camera in load_config(ROOT / "configs" / "demo.yaml").camera_ids:
-        assert used[camera] == [f"{camera}_bus", f"{camera}_token"]
+        assert used[camera] == [f"{camera}_bus", f"{camera}_pulses", f"{camera}_token"]
     assert sorted(secrets) == sorted(source for sources in used.values() for source in sources)
     files = [it["file"] for it in secrets.values()]
     assert len(set(files)) == len(files)
@@ -119,12 +122,13 @@ def test_each_service_has_its_own_secrets_alone() -> None:
 
 
 def test_the_secure_site_trusts_nobody_by_where_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
-    """But the pulses, which have no password."""
     for name, service in content(SECURE)["services"].items():
         config = _config(
             {**content(PLAIN)["services"][name]["environment"], **service["environment"]}, monkeypatch
         )
         assert not config.access.open_to_all
+        assert not config.access.trusted_network
+        assert config.sync.users == Path("/run/web/pulses" if name == "bestview" else SECRETS + "pulses")
         assert config.zenoh.connect.startswith("tls/")
         assert config.zenoh.listen.startswith("tls/")
         assert config.zenoh.users == Path(SECRETS + "bus")

@@ -26,6 +26,7 @@ from server.camera.thumbs import thumbnails
 from server.wire.bus import Bus
 from server.wire.config import Config
 from server.wire.messages import CameraStatus, CameraTracks, FrameHead, Keys, SoundHead, ThumbHead
+from server.wire.pulse_users import pulse_login
 
 log = logging.getLogger(__name__)
 
@@ -59,11 +60,12 @@ class CameraProcess:
     """Runs a pipeline on the pulses. Two threads of its own: video must never wait for tracking.
 
     Raises:
-        UserError: the source cannot be opened.
+        UserError: the source cannot be opened, or the password for the pulses not be read.
     """
 
     def __init__(self, config: Config, camera_id: str) -> None:
         self._config, self._id = config, camera_id
+        self._login = pulse_login(config, camera_id)
         self._boot = time.time_ns() // 1_000_000
         self._keys = Keys(config.site.name)
         self._sound = open_sound(config, camera_id)
@@ -141,7 +143,9 @@ class CameraProcess:
         # A recording makes up for a stall; a camera goes on with its newest picture.
         queue = self._backlog_pictures if self._pipeline.source.recorded else 2
         settings = ClientSettings(queue=queue, free_run_after=sync.start_timeout_s)
-        client = PulseClient(sync.host, sync.port, self._id, fps_hint=fps, settings=settings)
+        client = PulseClient(
+            sync.host, sync.port, self._id, fps_hint=fps, settings=settings, login=self._login
+        )
         async with client as pulses:
             self._meter.watch(pulses)
             async for pulse in pulses:

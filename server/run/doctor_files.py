@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import stat
+from collections.abc import Sequence
 from pathlib import Path
 
 from server.run.doctor_certificate import certificate_finding
 from server.run.doctor_findings import Finding, bad, ok, warning
 from server.run.exposed import check_bus, check_pulses, check_viewers
-from server.wire.bus_users import read_users
 from server.wire.config import Config
 from server.wire.errors import UserError
+from server.wire.pulse_users import SETTING, SHORTEST, pulse_clients
 from server.wire.tokens import read_tokens
+from server.wire.users import read_users
 
 
 def file_findings(config: Config) -> list[Finding]:
@@ -21,8 +23,12 @@ def file_findings(config: Config) -> list[Finding]:
         if tls.certificate is not None and tls.key is not None:
             found.append(certificate_finding(check, tls.certificate, tls.key))
             found += _private(f"{check}.key", tls.key)
-    if config.zenoh.users is not None:
-        found += _users(config, config.zenoh.users)
+    for check, users, names in (
+        (SETTING, config.sync.users, pulse_clients(config)),
+        ("zenoh.users", config.zenoh.users, config.camera_ids),
+    ):
+        if users is not None:
+            found += _users(check, users, names)
     for camera in config.cameras:
         if camera.password is not None:
             found += _private(f"camera {camera.id}", camera.password)
@@ -58,17 +64,21 @@ def _tokens(config: Config) -> list[Finding]:
     return found
 
 
-def _users(config: Config, path: Path) -> list[Finding]:
+def _users(check: str, path: Path, names: Sequence[str]) -> list[Finding]:
     try:
-        users = read_users(path)
+        users = read_users(path, check)
     except UserError as error:
-        return [bad("zenoh.users", str(error).removeprefix("zenoh.users: "))]
-    missing = [it for it in config.camera_ids if it not in users]
-    found = [ok("zenoh.users", f"{path}: {len(users)} users")]
+        return [bad(check, str(error).removeprefix(f"{check}: "))]
+    missing = [it for it in names if it not in users]
+    short = [name for name, password in users.items() if len(password) < SHORTEST]
+    found = [ok(check, f"{path}: {len(users)} users")]
     if missing:
-        do = "a line for each, where the router runs; a camera's machine needs its own alone"
-        found = [warning("zenoh.users", f"{path} has no line for {', '.join(missing)}", do)]
-    return found + _private("zenoh.users", path)
+        do = "a line for each, where the server runs; a camera's machine needs its own alone"
+        found = [warning(check, f"{path} has no line for {', '.join(missing)}", do)]
+    if short and check == SETTING:
+        text = f"{path}: less than {SHORTEST} characters are the passwords of {', '.join(short)}"
+        found = [bad(check, text, "`openssl rand -hex 32` makes one")]
+    return found + _private(check, path)
 
 
 def _private(check: str, path: Path) -> list[Finding]:

@@ -8,7 +8,7 @@ import time
 from collections.abc import Mapping
 from pathlib import Path
 
-from camsync.messages import Greeting
+from camsync.messages import Challenge, Greeting
 from camsync.protocol import ProtocolError, parse_server_line
 from server.run.doctor_findings import Finding, ok, warning
 from server.run.doctor_probe import Probe
@@ -108,4 +108,4 @@ async def _offset(host: str, port: int) -> float | None:
             said = parse_server_line(line.rstrip(b"\r\n"))
     except (OSError, TimeoutError, ProtocolError, ValueError):
         return None
-    return said.now - (asked + time.time()) / 2 if isinstance(said, Greeting) else None
+    return said.now - (asked + time.time()) / 2 if isinstance(said, Greeting | Challenge) else None

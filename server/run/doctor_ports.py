@@ -6,12 +6,12 @@ import errno
 import os
 
 import client
-from camsync import SyncError, clients_of
+from camsync import Login, SyncError, clients_of
 from server.run.checks import check_port_free
 from server.run.doctor_findings import Finding, bad, ok
 from server.wire.config import Config
 from server.wire.errors import UserError
-from server.wire.messages import pulse_client
+from server.wire.pulse_users import pulse_clients, pulse_login
 
 _END_IT = "end it, or take another port; if it is this site, set MYVIEW_TOKEN to a token of it"
 
@@ -63,12 +63,12 @@ def _taken(host: str, port: int, check: str) -> bool | str | None:
 async def _is_ours(config: Config, check: str) -> bool:
     """Ask whoever has a port whether it is this site."""
     if check == "sync.port":
-        expected = {*config.camera_ids, *map(pulse_client, range(config.view.share.of))}
+        host, login = _reached(config.sync.bind), _login(config)
         try:
-            clients = {it.name for it in await clients_of(_reached(config.sync.bind), config.sync.port)}
+            clients = {it.name for it in await clients_of(host, config.sync.port, login=login)}
         except SyncError:
             return False
-        return bool(clients & expected)
+        return not clients.isdisjoint(pulse_clients(config))
     scheme = "http" if config.http.tls.key is None else "https"
     host = _reached(config.http.host)
     url = f"{scheme}://[{host}]" if ":" in host else f"{scheme}://{host}"
@@ -79,6 +79,16 @@ async def _is_ours(config: Config, check: str) -> bool:
     except (client.ClientError, ValueError):
         return False
     return site.name == config.site.name and set(site.cameras) == set(config.camera_ids)
+
+
+def _login(config: Config) -> Login | None:
+    """Give what the pulse server knows somebody of this site by: on a camera's machine, that camera."""
+    for name in reversed(pulse_clients(config)):
+        try:
+            return pulse_login(config, name)
+        except UserError:
+            continue
+    return None
 
 
 def _reached(host: str) -> str:

@@ -28,13 +28,14 @@ def check_viewers(config: Config) -> None:
 
 
 def check_pulses(config: Config) -> None:
-    """Refuse to send pulses to other machines, unless their network is trusted.
+    """Refuse to send pulses to other machines, unless they have to prove who they are, or are trusted.
 
     Raises:
         UserError: `sync.bind` is not of this machine alone.
     """
-    if not is_loopback(config.sync.bind):
-        _check_network(config, f"sync.bind: {config.sync.bind} lets other machines listen to the pulses")
+    if config.sync.users is None and not is_loopback(config.sync.bind):
+        what = f"sync.bind: {config.sync.bind} lets other machines listen to the pulses"
+        _check_network(config, what, "name a file of passwords in sync.users")
 
 
 def check_bus(config: Config) -> None:
@@ -48,7 +49,8 @@ def check_bus(config: Config) -> None:
         return
     found = _AUTHORITY.match(zenoh.listen)
     if found is None or not is_loopback(found["host"].strip("[]")):
-        _check_network(config, f"zenoh.listen: {zenoh.listen} lets other machines send frames and tracks")
+        what = f"zenoh.listen: {zenoh.listen} lets other machines send frames and tracks"
+        _check_network(config, what, "let it be tls/ and name zenoh.users")
 
 
 def is_loopback(host: str) -> bool:
@@ -59,9 +61,9 @@ def is_loopback(host: str) -> bool:
         return host == "localhost"
 
 
-def _check_network(config: Config, what: str) -> None:
+def _check_network(config: Config, what: str, remedy: str) -> None:
     if not config.access.trusted_network:
         raise UserError(
-            f"{what}, and whoever does is believed: bind it to 127.0.0.1, or, where nobody else reaches it, "
-            "say access.trusted_network: true"
+            f"{what}, and whoever does is believed: bind it to 127.0.0.1, {remedy}, or, where nobody else "
+            "reaches it, say access.trusted_network: true"
         )

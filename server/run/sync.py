@@ -9,7 +9,7 @@ from camsync import PulseServer
 from server.run.exposed import check_pulses
 from server.run.hang_up import reloads
 from server.wire.errors import UserError
-from server.wire.messages import pulse_client
+from server.wire.pulse_users import pulse_clients, pulse_users
 from server.wire.running import Running
 
 log = logging.getLogger(__name__)
@@ -21,17 +21,18 @@ async def sync_process(running: Running) -> None:
     Nothing that it goes by can change while it runs: of a configuration that is read again it says so.
 
     Raises:
-        UserError: the port cannot be listened on, or strangers could listen.
+        UserError: the port cannot be listened on, strangers could listen, or passwords cannot be read.
     """
     config = running.now
     check_pulses(config)
     sync = config.sync
     server = PulseServer(
         config.site.fps,
-        expect={*config.camera_ids, *map(pulse_client, range(config.view.share.of))},
+        expect=pulse_clients(config),
         start_timeout=sync.start_timeout_s,
         host=sync.bind,
         port=sync.port,
+        users=pulse_users(config),
     )
     try:
         await server.start()

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import msgspec
 
-from camsync import PulseClient
+from camsync import Login, PulseClient
 from server.view.align import Aligner, Epoch
 from server.view.assist import Assist
 from server.view.board import Board
@@ -31,6 +31,7 @@ from server.wire.config import Config
 from server.wire.errors import UserError
 from server.wire.inbox import Inbox, Message
 from server.wire.messages import GopChoices, Keys, pulse_client
+from server.wire.pulse_users import pulse_login
 from server.wire.sections import View
 
 log = logging.getLogger(__name__)
@@ -90,6 +91,7 @@ class BestViewService:
         self._out = out
         self._recorder: Recorder | None = None
         self._bus: Bus | None = None
+        self.pulse_login: Login | None = None  # of whom the pulse server asks for none
         self._keys = Keys(config.site.name)
         self._changed = asyncio.Event()
 
@@ -97,9 +99,10 @@ class BestViewService:
         """Open the bus, which the cameras connect to; of several services the first one's.
 
         Raises:
-            UserError: its address is in use.
+            UserError: its address is in use, or a file of passwords cannot be read.
         """
         index, zenoh = self.config.view.share.index, self.config.zenoh
+        self.pulse_login = pulse_login(self.config, pulse_client(index))
         if index:
             self._bus = bus = Bus.second(zenoh, pulse_client(index))
         else:
@@ -214,7 +217,7 @@ class BestViewService:
     async def _follow_pulses(self) -> None:
         sync, fps = self.config.sync, self.config.site.fps
         name = pulse_client(self.config.view.share.index)
-        async with PulseClient(sync.host, sync.port, name, fps_hint=fps) as pulses:
+        async with PulseClient(sync.host, sync.port, name, fps_hint=fps, login=self.pulse_login) as pulses:
             self._clock = pulses.now
             async for pulse in pulses:
                 self.pulse = pulse.number

@@ -22,7 +22,7 @@ from server.web.operator_schema import (
     Pulses,
 )
 from server.wire.fit import Fit
-from server.wire.messages import pulse_client
+from server.wire.pulse_users import pulse_clients
 
 routes = web.RouteTableDef()
 
@@ -37,11 +37,11 @@ async def get_cameras(request: web.Request) -> web.Response:
 @routes.get(f"{PREFIX}/pulses")
 async def get_pulses(request: web.Request) -> web.Response:
     """Ask the pulse server who its clients are."""
-    config = request.app[SERVICE].config
-    expected = [*config.camera_ids, *(pulse_client(index) for index in range(config.view.share.of))]
-    where = f"{config.sync.host}:{config.sync.port}"
+    service = request.app[SERVICE]
+    sync, expected = service.config.sync, pulse_clients(service.config)
+    where = f"{sync.host}:{sync.port}"
     try:
-        clients = await clients_of(config.sync.host, config.sync.port)
+        clients = await clients_of(sync.host, sync.port, login=service.pulse_login)
     except SyncError as error:
         return answer(Pulses(where, str(error), [], []))
     listeners = [PulseListener(it.name, it.name in expected, it.behind) for it in clients]

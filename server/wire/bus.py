@@ -8,10 +8,11 @@ from typing import Any, Self
 
 import zenoh
 
-from server.wire.bus_users import password_of
+from server.wire.bus_users import SETTING
 from server.wire.errors import UserError
 from server.wire.inbox import Inbox, Message
 from server.wire.sections import Zenoh
+from server.wire.users import password_of
 
 _DROP_AFTER_US = 20_000
 """zenoh drops a message after 1 ms in a full queue by default: too soon for an I picture's burst."""
@@ -190,8 +191,9 @@ def _config(settings: Zenoh, mode: str, user: str | None) -> zenoh.Config:
     }.items():
         config.insert_json5(key, json.dumps(value))
     if settings.users is not None and user is not None:
+        password = password_of(settings.users, user, SETTING)
         config.insert_json5("transport/auth/usrpwd/user", json.dumps(user))
-        config.insert_json5("transport/auth/usrpwd/password", json.dumps(password_of(settings.users, user)))
+        config.insert_json5("transport/auth/usrpwd/password", json.dumps(password))
     if settings.tls.authority is not None:
         config.insert_json5("transport/link/tls/root_ca_certificate", json.dumps(str(settings.tls.authority)))
     return config

@@ -3,53 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 from server.wire.config import Config
-from server.wire.errors import UserError
 from server.wire.messages import Keys, pulse_client
+from server.wire.users import read_users
 
+SETTING = "zenoh.users"
 _SENDS = ["put", "delete", "liveliness_token"]
 _ASKS = ["declare_subscriber", "declare_liveliness_subscriber", "liveliness_query"]
 _PASSES = [*_SENDS, "declare_subscriber"]
 """What the router tells others: messages, who is there, and what somebody wants to hear."""
 _SERVICES = 64
 """Best-view services that a site may have, beside the first."""
-
-
-def read_users(path: Path) -> dict[str, str]:
-    """Read the users' passwords by name: a line ``name:password`` for each.
-
-    Raises:
-        UserError: it cannot be read, or a line is none.
-    """
-    try:
-        lines = path.read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "it is no text"
-        raise UserError(f"zenoh.users: cannot read {path}: {reason}") from error
-    users: dict[str, str] = {}
-    for number, line in enumerate(lines, start=1):
-        name, colon, password = line.partition(":")
-        if not (name and colon and password) or name in users or line != line.strip():
-            raise UserError(
-                f"zenoh.users: {path}: line {number} is no name:password, or a name is there twice"
-            )
-        users[name] = password
-    return users
-
-
-def password_of(path: Path, name: str) -> str:
-    """Give a user's password.
-
-    Raises:
-        UserError: it cannot be read, or there is none.
-    """
-    password = read_users(path).get(name)
-    if password is None:
-        raise UserError(f"zenoh.users: {path} has no line for {name!r}, as which this process comes")
-    return password
 
 
 def access_of(config: Config) -> dict[str, Any] | None:
@@ -60,7 +26,7 @@ def access_of(config: Config) -> dict[str, Any] | None:
     """
     if config.zenoh.users is None:
         return None
-    users = list(read_users(config.zenoh.users))
+    users = list(read_users(config.zenoh.users, SETTING))
     return access_rules(config.site.name, config.camera_ids, config.sounding, users)
 
 

@@ -80,7 +80,7 @@ def build_config(content: Mapping[str, Any], *, where: str, folder: Path) -> Con
 
 
 def _who_may(config: Config, folder: Path) -> dict[str, Any]:
-    """Resolve the paths of the files of tokens and certificates."""
+    """Resolve the paths of the files of tokens, passwords and certificates."""
     access, tls = config.access, config.http.tls
     if access.tokens is not None:
         access = access.model_copy(update={"tokens": folder / access.tokens})
@@ -90,6 +90,7 @@ def _who_may(config: Config, folder: Path) -> dict[str, Any]:
     return {
         "access": access,
         "http": config.http.model_copy(update={"tls": tls}),
+        "sync": config.sync.model_copy(update={"users": _users(config.sync.users, folder)}),
         "zenoh": _bus_files(config.zenoh, folder),
     }
 
@@ -97,8 +98,11 @@ def _who_may(config: Config, folder: Path) -> dict[str, Any]:
 def _bus_files(zenoh: Zenoh, folder: Path) -> Zenoh:
     named = {name: getattr(zenoh.tls, name) for name in ZenohTls.model_fields}
     tls = ZenohTls(**{name: None if it is None else (folder / it).absolute() for name, it in named.items()})
-    users = None if zenoh.users is None else (folder / zenoh.users).absolute()
-    return zenoh.model_copy(update={"tls": tls, "users": users})
+    return zenoh.model_copy(update={"tls": tls, "users": _users(zenoh.users, folder)})
+
+
+def _users(path: Path | None, folder: Path) -> Path | None:
+    return None if path is None else (folder / path).absolute()
 
 
 def changed_view(view: View, changes: Mapping[str, Any], where: str) -> View:

@@ -140,13 +140,16 @@ def test_all_are_healthy_by_https_and_with_tokens(secure: Secure) -> None:
 def test_each_has_its_own_secrets_and_they_are_in_no_variable(secure: Secure) -> None:
     for camera in ("c0", "c1", "c2"):
         there = secure.site.compose("exec", "-T", camera, "ls", "/run/secrets").split()
-        assert sorted(there) == ["bus", "token"]
-        own = secure.site.compose("exec", "-T", camera, "cat", "/run/secrets/bus")
-        assert own == (secure.secrets / "cameras" / camera / "bus").read_text("ascii").strip()
+        assert sorted(there) == ["bus", "pulses", "token"]
+        for secret in ("bus", "pulses"):
+            own = secure.site.compose("exec", "-T", camera, "cat", f"/run/secrets/{secret}")
+            assert own == (secure.secrets / "cameras" / camera / secret).read_text("ascii").strip()
     hidden = [
-        it.read_text("ascii").strip() for it in secure.secrets.rglob("*") if it.name in {"token", "bus"}
+        it.read_text("ascii").strip()
+        for it in secure.secrets.rglob("*")
+        if it.name in {"token", "bus", "pulses"}
     ]
-    assert len(hidden) == 7
+    assert len(hidden) == 12
     for container in secure.site.containers().values():
         assert not [it for it in hidden if it in str(container["Config"])]
 

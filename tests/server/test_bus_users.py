@@ -15,11 +15,12 @@ import pytest
 
 from server.run.setup import free_port
 from server.wire.bus import Bus
-from server.wire.bus_users import access_rules, password_of, read_users
+from server.wire.bus_users import SETTING, access_rules
 from server.wire.errors import UserError
 from server.wire.inbox import Message
 from server.wire.messages import Keys
 from server.wire.sections import Zenoh, ZenohTls
+from server.wire.users import password_of, read_users
 
 pytestmark = pytest.mark.skipif(shutil.which("openssl") is None, reason="needs openssl, to make certificates")
 
@@ -87,7 +88,9 @@ def opened(*openings: Callable[[], Bus]) -> Iterator[list[Bus]]:
 
 def router(settings: Zenoh) -> Bus:
     assert settings.users is not None
-    return Bus.router(settings, access_rules("hall", ["c0", "c1"], "c1", list(read_users(settings.users))))
+    return Bus.router(
+        settings, access_rules("hall", ["c0", "c1"], "c1", list(read_users(settings.users, SETTING)))
+    )
 
 
 async def test_a_camera_speaks_for_itself_alone(settings: Zenoh) -> None:
@@ -244,11 +247,11 @@ def _users(folder: Path, text: str) -> Path:
 @pytest.mark.parametrize("text", ["c0\n", "c0:\n", ":p\n", "c0:a\nc0:b\n", " c0:a\n", "c0:a\n\nc1:b\n"])
 def test_a_file_of_users_that_is_none_is_said_in_one_line(tmp_path: Path, text: str) -> None:
     with pytest.raises(UserError, match=r"zenoh\.users: .*: line \d is no name:password"):
-        read_users(_users(tmp_path, text))
+        read_users(_users(tmp_path, text), SETTING)
 
 
 def test_who_has_no_line_is_told_so(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="has no line for 'c1', as which this process comes"):
-        password_of(_users(tmp_path, "c0:a\n"), "c1")
+        password_of(_users(tmp_path, "c0:a\n"), "c1", SETTING)
     with pytest.raises(UserError, match=r"zenoh\.users: cannot read .*none"):
-        password_of(tmp_path / "none", "c0")
+        password_of(tmp_path / "none", "c0", SETTING)

@@ -20,7 +20,7 @@ from halls import Hall
 from rtsp_by_hand import RtspCamera
 from videos_by_hand import write_video
 
-from camsync import PulseServer
+from camsync import Login, PulseClient, PulseServer
 from server.run import doctor_machine
 from server.run.doctor import _checked
 from server.run.doctor_cameras import camera_findings, probe_all, sound_findings
@@ -154,6 +154,27 @@ async def test_the_pulse_servers_clock_is_compared_where_it_runs(tmp_path: Path)
         found = only(await clock_findings(there), "pulse server")
     assert found.level is Level.OK
     assert "ms off this machine's" in found.text
+
+
+async def test_a_closed_pulse_server_is_this_site_s_where_it_knows_one_of_its_passwords(
+    tmp_path: Path,
+) -> None:
+    users = {"c0": "0" * 32, "bestview": "1" * 32}
+    (tmp_path / "users").write_text(f"c0:{users['c0']}\n")  # a camera's machine has its own line alone
+    there = config(tmp_path, sync={"port": free(), "users": "users"})
+    login = Login("bestview", users["bestview"])
+    async with (
+        PulseServer(FPS, port=there.sync.port, users=users) as server,
+        PulseClient("127.0.0.1", server.port, "bestview", login=login) as service,
+    ):
+        await anext(aiter(service))
+        assert "ms off this machine's" in only(await clock_findings(there), "pulse server").text
+        found, _ = await port_findings(there)
+        assert only(found, "sync.port").level is Level.OK
+        (tmp_path / "users").write_text(f"c0:{'2' * 32}\n")
+        found, _ = await port_findings(there)
+        assert only(found, "sync.port").level is Level.BAD
+        assert server.clients()[0].name == "bestview", "who asks takes nobody's place"
 
 
 def test_a_network_camera_is_measured_against_the_site(tmp_path: Path) -> None:
@@ -297,6 +318,12 @@ def test_files_that_others_can_read_or_write_are_told_of(tmp_path: Path) -> None
     assert f"others may write {tokens}" in words
     assert f"others may read {users}" in words
     assert "no line for c0" in words
+    pulses = file_findings(config(tmp_path, **changes, sync={"port": 7400, "users": "users"}))
+    assert [it.level for it in of(pulses, "sync.users")] == [Level.BAD, Level.WARNING]
+    assert "passwords of bestview" in of(pulses, "sync.users")[0].text
+    users.write_text("bestview:" + "b" * 32 + "\n")
+    pulses = file_findings(config(tmp_path, **changes, sync={"port": 7400, "users": "users"}))
+    assert "no line for c0" in of(pulses, "sync.users")[0].text
     tokens.write_text("tokens: nonsense\n")
     assert of(file_findings(config(tmp_path, **changes)), "access.tokens")[0].level is Level.BAD
 

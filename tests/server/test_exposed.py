@@ -100,10 +100,18 @@ def test_a_bus_that_asks_who_comes_may_be_anywhere_if_it_is_encrypted() -> None:
             check_bus(small_config(zenoh=zenoh))
 
 
+def test_pulses_that_ask_who_comes_may_be_anywhere() -> None:
+    with pytest.raises(UserError, match=r"sync\.bind: .* sync\.users"):
+        check_pulses(small_config(sync={"bind": OUTSIDE}))
+    check_pulses(small_config(sync={"bind": OUTSIDE, "users": "sync.users"}))
+
+
 def test_the_secure_example_is_open_to_nobody_without_a_token_or_a_password() -> None:
     config = load_config(CONFIGS / "secure.yaml")
     assert not is_loopback(config.http.host)
     assert not config.access.open_to_all
+    assert not config.access.trusted_network
+    assert config.sync.users == CONFIGS / "secret" / "sync.users"
     assert config.access.tokens == CONFIGS / "secret" / "tokens.yaml"
     assert config.http.tls.key == CONFIGS / "secret" / "https.key"
     assert config.zenoh.connect.startswith("tls/")

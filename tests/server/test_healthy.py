@@ -21,8 +21,9 @@ import pytest
 from camsync import PulseServer
 from server.run.healthy import main
 from server.run.setup import free_port
-from server.wire.bus_users import read_users
+from server.wire.pulse_users import SHORTEST
 from server.wire.tokens import digest_of, read_tokens
+from server.wire.users import read_users
 
 ROOT = Path(__file__).resolve().parents[2]
 NEEDS_OPENSSL = pytest.mark.skipif(
@@ -167,7 +168,16 @@ def test_what_is_made_for_a_secure_site_fits_together(secrets: Path) -> None:
     assert (health.role, health.camera) == ("watch", "c0")
     token = (secrets / "cameras" / "c0" / "token").read_text("ascii").strip()
     assert health.sha256 == digest_of(token)
-    assert read_users(secrets / "bus") == read_users(secrets / "cameras" / "c0" / "bus")
+    c0 = secrets / "cameras" / "c0"
+    assert users(secrets / "bus") == users(c0 / "bus")
+    assert users(secrets / "pulses") == users(secrets / "web" / "pulses") | users(c0 / "pulses")
+    assert set(users(secrets / "pulses")) == {"bestview", "c0"}
+    assert min(map(len, users(secrets / "pulses").values())) >= SHORTEST
+    assert users(c0 / "bus") != users(c0 / "pulses"), "who has one of them has not the other"
+
+
+def users(path: Path) -> dict[str, str]:
+    return read_users(path, "users")
 
 
 def made(folder: Path, name: str, **environment: str) -> subprocess.CompletedProcess[str]:
@@ -225,4 +235,16 @@ def test_a_camera_is_added_to_a_secure_site_that_stays_as_it_is(secrets: Path, t
     assert all(it.read_bytes().startswith(content) for it, content in before.items())
     new = {str(it.relative_to(folder)) for it in folder.rglob("*") if it.is_file()}
     new -= {str(it.relative_to(folder)) for it in before}
-    assert new == {"cameras/yard/bus", "cameras/yard/token"}
+    assert new == {f"cameras/yard/{it}" for it in ("bus", "pulses", "token")}
+
+
+@NEEDS_OPENSSL
+def test_a_site_of_before_the_pulses_had_passwords_gets_them(secrets: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "secrets"
+    shutil.copytree(secrets, folder)
+    for name in ("pulses", "web/pulses", "cameras/c0/pulses"):
+        (folder / name).unlink()
+    before = {it: it.read_bytes() for it in folder.rglob("*") if it.is_file()}
+    assert made(folder, "cameras.example").returncode == 0
+    assert all(it.read_bytes() == content for it, content in before.items())
+    assert set(users(folder / "pulses")) == {"bestview", "c0"}

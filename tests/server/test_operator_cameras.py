@@ -8,7 +8,7 @@ import pytest
 from cameras_by_hand import CAMERAS, status
 from halls import A, B, Hall, opened
 
-from camsync import PulseClient, PulseServer
+from camsync import Login, PulseClient, PulseServer
 from server.wire.inbox import Message
 from server.wire.messages import Keys
 
@@ -73,6 +73,22 @@ async def test_the_pulse_servers_clients_are_told_and_who_is_missing() -> None:
         (A, True, 0),
         ("stranger", False, 0),
     }
+    assert told["missing"] == [B, "bestview"]
+
+
+async def test_a_closed_pulse_server_tells_it_to_the_service_whose_password_it_knows() -> None:
+    users = {A: "a" * 32, "bestview": "b" * 32}
+    async with (
+        PulseServer(25.0, users=users) as server,
+        PulseClient("127.0.0.1", server.port, A, login=Login(A, users[A])) as camera,
+        aclosing(opened(sync={"port": server.port})) as halls,
+    ):
+        await anext(aiter(camera))
+        hall = await anext(halls)
+        assert "asks for a password" in (await hall.get_json("/api/operator/pulses"))["error"]
+        hall.service.pulse_login = Login("bestview", users["bestview"])
+        told = await hall.get_json("/api/operator/pulses")
+    assert (told["error"], [it["name"] for it in told["clients"]]) == ("", [A])
     assert told["missing"] == [B, "bestview"]
 
 

@@ -26,6 +26,7 @@ from server.view.service import BestViewService
 from server.wire.config import Config
 from server.wire.loading import build_config
 from server.wire.messages import CameraStatus, CameraTracks, FrameHead, GopChoices, pulse_client
+from server.wire.pulse_users import pulse_users
 
 PATIENCE = 60.0  # seconds until a test that awaits something has failed
 FPS = 50
@@ -61,7 +62,9 @@ class Running:
         self.service = BestViewService(config, out)
         self._tasks: list[asyncio.Task[None]] = []
         expect = {*config.camera_ids, pulse_client(0)}
-        self._pulses = PulseServer(FPS, expect=expect, start_timeout=PATIENCE, port=config.sync.port)
+        self.pulses = PulseServer(
+            FPS, expect=expect, start_timeout=PATIENCE, port=config.sync.port, users=pulse_users(config)
+        )
 
     def camera(self, camera: str) -> asyncio.Task[None]:
         task = asyncio.create_task(self._run(camera))
@@ -74,7 +77,7 @@ class Running:
         await process.run()
 
     async def start(self) -> asyncio.Task[None]:
-        await self._pulses.start()
+        await self.pulses.start()
         self.service.open()
         task = asyncio.create_task(self.service.run())
         self._tasks.append(task)
@@ -85,7 +88,7 @@ class Running:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
         self.service.close()
-        await self._pulses.stop()
+        await self.pulses.stop()
 
 
 @pytest.fixture
@@ -205,6 +208,24 @@ async def test_a_camera_that_goes_is_seen_to_be_gone_and_the_others_go_on(
         decided.clear()
         await decided.wait()
     assert states["c0"].word == "live"
+
+
+async def test_a_camera_and_a_service_prove_who_they_are_to_pulses_that_ask(
+    tmp_path: Path, running: list[Running]
+) -> None:
+    (tmp_path / "users").write_text("".join(f"{name}:{name * 32}\n" for name in ("c0", "bestview")))
+    config = site(tmp_path, c0="scene:room?objects=1")
+    config = config.model_copy(update={"sync": config.sync.model_copy(update={"users": tmp_path / "users"})})
+    it = Running(config)
+    running.append(it)
+    decided = asyncio.Event()
+    it.service.on_decision.append(lambda _: decided.set())
+    await it.start()
+    it.camera("c0")
+    async with asyncio.timeout(PATIENCE):
+        await decided.wait()
+    assert {client.name for client in it.pulses.clients()} == {"c0", "bestview"}
+    assert it.pulses.refused == 0
 
 
 async def test_a_camera_whose_tracker_fails_ends_with_that_error(

@@ -27,6 +27,11 @@ class Sync(Section):
     bind: str = "127.0.0.1"
     """The address the server listens on."""
     port: Port = 7400
+    users: Path | None = None
+    """A file of `name:password`, one a line; none: whoever reaches the server is believed.
+
+    A camera comes as its id, services as bestview, bestview-1, … The server needs all lines, others theirs.
+    """
     start_timeout_s: NonNegativeFloat = 20.0
     """How long pulse 0 waits for all cameras to be there, so that recordings start at their first frame."""
 
