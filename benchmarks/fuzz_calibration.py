@@ -23,14 +23,14 @@ from server.view.calibrate import plan
 from server.view.calibrate.plan import PlanView
 from server.view.floor import covered
 from server.wire.errors import UserError
-from server.wire.loading import build_config
+from server.wire.loading import build_config, with_files
 
 WORDS = (
     b",", b'"', b"\n", b"\r", b"\x00", b"\xff", b"\xef\xbb\xbf", b"nan", b"NaN", b"Infinity", b"-Infinity",
     b"1e308", b"1e400", b"9" * 400, b"9" * 5000, b"[" * 3000, b"{", b"}", b"null", b"true", b"\\ud800",
     b"$", b"_", b"\\n",
 )  # fmt: skip
-_DRAWN_EVERY = 256
+_DRAWN_EVERY = 1024
 _TRUE = np.array([[0.012, 0.001, -3.0], [0.0004, 0.03, -2.0], [0.00001, 0.002, 0.2]])
 
 
@@ -63,11 +63,20 @@ def _points(rng: Random, cameras: dict[str, list[dict[str, Any]]]) -> bytes:
 
 
 class _Files(Target):
-    """Files in a folder of their own."""
+    """Files in a folder of their own, and a site that goes by them."""
 
     def __init__(self) -> None:
         self._folder = folder()
         self._path = Path(self._folder.name)
+        cameras = [{"id": it, "source": "scene:room"} for it in ("c0", "c1")]
+        self._site = build_config({"cameras": cameras}, where="site", folder=self._path)
+        self._site = self._site.model_copy(update={"ground": Path("ground.json")})
+
+    def lay_out(self) -> None:
+        """Read ground.json as a site does, and lay its floor out."""
+        for camera in with_files(self._site, where="site", folder=self._path).cameras:
+            if camera.ground is not None:
+                covered(np.array(camera.ground, dtype=np.float64), (640, 360), (640, 360))
 
     def written(self, data: bytes) -> Path:
         """Write a file of points, named by what it looks like."""
@@ -133,7 +142,7 @@ class Plans(_Files):
         for line in lines:
             assert len(line.splitlines()) == 1, line
             line.encode()
-        _site(self._path)
+        self.lay_out()
         return True
 
 
@@ -143,14 +152,6 @@ def _laid_out(views: Sequence[PlanView], unit: str, _: object) -> None:
         plan._area(view)
     for text in (unit, *(view.camera for view in views)):
         assert not is_math_text(plan._plain(text)), text
-
-
-def _site(folder: Path) -> None:
-    cameras = [{"id": it, "source": "scene:room"} for it in ("c0", "c1")]
-    config = build_config({"cameras": cameras, "ground": "ground.json"}, where="site", folder=folder)
-    for camera in config.cameras:
-        if camera.ground is not None:
-            covered(np.array(camera.ground, dtype=np.float64), (640, 360), (640, 360))
 
 
 class Ground(_Files):
@@ -170,7 +171,7 @@ class Ground(_Files):
         """Read a site with it, and lay its floor out."""
         (self._path / "ground.json").write_bytes(data)
         try:
-            _site(self._path)
+            self.lay_out()
         except UserError as error:
             return refused(error)
         return True

@@ -5,10 +5,12 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 MAX_BOX = 64_000_000  # bytes; a fragment of video has some thousand
 _HEADER = 8  # bytes: size and kind
 _LARGE_HEADER = 16  # bytes: with the size in 64 bits
+_SIZE_AND_KIND = struct.Struct(">I4s")
 _LARGE = 1  # as the size: the real one follows in 64 bits
 
 
@@ -103,13 +105,17 @@ def child(content: bytes, *path: bytes) -> bytes:
         Mp4Error: there is none.
     """
     for kind in path:
-        for box in BoxReader().feed(content):
-            if box.kind == kind:
-                content = box.content
-                break
-        else:
-            raise Mp4Error(f"there is no {kind.decode()} box")
+        content = _child(content, kind)
     return content
+
+
+def _child(content: bytes, kind: bytes) -> bytes:
+    at = 0
+    while (head := _head(content, at)) is not None and at + head.size <= len(content):
+        if head.kind == kind:
+            return content[at + head.length : at + head.size]
+        at += head.size
+    raise Mp4Error(f"there is no {kind.decode()} box")
 
 
 def _field(content: bytes, at_version_0: int, at_version_1: int, code: str) -> int:
@@ -121,17 +127,33 @@ def _field(content: bytes, at_version_0: int, at_version_1: int, code: str) -> i
     return int(value)
 
 
+class _Head(NamedTuple):
+    """What a box begins with: how many bytes it has, its four letters, and how long this is itself."""
+
+    size: int
+    kind: bytes
+    length: int
+
+
+def _head(data: bytes | bytearray, at: int) -> _Head | None:
+    """Read the beginning of the box there; None if that is not whole yet."""
+    if len(data) < at + _HEADER:
+        return None
+    size, kind = _SIZE_AND_KIND.unpack_from(data, at)
+    length = _HEADER
+    if size == _LARGE:
+        length = _LARGE_HEADER
+        if len(data) < at + length:
+            return None
+        (size,) = struct.unpack_from(">Q", data, at + _HEADER)
+    if not length <= size <= MAX_BOX:
+        raise Mp4Error(f"a box of {size} bytes")
+    return _Head(size, kind, length)
+
+
 def _first_box(data: bytes | bytearray) -> Mp4Box | None:
     """Give the box that the bytes begin with; None if it is not whole yet."""
-    if len(data) < _HEADER:
+    head = _head(data, 0)
+    if head is None or len(data) < head.size:
         return None
-    size, kind = struct.unpack_from(">I4s", data)
-    header = _HEADER
-    if size == _LARGE:
-        header = _LARGE_HEADER
-        if len(data) < header:
-            return None
-        (size,) = struct.unpack_from(">Q", data, _HEADER)
-    if not header <= size <= MAX_BOX:
-        raise Mp4Error(f"a box of {size} bytes")
-    return Mp4Box(kind, bytes(data[:size]), header) if len(data) >= size else None
+    return Mp4Box(head.kind, bytes(data[: head.size]), head.length)

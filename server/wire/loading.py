@@ -47,7 +47,7 @@ def read_content(path: Path) -> dict[str, Any]:
 
 
 def build_config(content: Mapping[str, Any], *, where: str, folder: Path) -> Config:
-    """Check a configuration's content and resolve what it refers to.
+    """Check a configuration's content, the environment's words on it, and what it refers to.
 
     Raises:
         UserError: something is wrong; the text begins with ``where``.
@@ -61,6 +61,15 @@ def build_config(content: Mapping[str, Any], *, where: str, folder: Path) -> Con
     except SettingsError as error:
         raise UserError(f"{where}: environment: {error}; a section's whole value must be JSON") from error
     check_numbers(config.model_dump(), where)
+    return with_files(config, where=where, folder=folder)
+
+
+def with_files(config: Config, *, where: str, folder: Path) -> Config:
+    """Read the ground that a configuration names, and resolve all its paths.
+
+    Raises:
+        UserError: the ground cannot be read, or is wrong; the text begins with ``where``.
+    """
     homographies, unit = _homographies(folder / config.ground, where) if config.ground else ({}, None)
     try:
         cameras = [_resolved(camera, homographies, unit, folder) for camera in config.cameras]
