@@ -131,6 +131,11 @@ def test_with_temporal_consistency_the_lookahead_covers_its_stages() -> None:
     assert enough.track.lag(25.0) == 19
 
 
+def test_stages_without_end_are_refused_before_anybody_counts_their_frames() -> None:
+    track = {"tracker": "temporal", "temporal": {"stage_s": float("inf")}}
+    assert "track.temporal: stages must be 1 to 1000, and stage_s" in complaint(site(track=track))
+
+
 def test_lookahead_shorter_than_the_trackers_lag_is_refused_with_the_least_that_would_do() -> None:
     assert "must be at least 20" in complaint(site(view={"lookahead": 19}))
 

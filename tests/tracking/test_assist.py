@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -148,6 +149,19 @@ def test_a_pointing_before_the_memory_is_not_taken() -> None:
     assert tracked.point([_at(ALIKE[1], 40, 1)]) is None
 
 
+def test_a_small_doubt_that_is_forgotten_keeps_no_later_pointing_from_mending() -> None:
+    tracked, stream = _helped(memory=60), _crossing(frames=91)
+    for n, seen in enumerate(stream):
+        tracked.push(n, seen)
+        if n == 20:
+            beside = _at(ALIKE[0], 15, 1)
+            assert tracked.point([replace(beside, x=beside.x + 0.3**0.5 * WIDTH)]) is None
+            assert tracked._doubtful == [15]
+    mended = tracked.point([_at(ALIKE[1], n, 1) for n in range(60, 70)])
+    assert mended is not None
+    assert mended.mended_from is not None
+
+
 def test_the_memory_is_bounded() -> None:
     tracked = _helped(memory=40)
     for n in range(300):
@@ -205,7 +219,17 @@ def test_only_who_asks_for_help_gets_a_tracker_that_takes_it(
     assert type(found) is kind
 
 
-@pytest.mark.parametrize("wrong", [{"memory": 0}, {"horizon": 0}, {"weight": -1.0}, {"hidden": 1.5}])
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"memory": 0},
+        {"memory": 10**6},
+        {"horizon": 0},
+        {"horizon": 10**12},
+        {"weight": -1.0},
+        {"hidden": 1.5},
+    ],
+)
 def test_settings_that_make_no_sense_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(ValueError, match=r"must|at least|share"):
         AssistSettings(**wrong)  # type: ignore[arg-type]

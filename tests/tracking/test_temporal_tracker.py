@@ -12,6 +12,7 @@ from tracking import CostSettings, Detections, WindowResult, WindowSettings, sol
 from tracking.boxes import Floats, iou
 from tracking.detectors.base import Image
 from tracking.temporal import BlobSettings, TemporalSettings
+from tracking.temporal.blobs import Blobs
 from tracking.temporal.tracker import TemporalTracker
 from tracking.yardsticks import needs_pictures, tracker_named
 
@@ -177,8 +178,34 @@ def test_it_is_a_tracker_by_name_that_needs_pictures() -> None:
 
 
 @pytest.mark.parametrize(
-    "wrong", [{"stages": 0}, {"stage_s": 0.0}, {"places": 4}, {"prune": 0.5}, {"most_people": 0}]
+    "wrong",
+    [
+        {"stages": 0},
+        {"stages": 10**9},
+        {"stage_s": 0.0},
+        {"stage_s": float("inf")},
+        {"stage_s": float("nan")},
+        {"places": 4},
+        {"prune": 0.5},
+        {"most_people": 0},
+        {"merge": -0.1},
+        {"vanish": float("nan")},
+        {"forget_s": -1.0},
+    ],
 )
 def test_settings_that_make_no_sense_are_refused(wrong: dict[str, float]) -> None:
-    with pytest.raises(ValueError, match=r"must be"):
+    with pytest.raises(ValueError, match=r"must (not )?be"):
         TemporalSettings(**wrong)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"grow_m": -0.1}, {"grow_m": 2.0}, {"least_m2": -1.0}, {"samples": 10**9}, {"learn_rate": 1.5}]
+)
+def test_settings_of_blobs_that_make_no_sense_are_refused(wrong: dict[str, float]) -> None:
+    with pytest.raises(ValueError, match=r"must be|is a share"):
+        BlobSettings(**wrong)  # type: ignore[arg-type]
+
+
+def test_however_little_floor_is_in_the_picture_foreground_grows_by_a_part_of_it() -> None:
+    blobs = Blobs((64, 48), 0.001, BlobSettings(grow_m=1.0))
+    assert blobs._grow.shape == (13, 13)

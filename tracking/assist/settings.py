@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+_MOST_FRAMES = 10_000
+"""Frames back, or ahead: messages, and what is worked out of a window, grow with them."""
+
 
 @dataclass(frozen=True, slots=True)
 class AssistSettings:
@@ -25,8 +28,8 @@ class AssistSettings:
     hidden: float = 0.25  # share of it that being hidden costs who is pointed at
 
     def __post_init__(self) -> None:
-        if min(self.memory, self.horizon, self.gone) < 1:
-            raise ValueError("memory, horizon and gone are at least 1 frame")
+        if not all(1 <= it <= _MOST_FRAMES for it in (self.memory, self.horizon, self.gone)):
+            raise ValueError(f"memory, horizon and gone must be 1 to {_MOST_FRAMES} frames")
         if not min(self.margin, self.alike, self.gap, self.weight) >= 0.0:
             raise ValueError("margin, alike, gap and weight must not be negative")
         for name in ("faint", "hidden"):

@@ -16,6 +16,8 @@ from tracking.temporal.settings import BlobSettings
 
 _MEDIAN = 3
 """Pixels of the median filter that takes lonely pixels out."""
+_MOST_GROWN = 0.1
+"""Of the picture's width, by how much the foreground grows at most."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,7 +58,8 @@ class Blobs:
         self.size = max(round(width * scale), 1), max(round(height * scale), 1)
         self.metre = self.size[0] / room_m
         self._least = settings.least_m2 * self.metre**2
-        grow = 2 * round(settings.grow_m * self.metre) + 1
+        # However little floor is in the picture: more than a part of it joins nothing that belongs together.
+        grow = 2 * round(min(settings.grow_m * self.metre, self.size[0] * _MOST_GROWN)) + 1
         self._grow = np.asarray(cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (grow, grow)), dtype=np.uint8)
         self._background: YuvBackground | None = None
 

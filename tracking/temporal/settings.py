@@ -5,6 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 _MOST_PLACES = 3
+_MOST_STAGES, _LONGEST_STAGE_S = 1000, 60.0
+_MOST_GROWN_M, _MOST_SAMPLES = 1.0, 200
+_NOT_NEGATIVE = (
+    *("merge", "partly", "apart", "unknown", "isolated_m"),
+    *("outside", "leave", "vanish", "person_m2", "forget_s"),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,13 +33,16 @@ class BlobSettings:
 
     def __post_init__(self) -> None:
         least = (self.work_width, self.threshold, self.brightness_floor, self.colour_floor, self.samples)
-        if not all(it > 0 for it in least) or self.bootstrap_frames < self.samples:
+        if not all(it > 0 for it in least):
             raise ValueError(
-                "work_width, threshold, brightness_floor, colour_floor and samples must be above 0, and "
-                "bootstrap_frames at least samples"
+                "work_width, threshold, brightness_floor, colour_floor and samples must be above 0"
             )
+        if not self.samples <= min(self.bootstrap_frames, _MOST_SAMPLES):
+            raise ValueError(f"samples must be at most bootstrap_frames, and at most {_MOST_SAMPLES}")
         if not 0.0 <= self.learn_rate <= 1.0:
             raise ValueError(f"learn_rate is a share between 0 and 1, not {self.learn_rate}")
+        if not 0.0 <= self.grow_m <= _MOST_GROWN_M or not self.least_m2 >= 0.0:
+            raise ValueError(f"grow_m must be 0 to {_MOST_GROWN_M:g} and least_m2 at least 0")
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,10 +76,17 @@ class TemporalSettings:
     blobs: BlobSettings = field(default_factory=BlobSettings)
 
     def __post_init__(self) -> None:
-        if self.stages < 1 or self.confirm < 1 or self.most_people < 1 or self.most_states < 1:
-            raise ValueError("stages, confirm, most_people and most_states must be at least 1")
-        if min(self.stage_s, self.room_m, self.speed) <= 0:
-            raise ValueError("stage_s, room_m and speed must be above 0")
+        if not 1 <= self.stages <= _MOST_STAGES or not 0.0 < self.stage_s <= _LONGEST_STAGE_S:
+            raise ValueError(
+                f"stages must be 1 to {_MOST_STAGES}, and stage_s above 0 and at most {_LONGEST_STAGE_S:g}"
+            )
+        if min(self.confirm, self.most_people, self.most_states) < 1:
+            raise ValueError("confirm, most_people and most_states must be at least 1")
+        if min(self.room_m, self.speed) <= 0:
+            raise ValueError("room_m and speed must be above 0")
+        for name in _NOT_NEGATIVE:
+            if not getattr(self, name) >= 0.0:
+                raise ValueError(f"{name} must not be negative, and is {getattr(self, name)}")
         if not 1 <= self.places <= _MOST_PLACES:
             raise ValueError(f"places must be 1 to {_MOST_PLACES} on a side, not {self.places}")
         if self.prune and self.prune < 1:
