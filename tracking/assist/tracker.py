@@ -93,7 +93,8 @@ class AssistedTracker(OnlineTracker):
         for it in sorted(pointings, key=lambda it: (it.frame, it.object)):
             if self.remembers(it.frame):
                 frames += self._hear(it)
-        self._doubtful += frames
+        # Doubts too small to be followed at once wait for others; what is forgotten meanwhile is not mended.
+        self._doubtful = [frame for frame in (*self._doubtful, *frames) if self.remembers(frame)]
         if not self._doubtful or self._doubt < _DOUBT * self._assist.weight:
             return None
         frame = min(self._doubtful)
