@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -100,9 +100,13 @@ class Reader:
         self._final |= {it.message.camera: it.message.final_to for it in windows}
         return windows
 
-    def read_late(self, epoch: Epoch) -> Sequence[CameraWindow]:
-        """Give what has mended the past, and came too late for its own epoch."""
-        return [self._window(message) for message in epoch.mended]
+    def read_late(self, epoch: Epoch) -> Iterator[CameraWindow]:
+        """Give what has mended the past, and came too late for its own epoch, one word after the other.
+
+        Each is read when it is asked for: the one before may have changed what tracks are called.
+        """
+        for message in epoch.mended:
+            yield self._window(message)
 
     def _window(self, message: CameraTracks) -> CameraWindow:
         fit = self.fits.get(message.camera)
