@@ -170,6 +170,7 @@ class Episodes:
             for key, it in self._current.items()
             if it.key in self._row or (it.firm and it.end.frame > oldest)
         }
+        self._cut = {key: it for key, it in self._cut.items() if key in self._current}
 
 
 def _end(seen: Sightings, track: int, column: int) -> End:

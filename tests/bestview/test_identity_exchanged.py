@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -111,3 +113,14 @@ def test_whatever_is_said_two_tracks_seen_at_once_in_one_camera_share_no_number(
         for at, one, two, frame in said:
             if at == step and one.camera == two.camera:
                 who.exchange(one, two, frame, (1, 2))
+
+
+def test_of_tracks_that_are_never_seen_again_nothing_is_kept() -> None:
+    who = registry(BLIND)
+    stays = [replace(it, end=min(it.end, 199)) for it in meeting(3.0)]
+    stays.append(Stay("south", 9, 0, 999, (0.0, 5.0)))
+    play(who, stays, 200)
+    assert who.exchange(ONE, TWO, 190, (1, 2))
+    assert set(who._episodes._cut) == {ONE, TWO}, "their next sightings begin new parts"
+    play(who, stays, 900, begin=200)
+    assert not who._episodes._cut
