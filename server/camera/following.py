@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from bestview import to_ground
-from server.camera.sources import Image, Source
+from server.camera.sources import Source
 from server.wire.config import Config
+from server.wire.fit import Fit
 from server.wire.ground_unit import METRES
 from server.wire.sections import Camera
 from tracking import Solver
@@ -23,32 +24,34 @@ def ready_tracker(
     camera: Camera,
     source: Source | None,
     solver: Callable[[], Solver],
-    picture: Callable[[Image], Image] = lambda image: image,
+    fit: Fit | None = None,
     *,
     ready: bool = True,
 ) -> Tracker:
     """Give the tracker of that name; what has to learn the room has done so where the source is a recording.
 
-    ``picture`` makes the tracker's pictures of the source's. Not ``ready``: it looks at none ahead.
+    It looks at the source's pictures as ``fit`` makes them, or at these themselves; not ``ready``: at none
+    ahead.
     """
     track = config.track
-    settings = track.temporal if source is None else _measured(track.temporal, camera, source.size)
+    seen = fit or (None if source is None else Fit(source.size, source.size))
+    settings = track.temporal if seen is None else _measured(track.temporal, camera, seen)
     tracker = tracker_named(
         name, track.window, track.costs, solver, settings, config.site.fps, assist=track.assist
     )
-    if ready and source is not None and isinstance(tracker, Preparing):
+    if ready and source is not None and seen is not None and isinstance(tracker, Preparing):
         places = range(0, config.detect.ahead_frames, config.detect.ahead_every)
-        tracker.prepare(picture(image) for image in source.ahead(places))
+        tracker.prepare(seen.image(image) for image in source.ahead(places))
     return tracker
 
 
-def _measured(settings: TemporalSettings, camera: Camera, size: tuple[int, int]) -> TemporalSettings:
-    """Take how much floor the picture is wide from the camera's ground, where that is in metres."""
+def _measured(settings: TemporalSettings, camera: Camera, fit: Fit) -> TemporalSettings:
+    """Take how much floor a picture is wide, black columns and all, from the ground where it is in metres."""
     per_metre = METRES.get(camera.ground_unit or "")
     if camera.ground is None or per_metre is None:
         return settings
-    width, height = size
-    ends = np.array([[0.0, height / 2.0], [width, height / 2.0]])
+    width, height = fit.size
+    ends = fit.to_own(np.array([[0.0, height / 2.0], [width, height / 2.0]]))
     left, right = to_ground(np.array(camera.ground, dtype=np.float64), ends)
     across = float(np.hypot(*(right - left))) / per_metre
     return replace(settings, room_m=across) if np.isfinite(across) else settings

@@ -101,7 +101,7 @@ class CameraPipeline:
             camera,
             self.source,
             lambda: solver_named(track.solver),
-            self._fit.image,
+            self._fit,
             ready=ready,
         )
         self._tracker = Stepping(tracker, self._detector.bins, track.window.stride)

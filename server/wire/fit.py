@@ -27,6 +27,11 @@ class Fit:
         self._left = (site[0] - self._inner[0]) // 2
         self._top = (site[1] - self._inner[1]) // 2
 
+    @property
+    def size(self) -> tuple[int, int]:
+        """The site's."""
+        return self._site
+
     def image(self, own: Image) -> Image:
         """Give the site-sized picture of a camera's own one."""
         if self._exact and own.shape[1::-1] == self._site:

@@ -10,6 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from bestview import IdentityRegistry, IdentitySettings, LocalTrack
+from server.camera.following import _measured
 from server.camera.observe import make_detector
 from server.camera.scene import Scene, write_recording
 from server.run.track import track_one
@@ -19,6 +20,7 @@ from server.wire.loading import build_config
 from tracking.boxes import iou
 from tracking.detectors import BackgroundDetector
 from tracking.motchallenge import read_rows
+from tracking.temporal import TemporalSettings
 
 SIZE = (640, 480)
 _STRIDE = 5
@@ -105,6 +107,16 @@ def test_who_stands_upright_and_who_is_seen_from_above_do_not_vouch_for_each_oth
     assert _config("upright").witnesses("c0") == ("c1",)
     assert not _config("overhead").witnesses("c0")
     assert _config("overhead").overhead == {"c0", "c1"}
+
+
+def test_floor_is_measured_across_all_of_the_picture_that_is_looked_at() -> None:
+    # Six metres across a picture of 4 by 3, which has black columns at its sides in a site of 16 by 9.
+    config = _config("overhead", ground=np.diag([0.0125, 0.0125, 1.0]).tolist(), ground_unit="m")
+    across = [
+        _measured(TemporalSettings(), config.cameras[0], Fit((480, 360), site)).room_m
+        for site in ((480, 360), (640, 360), (960, 720))
+    ]
+    assert across == pytest.approx([6.0, 8.0, 6.0])
 
 
 def test_another_kind_is_refused() -> None:
