@@ -44,21 +44,22 @@ class Findable:
         self._own = np.full(cameras, prior)
         self._shares = np.full((cameras, _ROWS, _COLUMNS), prior)
 
-    def learn(self, camera: Ints, feet: Floats, found: Mask, looks: float, kept: float) -> None:
+    def learn(self, camera: Ints, feet: Floats, found: Mask, looks: Floats | float, kept: float) -> None:
         """Take in whom cameras were to find, and whether they did.
 
         Args:
             camera: (V,) whose look each is.
             feet: (V, 2) where in its picture, pixels.
             found: (V,).
-            looks: that each of them stands for.
+            looks: that each of them stands for, (V,) or all of them.
             kept: the share of what was known that is not forgotten by now.
         """
         cells = self._cells(camera, feet)
         self._counts *= kept
         flat = self._counts.reshape(2, -1)
-        flat[0] += looks * np.bincount(cells, minlength=flat.shape[1])
-        flat[1] += looks * np.bincount(cells[found], minlength=flat.shape[1])
+        weights = np.broadcast_to(np.asarray(looks, dtype=np.float64), cells.shape)
+        flat[0] += np.bincount(cells, weights, flat.shape[1])
+        flat[1] += np.bincount(cells[found], weights[found], flat.shape[1])
         looked, seen = self._counts.sum(axis=(2, 3))
         self._own = (seen + self._many * self._prior) / (looked + self._many)
         around = uniform_filter(self._counts, (1, 1, _AROUND, _AROUND), mode="constant") * _AROUND**2

@@ -93,7 +93,9 @@ class Elsewhere:
         if not of.size:  # nothing is forgotten either while nobody is there
             return
         kept = math.exp(-frames / (_KEPT_S * self._fps))
-        self._findable.learn(tested.camera[of], tested.feet[of], tested.found[of], self._every, kept)
+        # The next outlook begins with a look, however soon: each stands for the frames up to then.
+        looks = np.minimum(self._every, frames - tested.frame[of]).astype(np.float64)
+        self._findable.learn(tested.camera[of], tested.feet[of], tested.found[of], looks, kept)
 
     def _floor(self) -> _Floor:
         spoken = [at for at, name in enumerate(self._cameras) if name in self._sight.fits]

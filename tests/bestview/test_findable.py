@@ -81,6 +81,14 @@ def _adjoin(one: np.ndarray, two: np.ndarray) -> bool:
     return bool(np.abs(cells[0] - cells[1]).max() <= 1)
 
 
+def test_looks_may_each_stand_for_as_many_as_they_like() -> None:
+    one, other = findable(), findable()
+    one.learn(np.zeros(2, int), np.array([HERE, FAR]), np.array([True, False]), np.array([3.0, 7.0]), 1.0)
+    look(other, HERE, found=True, times=3)
+    look(other, FAR, found=False, times=7)
+    assert [share(one, it) for it in (HERE, FAR)] == pytest.approx([share(other, it) for it in (HERE, FAR)])
+
+
 def trust(it: Findable, place: np.ndarray, camera: int = 0) -> float:
     return float(it.trust(np.array([camera]), place[None])[0])
 

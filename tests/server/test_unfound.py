@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,10 @@ from hypothesis import strategies as st
 
 from server.view.board import reason
 from server.view.decide import Decider, GopDecision
+from server.view.elsewhere import Elsewhere
+from server.view.sight import Sight
+from server.view.unfound import Tested as Looked
+from server.view.unfound import Unfound
 from server.wire.messages import Box
 
 A, B = CAMERAS
@@ -112,6 +117,18 @@ def test_why_says_who_does_not_find_them_and_what_that_view_is_worth() -> None:
     assert worth == pytest.approx(2.0 * alone), "twice as large, and people are always found there"
     assert why.views[B].cost == pytest.approx(0.0)
     assert reason(decisions[-1].choices[0], why).startswith("c1 does not find this person, but")
+
+
+@pytest.mark.parametrize("frames", [1, 4, 10, 13, 25])
+def test_a_look_stands_for_the_frames_to_the_next_one_and_for_none_that_are_decided_later(
+    frames: int,
+) -> None:
+    it = Elsewhere(small_config(), Sight(small_config(), GROUND, {}))
+    looks = np.array([0, 10, 20])
+    cameras, feet = np.zeros(3, int), np.full((3, 2), 20.0)
+    tested = Looked(looks, cameras, feet, np.ones(3, dtype=np.bool_))
+    it.learn(replace(Unfound.nobody(), tested=tested), frames)
+    assert it._findable._counts[0].sum() == frames, "the next outlook begins with a look"
 
 
 def test_the_factor_is_what_such_views_are_worth() -> None:
