@@ -14,7 +14,7 @@ from server.web.keys import SERVICE
 from server.web.operator_permission import PREFIX
 from server.web.operator_schema import Pointing
 from server.web.operator_session import asked_for
-from server.wire.help import POINTS_MOST
+from server.wire.help import POINTS_MOST, REACH_LEAST
 from server.wire.numbers import Pulse
 
 routes = web.RouteTableDef()
@@ -80,7 +80,7 @@ def _wrong(service: BestViewService, point: Point) -> str:
 
 def _place(point: Point, width: int) -> Place:
     reach = _REACH * width if point.reach is None else min(point.reach, _REACH_MOST * width)
-    return Place(point.pulse, point.x, point.y, reach)
+    return Place(point.pulse, point.x, point.y, max(reach, REACH_LEAST))
 
 
 def _cannot(service: BestViewService) -> str:

@@ -9,7 +9,7 @@ import msgspec
 from server.wire.numbers import Coordinate, Number, Pulse
 
 TROUBLES_MOST = 32
-"""Troubles that a camera tells of one window at most; the nearest ones."""
+"""Troubles that a camera tells of one window at most; the worst ones."""
 
 TroubleReason = Literal["alike", "fading", "gap", "exchange"]
 """Two who look alike are about to cross; somebody fades into the background; the window is not proven; two
@@ -32,6 +32,10 @@ POINTS_MOST = 256
 """Places that are pointed at in one message at most: ten seconds at 25 frames a second."""
 
 
+REACH_LEAST = 1.0
+"""Pixels by which any pointing may be off: nobody points better."""
+
+
 class Pointed(msgspec.Struct, frozen=True, kw_only=True):
     """Whom a track follows is at this place, says somebody who sees it."""
 
@@ -40,7 +44,7 @@ class Pointed(msgspec.Struct, frozen=True, kw_only=True):
     x: Coordinate
     """Pixels of the site's picture, as ``y`` and ``reach``."""
     y: Coordinate
-    reach: Annotated[float, msgspec.Meta(gt=0, le=1e4)]
+    reach: Annotated[float, msgspec.Meta(ge=REACH_LEAST, le=1e4)]
     """How far off the pointing may be."""
 
 

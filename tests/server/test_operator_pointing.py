@@ -60,6 +60,8 @@ async def test_the_camera_is_told_by_its_own_track(helped: Hall) -> None:
     status, answer = await say(helped, at(7), camera=B)
     assert (status, answer["taken"]) == (200, 1)
     assert told[1][0] == B
+    assert (await say(helped, at(7, reach=1e-200)))[0] == 200
+    assert told[2][1].points[0].reach == 1.0, "nobody points better than a pixel, and squares of this are 0"
 
 
 async def test_what_is_too_long_ago_is_left_out_and_said(helped: Hall) -> None:
@@ -158,8 +160,9 @@ def test_a_camera_takes_what_is_said_of_its_own_tracks_and_no_more_than_it_can_h
     hear({"boot": 1, "points": [{"pulse": 1, **point}]})
     for first in (0, 200):
         hear({"boot": 2, "points": [{"pulse": first + it, **point} for it in range(200)]})
-    for bad in (b"", b"[" * 100_000, b"{}", {"boot": 2, "points": [{"pulse": -1, **point}]}):
+    sharp = {"boot": 2, "points": [{"pulse": 1, **point, "reach": 1e-200}]}
+    for bad in (b"", b"[" * 100_000, b"{}", {"boot": 2, "points": [{"pulse": -1, **point}]}, sharp):
         hear(bad)
-    assert pointed.bad_messages == 4
+    assert pointed.bad_messages == 5
     assert [it.frame for it in pointed.take()] == list(range(400 - 256, 400))
     assert pointed.take() == []
