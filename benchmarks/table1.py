@@ -44,32 +44,32 @@ _QUICK = 150
 """Frames, the last ones of each view: there somebody is."""
 
 
-def recorded(data: Path) -> Iterator[tuple[View, float]]:
-    """Give the recordings that there are, with their rates."""
+def recorded(data: Path) -> Iterator[View]:
+    """Give the recordings that there are."""
     for scene, name, rate in _RECORDED:
         video, truth = data / scene / f"{name}.mp4", data / scene / "gt" / f"{name}.txt"
         if video.is_file() and truth.is_file():
-            yield _searched(f"{scene} {name}", video, truth), rate
+            yield _searched(f"{scene} {name}", video, truth, rate)
 
 
-def drawn(seconds: float) -> Iterator[tuple[View, float]]:
+def drawn(seconds: float) -> Iterator[View]:
     """Draw the scenes, as `myview scene` does, and search them."""
     for name, people, seed in _DRAWN:
         scene = Scene(name, cameras=1, objects=people, seed=seed)
         with tempfile.TemporaryDirectory() as folder:
             out = Path(folder) / "scene"
             write_recording(scene, out, seconds)
-            yield _searched(f"{name}, {people} people", out / "c0.mp4", out / "gt" / "c0.txt"), scene.fps
+            yield _searched(f"{name}, {people} people", out / "c0.mp4", out / "gt" / "c0.txt", scene.fps)
 
 
-def _searched(name: str, video: Path, truth: Path) -> View:
-    return View(name, list(searched(loaded_for(video, None, None))), read_rows(truth))
+def _searched(name: str, video: Path, truth: Path, fps: float) -> View:
+    return View(name, list(searched(loaded_for(video, None, None))), read_rows(truth), fps)
 
 
 def _shortened(view: View, frames: int) -> View:
     """Give the last frames of a view."""
     last = view.frames[-frames:]
-    return View(view.name, last, [row for row in view.truth if row.frame > last[0].number])
+    return View(view.name, last, [row for row in view.truth if row.frame > last[0].number], view.fps)
 
 
 def measure(options: argparse.Namespace) -> None:
@@ -77,12 +77,12 @@ def measure(options: argparse.Namespace) -> None:
     report = Report()
     table: dict[str, list[Measured]] = {name: [] for name in tracker_names()}
     # One after the other: the pictures of all of them at once are gigabytes.
-    for whole, rate in chain(recorded(options.data), drawn(_DRAWN_S)):
+    for whole in chain(recorded(options.data), drawn(_DRAWN_S)):
         view = _shortened(whole, options.frames) if options.frames else whole
         for name, found in table.items():
-            found.append(measured(view, rate, name))
+            found.append(measured(view, name))
         report.table(
-            f"{view.name}: {len(view.frames)} frames at {rate:.0f} fps",
+            f"{view.name}: {len(view.frames)} frames at {view.fps:.0f} fps",
             ["", "survived", "switches", "IDF1 %", "HOTA %", "targets", "ms", "fps"],
             [[name, *_cells(found[-1])] for name, found in table.items()],
         )

@@ -52,10 +52,10 @@ class Row:
         return self.kept / max(self.hidden, 1)
 
 
-def measured(view: View, rate: float, tracker: str) -> Measured:
-    """Let one tracker follow one view of `rate` frames a second."""
-    rows, milliseconds = follow(tracker, view.frames)
-    around = round(rate)
+def measured(view: View, tracker: str) -> Measured:
+    """Let one tracker follow one view."""
+    rows, milliseconds = follow(tracker, view)
+    around = round(view.fps)
     found = occlusions(view.truth, around)
     scores = evaluate(view.truth, rows)
     there = sum(row.confidence != 0.0 for row in view.truth) / len(view.frames)

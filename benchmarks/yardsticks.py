@@ -34,7 +34,8 @@ from tracking.yardsticks import Preparing, tracker_named, tracker_names
 CEILING = "perfect association"
 _SHOWN = ("hota", "mota", "idf1", "recall", "precision", "switches", "tracks", "objects")
 _AHEAD, _AHEAD_EVERY = 500, 20
-_VIEWS = (("pets09", "view1"), ("terrace", "c0"), ("terrace", "c1"))
+_VIEWS = (("pets09", "view1", 7.0), ("terrace", "c0", 25.0), ("terrace", "c1", 25.0))
+"""Scene, view, frames a second: what a file says of itself need not be what was filmed."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,6 +45,7 @@ class View:
     name: str
     frames: Sequence[Frame]
     truth: Sequence[MotRow]
+    fps: float
 
     @property
     def detections(self) -> list[MotRow]:
@@ -62,22 +64,25 @@ def views(data: Path, most: int | None) -> list[View]:
         CannotRunError: there is none.
     """
     found = []
-    for scene, name in _VIEWS:
+    for scene, name, rate in _VIEWS:
         video, truth = data / scene / f"{name}.mp4", data / scene / "gt" / f"{name}.txt"
         if video.is_file() and truth.is_file():
             frames = [
                 it for it in searched(loaded_for(video, None, None)) if most is None or it.number < most
             ]
             rows = [row for row in read_rows(truth) if row.frame <= len(frames)]
-            found.append(View(f"{scene} {name}", frames, rows))
+            found.append(View(f"{scene} {name}", frames, rows, rate))
     if not found:
         raise CannotRunError(f"needs pets09 or terrace in {data}; --data or MYVIEW_TEST_DATA say where")
     return found
 
 
-def follow(name: str, frames: Sequence[Frame]) -> tuple[list[MotRow], float]:
+def follow(name: str, view: View) -> tuple[list[MotRow], float]:
     """Give a tracker's tracks, and the milliseconds that it took for each frame."""
-    tracker = tracker_named(name, WindowSettings(), CostSettings(), lambda: solver_named(DEFAULT_SOLVER))
+    frames = view.frames
+    tracker = tracker_named(
+        name, WindowSettings(), CostSettings(), lambda: solver_named(DEFAULT_SOLVER), fps=view.fps
+    )
     if isinstance(tracker, Preparing):  # as a recording is looked at ahead
         tracker.prepare(it.image for it in frames[:_AHEAD:_AHEAD_EVERY] if it.image is not None)
     rows: list[MotRow] = []
@@ -96,7 +101,7 @@ def measure(options: argparse.Namespace) -> None:
     for view in views(options.data, options.frames):
         found = table[view.name] = {}
         for name in tracker_names():
-            rows, milliseconds = follow(name, view.frames)
+            rows, milliseconds = follow(name, view)
             found[name] = evaluate(view.truth, rows)
             took.setdefault(name, []).append(milliseconds)
         found[CEILING] = evaluate(view.truth, perfect_association(view.detections, view.truth))
