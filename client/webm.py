@@ -46,7 +46,7 @@ class ElementReader:
             WebmError: a name or a size that no element can have.
         """
         self._rest += data
-        while (element := _first(self._rest)) is not None:
+        while (element := _element(self._rest, 0)) is not None:
             del self._rest[: len(element.data)]
             yield element
 
@@ -57,7 +57,7 @@ def cluster_time(cluster: Element) -> int:
     Raises:
         WebmError: it does not say.
     """
-    for element in ElementReader().feed(cluster.content):
+    for element in _inside(cluster):
         if element.name == _TIMESTAMP and len(element.content) <= _LONGEST_NUMBER:
             return int.from_bytes(element.content, "big")
     raise WebmError("a cluster without a time")
@@ -65,7 +65,7 @@ def cluster_time(cluster: Element) -> int:
 
 def is_key(cluster: Element) -> bool:
     """Tell whether a cluster begins with a key frame."""
-    for element in ElementReader().feed(cluster.content):
+    for element in _inside(cluster):
         if element.name == _SIMPLE_BLOCK:
             content = element.content
             return len(content) > 3 and bool(content[3] & _KEY)  # noqa: PLR2004 — track, time, flags
@@ -75,7 +75,7 @@ def is_key(cluster: Element) -> bool:
 def at_time(cluster: Element, ticks: int) -> bytes:
     """Give the cluster at another time, as many bytes as before."""
     parts = []
-    for element in ElementReader().feed(cluster.content):
+    for element in _inside(cluster):
         if element.name == _TIMESTAMP:
             parts.append(element.data[: element.head] + ticks.to_bytes(len(element.content), "big"))
         else:
@@ -101,17 +101,25 @@ def _size(size: int) -> bytes:
     return (size | 1 << 56).to_bytes(_LONGEST_NUMBER, "big")
 
 
-def _first(data: bytes | bytearray) -> Element | None:
-    """Give the element that the bytes begin with; None if it is not whole yet."""
-    name, at = _number(data, 0, marked=True)
+def _inside(element: Element) -> Iterator[Element]:
+    """Give the elements inside another."""
+    at = element.head
+    while (inner := _element(element.data, at)) is not None:
+        at += len(inner.data)
+        yield inner
+
+
+def _element(data: bytes | bytearray, begin: int) -> Element | None:
+    """Give the element that begins there; None if it is not whole yet."""
+    name, at = _number(data, begin, marked=True)
     size, end = _number(data, at, marked=False) if at else (0, 0)
     if not end:
         return None
     if name == SEGMENT:
-        return Element(name, bytes(data[:end]), end)
+        return Element(name, bytes(data[begin:end]), end - begin)
     if size > LARGEST:
         raise WebmError(f"an element of {size} bytes")
-    return None if end + size > len(data) else Element(name, bytes(data[: end + size]), end)
+    return None if end + size > len(data) else Element(name, bytes(data[begin : end + size]), end - begin)
 
 
 def _number(data: bytes | bytearray, at: int, *, marked: bool) -> tuple[int, int]:

@@ -95,10 +95,14 @@ def secure(secrets: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Service]:
     yield from serving(service)
 
 
-async def test_pulses_are_well_while_somebody_greets(monkeypatch: pytest.MonkeyPatch) -> None:
-    async with PulseServer(25.0) as server:
+@pytest.mark.parametrize("users", [None, {"c0": "a password"}])
+async def test_pulses_are_well_while_somebody_greets(
+    monkeypatch: pytest.MonkeyPatch, users: dict[str, str] | None
+) -> None:
+    async with PulseServer(25.0, users=users) as server:
         monkeypatch.setenv("MYVIEW_SYNC__PORT", str(server.port))
         assert await _apart("sync") == 0
+        assert server.refused == 0, "whoever looks every few seconds is no stranger who is told of"
     monkeypatch.setenv("MYVIEW_SYNC__PORT", str(free_port()))
     assert await _apart("sync") == 1
 
