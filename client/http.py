@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import os
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
@@ -113,7 +114,7 @@ async def get_any(url: URL, settings: HttpSettings, accept: str) -> AsyncIterato
     except aiohttp.TooManyRedirects as error:
         raise AwayError(f"{url.origin()}: leads on and on, and nowhere") from error
     except aiohttp.ClientError as error:
-        raise AwayError(f"{url.origin()}: {_one_line(error)}") from error
+        raise AwayError(f"{url.origin()}: {_why_away(error)}") from error
     except TimeoutError as error:
         raise AwayError(f"{url.origin()}: no answer") from error
 
@@ -219,7 +220,11 @@ def _error_text(body: bytes) -> str | None:
     return words.splitlines()[0] if words.strip() else None
 
 
-def _one_line(error: Exception) -> str:
-    """Give a library's words, which may be several lines and quote what came."""
+def _why_away(error: aiohttp.ClientError) -> str:
+    """Say in one line why there is no answer: the library's words may be several, and quote what came."""
     words = error.message if isinstance(error, aiohttp.ClientResponseError) else str(error)
+    if isinstance(error, aiohttp.ClientConnectorError) and not isinstance(error, aiohttp.ClientSSLError):
+        number, told = error.os_error.errno, error.os_error.strerror
+        # A name that is not known has a number below 0, and words of its own.
+        words = (os.strerror(number) if number and number > 0 else told) or words
     return " ".join(words.split())[:_MAX_SHOWN] or type(error).__name__

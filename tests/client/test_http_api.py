@@ -44,8 +44,16 @@ async def test_an_unknown_object_is_told_in_the_servers_words(site_url: str) -> 
 async def test_nobody_there_is_an_away_error() -> None:
     with socket.socket() as held:  # bound and not listening: nobody can be there
         held.bind(("127.0.0.1", 0))
-        with pytest.raises(client.AwayError, match=r"127\.0\.0\.1"):
-            await client.objects(f"http://127.0.0.1:{held.getsockname()[1]}")
+        url = f"http://127.0.0.1:{held.getsockname()[1]}"
+        with pytest.raises(client.AwayError, match=f"^{url}: Connection refused$"):
+            await client.objects(url)
+
+
+async def test_a_name_that_nobody_has_is_said_to_be_unknown() -> None:
+    with pytest.raises(client.AwayError) as caught:
+        await client.objects("http://nobody.invalid")
+    assert "ssl" not in str(caught.value)
+    assert "nobody.invalid: " in str(caught.value)
 
 
 @pytest.mark.parametrize(
