@@ -44,7 +44,9 @@ def read_yaml(path: Path, what: str) -> Any:
     try:
         return yaml.load(text, Loader=_Loader)  # noqa: S506 — the safe loader, made safer
     except yaml.YAMLError as error:
-        raise UserError(f"{path}: is not valid YAML: {' '.join(str(error).split())[:_SHOWN]}") from error
+        # It names the file as it knows it, which is a string in memory.
+        words = " ".join(str(error).split()).replace(' in "<unicode string>",', ",")
+        raise UserError(f"{path}: is not valid YAML: {words[:_SHOWN]}") from error
     except RecursionError as error:
         raise UserError(f"{path}: is not valid YAML: brackets within brackets without end") from error
     except (ValueError, LookupError, TypeError, AttributeError) as error:  # how PyYAML says `!!int x` is none

@@ -196,6 +196,7 @@ def test_what_is_no_mapping_of_sections_is_refused(content: str, tmp_path: Path)
     with pytest.raises(UserError, match=r"site\.yaml") as caught:
         load_config(path)
     assert "\n" not in str(caught.value)
+    assert "<unicode string>" not in str(caught.value)
 
 
 def test_every_example_configuration_loads() -> None:
