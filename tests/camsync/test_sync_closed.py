@@ -9,8 +9,6 @@ from contextlib import asynccontextmanager
 from itertools import pairwise
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from pulses_by_hand import PATIENCE, ByHand, Connect
 
 from camsync import (
@@ -28,11 +26,11 @@ from camsync import (
 from camsync.messages import Challenge, Greeting, Refusal
 from camsync.proof import Proof
 from camsync.protocol import parse_server_line
-from camsync.seal import SealError, Seals, new_nonce
 
 FPS = 400.0
 USERS = {"c0": "zero" * 16, "c1": "one!" * 16, "bestview": "best" * 16}
-QUICK = ClientSettings(backoff_first=0.01, backoff_most=0.05)
+PATIENT = ClientSettings(backoff_first=0.01, backoff_most=0.05, queue=100_000, catch_up=PATIENCE)
+"""Loses nothing, however busy the machine is."""
 HERE = "127.0.0.1"
 C0 = Login("c0", USERS["c0"])
 
@@ -57,7 +55,7 @@ async def take(client: PulseClient, count: int) -> list[Pulse]:
 async def test_who_knows_a_password_gets_every_pulse_and_may_ask_who_is_there() -> None:
     limits = ServerLimits(catch_up=PATIENCE)
     async with PulseServer(FPS, expect={"c0"}, start_timeout=1000.0, users=USERS, limits=limits) as server:
-        async with PulseClient(HERE, server.port, "c0", login=C0) as client:
+        async with PulseClient(HERE, server.port, "c0", settings=PATIENT, login=C0) as client:
             pulses = await take(client, 30)
             assert [it.number for it in pulses] == list(range(30))
             assert client.status().connected
@@ -136,9 +134,10 @@ async def test_what_another_connection_said_opens_nothing(by_hand: Connect) -> N
 
 
 async def test_strangers_in_masses_keep_nobody_out(by_hand: Connect) -> None:
-    async with PulseServer(FPS, users=USERS, limits=ServerLimits(strangers=4, clients=2)) as server:
+    limits = ServerLimits(strangers=4, clients=2, catch_up=PATIENCE)
+    async with PulseServer(FPS, users=USERS, limits=limits) as server:
         crowd = [await by_hand(server.port) for _ in range(50)]
-        async with PulseClient(HERE, server.port, "c0", login=C0) as client:
+        async with PulseClient(HERE, server.port, "c0", settings=PATIENT, login=C0) as client:
             numbers = [it.number for it in await take(client, 20)]
             crowd += [await by_hand(server.port) for _ in range(50)]
             numbers += [it.number for it in await take(client, 20)]
@@ -229,12 +228,14 @@ async def in_between(port: int, changed: Callable[[int, bytes], bytes]) -> Async
 
 @pytest.mark.parametrize("way", ["changed", "doubled", "left out"])
 async def test_who_sits_in_between_misleads_nobody(way: str, caplog: pytest.LogCaptureFixture) -> None:
-    """From the 20th line on: the client then follows nobody, and counts by itself."""
+    """One pulse after the 20th line: the client then follows nobody, counts by itself, and comes anew."""
     caplog.set_level(logging.WARNING, "camsync.client")
+    misled: list[bytes] = []
 
     def misleading(number: int, line: bytes) -> bytes:
-        if number != 20:
+        if misled or number < 20 or not line.startswith(b"PULSE "):
             return line
+        misled.append(line)
         ways = {"changed": line.replace(b"PULSE ", b"PULSE 9", 1), "doubled": line + line, "left out": b""}
         return ways[way]
 
@@ -242,65 +243,10 @@ async def test_who_sits_in_between_misleads_nobody(way: str, caplog: pytest.LogC
     async with (
         PulseServer(FPS, users=USERS, limits=limits) as server,
         in_between(server.port, misleading) as port,
-        PulseClient(HERE, port, "c0", settings=QUICK, login=C0) as client,
+        PulseClient(HERE, port, "c0", settings=PATIENT, login=C0) as client,
     ):
         numbers = [it.number for it in await take(client, 100)]
-        assert client.status().connections > 1
+        while client.status().connections < 2:
+            numbers += [it.number for it in await take(client, 1)]
     assert all(later == earlier + 1 for earlier, later in pairwise(numbers))
     assert "what it says is not sealed by the password" in caplog.text
-
-
-LINES = st.lists(st.binary(max_size=30).filter(lambda it: not {*b"\r\n"} & {*it}), min_size=1, max_size=6)
-
-
-@given(LINES, st.data())
-def test_of_what_was_tampered_with_no_more_is_believed_than_came_before_it(
-    lines: list[bytes], data: st.DataObject
-) -> None:
-    nonces = (new_nonce(), new_nonce())
-    ours, theirs = (Seals.of("secret", "c0", nonces) for _ in range(2))
-    sealed = ours.server.sealed(b"".join(line + b"\n" for line in lines)).splitlines()
-    place = data.draw(st.integers(0, len(sealed) - 1))
-    spoiled = data.draw(
-        st.one_of(
-            st.permutations(sealed),
-            st.just(sealed[:place] + sealed[place + 1 :]),
-            st.just([*sealed[: place + 1], sealed[place], *sealed[place + 1 :]]),
-            st.tuples(st.integers(0, len(sealed[place]) - 1), st.integers(1, 255)).map(
-                lambda it: [*sealed[:place], flipped(sealed[place], *it), *sealed[place + 1 :]]
-            ),
-            st.just([ours.client.sealed(b"PING 1\n")[:-1], *sealed]),
-        )
-    )
-    opened = []
-    try:
-        for line in spoiled:
-            opened.append(theirs.server.opened(line))  # noqa: PERF401 — as many as there are
-    except SealError:
-        same = next((at for at, (a, b) in enumerate(zip(spoiled, sealed, strict=False)) if a != b), None)
-        assert opened == lines[: len(opened)]
-        assert same is None or len(opened) <= same
-    else:
-        assert opened == lines[: len(opened)]
-        assert spoiled == sealed[: len(spoiled)]
-
-
-def flipped(line: bytes, place: int, bits: int) -> bytes:
-    return line[:place] + bytes([line[place] ^ bits]) + line[place + 1 :]
-
-
-@given(st.text(max_size=8), st.text(max_size=8), st.sampled_from(["c0", "c1"]), st.integers(0, 2))
-def test_keys_are_of_one_password_one_user_one_pair_of_nonces_and_one_way(
-    password: str, other: str, user: str, which: int
-) -> None:
-    nonces = ("1" * 32, "2" * 32)
-    line = Seals.of(password, "c0", nonces).client.sealed(b"WHO\n")[:-1]
-    theirs = [nonces, (nonces[1], nonces[0]), (nonces[0], nonces[0])][which]
-    seals = Seals.of(other, user, theirs)
-    if (password, "c0", nonces) == (other, user, theirs):
-        assert seals.client.opened(line) == b"WHO"
-    else:
-        with pytest.raises(SealError):
-            seals.client.opened(line)
-    with pytest.raises(SealError):
-        Seals.of(password, "c0", nonces).server.opened(line)
