@@ -14,7 +14,7 @@ from benchmarks.fuzz_pulse_wire import Clock, Wire
 from benchmarks.fuzz_target import Target
 from camsync import ClientSettings, Login, PulseClient, PulseServer
 from camsync.link import Link
-from camsync.messages import Beat, Challenge, Greeting, Hello, Ping, Refusal, Who
+from camsync.messages import Beat, Challenge, Greeting, Hello, Ping, Refusal, ServerLine, Who
 from camsync.proof import Proof
 from camsync.protocol import encode, parse_server_line
 from camsync.seal import Seals
@@ -118,7 +118,8 @@ class Between(Target):
         self._foreseen.start()
         seals = Seals.of(_LOGIN.password, "c0", _NONCES)
         beats = [Beat(number, 1000.0 + number / 25) for number in range(_BEATS)]
-        said = b"".join(encode(it) for it in (Greeting(1, 25.0, 1000.0, None), *beats))
+        lines: tuple[ServerLine, ...] = (Greeting(1, 25.0, 1000.0, None), *beats)
+        said = b"".join(map(encode, lines))
         self._right = seals.server.sealed(said).splitlines(keepends=True)
 
     def make(self, rng: Random) -> bytes:
