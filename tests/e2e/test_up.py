@@ -17,6 +17,8 @@ import numpy as np
 import pytest
 import pytest_asyncio
 import zenoh
+from monitoring_files import ASKED, OF_PROMETHEUS
+from promql_series import Printed, given, selectors
 from running_site import CAMERAS, RunningSite, bounded, configuration, running
 from spliced import pictures, record, shown_from_to
 
@@ -81,6 +83,16 @@ async def test_metadata_is_readable_by_a_plain_zenoh_subscriber(site: RunningSit
         waiting.discard(tracks["camera"])
     subscriber.undeclare()
     await asyncio.to_thread(session.close)
+
+
+async def test_every_panel_and_every_alert_is_about_something_that_the_site_prints(site: RunningSite) -> None:
+    async with aiohttp.ClientSession() as session, session.get(f"{site.url}metrics") as answer:
+        printed = Printed.of(await answer.text())
+    for asked in ASKED:
+        if not {it.name for it in selectors(asked.expression)} <= OF_PROMETHEUS:
+            series = given(asked.expression, printed)
+            assert series, asked.place
+            assert all(asked.shown <= dict(it).keys() for it in series), asked.place
 
 
 async def test_every_frame_is_the_chosen_cameras_own_pixel_for_pixel_across_cuts(

@@ -2,100 +2,41 @@
 
 from __future__ import annotations
 
-import json
-import re
-from collections.abc import Iterator
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
-
-import promql_parser as promql
 import pytest
-import yaml
 from cameras_by_hand import CAMERAS, status, tracks, word
 from halls import Hall
-from prometheus_client.parser import text_string_to_metric_families
+from monitoring_files import ALERTS, ASKED, CONFIGS, DASHBOARD, OF_PROMETHEUS, SCRAPING, VARIABLES
+from promql_series import Printed, given, selectors
 
-CONFIGS = Path(__file__).parents[2] / "configs"
-RULES: Any = yaml.safe_load((CONFIGS / "prometheus" / "alerts.yml").read_text(encoding="utf-8"))
-SCRAPING: Any = yaml.safe_load((CONFIGS / "prometheus" / "prometheus.yml").read_text(encoding="utf-8"))
-DASHBOARD: Any = json.loads((CONFIGS / "grafana" / "myview.json").read_text(encoding="utf-8"))
-ALERTS: list[dict[str, Any]] = [rule for group in RULES["groups"] for rule in group["rules"]]
-PANELS: list[dict[str, Any]] = [panel for panel in DASHBOARD["panels"] if panel["type"] != "row"]
-OF_PROMETHEUS = {"up"}
-"""Metrics that are about a service, not of it."""
-GIVEN_BY_PROMETHEUS = {"job", "instance"}
 SEVERITIES = {"critical", "warning", "info"}
 
 
-@dataclass(frozen=True)
-class Asked:
-    """What an expression asks for: a metric, and values that its labels must have."""
-
-    metric: str
-    labels: dict[str, str]
-
-
-def asked(expression: str) -> list[Asked]:
-    """List what a PromQL expression asks for, with the dashboard's variables filled in."""
-    found: list[Asked] = []
-
-    def visit(node: promql.Expr) -> None:
-        if isinstance(node, promql.VectorSelector):
-            equal = [it for it in node.matchers.matchers if it.op == promql.MatchOp.Equal]
-            labels = {it.name: it.value for it in equal if it.name not in GIVEN_BY_PROMETHEUS}
-            found.append(Asked(node.name or "", labels))
-
-    filled = expression.replace("$__rate_interval", "1m").replace("$job", "myview")
-    promql.walk(promql.parse(filled), visit)
-    return found
-
-
-def expressions() -> Iterator[tuple[str, str]]:
-    """Give every expression of both files by its place."""
-    for alert in ALERTS:
-        yield f"alert {alert['alert']}", alert["expr"]
-    for panel in PANELS:
-        for target in panel["targets"]:
-            yield f"panel {panel['title']} {target['refId']}", target["expr"]
-
-
-EXPRESSIONS = list(expressions())
-
-
-async def printed(hall: Hall) -> dict[str, list[dict[str, str]]]:
-    """Give the labels of every sample that /metrics prints, by its name."""
+async def printed(hall: Hall) -> Printed:
+    """Read what /metrics prints of a site in which everything has happened."""
     for camera in CAMERAS:
         hall.service.intake.status(status(camera))
         hall.service.intake.tracks(tracks(word(camera, 2, {}, solved_at=1.0)))
-    found: dict[str, list[dict[str, str]]] = {}
     async with hall.session.get("/metrics") as answer:
         assert answer.status == 200
-        families = text_string_to_metric_families(await answer.text())
-    for sample in (it for family in families for it in family.samples):
-        found.setdefault(sample.name, []).append(sample.labels)
-    return found
+        return Printed.of(await answer.text())
 
 
-async def test_whatever_is_asked_for_is_printed(busy: Hall) -> None:
-    samples = await printed(busy)
-    assert len(EXPRESSIONS) > 50
-    for place, expression in EXPRESSIONS:
-        questions = asked(expression)
-        assert questions, place
-        for question in questions:
-            if question.metric in OF_PROMETHEUS:
-                continue
-            assert question.metric in samples, f"{place}: {question.metric}"
-            assert any(question.labels.items() <= it.items() for it in samples[question.metric]), place
+async def test_every_expression_gives_series_that_have_the_labels_it_shows(busy: Hall) -> None:
+    there = await printed(busy)
+    assert len(ASKED) > 50
+    for asked in ASKED:
+        if {it.name for it in selectors(asked.expression)} <= OF_PROMETHEUS:
+            continue
+        series = given(asked.expression, there)
+        assert series, asked.place
+        assert all(asked.shown <= dict(it).keys() for it in series), asked.place
 
 
 async def test_whatever_is_printed_can_be_looked_at(busy: Hall) -> None:
-    shown = {it.metric for panel in PANELS for t in panel["targets"] for it in asked(t["expr"])}
-    shown |= {it.metric for alert in ALERTS for it in asked(alert["expr"])}
-    for name in await printed(busy):
+    looked_at = {it.name for asked in ASKED for it in selectors(asked.expression)}
+    for name in (await printed(busy)).samples:
         if name.startswith("myview_") and not name.endswith(("_created", "_sum", "_count")):
-            assert name in shown or name in _LOOKED_AT_OTHERWISE, name
+            assert name in looked_at or name in _LOOKED_AT_OTHERWISE, name
 
 
 _LOOKED_AT_OTHERWISE = {
@@ -104,27 +45,50 @@ _LOOKED_AT_OTHERWISE = {
     "myview_config_differs",  # on the operator's page
 }
 
-
-async def test_labels_that_are_shown_are_there(busy: Hall) -> None:
-    samples = await printed(busy)
-    for panel in PANELS:
-        for target in panel["targets"]:
-            shown = set(re.findall(r"\{\{(\w+)\}\}", target["legendFormat"]))
-            metrics = [it.metric for it in asked(target["expr"])]
-            assert all(shown <= set(samples[metric][0]) for metric in metrics), target
-    for alert in ALERTS:
-        shown = set(re.findall(r"\$labels\.(\w+)", alert["annotations"]["summary"])) - GIVEN_BY_PROMETHEUS
-        metrics = [it.metric for it in asked(alert["expr"]) if it.metric not in OF_PROMETHEUS]
-        assert all(shown <= set(samples[metric][0]) for metric in metrics), alert["alert"]
+SAID = """# TYPE a_total counter
+a_total{camera="c0",of="video"} 1
+a_total{camera="c1",of="video"} 1
+# TYPE b gauge
+b{camera="c1"} 1
+b{camera="c2"} 1
+# TYPE h histogram
+h_bucket{camera="c0",le="1"} 1
+h_bucket{camera="c0",le="+Inf"} 1
+"""
 
 
-def test_an_expression_that_asks_for_something_else_would_be_noticed() -> None:
-    assert asked('rate(myview_x_total{job="$job",stage="take"}[$__rate_interval])') == [
-        Asked("myview_x_total", {"stage": "take"})
-    ]
-    assert [it.metric for it in asked("sum(a) / on (camera) b > 2")] == ["a", "b"]
-    with pytest.raises(ValueError, match=r"."):
-        asked("rate(myview_x_total[5m)")
+@pytest.mark.parametrize(
+    ("expression", "series"),
+    [
+        ('rate(a_total{job="x",camera="c0"}[5m])', [{"camera": "c0", "of": "video"}]),
+        ("2 * b > 1", [{"camera": "c1"}, {"camera": "c2"}]),
+        ("sum(b)", [{}]),
+        ("sum(c)", []),
+        ("c == 0", []),
+        ('b{camera="c7"}', []),
+        ("sum by (camera) (rate(a_total[5m])) / b", [{"camera": "c1"}]),
+        ("rate(a_total[5m]) / b", []),
+        ("histogram_quantile(0.5, sum by (le) (rate(h_bucket[5m])))", [{}]),
+        ("histogram_quantile(0.5, rate(h_bucket[5m]))", [{"camera": "c0"}]),
+    ],
+)
+def test_what_an_expression_gives_is_known(expression: str, series: list[dict[str, str]]) -> None:
+    assert given(expression, Printed.of(SAID)) == {frozenset(it.items()) for it in series}
+
+
+@pytest.mark.parametrize(
+    ("expression", "words"),
+    [
+        ("rate(b[5m])", "rate of b, which is a gauge"),
+        ("delta(a_total[5m])", "delta of a_total, which is a counter"),
+        ("sum by (object) (b)", "by labels that there are not"),
+        ("histogram_quantile(0.5, b)", "what has no buckets"),
+        ("rate(a_total[5m)", "."),
+    ],
+)
+def test_what_makes_no_sense_is_noticed(expression: str, words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        given(expression, Printed.of(SAID))
 
 
 def test_every_alert_says_how_bad_it_is_and_has_a_name_of_its_own() -> None:
@@ -138,7 +102,7 @@ def test_every_alert_says_how_bad_it_is_and_has_a_name_of_its_own() -> None:
 def test_prometheus_reads_the_alerts_and_the_page_of_the_demo() -> None:
     assert [(CONFIGS / "prometheus" / name).is_file() for name in SCRAPING["rule_files"]] == [True]
     (job,) = SCRAPING["scrape_configs"]
-    assert job["job_name"] == DASHBOARD["templating"]["list"][1]["current"]["value"] == "myview"
+    assert job["job_name"] == VARIABLES[1]["current"]["value"] == "myview"
     assert job["static_configs"] == [{"targets": ["127.0.0.1:8080"]}]
 
 
