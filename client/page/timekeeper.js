@@ -1,4 +1,4 @@
-/** Asks the server for its clock, well at every connection and now and then after it. */
+/** Asks the server for its clock, and what the site is: well at every connection and now and then after it. */
 
 import { ServerClock } from './clock.js';
 import { getJson, pause } from './http.js';
@@ -8,9 +8,12 @@ import { getJson, pause } from './http.js';
 const EVERY_MS = 10_000;
 const SAMPLES = 4; // one after the other, at every connection
 const BETWEEN_MS = 250;
+const SOON_MS = 500; // while the site itself does not know yet what its streams are
 
 export class Timekeeper {
   #clock = new ServerClock();
+  /** @type {ReturnType<typeof setTimeout> | undefined} */
+  #soon = undefined;
 
   /** @param {Viewer} viewer */
   constructor(viewer) {
@@ -34,6 +37,8 @@ export class Timekeeper {
       this.#clock.add(sent, Date.now(), site.now);
       this.viewer.now.clockOffset = this.#clock.offset;
       this.viewer.setSite(site);
+      clearTimeout(this.#soon);
+      if (site.codec === null) this.#soon = setTimeout(() => this.#ask(), SOON_MS);
     } catch {
       // The events say when the server is away, and when it is back.
     }
