@@ -33,8 +33,8 @@ export class Banner {
   take(flag) {
     this.flags.take(flag);
     const { object } = this.pointing;
-    const more = this.flags.all.some(({ objects }) => object !== null && objects.includes(object));
-    if (flag.state === 'answered' && object !== null && flag.objects.includes(object) && !more) this.#leave();
+    const mine = object !== null && flag.objects.includes(object);
+    if (flag.state === 'answered' && mine && !this.flags.about(object)) this.#leave();
     this.show();
   }
 
@@ -49,11 +49,12 @@ export class Banner {
 
   show() {
     const { flags, pointing, viewer } = this;
-    const [flag] = flags.all;
-    const { site, probe } = viewer;
-    this.#banner.hidden = !flag && pointing.object === null;
-    const target = pointing.object ?? flag?.objects[0] ?? null;
     const on = pointing.object !== null;
+    // Who follows somebody is told what they are followed through, however urgent others are.
+    const flag = on ? flags.about(pointing.object) : flags.all[0];
+    const { site, probe } = viewer;
+    this.#banner.hidden = !flag && !on;
+    const target = pointing.object ?? flag?.objects[0] ?? null;
     const follow = on && target !== null ? `Follow ${label(target)}` : '';
     write(this.#words, [follow, flag ? words(flag, label) : ''].filter(Boolean).join(': '));
     write(this.#when, flag && site && probe.pulse !== null ? ` ${when(flag, probe.pulse, site.fps)}` : '');

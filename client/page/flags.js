@@ -25,9 +25,12 @@ export class Flags {
     return [...this.#open.values()].sort((a, b) => a.pulse - b.pulse || a.margin - b.margin || a.id - b.id);
   }
 
-  /** @returns {number} how many there are */
-  get size() {
-    return this.#open.size;
+  /**
+   * @param {number | null} object
+   * @returns {Flag | undefined} the most urgent that somebody is in
+   */
+  about(object) {
+    return this.all.find(({ objects }) => object !== null && objects.includes(object));
   }
 }
 

@@ -34,11 +34,6 @@ export class Samples {
     if (this.#waiting.length > KEPT) this.#waiting.shift();
   }
 
-  /** @returns {number} how many wait */
-  get size() {
-    return this.#waiting.length;
-  }
-
   /** @returns {Said | null} the first of what waits that can be sent at once; null: nothing waits */
   take() {
     const [first] = this.#waiting;
@@ -47,9 +42,5 @@ export class Samples {
     const end = this.#waiting.findIndex((it) => it.object !== object || it.camera !== camera);
     const taken = this.#waiting.splice(0, end < 0 ? this.#waiting.length : end);
     return { object, camera, points: taken.map(({ points: [point] }) => point) };
-  }
-
-  clear() {
-    this.#waiting = [];
   }
 }

@@ -74,6 +74,23 @@ async def test_the_pointer_is_followed_in_the_picture_of_the_camera_in_doubt(bro
         await expect(visit.page.locator("#cross")).to_be_hidden()
 
 
+async def test_who_follows_somebody_reads_what_for_though_another_flag_is_more_urgent(
+    browser: Browser,
+) -> None:
+    site = FakeSite(operates=True)
+    site.flags.append(flag(site))
+    async with visiting(browser, site) as visit:
+        await visit.playing(1)
+        await visit.page.locator("#flag-point").click()
+        words = visit.page.locator("#flag-words")
+        await expect(words).to_have_text("Follow 2: 2 and 1, alike, cross")
+        site.flags.append(flag(site, 20.0, id=2, objects=[3], reason="fading"))
+        await visit.until("myview.flags.length === 2 && myview.flags[0].id === 2")
+        await expect(words).to_have_text("Follow 2: 2 and 1, alike, cross")
+        await visit.page.locator("#flag-point").click()
+        await expect(words).to_have_text("3 fades, or is lost from sight")
+
+
 async def test_by_keyboard_one_can_point_at_whoever_is_watched(browser: Browser) -> None:
     site = FakeSite(operates=True)
     async with visiting(browser, site) as visit:

@@ -23,6 +23,15 @@ test('the most urgent flag comes first, and one that is over does not come', () 
   assert.deepEqual(flags.all.map(({ id }) => id), [3]);
 });
 
+test('of somebody the most urgent flag that they are in is found, whatever others are in', () => {
+  const flags = new Flags();
+  for (const it of [flag({ objects: [5, 7] }), flag({ id: 2, pulse: 90 }), flag({ id: 3, pulse: 10, objects: [4] })]) flags.take(it);
+  assert.equal(flags.about(7)?.id, 2);
+  assert.equal(flags.about(5)?.id, 1);
+  assert.equal(flags.about(8), undefined);
+  assert.equal(flags.about(null), undefined);
+});
+
 test('it is said who, what and when', () => {
   const called = (/** @type {number} */ it) => (it === 7 ? '7 Ann' : String(it));
   assert.equal(words(flag(), called), '7 Ann and 9, alike, cross');
