@@ -79,7 +79,10 @@ function build(site) {
   sections.set('choosing', new ChoosingForm(tell));
   sections.set('configuration', new Configuration(tell));
   new ServerEvents({
-    opened: () => tell(null),
+    opened: () => {
+      tell(null);
+      flags.open(); // another run of the service has raised others
+    },
     lost: () => tell(new Error('The connection is lost; it is tried again.')),
     heard: (name, data) => {
       if (name === 'gop') floor.add(data);
