@@ -19,6 +19,7 @@ from server.view.calibrate.walking import Walking
 from server.view.codec import agreement_for
 from server.view.decide import Decider, GopDecision, homographies
 from server.view.intake import Intake
+from server.view.lacking import Lacking
 from server.view.past.past import Past
 from server.view.record import Recorder
 from server.view.shelf import Shelf
@@ -81,9 +82,7 @@ class BestViewService:
         self._pulsed_at: float | None = None
         self._clock: Callable[[], float] = time.time
         """The pulses', which does not step when the system's is set."""
-        self.late_epochs = 0
-        self.lost_pictures = dict.fromkeys(cameras, 0)
-        """By camera: pictures of decided GOPs that did not come though it was delivering."""
+        self.lacking = Lacking(self.shelves, self.intake.states, stride)
         self.stages = Stages()
         self.inboxes: list[Inbox[Message]] = []
         """Where the bus's messages wait for the event loop."""
@@ -127,7 +126,7 @@ class BestViewService:
             UserError: the output folder cannot be written.
         """
         if self._out is not None:  # not before all ports are listened on: a failed start leaves no files
-            self._recorder = self._record(self._out)
+            self._recorder = self.lacking.recorder = self._record(self._out)
         self.past.open()
         self.by_hand.open()
         follow = asyncio.create_task(self._follow_pulses(), name="pulses")
@@ -239,7 +238,7 @@ class BestViewService:
         self._changed.set()
 
     def _step(self, epoch: Epoch) -> None:
-        self._note_late(epoch)
+        self.lacking.epoch(epoch)
         self.walking.take(epoch)
         with self.stages.deciding():
             decisions = self.decider.step(epoch)
@@ -273,28 +272,5 @@ class BestViewService:
             self._bus.publish(key, msgspec.json.encode(choices))
         if self._recorder is not None:
             self._recorder.write(decision)
-        self._note_lost(decision)
+        self.lacking.gop(decision)
         self.intake.forget_thumbnails_before(decision.first - self.config.view.identity.forget_after)
-
-    def _note_lost(self, decision: GopDecision) -> None:
-        """Note the pictures of a GOP that did not come, of cameras that were delivering."""
-        for camera, shelf in self.shelves.items():
-            lost = shelf.lost(decision.first, decision.frames)
-            self.lost_pictures[camera] += len(lost)
-            if self._recorder is not None:
-                self._recorder.late(camera, lost, "no picture")
-
-    def _note_late(self, epoch: Epoch) -> None:
-        stride = self.config.track.window.stride
-        for camera in epoch.late:
-            self.late_epochs += 1
-            log.warning("camera %s: its tracks for pulses up to %d came too late", camera, epoch.last)
-        for camera, message in epoch.tracks.items():
-            self.intake.states[camera].unheard += len(message.alone)
-        if self._recorder is None:
-            return
-        for camera in epoch.late:
-            self._recorder.late(camera, range(epoch.last - stride + 1, epoch.last + 1), "tracks late")
-        for camera, message in epoch.tracks.items():
-            self._recorder.late(camera, message.shed, "not searched")
-            self._recorder.late(camera, message.alone, "others not heard")

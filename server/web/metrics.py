@@ -35,7 +35,7 @@ class ServiceCollector(Collector):
         yield CounterMetricFamily(
             "myview_late_epochs",
             "Windows decided without a camera that was there.",
-            value=service.late_epochs,
+            value=service.lacking.late_epochs,
         )
         yield CounterMetricFamily(
             "myview_wrong_tokens",

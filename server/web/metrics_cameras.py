@@ -42,7 +42,7 @@ class CameraStages(Collector):
         )
         for what, words, spread in _SPREADS:
             yield self._spread(what, words, spread)
-        late, lost = self._service.aligner.late_messages, self._service.lost_pictures
+        late, lost = self._service.aligner.late_messages, self._service.lacking.lost_pictures
         yield self._counter("late_windows", "Windows that came too late to count.", lambda it, _: late[it])
         yield self._counter(
             "lost_pictures", "Pictures not there when their GOP was decided.", lambda it, _: lost[it]

@@ -1,0 +1,49 @@
+"""What did not come, or not in time: counted, said in the log, and written into `late.csv`."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping
+
+from server.view.align import Epoch
+from server.view.decide import GopDecision
+from server.view.intake import CameraState
+from server.view.record import Recorder
+from server.view.shelf import Shelf
+
+log = logging.getLogger(__name__)
+
+
+class Lacking:
+    """Notes what was lacking when it was decided. ``recorder``, once there is one, is told of all of it."""
+
+    def __init__(self, shelves: Mapping[str, Shelf], states: Mapping[str, CameraState], stride: int) -> None:
+        self._shelves, self._states, self._stride = shelves, states, stride
+        self.recorder: Recorder | None = None
+        self.late_epochs = 0
+        """Windows that were decided without a camera that was there."""
+        self.lost_pictures = dict.fromkeys(shelves, 0)
+        """By camera: pictures of decided GOPs that did not come though it was delivering."""
+
+    def epoch(self, epoch: Epoch) -> None:
+        """Note whose tracks are late, and what cameras say that they did not do or hear."""
+        for camera in epoch.late:
+            self.late_epochs += 1
+            log.warning("camera %s: its tracks for pulses up to %d came too late", camera, epoch.last)
+        for camera, message in epoch.tracks.items():
+            self._states[camera].unheard += len(message.alone)
+        if self.recorder is None:
+            return
+        for camera in epoch.late:
+            self.recorder.late(camera, range(epoch.last - self._stride + 1, epoch.last + 1), "tracks late")
+        for camera, message in epoch.tracks.items():
+            self.recorder.late(camera, message.shed, "not searched")
+            self.recorder.late(camera, message.alone, "others not heard")
+
+    def gop(self, decision: GopDecision) -> None:
+        """Note the pictures of a GOP that did not come, of cameras that were delivering."""
+        for camera, shelf in self._shelves.items():
+            lost = shelf.lost(decision.first, decision.frames)
+            self.lost_pictures[camera] += len(lost)
+            if self.recorder is not None:
+                self.recorder.late(camera, lost, "no picture")
