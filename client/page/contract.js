@@ -77,6 +77,7 @@
  * @property {string} reason one plain sentence
  * @property {Record<string, number | null>} costs by camera, mean of a frame; null: it cannot be shown
  * @property {Record<string, number>} seen by camera, share of the look-ahead
+ * @property {Record<string, number>} [unfound] likewise: in which it does not find them, who stand before it as others know
  * @property {Record<string, Record<string, number>>} terms by camera: what its quality is made of
  * @property {Record<string, number>} weights by term
  * @property {string | null} before the camera of the GOP before

@@ -47,6 +47,7 @@ class FakeSite:
         recorded: Seconds of the past that are recorded.
         ahead: Seconds that the streams run ahead of the clock: minutes pass in no time.
         blind: Pulses, from GOP to GOP, at which the first camera finds nobody.
+        unfound: Share of the look-ahead in which every camera does not find whom others know to be there.
         operates: Whoever looks at the page may operate.
         flags: What an operator is asked to look at.
         pointed: Where the operator pointed, as it was sent.
@@ -67,6 +68,7 @@ class FakeSite:
     recorded: int = 0
     ahead: float = 0.0
     blind: range = range(0)
+    unfound: float = 0.0
     operates: bool = False
     flags: list[dict[str, Any]] = field(default_factory=list)
     pointed: list[dict[str, Any]] = field(default_factory=list)
@@ -168,6 +170,7 @@ class FakeSite:
             "costs": costs | {CAMERAS[shown - 1]: None},
             "seen": {camera: 1.0 - cost for camera, cost in costs.items()},
             "quality": {camera: 1.0 - cost for camera, cost in costs.items()},
+            "unfound": dict.fromkeys(CAMERAS, self.unfound),
             "terms": {camera: {"size": 1.0 - cost, "whole": 1.0} for camera, cost in costs.items()},
             "weights": {"size": 1.0, "whole": 0.1},
             "before": CAMERAS[shown],
