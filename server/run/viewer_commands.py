@@ -20,7 +20,7 @@ def watch(
         int | None, typer.Option("--object", help="Whom to watch; else all are listed.")
     ] = None,
     out: Annotated[Path | None, typer.Option("--out", help="The file to record into.")] = None,
-    seconds: Annotated[float | None, typer.Option(help="Stop recording after this long.")] = None,
+    seconds: Annotated[float | None, typer.Option(min=0, help="Stop recording after this long.")] = None,
     start: Annotated[
         str | None,
         typer.Option(

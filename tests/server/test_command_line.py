@@ -193,6 +193,14 @@ def test_track_takes_its_settings_from_a_configuration_wherever_it_is(run: Run, 
     assert "widow" in refusal(run("track", "--det", "det.txt", "--out", "t.txt", "--config", path))
 
 
+@pytest.mark.parametrize("seconds", ["nan", "-1"])
+@pytest.mark.parametrize("command", [["demo", "--no-browser"], ["watch", "http://127.0.0.1:1"]], ids=" ".join)
+def test_seconds_that_are_none_are_refused(run: Run, command: list[str], seconds: str) -> None:
+    done = run(*command, "--seconds", seconds)
+    assert done.code == 2
+    assert "--seconds" in done.err
+
+
 def test_watch_says_in_one_line_that_nobody_is_there(run: Run) -> None:
     assert "watch: " in refusal(run("watch", f"http://127.0.0.1:{free()}"))
 
