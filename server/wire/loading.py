@@ -59,7 +59,7 @@ def build_config(content: Mapping[str, Any], *, where: str, folder: Path) -> Con
     except ValidationError as error:
         raise UserError(_one_line(where, error)) from error
     except SettingsError as error:
-        raise UserError(f"{where}: environment: {error}; a section's whole value must be JSON") from error
+        raise UserError(f"{where}: environment: {error}; a list, or a whole section, must be JSON") from error
     check_numbers(config.model_dump(), where)
     return with_files(config, where=where, folder=folder)
 

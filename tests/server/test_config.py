@@ -182,6 +182,15 @@ def test_environment_for_an_unknown_section_is_refused(monkeypatch: pytest.Monke
     assert "MYVIEW_HTP__PORT" in complaint(site())
 
 
+def test_a_list_from_the_environment_is_json_and_who_writes_another_is_told(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("MYVIEW_VIEW__FLAGS__REASONS", '["gap"]')
+    assert build_config(site(), where="", folder=Path()).view.flags.reasons == ["gap"]
+    monkeypatch.setenv("MYVIEW_VIEW__FLAGS__REASONS", "gap")
+    assert "a list, or a whole section, must be JSON" in complaint(site())
+
+
 def test_paths_are_relative_to_the_configuration(tmp_path: Path) -> None:
     path = tmp_path / "site.yaml"
     path.write_text(yaml.safe_dump(site()))
