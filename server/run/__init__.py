@@ -11,7 +11,12 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # What runs until it is told to end may be told while it still loads, which takes a second on a busy machine:
 # that is no failure either. And what is yet to be read need not be read again.
 _SERVING = frozenset({"up", "demo", "sync", "camera", "bestview"})
-if sys.argv[0].rpartition("/")[2] in {"-m", "myview"} and _SERVING.intersection(sys.argv[1:2]):
-    signal.signal(signal.SIGTERM, lambda *_: os._exit(0))
-    if sys.argv[1] != "demo":
+if sys.argv[0].rpartition("/")[2] in {"-m", "myview"}:
+    serves = bool(_SERVING.intersection(sys.argv[1:2]))
+    # Ctrl-C would be answered with a traceback that says which library was just being loaded.
+    if signal.getsignal(signal.SIGINT) == signal.default_int_handler:
+        signal.signal(signal.SIGINT, (lambda *_: os._exit(0)) if serves else signal.SIG_DFL)
+    if serves:
+        signal.signal(signal.SIGTERM, lambda *_: os._exit(0))
+    if serves and sys.argv[1] != "demo":
         signal.signal(signal.SIGHUP, signal.SIG_IGN)

@@ -59,6 +59,8 @@ def main() -> None:
     if os.environ.get(SUPERVISED):
         end_with_parent()
     # So that what is half-written is tidied away; what runs until it is told to end has its own handler.
+    if signal.getsignal(signal.SIGINT) != signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     if signal.getsignal(signal.SIGTERM) == signal.SIG_DFL:
         signal.signal(signal.SIGTERM, lambda *_: sys.exit(_TERMINATED))
     try:

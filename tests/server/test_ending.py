@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
@@ -105,6 +106,48 @@ def test_a_process_that_is_told_to_end_while_it_loads_ends_with_0(tmp_path: Path
     )
     hurried.terminate()
     assert hurried.wait(PATIENCE) == 0, "it had not read its configuration, which is not there"
+
+
+_CTRL_C = """
+import os, signal, sys
+
+class CtrlC:
+    def find_spec(self, name, path=None, target=None):
+        if name == "server.wire.loading":
+            os.kill(os.getpid(), signal.SIGINT)
+
+sys.meta_path.insert(0, CtrlC())
+"""
+"""What presses Ctrl-C while a command still loads."""
+
+
+@pytest.mark.parametrize(
+    ("command", "code"),
+    [(["token", "nobody"], -signal.SIGINT), (["up", "none.yaml"], 0)],
+    ids=["other", "serves"],
+)
+def test_ctrl_c_while_a_command_still_loads_ends_it_without_a_word(
+    tmp_path: Path, command: list[str], code: int
+) -> None:
+    ended = pressed(tmp_path, command)
+    assert (ended.returncode, ended.stdout, ended.stderr) == (code, "", "")
+
+
+def test_a_command_that_is_to_mind_no_ctrl_c_minds_none_while_it_loads(tmp_path: Path) -> None:
+    ended = pressed(tmp_path, ["token", "nobody"], "signal.signal(signal.SIGINT, signal.SIG_IGN)")
+    assert ended.returncode == 0, ended.stderr
+    assert "nobody" in ended.stdout
+
+
+def pressed(folder: Path, command: list[str], before: str = "") -> subprocess.CompletedProcess[str]:
+    (folder / "sitecustomize.py").write_text(_CTRL_C + before, encoding="ascii")
+    return subprocess.run(
+        [sys.executable, "-m", "server.run.cli", *command],
+        env=os.environ | {"PYTHONPATH": os.pathsep.join([str(folder), os.environ.get("PYTHONPATH", "")])},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
 
 
 def caught(status: str, number: signal.Signals) -> bool:
