@@ -41,6 +41,8 @@ COLOURS = (1.0, 0.25)
 WAYS = ("every edge", "edges left by pruning", "person by person")
 _TIMED_EVERY = 60
 """One window in so many is solved in all ways."""
+_LEAST_MINUTES = 8.0
+"""Half of one for each clip: whoever meets has parted by then."""
 
 
 @dataclass(slots=True)
@@ -209,7 +211,10 @@ def main() -> None:
     cv2.setNumThreads(1)
     options = parser(__doc__, "temporal")
     options.add_argument("--minutes", type=float, default=40.0, help="of all clips together")
-    measure(options.parse_args())
+    chosen = options.parse_args()
+    if not _LEAST_MINUTES <= chosen.minutes < float("inf"):
+        options.error(f"--minutes: {_LEAST_MINUTES:g} at least")
+    measure(chosen)
 
 
 if __name__ == "__main__":

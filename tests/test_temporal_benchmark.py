@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.temporal import follow
+from benchmarks.temporal import follow, main
 from benchmarks.temporal_merges import NOBODY, events, merged, mistaken
 from benchmarks.temporal_room import Clip, played
 from tracking.temporal import TemporalSettings
@@ -31,6 +31,16 @@ def test_three_who_join_one_after_the_other_are_one_merge() -> None:
     found = merged(blobs)
     assert len(found) == 3
     assert events(found, blobs) == 1
+
+
+@pytest.mark.parametrize("minutes", ["1", "nan", "inf"])
+def test_clips_in_which_nobody_can_have_met_and_parted_are_refused(
+    minutes: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("sys.argv", ["temporal", "--minutes", minutes])
+    with pytest.raises(SystemExit, match="2"):
+        main()
+    assert "--minutes: 8 at least" in capsys.readouterr().err
 
 
 def test_a_merge_that_does_not_end_is_no_chance() -> None:
