@@ -233,3 +233,27 @@ def test_only_who_asks_for_help_gets_a_tracker_that_takes_it(
 def test_settings_that_make_no_sense_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(ValueError, match=r"must|at least|share"):
         AssistSettings(**wrong)  # type: ignore[arg-type]
+
+
+def test_who_is_pointed_at_has_a_box_of_their_own_where_the_detector_finds_one_for_two() -> None:
+    tracked, stream = _helped(), _crossing()
+    merged = (33, 34, 35, 40, 41)
+    for n in range(33, 42):
+        both = np.array([person.box(n) for person in ALIKE])
+        box = np.concatenate([both[:, :2].min(axis=0), both[:, 2:].max(axis=0)])
+        stream[n] = Detections(box[None], stream[n].scores, stream[n].histograms)
+    shown = final_boxes(follow(stream, _plain()))
+    assert not any(_own(shown[n].get(2), n) for n in merged), "one box is nobody's own"
+    for n, seen in enumerate(stream):
+        tracked.push(n, seen)
+    mended = tracked.point([_at(ALIKE[1], n, 2) for n in range(30, 46)])
+    assert mended is not None
+    boxes = _boxes(mended, 2)
+    assert all(_own(boxes[n - mended.first], n) for n in merged)
+    assert {track.id for track in mended.tracks} == {1, 2}
+    later = [tracked.push(n, seen_at(ALIKE, n, 0.5)) for n in range(80, 100)]
+    assert {track.id for it in later if it for track in it.tracks} == {1, 2}, "nobody begins with such a box"
+
+
+def _own(box: np.ndarray | None, frame: int) -> bool:
+    return box is not None and bool(iou(box, np.array(ALIKE[1].box(frame))) > 0.7)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from tracking.assist.placing import is_found, place_of, with_place
 from tracking.assist.pointing import Pointing, farness
 from tracking.assist.settings import AssistSettings
 from tracking.boxes import BOX_SIDES, Floats, iou
@@ -19,6 +20,9 @@ from tracking.told import Told
 
 _SAME_PLACE = 0.5
 """Overlap (IoU) from which somebody new is the one who began in that frame before."""
+
+_AROUND = 50
+"""Frames before and after in which it is looked how large somebody is."""
 
 _SAME_TIME = 5
 """Frames by which somebody new may begin earlier or later than before."""
@@ -58,6 +62,7 @@ class Memory:
     Attributes:
         seen: the detections, by frame; a frame that is not there showed nothing.
         where: who was in which of them in the end, by frame: the observation's index by id.
+        places: what was made of pointings, by frame: the observation's index by whom it was made for.
         steps: the windows, oldest first.
     """
 
@@ -66,6 +71,7 @@ class Memory:
         self._births: list[Began] = []
         self.seen: dict[int, Detections] = {}
         self.where: dict[int, Mapping[int, int]] = {}
+        self.places: dict[int, dict[int, int]] = {}
         self.steps: deque[Step] = deque()
 
     def look(self, frame: int, detections: Detections) -> None:
@@ -78,7 +84,34 @@ class Memory:
         oldest = min(oldest, self.steps[0].first if self.steps else frame)
         self.seen = {number: it for number, it in self.seen.items() if number >= oldest}
         self.where = {number: it for number, it in self.where.items() if number >= oldest}
+        self.places = {number: it for number, it in self.places.items() if number >= oldest}
         self._births = [it for it in self._births if it.frame >= oldest - _SAME_TIME]
+
+    def place(self, pointing: Pointing, look: Floats) -> None:
+        """Make a place for who is pointed at, where nothing like them is found, or move what was made."""
+        frame, who = pointing.frame, pointing.object
+        size, seen = self._size(who, frame), self.seen.get(frame)
+        if size is None or seen is None:
+            return
+        made = self.places.get(frame, {})
+        real = len(seen) - len(made)
+        box = place_of(pointing, size)
+        if who in made:
+            boxes = seen.boxes.copy()
+            boxes[made[who]] = box
+            self.seen[frame] = Detections(boxes, seen.scores, seen.histograms)
+        elif not is_found(pointing, size, seen.boxes[:real]):
+            self.seen[frame] = with_place(seen, box, look)
+            self.places[frame] = {**made, who: len(seen)}
+
+    def _size(self, who: int, frame: int) -> Floats | None:
+        """Give how large somebody was found around a frame, `(2,)` pixels across and down, in the median."""
+        sides = [
+            self.seen[n].boxes[self.where[n][who]]
+            for n in range(frame - _AROUND, frame + _AROUND + 1)
+            if who in self.where.get(n, {}) and who not in self.places.get(n, {}) and n in self.seen
+        ]
+        return np.median([box[2:] - box[:2] for box in sides], axis=0) if sides else None
 
     def step(self, step: Step) -> None:
         """Take down that a window is solved; later ones are not valid any more."""

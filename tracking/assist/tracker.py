@@ -11,6 +11,7 @@ import numpy.typing as npt
 from tracking.assist.carry import carried
 from tracking.assist.foresight import Foresight
 from tracking.assist.memory import Began, Memory, Step
+from tracking.assist.placing import with_places
 from tracking.assist.pointing import Pointing, pointed_at, with_pointings
 from tracking.assist.settings import AssistSettings
 from tracking.assist.solved import Solved
@@ -28,7 +29,7 @@ from tracking.window import WindowResult, WindowSettings, joined
 _DOUBT = 0.25
 """Share of a pointing's weight from which windows are solved again: small errors change nothing."""
 
-_TRAIL = 40
+_TRAIL = 75
 """Frames up to the newest over which it is looked where everybody was."""
 
 
@@ -104,6 +105,7 @@ class AssistedTracker(OnlineTracker):
     def _hear(self, pointing: Pointing) -> list[int]:
         """Take down a pointing; give the frames that it says something else of than the answer there."""
         self._pointings.setdefault(pointing.frame, {})[pointing.object] = pointing
+        self._place(pointing)
         doubt = self._memory.doubt(pointing, self._assist)
         if not doubt:
             return []
@@ -117,6 +119,15 @@ class AssistedTracker(OnlineTracker):
         if len(frames) > 1:
             self._doubt += self._assist.weight
         return frames
+
+    def _place(self, pointing: Pointing) -> None:
+        """Make sure that there is something at the place that is pointed at."""
+        look = next((it.histogram for it in self._objects if it.id == pointing.object), None)
+        if look is None or pointing.frame not in self._memory.seen:
+            return
+        self._memory.place(pointing, look)
+        if pointing.frame in self._seen:
+            self._seen[pointing.frame] = self._memory.seen[pointing.frame]
 
     def _agreed(self, pointing: Pointing) -> int:
         """Give the frame since which the object may have been somebody else: it was pointed at before."""
@@ -201,9 +212,13 @@ class AssistedTracker(OnlineTracker):
                 # Who is pointed at has got there, however far it is.
                 allowed = allowed or [np.zeros(len(it), dtype=np.bool_) for it in frames]
                 allowed[m] = allowed[m] | pointed_at(pointing, seen.boxes)
+            for who, place in self._memory.places.get(first + m, {}).items():
+                if allowed and who != item.id:
+                    allowed[m][place] = False
         return allowed
 
     def _weighed(self, network: Network, first: int, ids: list[int]) -> Network:
+        network = with_places(network, first, ids, self._memory.places, self._costs.change)
         comeback = self._costs.change + self._costs.course + self._costs.comeback
         network = with_pointings(network, first, ids, self._pointings, self._assist, comeback)
         self._network = ids, network
