@@ -3,34 +3,32 @@
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.assist --out out/bench
 
 Clips of 20 seconds of fish that all look alike are drawn (Todor 2009, section 8.1) and tracked twice: alone,
-and with a simulated operator at the screen who is shown one flag at a time, looks after a while, points at
+and with a simulated operator at the screen, who sees to one flag at a time, looks after a while, points at
 where the fish really is with errors of a hand, and follows it until it is alone again. The picture that
-they see is as late as MyView's is. Thresholds were chosen on clips of even seeds; those of odd seeds are
-measured.
-`--made-up` takes a school of boxes without pictures instead, of which there are many clips in little time.
+they see is as late as MyView's is. What is foreseen becomes a flag where a site would raise one. Risks were
+learned (`python -m benchmarks.assist_risk`) on clips of even seeds; those of odd seeds are measured.
+`--kind school` takes a school of boxes without pictures instead, of which there are many clips in little
+time; `--objects` says how many swim.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
-from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 import cv2
 import matplotlib as mpl
 import matplotlib.pyplot as plt
 
+from benchmarks import assist_curve
 from benchmarks.assist_cases import CAUSES, Cases, count
-from benchmarks.assist_clips import Clip
-from benchmarks.assist_drawn import Film, drawn
+from benchmarks.assist_desk import Desk
+from benchmarks.assist_kinds import Kind, kinds
 from benchmarks.assist_operator import Person
-from benchmarks.assist_school import school
-from benchmarks.assist_watch import FISH, PLAYERS, Watched, watch
+from benchmarks.assist_watch import Watched, watch
 from benchmarks.report import Report
-from benchmarks.surroundings import CannotRunError, finish, parser
-from server.camera.scene import scene_names
+from benchmarks.surroundings import parser
+from server.wire.sections import Flags
 
 _SWEEP = (
     ("as a hand", Person()),
@@ -40,47 +38,36 @@ _SWEEP = (
     ("slow: 1 s", Person(reaction_s=1.0)),
     ("picture not late", Person(delay_s=0.0)),
 )
-_FILMS = {
-    "fish": (Film("fish", 9), FISH),
-    "court": (Film("court", 10, fps=25.0, size=(640, 360)), PLAYERS),
-}
-
-
-def clips(options: argparse.Namespace) -> Iterator[Clip]:
-    """Give the clips that are measured.
-
-    Raises:
-        CannotRunError: there is no such scene.
-    """
-    if options.made_up:
-        make = partial(school, seconds=options.seconds)
-    elif options.scene in scene_names():
-        make = partial(drawn, replace(_FILMS[options.scene][0], seconds=options.seconds))
-    else:
-        raise CannotRunError(f"there is no scene {options.scene}; there are {', '.join(scene_names())}")
-    for number in range(options.clips):
-        yield make(2 * number + (0 if options.even else 1))
 
 
 def measure(options: argparse.Namespace) -> None:
     """Measure, print and save."""
-    report, setup = Report(), _FILMS[options.scene][1]
+    report, kind = Report(), kinds(options.objects, options.seconds)[options.kind]
     people = _SWEEP if options.sweep else _SWEEP[:1]
-    pairs: dict[str, list[tuple[Watched, Watched]]] = {name: [] for name, _ in people}
-    for clip in clips(options):
-        alone = watch(clip, setup, None)
-        for name, person in people:
-            pairs[name].append((alone, watch(clip, setup, person)))
+    alone = [watch(clip, kind.setup) for clip in kind.clips(options.clips, first=0 if options.even else 1)]
+    points = assist_curve.curve(alone, people[0][1])
+    fps = alone[0].clip.fps
+    settings = Flags(per_minute=options.per_minute, risk=options.risk)
+    pairs = {name: _helped(alone, kind, person, Desk(settings, fps)) for name, person in people}
     found = {name: count(pairs[name], person) for name, person in people}
+    name = f"assist-{options.kind}{options.objects or ''}"
+    report.say(f"{len(alone)} clips, {points[0].minutes:.1f} minutes")
+    report.table(
+        "What flags foresee",
+        ["risk from", "flags/min", "failures/min", "flags per failure", "foreseen", "possible at most"],
+        assist_curve.rows(points),
+    )
     _tell(report, found)
-    name = f"assist-{'school' if options.made_up else options.scene}"
+    assist_curve.plot(points, options.out / f"{name}-flags.png")
     _plot(found, options.out / f"{name}.png")
     report.save(options.out / f"{name}.txt")
 
 
+def _helped(alone: list[Watched], kind: Kind, person: Person, desk: Desk) -> list[tuple[Watched, Watched]]:
+    return [(it, watch(it.clip, kind.setup, person, desk)) for it in alone]
+
+
 def _tell(report: Report, found: dict[str, Cases]) -> None:
-    first = next(iter(found.values()))
-    report.say(f"{first.clips} clips, {first.minutes:.1f} minutes")
     report.table(
         "What helping is worth",
         ["operator", "flags/min", "failures", "foreseen", "with help", "avoided", "new", "saved"],
@@ -134,7 +121,7 @@ def _plot(found: dict[str, Cases], path: Path) -> None:
     names = ["nobody helps", *found]
     axes.barh(names[0], next(iter(found.values())).unaided.total(), color="0.6", label="without help")
     left = [0.0] * len(found)
-    for cause, colour in zip(CAUSES, ("C0", "C1", "C2", "C3"), strict=True):
+    for cause, colour in zip(CAUSES, (f"C{n}" for n in range(len(CAUSES))), strict=True):
         counts = [cases.left[cause] for cases in found.values()]
         axes.barh(names[1:], counts, left=left, color=colour, label=cause)
         left = [before + more for before, more in zip(left, counts, strict=True)]
@@ -151,20 +138,19 @@ def main() -> None:
     mpl.use("Agg")
     cv2.setNumThreads(1)
     options = parser(__doc__, "assist")
-    options.add_argument("--scene", choices=_FILMS, default="fish", help="what is filmed")
+    options.add_argument("--kind", choices=kinds(), default="fish", help="what is filmed")
+    options.add_argument("--objects", type=int, help="how many of them; else nine fish, ten players")
     options.add_argument("--clips", type=int, default=56, help="how many")
     options.add_argument("--seconds", type=float, default=20.0, help="of each")
-    options.add_argument("--even", action="store_true", help="the seeds that thresholds were chosen on")
+    options.add_argument("--per-minute", type=int, default=Flags().per_minute, help="flags at most")
+    options.add_argument("--risk", type=float, default=Flags().risk, help="from which one is raised")
+    options.add_argument("--even", action="store_true", help="the seeds that risks were learned on")
     options.add_argument("--sweep", action="store_true", help="other operators, too")
-    options.add_argument("--made-up", action="store_true", help="a school of boxes without pictures")
     options.add_argument("--quick", action="store_true", help="4 clips")
     chosen = options.parse_args()
     if chosen.quick:
         chosen.clips = min(chosen.clips, 4)
-    try:
-        measure(chosen)
-    except CannotRunError as problem:
-        finish(problem, "assist")
+    measure(chosen)
 
 
 if __name__ == "__main__":

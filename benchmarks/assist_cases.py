@@ -5,19 +5,25 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
-from benchmarks.assist_failures import Failure
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.assist_failures import Failure, matches
 from benchmarks.assist_operator import Flag, Person
 from benchmarks.assist_watch import Watched
 from tracking.assist import Trouble
 
 Outcome = Literal["helped", "not needed", "harmed", "no help"]
-Cause = Literal["flagged", "busy", "earlier failure", "not foreseen"]
-"""Why a failure is left: the operator was asked and it failed all the same; was busy with others; its tracks
-had failed before; or nothing had been foreseen."""
+Cause = Literal[
+    "pointed in vain", "followed wrongly", "late", "busy", "no flag", "earlier failure", "not foreseen"
+]
+"""Why a failure is left: the operator pointed at the right fish before and after it; followed another fish
+than the track that was named had been on; had not pointed when it happened; was busy with other flags;
+it was foreseen, but others were more worth a flag; its tracks had failed before; or nothing was foreseen."""
 
-CAUSES: tuple[Cause, ...] = ("flagged", "busy", "earlier failure", "not foreseen")
+CAUSES: tuple[Cause, ...] = get_args(Cause)
 
 _BEFORE_S = 3.0
 """Seconds before a failure in which a trouble or a flag of its tracks is about it."""
@@ -81,11 +87,12 @@ def count(pairs: Sequence[tuple[Watched, Watched]], person: Person) -> Cases:
                 cases.crossings[outcome] += 1
         for failure in alone.failures:
             cases.unaided[failure.kind] += 1
-            foreseen += any(_tells(it, at, failure, fps, person) for at, it in alone.troubles)
+            foreseen += any(tells(it, at, failure, fps, person) for at, it in alone.troubles)
             avoided += not _again(failure, helped.failures, fps)
+        found = matches(helped.clip.truth, helped.tracks)
         for failure in helped.failures:
             cases.kinds[failure.kind] += 1
-            cases.left[_cause(failure, helped, fps)] += 1
+            cases.left[_cause(failure, helped, found)] += 1
             made += not _again(failure, alone.failures, fps)
     return Cases(
         cases.minutes,
@@ -116,7 +123,7 @@ def _outcome(flag: Flag, alone: Watched, helped: Watched, fps: float) -> Outcome
     return "harmed" if with_help else "not needed"
 
 
-def _tells(trouble: Trouble, newest: int, failure: Failure, fps: float, person: Person) -> bool:
+def tells(trouble: Trouble, newest: int, failure: Failure, fps: float, person: Person) -> bool:
     """Say whether a trouble is about a failure, and came early enough for the operator to see it happen."""
     early = newest - person.delay_s * fps + person.reaction_s * fps <= failure.frame
     return bool(
@@ -132,17 +139,30 @@ def _again(failure: Failure, others: Sequence[Failure], fps: float) -> bool:
     )
 
 
-def _cause(failure: Failure, helped: Watched, fps: float) -> Cause:
-    first = failure.before - _BEFORE_S * fps
-    mine = {*failure.tracks}
-    if any(
-        (mine & {*it.trouble.objects} or it.fish in failure.fish)
-        and first <= it.raised <= failure.frame + fps
+def _cause(failure: Failure, helped: Watched, found: NDArray[np.int64]) -> Cause:
+    """Say why a failure is left; `found` is which track each fish was matched with, `(n, T)`."""
+    fps, mine = helped.clip.fps, {*failure.tracks}
+    first, last = failure.before - _BEFORE_S * fps, failure.frame + fps
+    flags = [
+        it
         for it in helped.flags
-    ):
-        return "flagged"
-    if any(mine & {*it.objects} and first <= it.frame <= failure.frame + fps for it in helped.missed):
-        return "busy"
+        if (mine & {*it.trouble.objects} or it.fish in failure.fish) and first <= it.raised <= last
+    ]
+    seen_to = [it for it in flags if it.fish is not None and it.looks]
+    if any(_right(it, found) and it.looks[0] <= failure.frame for it in seen_to):
+        return "pointed in vain"
+    if seen_to:
+        return "late" if any(_right(it, found) for it in seen_to) else "followed wrongly"
+    if flags:
+        return "busy" if any(it.begun is None for it in flags) else "late"
     if any(it.frame < failure.before and {*it.tracks} & mine for it in helped.failures if it is not failure):
         return "earlier failure"
-    return "not foreseen"
+    told = any(mine & {*it.objects} and first <= newest <= last for newest, it in helped.troubles)
+    return "no flag" if told else "not foreseen"
+
+
+def _right(flag: Flag, found: NDArray[np.int64]) -> bool:
+    """Say whether the fish that was followed is the one that the named track was on before."""
+    before = found[flag.fish, : max(flag.looks[0], 1)]
+    known = before[before > 0]
+    return bool(len(known) and known[-1] == flag.object)

@@ -3,7 +3,7 @@
 As in the thesis (Todor 2009, section 8.2): what differs enough from the median of pictures seen before is
 foreground, and every connected piece of it that is large enough is found, with how much it differs as its
 score; so are the parts that it falls into when it is eroded a little, since bodies that touch are one piece.
-MyView's own detector looks for upright people.
+MyView's own detector looks for upright people: those of the court are found by it.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from benchmarks.experiments_scene import Truth
 from server.camera.scene import Scene
 from tracking import Detections
 from tracking.boxes import BOX_SIDES, Floats
-from tracking.detectors import Image
+from tracking.detectors import BackgroundDetector, Image
 from tracking.detectors.base import Mask
 from tracking.detectors.looks import Looks
 
@@ -47,6 +47,7 @@ class Film:
     seconds: float = 20.0
     fps: float = 30.0
     size: tuple[int, int] = (640, 480)
+    people: bool = False
 
 
 class Blobs:
@@ -118,7 +119,7 @@ def drawn(film: Film, seed: int) -> Clip:
     """Give a clip of the first camera of a scene."""
     played = Scene(film.scene, 1, film.objects, seed, *film.size, film.fps)
     count = round(film.seconds * film.fps)
-    detector = Blobs([played.image(0, place * _EVERY) for place in range(_AHEAD)])
+    detector = _detector(film, [played.image(0, place * _EVERY) for place in range(_AHEAD)])
     boxes = np.full((film.objects, count, BOX_SIDES), np.nan)
     visible = np.zeros((film.objects, count))
     seen = []
@@ -128,3 +129,11 @@ def drawn(film: Film, seed: int) -> Clip:
         boxes[there.ids - 1, t] = there.boxes
         visible[there.ids - 1, t] = there.visible
     return Clip(seed, film.fps, tuple(seen), Truth(boxes, visible))
+
+
+def _detector(film: Film, ahead: Sequence[Image]) -> Blobs | BackgroundDetector:
+    if not film.people:
+        return Blobs(ahead)
+    detector = BackgroundDetector()
+    detector.prepare(ahead, _EVERY)
+    return detector

@@ -1,4 +1,4 @@
-"""A simulated operator: is shown one flag at a time, looks after a while, and points as a hand can."""
+"""A simulated operator: sees to one flag at a time, looks after a while, and points as a hand can."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from benchmarks.assist_desk import Desk
 from benchmarks.experiments_scene import Truth
 from tracking.assist import Pointing, Trouble
 from tracking.boxes import Floats, iou
@@ -49,6 +50,7 @@ class Flag:
         object: whom the operator is asked to follow; the other one where only that is to be seen.
         raised: the newest frame when it was raised.
         until: the frame on the screen up to which it lasts at least.
+        begun: the newest frame when the operator turned to it; `None`: not yet, or never.
         fish: who was followed in truth; `None`: nobody, yet.
         looks: the frames in which the operator pointed.
         ended: the frame on the screen when it was over; `None`: not yet.
@@ -58,6 +60,7 @@ class Flag:
     object: int
     raised: int
     until: int
+    begun: int | None = None
     fish: int | None = None
     looks: list[int] = field(default_factory=list)
     ended: int | None = None
@@ -68,14 +71,15 @@ class Flag:
 class Operator:
     """Follows whom flags name, one at a time, on a picture that is late; never mistakes whom they follow."""
 
-    def __init__(self, person: Person, truth: Truth, fps: float, seed: int) -> None:
+    def __init__(self, person: Person, desk: Desk, truth: Truth, fps: float, seed: int) -> None:
+        self._desk = desk
         self._person, self._truth, self._fps = person, truth, fps
         self._rng = np.random.default_rng(seed)
         self._delay = round(person.delay_s * fps)
         self._reaction = round(person.reaction_s * fps)
         self.flags: list[Flag] = []
-        self.missed: list[Trouble] = []
-        """What was foreseen while the operator was busy."""
+        self._now: Flag | None = None
+        """Which the operator sees to."""
 
     @property
     def delay(self) -> int:
@@ -83,44 +87,54 @@ class Operator:
         return self._delay
 
     def hear(self, newest: int, troubles: Sequence[Trouble]) -> None:
-        """Be told the troubles of a window; the worst in time raises a flag."""
-        for trouble in troubles:
-            if self.flags and self.flags[-1].ended is None and self.flags[-1].object in trouble.objects:
-                # Who is being followed is in trouble again before the picture is there.
-                self.flags[-1].until = max(self.flags[-1].until, trouble.frame)
-            if self._told(trouble):
-                continue
-            if self.flags and self.flags[-1].ended is None:
-                self.missed.append(trouble)
-                continue
-            self.flags.append(Flag(trouble, trouble.objects[0], newest, trouble.frame))
-
-    def _told(self, trouble: Trouble) -> bool:
-        """Say whether a flag is about this already: about one of these, until it is over."""
-        return any(
-            {*it.trouble.objects} & {*trouble.objects} and (it.ended is None or it.ended >= trouble.frame)
-            for it in self.flags
-        )
+        """Be told the troubles of a window, some of which raise flags."""
+        now = self._now
+        mine = [it for it in troubles if now is not None and now.object in it.objects]
+        for it in mine:
+            # Who is being followed is in trouble again before the picture is there.
+            now.until = max(now.until, it.frame)
+        others = [it for it in troubles if it not in mine]
+        self.flags += [Flag(it, it.objects[0], newest, it.frame) for it in self._desk.raised(newest, others)]
 
     def look(self, newest: int, shown: Mapping[int, Mapping[int, Floats]]) -> Pointing | None:
         """Look at the screen and point at whom the flag names, if anybody can be seen there."""
         screen = newest - self._delay
-        if not self.flags or self.flags[-1].ended is not None or screen < 0:
+        if not 0 <= screen < self._truth.frames:
             return None
-        flag = self.flags[-1]
-        if screen >= self._truth.frames:
+        flag = self._now = self._now or self._next(newest, screen)
+        if flag is None or flag.begun is None:
             return None
+        pointing = self._see_to(flag, flag.begun, newest, shown)
+        if flag.ended is not None:
+            self._now = None
+        return pointing
+
+    def _next(self, newest: int, screen: int) -> Flag | None:
+        """Turn to the flag that is due first; what is over on the screen after a wait is let be."""
+        waiting = [it for it in self.flags if it.begun is None and it.ended is None]
+        for it in waiting:
+            if it.until < screen and it.raised < newest:
+                it.ended = screen
+        flag = min((it for it in waiting if it.ended is None), key=lambda it: it.until, default=None)
+        if flag is not None:
+            flag.begun = newest
+        return flag
+
+    def _see_to(
+        self, flag: Flag, begun: int, newest: int, shown: Mapping[int, Mapping[int, Floats]]
+    ) -> Pointing | None:
+        screen = newest - self._delay
         if flag.fish is None:
             self._recognise(flag, shown.get(screen, {}), screen)
-            if newest < flag.raised + self._reaction:
+            if newest < begun + self._reaction:
                 return None
             if not flag.likely:
                 # Nobody in particular: a piece of somebody who has a number, or a weed.
                 flag.ended = screen
                 return None
             flag.object, flag.fish = max(flag.likely, key=lambda it: (it[0] == flag.object, flag.likely[it]))
-        self._follow(flag, screen, newest, shown.get(screen, {}).get(flag.object))
-        if flag.fish is None or flag.ended is not None or self._truth.visible[flag.fish, screen] < _SEEN:
+        self._follow(flag, newest, shown.get(screen, {}).get(flag.object))
+        if flag.ended is not None or self._truth.visible[flag.fish, screen] < _SEEN:
             return None
         flag.looks.append(screen)
         return self._pointing(flag, screen)
@@ -140,8 +154,9 @@ class Operator:
                 it = numbers[best], fish
                 flag.likely[it] = flag.likely.get(it, 0.0) + float(row[best])
 
-    def _follow(self, flag: Flag, screen: int, newest: int, box: Floats | None) -> None:
+    def _follow(self, flag: Flag, newest: int, box: Floats | None) -> None:
         """Let go once all is over: who is followed has been alone for a while, with the right box around."""
+        screen = newest - self._delay
         if flag.fish is not None:
             boxes = self._truth.boxes[:, screen]
             touching = np.nan_to_num(iou(boxes, boxes[flag.fish])) > _TOUCH
@@ -149,7 +164,7 @@ class Operator:
             right = box is not None and iou(boxes[flag.fish], box) >= _FOUND
             flag.clear = flag.clear + 1 if alone and right else 0
         over = screen > flag.until and flag.clear >= _CLEAR_S * self._fps
-        if over or newest - flag.raised > (_LONGEST_S + self._person.delay_s) * self._fps:
+        if over or newest - (flag.begun or 0) > (_LONGEST_S + self._person.delay_s) * self._fps:
             flag.ended = screen
 
     def _pointing(self, flag: Flag, screen: int) -> Pointing:

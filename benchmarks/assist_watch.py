@@ -8,13 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.assist_clips import Clip
+from benchmarks.assist_desk import Desk
 from benchmarks.assist_failures import Failure, failures
 from benchmarks.assist_operator import Flag, Operator, Person
+from server.wire.sections import Flags
 from tracking import CostSettings, WindowResult, WindowSettings, solver_named
 from tracking.assist import AssistedTracker, AssistSettings, Pointing, Trouble
 from tracking.boxes import Floats
 from tracking.solvers import DEFAULT_SOLVER
 
+_ALL = Flags(per_minute=600, risk=0.0)
 _BATCH = 3
 """Frames of which pointings are sent together: a tenth of a second."""
 
@@ -58,7 +61,6 @@ class Watched:
         failures: where identities failed, with all mended that was.
         troubles: what was foreseen, with the newest frame when it was.
         flags: what the operator was asked.
-        missed: what was foreseen while they were busy.
         tracks: the boxes by frame and id.
     """
 
@@ -66,14 +68,18 @@ class Watched:
     failures: list[Failure]
     troubles: list[tuple[int, Trouble]]
     flags: list[Flag]
-    missed: list[Trouble]
     tracks: dict[int, dict[int, Floats]]
 
 
-def watch(clip: Clip, setup: Setup, person: Person | None) -> Watched:
-    """Track a clip as a camera does, frame by frame; nobody helps where there is no person."""
+def watch(clip: Clip, setup: Setup, person: Person | None = None, desk: Desk | None = None) -> Watched:
+    """Track a clip as a camera does, frame by frame; nobody helps where there is no person.
+
+    Flags are raised at the desk; without one, for all that is foreseen.
+    """
+    desk = desk or Desk(_ALL, clip.fps)
+    desk.begin()
     tracker = AssistedTracker(setup.window, setup.costs, solver_named(DEFAULT_SOLVER), setup.assist)
-    operator = Operator(person, clip.truth, clip.fps, clip.seed) if person else None
+    operator = Operator(person, desk, clip.truth, clip.fps, clip.seed) if person else None
     shown: dict[int, dict[int, Floats]] = {}
     troubles: list[tuple[int, Trouble]] = []
     waiting: list[Pointing] = []
@@ -96,8 +102,7 @@ def watch(clip: Clip, setup: Setup, person: Person | None) -> Watched:
     _show(shown, tracker.flush())
     _show(shown, tracker.point(waiting))
     failed = failures(clip.truth, shown, clip.fps)
-    flags, missed = (operator.flags, operator.missed) if operator else ([], [])
-    return Watched(clip, failed, troubles, flags, missed, shown)
+    return Watched(clip, failed, troubles, operator.flags if operator else [], shown)
 
 
 def _show(shown: dict[int, dict[int, Floats]], result: WindowResult | None) -> None:

@@ -8,15 +8,18 @@ import numpy as np
 import pytest
 
 from benchmarks.assist_cases import count
+from benchmarks.assist_desk import Desk
 from benchmarks.assist_failures import failures, matches
 from benchmarks.assist_operator import Operator, Person
 from benchmarks.assist_school import school
 from benchmarks.assist_watch import FISH, watch
 from benchmarks.experiments_scene import Truth
+from server.wire.sections import Flags
 from tracking.assist import Trouble
 
 FRAMES = 200
 FPS = 25.0
+ALL = Flags(per_minute=600, risk=0.0)
 
 
 def _truth() -> Truth:
@@ -55,8 +58,8 @@ def test_a_moment_under_another_number_is_no_failure_and_a_new_number_after_a_ga
 def test_the_operator_points_at_what_was_on_the_late_screen_once_they_have_reacted() -> None:
     truth = _truth()
     shown = _tracks(truth, [[1] * FRAMES, [2] * FRAMES])
-    operator = Operator(Person(reaction_s=0.4, error=0.0, delay_s=1.0), truth, FPS, seed=1)
-    operator.hear(60, [Trouble("exchange", (2, 1), 55, 0.1)])
+    operator = Operator(Person(reaction_s=0.4, error=0.0, delay_s=1.0), Desk(ALL, FPS), truth, FPS, seed=1)
+    operator.hear(60, [Trouble("exchange", (2, 1), 55, 0.1, 5, 0.5)])
     said = {newest: operator.look(newest, shown) for newest in range(60, 100)}
     assert all(said[newest] is None for newest in range(60, 70))
     first = said[70]
@@ -69,18 +72,37 @@ def test_who_is_under_the_wrong_box_when_the_operator_looks_is_followed_wrongly(
     """The operator knows no more than the screen: there the two had changed places already."""
     truth = _truth()
     shown = _tracks(truth, [[2] * FRAMES, [1] * FRAMES])
-    operator = Operator(Person(delay_s=0.0), truth, FPS, seed=1)
-    operator.hear(60, [Trouble("exchange", (2, 1), 55, 0.1)])
+    operator = Operator(Person(delay_s=0.0), Desk(ALL, FPS), truth, FPS, seed=1)
+    operator.hear(60, [Trouble("exchange", (2, 1), 55, 0.1, 5, 0.5)])
     for newest in range(60, 80):
         operator.look(newest, shown)
     assert operator.flags[0].fish == 0
 
 
-def test_a_second_flag_waits_until_the_first_is_over() -> None:
-    operator = Operator(Person(), _truth(), FPS, seed=1)
-    operator.hear(60, [Trouble("exchange", (1, 2), 55, 0.1), Trouble("fading", (7,), 60, 0.0)])
-    assert [flag.trouble.objects for flag in operator.flags] == [(1, 2)]
-    assert [trouble.objects for trouble in operator.missed] == [(7,)]
+def test_a_second_flag_waits_until_the_first_is_over_and_is_let_be_if_all_is_over_then() -> None:
+    truth = _truth()
+    shown = _tracks(truth, [[1] * FRAMES, [2] * FRAMES])
+    for due, seen_to in ((150, True), (61, False)):
+        operator = Operator(Person(delay_s=0.0), Desk(ALL, FPS), truth, FPS, seed=1)
+        operator.hear(60, [_trouble((1, 2), 60, 0.9), _trouble((2, 7), due, 0.5)])
+        pointings = [operator.look(newest, shown) for newest in range(60, 200)]
+        assert [flag.trouble.objects for flag in operator.flags] == [(1, 2), (2, 7)]
+        first, second = operator.flags
+        assert first.fish == 0
+        assert (second.fish == 1) == seen_to
+        assert {it.object for it in pointings if it} == ({1, 2} if seen_to else {1})
+
+
+def test_flags_go_to_the_riskiest_and_once_to_the_same_two() -> None:
+    desk = Desk(Flags(per_minute=2), FPS)
+    desk.begin()
+    first = desk.raised(10, [_trouble((1, 2), 10, 0.2), _trouble((3, 4), 10, 0.8), _trouble((5, 6), 10, 0.5)])
+    assert [it.objects for it in first] == [(3, 4), (5, 6)]
+    assert desk.raised(15, [_trouble((4, 3), 15, 0.9), _trouble((1, 2), 15, 0.2)]) == []
+
+
+def _trouble(objects: tuple[int, int], frame: int, risk: float) -> Trouble:
+    return Trouble("exchange", objects, frame, 0.1, 5, risk)
 
 
 @pytest.mark.slow
@@ -88,7 +110,7 @@ def test_a_school_is_played_again_from_its_seed_and_helped_it_fails_no_more_than
     clip = school(8, seconds=18.0)
     again = school(8, seconds=18.0)
     assert all((one.boxes == other.boxes).all() for one, other in zip(clip.seen, again.seen, strict=True))
-    alone, helped = watch(clip, FISH, None), watch(clip, FISH, Person())
+    alone, helped = watch(clip, FISH), watch(clip, FISH, Person())
     assert alone.failures
     assert len(helped.failures) < len(alone.failures)
     cases = count([(alone, helped)], Person())

@@ -20,11 +20,15 @@ class Trouble:
         frame: when it is expected. The newest frame or later for what is ahead; within the window for what
             has been seen to be doubtful (`exchange`: where the identities would part): pictures are shown
             later than they are tracked, so that it may still be ahead of who looks at them.
-        margin: how sure the tracker is, as a cost: 0 is undecided. Comparable between troubles of all
-            reasons; the least is the worst.
+        margin: how sure the tracker is, as a cost: 0 is undecided.
+        length: frames for which the two are in each other's way, or somebody is hidden.
+        risk: how likely it is to go wrong unless somebody helps, in [0, 1]: what troubles of all reasons are
+            compared by.
     """
 
     reason: Reason
     objects: tuple[int, ...]
     frame: int
     margin: float
+    length: int
+    risk: float

@@ -68,6 +68,7 @@
  * @property {number} pulse when it is expected
  * @property {number} raised the newest pulse when it was raised
  * @property {number} margin by how much the tracker is sure, as a cost
+ * @property {number} risk how likely it is to go wrong unless somebody helps
  * @property {'raised' | 'followed' | 'answered' | 'expired'} state
  *
  * @typedef {object} Choice /api/objects/{k}/choice

@@ -100,6 +100,7 @@ def _trouble(trouble: troubles.Trouble) -> Trouble:
         tracks=list(trouble.objects),
         pulse=max(trouble.frame, 0),
         margin=float(trouble.margin),
+        risk=float(trouble.risk),
     )
 
 

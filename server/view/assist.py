@@ -52,4 +52,4 @@ class Assist:
                 whose = [self._people.whose(camera, message.boot, it, message.last) for it in trouble.tracks]
                 known = tuple(dict.fromkeys(number for number in whose if number is not None))
                 if known and len(known) == len(whose):
-                    yield Foreseen(camera, known, trouble.reason, trouble.pulse, trouble.margin)
+                    yield Foreseen(camera, known, trouble.reason, trouble.pulse, trouble.margin, trouble.risk)

@@ -9,12 +9,12 @@ from typing import Literal
 
 import msgspec
 
+from server.view.flag_budget import Budget
 from server.wire.help import TroubleReason
 from server.wire.sections import Flags as FlagSettings
 
 State = Literal["raised", "followed", "answered", "expired"]
 
-_MINUTE_S = 60.0
 _THROUGH_S = 0.4
 """For how long after what was expected somebody must be followed for it to be answered."""
 _TOLD_S = 0.2
@@ -39,6 +39,8 @@ class Flag(msgspec.Struct, frozen=True, kw_only=True):
     """The newest pulse when it was raised."""
     margin: float
     """By how much the tracker is sure, as a cost: 0 is not at all."""
+    risk: float
+    """How likely it is to go wrong unless somebody helps, in [0, 1]."""
     state: State
     """raised; followed: somebody points at them; answered: was followed through it; expired: was not."""
 
@@ -58,21 +60,21 @@ class Foreseen:
     reason: TroubleReason
     pulse: int
     margin: float
+    risk: float
 
 
 class Flags:
     """Raises flags, and sees them through. It has no clock: it is told which pulse it is.
 
     What several cameras foresee of the same people, or one foresees again and again, is one flag. Of more
-    than may be raised in a minute the most urgent are: the sooner it is expected, and the less sure.
+    than may be raised in a minute the riskiest are (`Budget`).
     """
 
     def __init__(self, settings: FlagSettings, fps: float) -> None:
         self._settings, self._fps = settings, fps
         self._open: dict[int, Flag] = {}
         self._ended: deque[Flag] = deque(maxlen=_ENDED_MOST)
-        self._raised: deque[int] = deque()
-        """When flags were raised in the last minute."""
+        self._budget = Budget(settings, fps)
         self._pointed: dict[int, int] = {}
         """By flag, the last frame in which somebody was pointed at."""
         self._told: dict[int, Flag] = {}
@@ -93,14 +95,14 @@ class Flags:
         """Take in what is foreseen at a pulse; ``resolve`` gives the number that a merged one goes by now."""
         for flag in list(self._open.values()):
             self._put(self._resolved(flag, resolve))
-        while self._raised and self._raised[0] <= now - _MINUTE_S * self._fps:
-            self._raised.popleft()
         wanted = [it for it in foreseen if it.reason in self._settings.reasons]
-        for it in sorted(wanted, key=lambda it: (it.pulse, it.margin, it.objects, it.camera)):
+        for it in wanted:
+            self._budget.hear(now, frozenset(it.objects), it.risk)
+        for it in sorted(wanted, key=lambda it: (-it.risk, it.pulse, it.objects, it.camera)):
             known = self._about(it)
             if known is not None:
                 self._see_again(known, it)
-            elif it.objects and len(self._raised) < self._settings.per_minute and not self._was(it):
+            elif it.objects and not self._was(it) and self._budget.worth(now, it.risk):
                 self._raise(now, it)
         late = now - self._settings.answer_s * self._fps
         for flag in [flag for flag in self._open.values() if flag.pulse < late]:
@@ -122,7 +124,7 @@ class Flags:
 
     def _raise(self, now: int, it: Foreseen) -> None:
         self.counts["raised"] += 1
-        self._raised.append(now)
+        self._budget.spend()
         self._put(
             Flag(
                 id=self.counts["raised"],
@@ -132,6 +134,7 @@ class Flags:
                 pulse=it.pulse,
                 raised=now,
                 margin=it.margin,
+                risk=it.risk,
                 state="raised",
             )
         )
@@ -141,7 +144,7 @@ class Flags:
         cameras = flag.cameras if it.camera in flag.cameras else [*flag.cameras, it.camera]
         flag = msgspec.structs.replace(flag, cameras=cameras)
         if flag.state == "raised" and it.camera == cameras[0]:
-            flag = msgspec.structs.replace(flag, pulse=it.pulse, margin=it.margin)
+            flag = msgspec.structs.replace(flag, pulse=it.pulse, margin=it.margin, risk=it.risk)
         self._put(flag)
 
     def _about(self, it: Foreseen) -> Flag | None:

@@ -9,7 +9,7 @@ import msgspec
 from server.wire.numbers import Coordinate, Number, Pulse
 
 TROUBLES_MOST = 32
-"""Troubles that a camera tells of one window at most; the worst ones."""
+"""Troubles that a camera tells of one window at most; the riskiest ones."""
 
 TroubleReason = Literal["alike", "fading", "gap", "exchange"]
 """Two who look alike are about to cross; somebody fades into the background; the window is not proven; two
@@ -26,6 +26,8 @@ class Trouble(msgspec.Struct, frozen=True, kw_only=True):
     """When that is expected."""
     margin: float
     """By how much the solution that is taken costs less than the other one: the smaller the less sure."""
+    risk: Annotated[float, msgspec.Meta(ge=0, le=1)]
+    """How likely it is to go wrong unless somebody helps."""
 
 
 POINTS_MOST = 256

@@ -35,7 +35,7 @@ async def site(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Runnin
         "zenoh": {"connect": bus, "listen": bus},
         "http": {"port": free_port()},
         "track": {"assist": {"enabled": True, "alike": 1000.0, "margin": 100.0}},
-        "view": {"flags": {"per_minute": 60}},
+        "view": {"flags": {"per_minute": 60, "risk": 0.0}},
     }
     path = tmp_path_factory.mktemp("demo") / "demo.yaml"
     path.write_text(yaml.safe_dump(content), encoding="utf-8")

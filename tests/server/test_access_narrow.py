@@ -101,8 +101,8 @@ async def test_events_are_of_one_camera_alone(site: Hall) -> None:
 
 async def test_flags_are_of_who_may_be_seen_alone(site: Hall) -> None:
     troubles = [
-        Trouble(reason="alike", tracks=[1, 2], pulse=19, margin=0.5),
-        Trouble(reason="fading", tracks=[2], pulse=19, margin=0.5),
+        Trouble(reason="alike", tracks=[1, 2], pulse=19, margin=0.5, risk=0.5),
+        Trouble(reason="fading", tracks=[2], pulse=19, margin=0.5, risk=0.5),
     ]
     said = word(A, 3, {1: SMALL, 2: SMALL}, troubles=troubles)
     async with site.session.get("/api/events", headers=bearer("family")) as theirs:

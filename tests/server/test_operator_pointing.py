@@ -117,9 +117,9 @@ async def test_where_no_camera_takes_it_that_is_said(busy: Hall) -> None:
 
 async def test_a_flag_is_raised_followed_answered_and_counted(helped: Hall) -> None:
     expected = 4 * STRIDE
-    trouble = Trouble(reason="alike", tracks=[1, 2], pulse=expected, margin=0.1)
-    nobody = [Trouble(reason="gap", tracks=[], pulse=17, margin=0.0)]
-    nobody += [Trouble(reason="fading", tracks=[77], pulse=17, margin=0.0)]
+    trouble = Trouble(reason="alike", tracks=[1, 2], pulse=expected, margin=0.1, risk=0.5)
+    nobody = [Trouble(reason="gap", tracks=[], pulse=17, margin=0.0, risk=0.5)]
+    nobody += [Trouble(reason="fading", tracks=[77], pulse=17, margin=0.0, risk=0.5)]
     helped.service.intake.tracks(tracks(word(A, 3, {1: SMALL, 2: SMALL}, troubles=[*nobody, trouble])))
     helped.service.intake.tracks(tracks(word(B, 3, {1: LARGE})))
     helped.service.pulse = 4 * STRIDE - 1

@@ -3,6 +3,7 @@
 from tracking.assist.exchange import Exchanges, exchange_margins, exchanges
 from tracking.assist.foresight import Foresight
 from tracking.assist.pointing import Pointing
+from tracking.assist.risk import Signs
 from tracking.assist.settings import AssistSettings
 from tracking.assist.tracker import AssistedTracker
 from tracking.troubles import Reason, Trouble
@@ -14,6 +15,7 @@ __all__ = [
     "Foresight",
     "Pointing",
     "Reason",
+    "Signs",
     "Trouble",
     "exchange_margins",
     "exchanges",

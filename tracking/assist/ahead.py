@@ -32,12 +32,14 @@ class Crossing:
     Attributes:
         first, second: their ids.
         frame: frames after the one that follows the window.
+        length: frames for which they are in each other's way, as far as it is looked ahead.
         margin: what it would cost to take each for the other from then on.
     """
 
     first: int
     second: int
     frame: int
+    length: int
     margin: float
 
 
@@ -90,6 +92,7 @@ def crossings(window: Solved, horizon: int, costs: CostSettings) -> list[Crossin
             window.known[rows[a]],
             window.known[rows[b]],
             int(meeting[a, b].argmax()),
+            int(np.count_nonzero(meeting[a, b])),
             max(float(found.margins[a, b]), 0.0),
         )
         for a, b in zip(*(it.tolist() for it in np.nonzero(near)), strict=True)

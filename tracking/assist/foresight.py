@@ -7,11 +7,12 @@ import numpy as np
 from tracking.appearance import appearance_distance
 from tracking.assist.ahead import crossings, ways
 from tracking.assist.exchange import Exchanges, exchanges
+from tracking.assist.risk import Signs, risk_of
 from tracking.assist.settings import AssistSettings
 from tracking.assist.solved import Solved
 from tracking.boxes import Floats, overlap
 from tracking.costs import CostSettings
-from tracking.troubles import Trouble
+from tracking.troubles import Reason, Trouble
 
 _TOUCH = 0.25
 """Shared over average area from which somebody covers somebody else."""
@@ -38,7 +39,7 @@ class Foresight:
             *self._gap(window, found.margins),
         ]
         once: dict[tuple[str, tuple[int, ...]], Trouble] = {}
-        for it in sorted(troubles, key=lambda it: (it.margin, it.frame, it.objects, it.reason)):
+        for it in sorted(troubles, key=lambda it: (-it.risk, it.frame, it.objects, it.reason)):
             once.setdefault((it.reason, tuple(sorted(it.objects))), it)
         return tuple(once.values())
 
@@ -50,11 +51,13 @@ class Foresight:
         settled = window.first + found.frames <= window.final_to
         first, second = np.nonzero(np.triu((found.margins < self._settings.margin) & settled, 1))
         return [
-            Trouble(
+            _trouble(
                 "exchange",
                 _pair(window, a, b),
+                window,
                 window.first + int(found.frames[a, b]),
-                max(float(found.margins[a, b]), 0.0),
+                float(found.margins[a, b]),
+                _unclear(window, a, b),
             )
             for a, b in zip(first.tolist(), second.tolist(), strict=True)
         ]
@@ -63,7 +66,14 @@ class Foresight:
         """Give those whose ways cross within the horizon, and who could then be exchanged for little."""
         found = crossings(window, self._settings.horizon, self._costs)
         return [
-            Trouble("alike", tuple(sorted((it.first, it.second))), window.last + 1 + it.frame, it.margin)
+            _trouble(
+                "alike",
+                tuple(sorted((it.first, it.second))),
+                window,
+                window.last + 1 + it.frame,
+                it.margin,
+                it.length,
+            )
             for it in found
             if it.margin < self._settings.alike
         ]
@@ -76,8 +86,8 @@ class Foresight:
         """
         looks, found = window.looks, []
         length = window.last - window.first + 1
-        for n, (hidden, way) in ways(window, self._settings.gone + _RECENT).items():
-            if not self._settings.gone <= hidden < self._settings.gone + _RECENT:
+        for n, (hidden, way) in ways(window, window.trail.shape[1]).items():
+            if hidden < self._settings.gone:
                 continue
             here = window.trail[:, -hidden:].copy()
             here[n] = np.nan
@@ -87,9 +97,10 @@ class Foresight:
             differ = float(appearance_distance(looks[n, None], looks[b, None], self._costs.measure)[0, 0])
             margin = length * max(differ - self._costs.unknown, 0.0)
             if covers[b] > _TOUCH and margin < self._settings.alike:
-                found.append(Trouble("alike", (window.known[n], window.known[b]), frame, margin))
+                pair = window.known[n], window.known[b]
+                found.append(_trouble("alike", pair, window, frame, margin, hidden))
             else:
-                found.append(Trouble("fading", (window.known[n],), frame, 0.0))
+                found.append(_trouble("fading", (window.known[n],), window, frame, 0.0, hidden))
         return found
 
     def _fading(self, window: Solved) -> list[Trouble]:
@@ -104,7 +115,7 @@ class Foresight:
             left = (level - faint) / -slope if slope < 0.0 else np.inf
             if level <= faint or left <= self._settings.horizon:
                 frame = window.last + max(int(left), 0) if level > faint else window.last
-                found.append(Trouble("fading", (number,), frame, max(float(level - faint), 0.0)))
+                found.append(_trouble("fading", (number,), window, frame, float(level - faint), 0))
         return found
 
     def _gap(self, window: Solved, margins: Floats) -> list[Trouble]:
@@ -112,7 +123,24 @@ class Foresight:
         if window.report.gap <= self._settings.gap or not np.isfinite(margins).any():
             return []
         a, b = np.unravel_index(int(margins.argmin()), margins.shape)
-        return [Trouble("gap", _pair(window, int(a), int(b)), window.last, max(float(margins[a, b]), 0.0))]
+        pair = _pair(window, int(a), int(b))
+        return [_trouble("gap", pair, window, window.last, float(margins[a, b]), _unclear(window, a, b))]
+
+
+def _trouble(
+    reason: Reason, objects: tuple[int, ...], window: Solved, frame: int, margin: float, length: int
+) -> Trouble:
+    """Give a trouble with its risk; `length` as in `Signs`."""
+    margin = max(margin, 0.0)
+    likely = risk_of(reason, Signs(margin, frame - window.last, length))
+    return Trouble(reason, objects, frame, margin, length, likely)
+
+
+def _unclear(window: Solved, a: int, b: int) -> int:
+    """Give in how many of the last frames the objects a and b were in each other's way, or one was hidden."""
+    one, other = (window.trail[window.known.index(window.ids[n])] for n in (a, b))
+    hidden = np.isnan(one[:, 0]) | np.isnan(other[:, 0])
+    return int(np.count_nonzero(hidden | (np.nan_to_num(overlap(one, other)) > _TOUCH)))
 
 
 def _pair(window: Solved, a: int, b: int) -> tuple[int, ...]:

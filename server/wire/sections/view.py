@@ -44,7 +44,9 @@ class Flags(Section):
     """What an operator is asked to look at."""
 
     per_minute: Annotated[int, Field(ge=0, le=600)] = 2
-    """Flags raised in any minute at most, the most urgent first."""
+    """Flags raised a minute at most, where identities are likeliest to fail; those of 3 minutes are saved."""
+    risk: Annotated[float, Field(ge=0, le=1)] = 0.25
+    """How likely a failure is at least for which one is raised, as far as the trackers can tell."""
     reasons: list[TroubleReason] = ["alike", "exchange", "fading", "gap"]
     """For which of the troubles that are foreseen one is raised."""
     answer_s: Annotated[float, Field(gt=0, le=600)] = 8.0

@@ -1,0 +1,38 @@
+"""Which troubles become flags, clip after clip: as many a minute as a site raises, where it raises them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from server.view.flag_budget import Budget
+from server.wire.sections import Flags
+from tracking.assist import Trouble
+
+
+class Desk:
+    """Raises flags. The clips follow each other as if they were one recording."""
+
+    def __init__(self, settings: Flags, fps: float) -> None:
+        self._budget = Budget(settings, fps)
+        self._same = settings.answer_s * fps
+        self._began = self._last = 0
+        self._raised: dict[frozenset[int], int] = {}
+
+    def begin(self) -> None:
+        """Begin another clip, in which people have other numbers."""
+        self._began = self._last = self._last + 1
+        self._raised = {}
+
+    def raised(self, newest: int, troubles: Sequence[Trouble]) -> list[Trouble]:
+        """Give those of a window's troubles for which a flag is raised, the riskiest first."""
+        now = self._last = self._began + newest
+        for it in troubles:
+            self._budget.hear(now, (self._began, frozenset(it.objects)), it.risk)
+        found = []
+        for it in sorted(troubles, key=lambda it: -it.risk):
+            who = frozenset(it.objects)
+            if now - self._raised.get(who, -(10**9)) > self._same and self._budget.worth(now, it.risk):
+                self._budget.spend()
+                self._raised[who] = now
+                found.append(it)
+        return found

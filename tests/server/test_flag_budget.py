@@ -1,0 +1,78 @@
+"""Flags are spent on what is likeliest to fail."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from server.view.flag_budget import Budget
+from server.wire.sections import Flags
+
+FPS = 25.0
+MINUTE = round(60 * FPS)
+
+
+def raised(per_minute: int, told: list[tuple[int, int, float]]) -> list[int]:
+    """Give when flags are raised for troubles of (pulse, who, risk)."""
+    budget, found = Budget(Flags(per_minute=per_minute, risk=0.0), FPS), []
+    for now, who, risk in told:
+        budget.hear(now, who, risk)
+        if budget.worth(now, risk):
+            budget.spend()
+            found.append(now)
+    return found
+
+
+@given(
+    st.integers(0, 4),
+    st.lists(st.tuples(st.integers(0, 900), st.integers(0, 5), st.floats(0, 1)), max_size=80),
+)
+def test_flags_are_as_many_a_minute_as_may_be_and_what_was_saved(
+    per_minute: int, steps: list[tuple[int, int, float]]
+) -> None:
+    now, told = 0, []
+    for pause, who, risk in steps:
+        now += pause
+        told.append((now, who, risk))
+    flags = raised(per_minute, told)
+    for n, first in enumerate(flags):
+        for k, last in enumerate(flags[n:], 1):
+            assert k <= per_minute * (3 + (last - first) / MINUTE) + 1e-6
+
+
+def test_of_many_troubles_those_that_are_likelier_to_fail_have_the_flags() -> None:
+    """Thirty a minute, of which two are very risky: chance would find one in fifteen of these."""
+    rng = np.random.default_rng(3)
+    told = []
+    for n in range(30 * 20):
+        bad = n % 15 == rng.integers(15)
+        told.append((n * MINUTE // 30, n, 0.6 + 0.2 * rng.random() if bad else 0.3 * rng.random()))
+    flags = set(raised(2, told))
+    bad = [now for now, _, risk in told if risk >= 0.6 and now > 2 * MINUTE]
+    assert sum(now in flags for now in bad) > 0.6 * len(bad)
+
+
+def test_risks_that_are_all_wrong_by_a_factor_change_nothing() -> None:
+    rng = np.random.default_rng(4)
+    told = [(n * 100, n, float(rng.random())) for n in range(200)]
+    assert raised(3, told) == raised(3, [(now, who, risk / 50) for now, who, risk in told])
+
+
+def test_what_is_told_again_and_again_counts_once() -> None:
+    """Else one long trouble would make everything else look rare."""
+    budget = Budget(Flags(per_minute=1, risk=0.0), FPS)
+    for now in range(0, 40, 5):
+        budget.hear(now, "same", 0.9)
+    budget.hear(45, "other", 0.5)
+    assert not budget.worth(45, 0.5)
+    assert budget.worth(45, 0.9)
+    budget.hear(3 * MINUTE, "late", 0.5)
+    assert budget.worth(3 * MINUTE, 0.5), "one in the first minute leaves two for the others"
+
+
+def test_what_is_not_likely_enough_is_worth_none_however_little_else_there_is() -> None:
+    budget = Budget(Flags(per_minute=5, risk=0.25), FPS)
+    budget.hear(10, "who", 0.24)
+    assert not budget.worth(10, 0.24)
+    assert budget.worth(10, 0.25)

@@ -1,0 +1,38 @@
+"""How likely a failure is: by signs that mean what they say."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import get_args
+
+import numpy as np
+import pytest
+
+from benchmarks.assist_risk import fitted
+from tracking.assist import Reason, Signs
+from tracking.assist.risk import WEIGHTS, risk_of
+
+
+@pytest.mark.parametrize("reason", get_args(Reason))
+def test_a_risk_is_a_probability_and_no_larger_where_the_tracker_is_surer(reason: Reason) -> None:
+    for lead in (-20.0, 0.0, 20.0):
+        risks = [risk_of(reason, Signs(margin, lead, 10.0)) for margin in (0.0, 0.5, 2.0, 100.0, np.inf)]
+        assert all(0.0 < it < 1.0 for it in risks)
+        assert all(one >= other for one, other in pairwise(risks))
+
+
+def test_the_longer_somebody_is_hidden_the_likelier_they_are_lost() -> None:
+    risks = [risk_of("fading", Signs(0.0, -hidden, hidden)) for hidden in (5, 10, 20, 40)]
+    assert all(one < other for one, other in pairwise(risks))
+
+
+def test_the_weights_that_made_the_examples_are_found_again() -> None:
+    rng = np.random.default_rng(1)
+    truth = np.array([-1.0, 2.0])
+    terms = np.stack([np.ones(20_000), rng.normal(size=20_000)], axis=1)
+    wrong = rng.random(20_000) < 1.0 / (1.0 + np.exp(-(terms @ truth)))
+    np.testing.assert_allclose(fitted(terms, wrong.astype(np.float64)), truth, atol=0.1)
+
+
+def test_every_reason_has_weights() -> None:
+    assert set(WEIGHTS) == set(get_args(Reason))

@@ -1,0 +1,52 @@
+"""How likely what is foreseen goes wrong, unless somebody helps."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from tracking.troubles import Reason
+
+
+_MUCH = 10.0
+"""A margin from which more of it tells nothing."""
+_LEAD = 10.0
+"""Frames that what is ahead is counted in."""
+
+
+@dataclass(frozen=True, slots=True)
+class Signs:
+    """What a risk is told from.
+
+    Attributes:
+        margin: what it would cost the tracker to see it the other way.
+        lead: frames from the newest one to when it is expected; negative: so long ago.
+        length: frames for which the two are in each other's way, or somebody is hidden.
+    """
+
+    margin: float
+    lead: float
+    length: float
+
+    @property
+    def terms(self) -> tuple[float, float, float, float, float]:
+        """The terms of the log odds: a constant, the margin, and what is ahead and what has begun apart."""
+        ahead = float(self.lead > 0.0)
+        begun = math.log1p(self.length) * (1.0 - ahead)
+        return 1.0, min(self.margin, _MUCH), ahead, ahead * self.lead / _LEAD, begun
+
+
+WEIGHTS: Mapping[Reason, tuple[float, float, float, float, float]] = {
+    "exchange": (-0.60, -1.17, 0.00, 0.00, 0.30),
+    "alike": (-2.97, -0.07, 0.44, -0.09, 0.61),
+    "fading": (-3.69, -0.03, -0.08, -0.17, 0.87),
+    "gap": (-3.00, -1.00, 0.00, 0.00, 0.00),
+}
+"""By reason; `python -m benchmarks.assist_risk` learns them."""
+
+
+def risk_of(reason: Reason, signs: Signs) -> float:
+    """Give the probability of a failure, by a logistic regression on its signs."""
+    odds = sum(weight * term for weight, term in zip(WEIGHTS[reason], signs.terms, strict=True))
+    return 1.0 / (1.0 + math.exp(-odds))
