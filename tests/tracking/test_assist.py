@@ -11,6 +11,7 @@ from strolls import TEST_COSTS, WIDTH, Stroll, final_boxes, follow, seen_at
 
 from tracking import Detections, OnlineTracker, WindowResult, WindowSettings, solver_named
 from tracking.assist import AssistedTracker, AssistSettings, Pointing
+from tracking.assist.carry import carried
 from tracking.boxes import iou
 from tracking.yardsticks import tracker_named
 
@@ -257,3 +258,14 @@ def test_who_is_pointed_at_has_a_box_of_their_own_where_the_detector_finds_one_f
 
 def _own(box: np.ndarray | None, frame: int) -> bool:
     return box is not None and bool(iou(box, np.array(ALIKE[1].box(frame))) > 0.7)
+
+
+def test_who_is_pointed_at_while_hidden_by_somebody_who_was_there_before_is_behind_them() -> None:
+    """That says nothing of the frames before; at a box of the other one's in the open it does."""
+    tracked = _helped()
+    for n, seen in enumerate(_crossing()):
+        tracked.push(n, seen)
+    behind, open_ = _at(ALIKE[1], 38, 2), _at(ALIKE[0], 60, 2)
+    assert 2 not in tracked._memory.where[38]
+    assert carried(behind, tracked._memory, TEST_COSTS, since=0) == []
+    assert {it.object for it in carried(open_, tracked._memory, TEST_COSTS, since=0)} == {1, 2}

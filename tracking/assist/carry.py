@@ -28,13 +28,16 @@ def carried(pointing: Pointing, memory: Memory, costs: CostSettings, since: int)
     have exchanged their identities from some frame on: from that one on from which exchanging the tracks, as
     they were found, costs least (`exchanges`, with only the two and their own boxes in it, and nothing said
     of where they should be by now); where b began while a was hidden, since b began. From there on a was
-    where b was said to be, and b where a was. Empty where a is what is pointed at, or nobody else is.
+    where b was said to be, and b where a was. Empty where a is what is pointed at, or nobody else is,
+    and where a may just be behind b.
     """
     a, b = pointing.object, _instead(pointing, memory)
     if b is None:
         return []
     frames = [n for n in sorted(memory.where) if since <= n <= pointing.frame]
     states = np.array([[memory.where[n].get(k, OCCLUDED) for n in frames] for k in (a, b)])
+    if _covered(states != OCCLUDED):
+        return []
     start = _start(states, [memory.seen.get(n) for n in frames], costs)
     return [
         Pointing(n, ours, *_aim(memory.seen[n].boxes[state]))
@@ -56,6 +59,12 @@ def _instead(pointing: Pointing, memory: Memory) -> int | None:
         return None
     nearest = min(far, key=lambda number: (far[number], number != pointing.object, number))
     return nearest if nearest != pointing.object and far[nearest] < _SURE else None
+
+
+def _covered(seen: NDArray[np.bool_]) -> bool:
+    """Say whether a may be behind b: a, the first of `(2, M)`, is hidden at last, and b was there before."""
+    shown = np.flatnonzero(seen[0])
+    return bool(len(shown) and not seen[0, -1] and seen[1, : shown[-1] + 1].any())
 
 
 def _aim(box: Floats) -> tuple[float, float, float]:
