@@ -8,6 +8,9 @@ from server.view.flag_budget import Budget
 from server.wire.sections import Flags
 from tracking.assist import Trouble
 
+_MOST = 1000
+"""Numbers that people of one clip have at most."""
+
 
 class Desk:
     """Raises flags. The clips follow each other as if they were one recording."""
@@ -26,13 +29,13 @@ class Desk:
     def raised(self, newest: int, troubles: Sequence[Trouble]) -> list[Trouble]:
         """Give those of a window's troubles for which a flag is raised, the riskiest first."""
         now = self._last = self._began + newest
-        for it in troubles:
-            self._budget.hear(now, (self._began, frozenset(it.objects)), it.risk)
+        whose = [frozenset(self._began * _MOST + it for it in trouble.objects) for trouble in troubles]
+        for who, it in zip(whose, troubles, strict=True):
+            self._budget.hear(now, who, it.risk)
         found = []
-        for it in sorted(troubles, key=lambda it: -it.risk):
-            who = frozenset(it.objects)
-            if now - self._raised.get(who, -(10**9)) > self._same and self._budget.worth(now, it.risk):
-                self._budget.spend()
+        for who, it in sorted(zip(whose, troubles, strict=True), key=lambda it: -it[1].risk):
+            if now - self._raised.get(who, -(10**9)) > self._same and self._budget.worth(now, who, it.risk):
+                self._budget.spend(now, who)
                 self._raised[who] = now
                 found.append(it)
         return found

@@ -103,7 +103,9 @@ def word(rng: Random, camera: str, epoch: int) -> CameraTracks:
         tracks=[_track(rng, person, first) for person in range(1, rng.randrange(1, 5))],
         solve=Solve(objective=1.0, bound=1.0, gap=0.0, integral=True, rounds=1),
         solved_at=(first + STRIDE) / FPS,
-        troubles=[Trouble(reason="alike", tracks=[1, 2], pulse=first + 9, margin=rng.random())],
+        troubles=[
+            Trouble(reason="alike", tracks=[1, 2], pulse=first + 9, margin=rng.random(), risk=rng.random())
+        ],
         mended_from=first if rng.random() < 0.1 else None,
     )
 

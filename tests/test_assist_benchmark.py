@@ -84,9 +84,9 @@ def test_a_second_flag_waits_until_the_first_is_over_and_is_let_be_if_all_is_ove
     shown = _tracks(truth, [[1] * FRAMES, [2] * FRAMES])
     for due, seen_to in ((150, True), (61, False)):
         operator = Operator(Person(delay_s=0.0), Desk(ALL, FPS), truth, FPS, seed=1)
-        operator.hear(60, [_trouble((1, 2), 60, 0.9), _trouble((2, 7), due, 0.5)])
+        operator.hear(60, [_trouble((1, 8), 60, 0.9), _trouble((2, 7), due, 0.5)])
         pointings = [operator.look(newest, shown) for newest in range(60, 200)]
-        assert [flag.trouble.objects for flag in operator.flags] == [(1, 2), (2, 7)]
+        assert [flag.trouble.objects for flag in operator.flags] == [(1, 8), (2, 7)]
         first, second = operator.flags
         assert first.fish == 0
         assert (second.fish == 1) == seen_to

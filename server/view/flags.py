@@ -102,7 +102,7 @@ class Flags:
             known = self._about(it)
             if known is not None:
                 self._see_again(known, it)
-            elif it.objects and not self._was(it) and self._budget.worth(now, it.risk):
+            elif it.objects and not self._was(it) and self._budget.worth(now, frozenset(it.objects), it.risk):
                 self._raise(now, it)
         late = now - self._settings.answer_s * self._fps
         for flag in [flag for flag in self._open.values() if flag.pulse < late]:
@@ -124,7 +124,7 @@ class Flags:
 
     def _raise(self, now: int, it: Foreseen) -> None:
         self.counts["raised"] += 1
-        self._budget.spend()
+        self._budget.spend(now, frozenset(it.objects))
         self._put(
             Flag(
                 id=self.counts["raised"],

@@ -16,6 +16,7 @@ from client.sse import MAX_EVENT, EventStreamError, SentEvent, SseParser
 FLAG = {"id": 1, "objects": [7, 9], "cameras": ["c0"], "reason": "alike", "pulse": 80} | {
     "raised": 50,
     "margin": 0.5,
+    "risk": 0.5,
     "state": "raised",
 }
 HASTY = client.HttpSettings(retries=2, backoff_first=0.01, backoff_most=0.01)

@@ -17,7 +17,7 @@ pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="session")]
 def flag(site: FakeSite, seconds: float = 60.0, **changes: Any) -> dict[str, Any]:
     pulse = site.edge + round(25 * seconds)
     told = {"objects": [2, 1], "cameras": [CAMERAS[2]], "reason": "alike", "pulse": pulse}
-    return {"id": 1, "raised": site.edge, "margin": 0.5, "state": "raised", **told, **changes}
+    return {"id": 1, "raised": site.edge, "margin": 0.5, "risk": 0.5, "state": "raised", **told, **changes}
 
 
 def points(site: FakeSite) -> list[dict[str, float]]:

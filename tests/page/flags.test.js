@@ -8,7 +8,7 @@ const FPS = 25;
 /** @param {object} [changes] */
 function flag(changes) {
   return /** @type {any} */ ({
-    id: 1, objects: [7, 9], cameras: ['c0'], reason: 'alike', pulse: 100, raised: 80, margin: 0.4, state: 'raised', ...changes,
+    id: 1, objects: [7, 9], cameras: ['c0'], reason: 'alike', pulse: 100, raised: 80, margin: 0.4, risk: 0.4, state: 'raised', ...changes,
   });
 }
 

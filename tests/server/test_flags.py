@@ -102,7 +102,7 @@ def test_what_was_just_answered_is_not_asked_again() -> None:
     asked.flags.pointed(7, "c0", [60])
     asked.step(45, foreseen(7, 9, pulse=44))
     assert asked.flags.open == []
-    asked.step(95, foreseen(7, 9, pulse=110))
+    asked.step(115, foreseen(7, 9, pulse=130))
     assert [flag.id for flag in asked.flags.open] == [2], "another meeting of the same two"
 
 

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 from tracking.troubles import Reason
 
-
 _MUCH = 10.0
 """A margin from which more of it tells nothing."""
 _LEAD = 10.0
@@ -38,9 +37,9 @@ class Signs:
 
 
 WEIGHTS: Mapping[Reason, tuple[float, float, float, float, float]] = {
-    "exchange": (-0.60, -1.17, 0.00, 0.00, 0.30),
-    "alike": (-2.97, -0.07, 0.44, -0.09, 0.61),
-    "fading": (-3.69, -0.03, -0.08, -0.17, 0.87),
+    "exchange": (-0.50, -0.84, 0.00, 0.00, 0.26),
+    "alike": (-2.40, -0.02, 0.45, -0.08, 0.48),
+    "fading": (-4.71, -0.02, -0.05, -0.12, 1.23),
     "gap": (-3.00, -1.00, 0.00, 0.00, 0.00),
 }
 """By reason; `python -m benchmarks.assist_risk` learns them."""
