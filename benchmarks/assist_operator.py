@@ -89,11 +89,13 @@ class Operator:
     def hear(self, newest: int, troubles: Sequence[Trouble]) -> None:
         """Be told the troubles of a window, some of which raise flags."""
         now = self._now
-        mine = [it for it in troubles if now is not None and now.object in it.objects]
-        for it in mine:
-            # Who is being followed is in trouble again before the picture is there.
-            now.until = max(now.until, it.frame)
-        others = [it for it in troubles if it not in mine]
+        others = []
+        for it in troubles:
+            if now is not None and now.object in it.objects:
+                # Who is being followed is in trouble again before the picture is there.
+                now.until = max(now.until, it.frame)
+            else:
+                others.append(it)
         self.flags += [Flag(it, it.objects[0], newest, it.frame) for it in self._desk.raised(newest, others)]
 
     def look(self, newest: int, shown: Mapping[int, Mapping[int, Floats]]) -> Pointing | None:

@@ -81,13 +81,15 @@ class Foresight:
     def _vanished(self, window: Solved) -> list[Trouble]:
         """Give those who have been hidden for a while: with who covers them and looks alike, or alone.
 
+        No longer than somebody who looks at pictures of a second ago could still see who they are.
+
         The margin is what the looks of a whole window tell of the two, over what one differs from oneself;
         nothing tells anything of who is just not seen.
         """
         looks, found = window.looks, []
         length = window.last - window.first + 1
         for n, (hidden, way) in ways(window, window.trail.shape[1]).items():
-            if hidden < self._settings.gone:
+            if not self._settings.gone <= hidden <= self._settings.horizon + _RECENT:
                 continue
             here = window.trail[:, -hidden:].copy()
             here[n] = np.nan
@@ -122,8 +124,8 @@ class Foresight:
         """Give the two who are nearest to being exchanged, where the window's answer is not proven."""
         if window.report.gap <= self._settings.gap or not np.isfinite(margins).any():
             return []
-        a, b = np.unravel_index(int(margins.argmin()), margins.shape)
-        pair = _pair(window, int(a), int(b))
+        a, b = divmod(int(margins.argmin()), margins.shape[1])
+        pair = _pair(window, a, b)
         return [_trouble("gap", pair, window, window.last, float(margins[a, b]), _unclear(window, a, b))]
 
 
