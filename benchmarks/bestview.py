@@ -7,8 +7,9 @@ scored as `myview evaluate --views` does, beside the exact offline optimum of wh
 
 The truth stands in for MyView's stages, one after the other; what is lost between two rows is that stage's:
 *true boxes* of those who are visible; *own boxes, true ids*: those that MyView's cameras tracked, each with
-the number of the person it is at, and the same with short gaps bridged; *own tracks, true joins*: each track
-with the number of the person it is mostly at; *again*: all as MyView numbered it at last, known at once, and
+the number of the person it is at, and the same with short gaps bridged; *own parts, true joins*: each part of
+a track that identity takes for one person's, with the number of the person it is mostly at; *own tracks, true
+joins*: the same of whole tracks; *again*: all as MyView numbered it at last, known at once, and
 nobody ever away. The mean of *own tracks, not joined* is what each camera's tracker is worth by itself.
 
 Recordings are looked at ahead, as MyView does with recordings; `--as-live` has them learned as they go.
@@ -40,7 +41,8 @@ from benchmarks.bestview_join import own_tracks
 from benchmarks.bestview_plot import plot_sweeps, plot_ways
 from benchmarks.bestview_sweep import Swept, sweep, sweep_tables
 from benchmarks.bestview_watch import Watched, followed
-from benchmarks.bestview_ways import Outcome, Seen, outcome, ways
+from benchmarks.bestview_ways import LEAST_IOU, Outcome, Seen, Way, outcome, ways
+from benchmarks.bestview_who import Met
 from benchmarks.bestview_why import Losses, losses
 from benchmarks.peer_environment import PeerEnvironment, PeersAwayError, default_folder, peer_environment
 from benchmarks.report import Report
@@ -55,6 +57,9 @@ GALLERY, QUICK_GALLERY = (6, 240.0), (3, 30.0)
 """People, seconds."""
 COLUMNS = ["", "joint", "mean", "Agree", "Regret", "Visible", "Chosen", "Cuts", "Best", "Shot"]
 
+LATER_S = (1.0, 15.0)
+"""Seconds after which cameras are compared with themselves."""
+WHO = ["", "whole", "pure", *(word for it in LATER_S for word in (f"{it:g} s: whole", "pure"))]
 WHY = ["", "Visible", "choice", "number", "missed"]
 
 
@@ -101,6 +106,14 @@ def losses_of(name: str, it: Losses) -> list[str]:
     return [name, *(f"{100 * share:.1f}" for share in (it.visible, it.choice, it.number, it.missed))]
 
 
+def agreements_of(case: Case, way: Way) -> list[str]:
+    """Give a row of the table of who is who, percent."""
+    met = Met.of(way.rendering.tracks, case.gt, LEAST_IOU)
+    fps = float(case.content["site"]["fps"])
+    told = (met.at_once(), *(met.later(round(seconds * fps)) for seconds in LATER_S))
+    return [way.name, *(f"{100 * share:.1f}" for it in told for share in (it.whole, it.pure))]
+
+
 def peers_of(options: argparse.Namespace, report: Report) -> PeerEnvironment | None:
     """Give the other trackers' environment, or say why there is none."""
     if options.no_peers or options.quick:
@@ -139,11 +152,17 @@ def measure(options: argparse.Namespace) -> None:
             tried = list(ways(case, truth, seen, blind, peers, walked))
             found[case.name] = [outcome(case, truth, way) for way in tried]
             report.table(f"{case.name}: {case.about}", COLUMNS, [row_of(it) for it in found[case.name]])
+            who = [agreements_of(case, way) for way in tried if not way.given]
+            report.table(f"{case.name}: who is who, at once and later", WHO, who)
             why = [(way.name, losses(case, truth, way)) for way in tried if not way.given]
             report.table(f"{case.name}: why not visible", WHY, [losses_of(name, it) for name, it in why])
             if not options.no_sweeps:
                 swept[case.name] = sweep(case, truth, quick=options.quick)
     report.say("joint, mean: IDF1. Cuts, Best: a minute, the choice's and the optimum's. Shot: frames.")
+    report.say(
+        "Who is who: of pairs of boxes at one person, in two cameras at once or in one camera so long after, "
+        "those that have one number are whole; of pairs of one number those at one person are pure."
+    )
     report.say(
         "Not visible in the chosen view, though in some: by choice, their number was at them in a camera "
         "that shows them; by number, only others were; missed, none was."

@@ -17,6 +17,7 @@ from benchmarks.bestview_join import (
     own_tracks,
     tracks_by_truth,
 )
+from benchmarks.bestview_parts import own_parts
 from benchmarks.bestview_watch import Rows, Watched, followed
 from benchmarks.occupancy import occupancy_rows
 from benchmarks.occupancy_masks import CannotMapError
@@ -116,10 +117,12 @@ def ways(
     there = visible_rows(case, truth)
     yield Way(TRUE, chosen(there), given=True)
     yield Way(TRUE_LARGEST, simple(there), given=True)
-    own = own_tracks(followed(config, seen.frames))
+    said = followed(config, seen.frames)
+    own = own_tracks(said)
     named = boxes_by_truth(own, case.gt)
     yield Way("own boxes, true ids", chosen(named))
     yield Way("  and gaps bridged", chosen(bridged(named, BRIDGE)))
+    yield Way("own parts, true joins", chosen(tracks_by_truth(own_parts(config, said), case.gt)))
     yield Way("own tracks, true joins", chosen(tracks_by_truth(own, case.gt)))
     yield Way("own tracks, not joined", simple(not_joined(own)))
     uncalibrated = case.config(ground=False)
@@ -134,7 +137,7 @@ def ways(
         if sight is None:
             continue
         scene, found = sight.case, sight.watched
-        said = followed(scene.config(), found.frames)
+        said = said if scene is case else followed(scene.config(), found.frames)
         apart = followed(uncalibrated, found.frames)
         ours = decide(scene.config(), said)
         yield Way(name, ours)
