@@ -81,15 +81,13 @@ class Foresight:
     def _vanished(self, window: Solved) -> list[Trouble]:
         """Give those who have been hidden for a while: with who covers them and looks alike, or alone.
 
-        No longer than somebody who looks at pictures of a second ago could still see who they are.
-
         The margin is what the looks of a whole window tell of the two, over what one differs from oneself;
         nothing tells anything of who is just not seen.
         """
         looks, found = window.looks, []
         length = window.last - window.first + 1
         for n, (hidden, way) in ways(window, window.trail.shape[1]).items():
-            if not self._settings.gone <= hidden <= self._settings.horizon + _RECENT:
+            if hidden < self._settings.gone:
                 continue
             here = window.trail[:, -hidden:].copy()
             here[n] = np.nan

@@ -38,8 +38,8 @@ class Signs:
 
 WEIGHTS: Mapping[Reason, tuple[float, float, float, float, float]] = {
     "exchange": (-0.50, -0.84, 0.00, 0.00, 0.26),
-    "alike": (-1.76, -0.08, -0.02, -0.08, 0.22),
-    "fading": (-3.85, -0.03, -0.09, -0.21, 0.87),
+    "alike": (-2.40, -0.02, 0.45, -0.08, 0.48),
+    "fading": (-4.71, -0.02, -0.05, -0.12, 1.23),
     "gap": (-3.00, -1.00, 0.00, 0.00, 0.00),
 }
 """By reason; `python -m benchmarks.assist_risk` learns them."""
