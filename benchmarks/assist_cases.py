@@ -39,7 +39,6 @@ class Cases:
         flags: by outcome, and whether others were in the way when it was raised.
         unaided: failures without help, by kind.
         foreseen: those that a trouble told of early enough to be answered.
-        told: those that a trouble told of at any time before they were final and shown.
         left: failures with help, by cause.
         kinds: failures with help, by kind.
         avoided: failures without help that are none with it.
