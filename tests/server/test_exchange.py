@@ -134,7 +134,7 @@ async def test_a_camera_that_never_comes_is_told_and_does_not_hold_up_the_others
 ) -> None:
     config = config_of(recording, wait=0.5)
     it = Running(config, tmp_path / "out")
-    it._pulses = type(it._pulses)(
+    it.pulses = type(it.pulses)(
         50, expect={"bestview", "c0", "c1"}, start_timeout=PATIENCE, port=config.sync.port
     )
     running.append(it)
