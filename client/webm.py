@@ -73,10 +73,16 @@ def is_key(cluster: Element) -> bool:
 
 
 def at_time(cluster: Element, ticks: int) -> bytes:
-    """Give the cluster at another time, as many bytes as before."""
+    """Give the cluster at another time, as many bytes as before.
+
+    Raises:
+        WebmError: it has no room for that time: its own is no longer, or there are several.
+    """
     parts = []
     for element in _inside(cluster):
         if element.name == _TIMESTAMP:
+            if ticks.bit_length() > 8 * len(element.content):
+                raise WebmError("a cluster without room for its time")
             parts.append(element.data[: element.head] + ticks.to_bytes(len(element.content), "big"))
         else:
             parts.append(element.data)

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from vp8_by_hand import EPOCHS, feed, own
 
 import client
-from client.webm import ElementReader, WebmError
+from client.webm import CLUSTER, ElementReader, WebmError, at_time, made, number
 from client.webm_recording import WebmChangedError, WebmRecording, write_indexed
 from server.view.webm import cluster, header
 
@@ -133,3 +133,12 @@ def test_another_format_ends_the_recording_and_damage_is_named() -> None:
         take(record, header(2 * WIDTH, HEIGHT, FPS) + stream(5, 10)[len(HEAD) :], 100)
     with pytest.raises(WebmError):
         list(ElementReader().feed(b"\x00\x00\x00\x18ftyp"))
+
+
+def test_a_cluster_that_tells_its_time_twice_and_once_too_short_for_it_is_refused() -> None:
+    timestamp = 0xE7  # RFC 9559
+    twice = made(CLUSTER, number(timestamp, 0x10_0000) + number(timestamp, 1, 1))
+    (element,) = ElementReader().feed(twice)
+    assert len(at_time(element, 0xFF)) == len(twice)
+    with pytest.raises(WebmError, match="room for its time"):
+        at_time(element, 0x100)
