@@ -47,6 +47,7 @@ class Viewer:
         """Takes a piece while nothing waits, or says False; waking a task is most of what a piece costs."""
         self.lost = 0
         """GOPs lost because the viewer fell behind."""
+        self._lost_before = 0
 
     @property
     def waiting(self) -> int:
@@ -79,6 +80,11 @@ class Viewer:
         self._queue.clear()
         self.lost += waiting
         return True
+
+    def has_lost(self) -> bool:
+        """Whether anything was lost since this was last asked."""
+        lost, self._lost_before = self.lost > self._lost_before, self.lost
+        return lost
 
     def put_first(self, piece: Piece) -> None:
         """Put a piece before all that waits."""
@@ -147,6 +153,10 @@ class Channel:
         if self._closed:
             viewer.close()
         return viewer
+
+    def who_lost(self) -> list[Viewer]:
+        """Give those who have lost something since this was last asked."""
+        return [viewer for viewer in self._viewers if viewer.has_lost()]
 
     def leave(self, viewer: Viewer) -> None:
         """Let somebody go."""

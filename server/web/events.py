@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections import deque
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -25,6 +26,8 @@ _GOPS_KEPT = 4
 """GOP events that whoever comes is given: they cover what the streams start with."""
 _QUEUE = 64
 """Events a reader may fall behind."""
+_FLAGS_AGAIN = 16
+"""Flags that are over, and that whoever fell behind is told of: they may have seen them open."""
 
 
 def event(name: str, content: Any, event_id: int | None = None) -> bytes:
@@ -108,7 +111,20 @@ class Events:
             if line.told.get(name) != data:
                 line.told[name] = data
                 line.channel.tell(Chunk(data, start=True))
+        for viewer in line.channel.who_lost():
+            for chunk in self._again(sees):
+                viewer.put(chunk)
         line.channel.tell(Chunk(b": here\n\n", start=False))
+
+    def _again(self, sees: Scope) -> Iterator[Chunk]:
+        """Give all that holds, to who fell behind: what is told only once may be among what they lost."""
+        for name, content in self._lists(sees).items():
+            yield Chunk(event(name, content), start=True)
+        flags = self._service.assist.flags
+        for flag in [*reversed(flags.ended[:_FLAGS_AGAIN]), *flags.open]:
+            chunk = self._flag(sees, flag)
+            if chunk is not None:
+                yield chunk
 
     def _lists(self, sees: Scope) -> dict[str, Any]:
         service = self._service

@@ -119,3 +119,14 @@ async def test_who_refuses_at_once_loses_whole_gops_as_ever() -> None:
         channel.publish(gop(number))
     assert viewer.lost > 0
     assert len(viewer._queue) <= 3
+
+
+def test_who_has_lost_something_is_said_once() -> None:
+    channel = Channel(queue_starts=2)
+    viewer = channel.join()
+    channel.publish(Chunk(b"1", start=True))
+    assert channel.who_lost() == []
+    for number in range(4):
+        channel.publish(Chunk(b"%d" % number, start=True))
+    assert channel.who_lost() == [viewer]
+    assert channel.who_lost() == []

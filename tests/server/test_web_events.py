@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 from typing import Any
 
 import aiohttp
 from cameras_by_hand import CAMERAS, GOP, LARGE, SMALL
 from halls import A, B, Hall
+
+from server.web.access_grant import ALL
+from server.web.events import Events
 
 
 async def events(answer: aiohttp.ClientResponse, count: int) -> list[tuple[str, Any]]:
@@ -61,3 +65,22 @@ async def test_the_gop_is_told_before_its_video_is_sent(hall: Hall) -> None:
     for epoch in range(4):
         hall.service.feed(epoch, {A: {1: SMALL}, B: {}})
     assert order == ["told", "sent"] * 3
+
+
+async def test_who_fell_behind_is_told_again_what_goes_on_to_hold(busy: Hall) -> None:
+    told = Events(busy.service)
+    reader = told.join(ALL)
+    for epoch in range(3, 120):
+        busy.service.feed(epoch, {A: {1: LARGE, 2: SMALL}, B: {1: None}})
+    assert reader.lost, "some of what was told, maybe a list"
+    speaking = asyncio.create_task(told.run())
+    lists: set[str] = set()
+    try:
+        async with asyncio.timeout(30):
+            async for data in reader:
+                name = data.partition(b"\n")[0].removeprefix(b"event: ").decode()
+                lists |= {name} & {"objects", "cameras", "site"}
+                if len(lists) == 3:
+                    break
+    finally:
+        speaking.cancel()
