@@ -155,10 +155,10 @@ def scene(
     objects: Annotated[
         int | None, typer.Option(min=1, show_default="as many as suit the scene", help="People, or fish.")
     ] = None,
-    seconds: Annotated[float, typer.Option(min=0.04)] = 20.0,
+    seconds: Annotated[float, typer.Option(min=0.04, max=86400.0)] = 20.0,
     seed: Annotated[int, typer.Option(min=0)] = 1,
     size: Annotated[str, typer.Option(help="WIDTHxHEIGHT in pixels.")] = "640x360",
-    fps: Annotated[float, typer.Option(min=1.0)] = 25.0,
+    fps: Annotated[float, typer.Option(min=1.0, max=240.0)] = 25.0,
 ) -> None:
     """Write a synthetic multi-view recording with ground truth.
 
