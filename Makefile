@@ -4,6 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 NODE_STAMP := node_modules/.installed
+TESTED := $(sort $(dir $(wildcard tests/*.py tests/*/*.py)))
 AGAIN ?= --reruns 2 --reruns-delay 1
 
 .PHONY: demo test test-slow lint format bench lock clean
@@ -24,6 +25,7 @@ lint: $(STAMP) $(NODE_STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+	for room in $(TESTED); do MYPYPATH=tests:$$room $(BIN)/mypy --config-file tests/mypy.ini $$room*.py || exit 1; done
 	$(BIN)/lint-imports
 	$(BIN)/node node_modules/typescript/bin/tsc
 

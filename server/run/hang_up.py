@@ -8,7 +8,7 @@ import os
 import signal
 import sys
 import termios
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncGenerator, AsyncIterator, Callable
 
 from server.run.reload import Reload, reloaded
 from server.wire.config import Config
@@ -32,7 +32,7 @@ def mind_hang_ups() -> None:
     signal.signal(signal.SIGHUP, lambda number, _: _early.append(number))
 
 
-async def hang_ups() -> AsyncIterator[None]:
+async def hang_ups() -> AsyncGenerator[None, None]:
     """Give a turn for each time that SIGHUP has come; those that come meanwhile are one.
 
     When it came because the terminal was closed, the process is told to end instead.

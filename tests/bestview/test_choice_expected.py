@@ -28,7 +28,8 @@ def test_every_view_is_there_once_and_with_the_larger_worth(seed: int) -> None:
     expected = {it: float(worth[1][it]) for it in every if kind[it] in {3, 4}}
     columns = [np.array(side) for side in line_up(found | missed)]
     shown = np.ones((FRAMES, CAMERAS), dtype=np.bool_)
-    views = SeenViews(*columns[:3], columns[3], shown, PEOPLE, found=len(found))
+    frames, cameras, people, worths = columns
+    views = SeenViews(frames, cameras, people, worths, shown, PEOPLE, found=len(found))
     frame, camera, person, extra = (np.array(side) for side in line_up(expected))
     views = with_expected(
         views, frame.astype(int), camera.astype(int), person.astype(int), extra.astype(float)

@@ -42,7 +42,7 @@ def test_numbers_follow_the_people(most: int, apart: float, told: int) -> None:
     for update in after:
         assert numbers(update).get(ONE, 2) == 2
         assert numbers(update).get(TWO, 1) == 1
-        assert update.born == update.merged == update.split == ()
+        assert (update.born, update.merged, update.split) == ((), (), ())
     assert known(after)[ONE] == 2
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncGenerator, AsyncIterator, Iterator
 from dataclasses import dataclass
 from functools import cache
 
@@ -146,7 +146,7 @@ class Part:
     jpeg: bytes
 
 
-async def parts(answer: aiohttp.ClientResponse) -> AsyncIterator[Part]:
+async def parts(answer: aiohttp.ClientResponse) -> AsyncGenerator[Part, None]:
     """Read multipart JPEG as RFC 2046 has it: by its boundary and the lengths it tells."""
     boundary = "--" + answer.headers["Content-Type"].partition("boundary=")[2]
     stream = answer.content

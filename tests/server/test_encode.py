@@ -53,6 +53,7 @@ def test_keys_are_where_gops_begin_and_the_bytes_the_same_each_time(settings: En
     units = encoded(settings)
     codec = "h264" if settings.codec == "h264" else "vp8"
     parser = av.CodecContext.create(codec, "r")
+    assert isinstance(parser, av.VideoCodecContext)
     keys = [frame.key_frame for unit in units for frame in parser.decode(av.Packet(unit.data))]
     assert keys == [unit.key for unit in units], "nor are there others, where noise begins and ends"
     assert [unit.pulse for unit in units if unit.key] == list(range(0, FRAMES, 10))

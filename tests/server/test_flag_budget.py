@@ -51,8 +51,8 @@ def test_of_many_troubles_those_that_are_likelier_to_fail_have_the_flags() -> No
         bad = n % 15 == rng.integers(15)
         told.append((n * MINUTE // 30, n, 0.6 + 0.2 * rng.random() if bad else 0.3 * rng.random()))
     flags = set(raised(2, told))
-    bad = [now for now, _, risk in told if risk >= 0.6 and now > 2 * MINUTE]
-    assert sum(now in flags for now in bad) > 0.6 * len(bad)
+    risky = [now for now, _, risk in told if risk >= 0.6 and now > 2 * MINUTE]
+    assert sum(now in flags for now in risky) > 0.6 * len(risky)
 
 
 def test_risks_that_are_all_wrong_by_a_factor_change_nothing() -> None:

@@ -12,13 +12,12 @@ from typing import Any
 import av
 import numpy as np
 import pytest
-from cameras_by_hand import CAMERAS, GOP, LARGE, SMALL, Box
+from cameras_by_hand import CAMERAS, FPS, GOP, LARGE, SMALL
 from halls import Hall, opened
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from recorded_by_hand import (
     AMPLE,
-    FPS,
     PULSE0,
     A,
     B,
@@ -44,6 +43,7 @@ from server.view.past.stretch import Span
 from server.view.picture import Picture as Shown
 from server.view.timeline import Timeline
 from server.view.ts import Counters
+from server.wire.messages import Box
 
 MOMENT = "say seconds back (-60), a pulse (p1250) or a time (2026-11-21T16:13:36Z)"
 IN_A: Mapping[str, Mapping[int, Box | None]] = {A: {1: LARGE}, B: {1: SMALL}}
@@ -372,7 +372,7 @@ async def test_a_few_seconds_come_at_once_and_the_rest_in_real_time(
         now[0] += seconds
 
     monkeypatch.setattr(loop, "time", lambda: now[0])
-    monkeypatch.setattr(past_stream.asyncio, "sleep", slept)
+    monkeypatch.setattr(asyncio, "sleep", slept)
     agreement, _ = site_of(store)
     source = OnDisk(Recorded(store.run, store.run.objects[1].tape), end=200)
     stream = PastStream(source, Timeline(agreement, FPS, GOP), FPS, lambda: None)

@@ -15,6 +15,7 @@ from ffprobe_by_hand import needs_ffprobe, probed
 from halls import A, Hall, opened
 from hypothesis import given
 from hypothesis import strategies as st
+from played_in_chromium import PLAY
 from sounds_by_hand import (
     BEEPS,
     EVERY,
@@ -29,7 +30,6 @@ from sounds_by_hand import (
     sends,
     write_flashes,
 )
-from test_sound_streams import PLAY
 
 import client
 from benchmarks.browser import CHROMIUM, chromium

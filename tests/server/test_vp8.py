@@ -43,6 +43,7 @@ def encoded(width: int, height: int, missed: frozenset[int] = frozenset()) -> tu
 
 def decoded(frames: list[bytes], decoder: str) -> list[Pixels]:
     context = av.CodecContext.create(decoder, "r")
+    assert isinstance(context, av.VideoCodecContext)
     return [it.to_ndarray(format="yuv420p") for data in frames for it in context.decode(av.Packet(data))]
 
 

@@ -21,7 +21,7 @@ Pairs = list[tuple[int, int]]
 def random_rows(rng: np.random.Generator, objects: int) -> list[MotRow]:
     """Draw up to `objects` people who crowd into a place two boxes wide, for five frames."""
     return [
-        MotRow(frame, number, *(float(it) for it in rng.uniform(0, 60, 2)), 80.0, 160.0)
+        MotRow(frame, number, rng.uniform(0, 60), rng.uniform(0, 60), 80.0, 160.0)
         for frame in range(1, 6)
         for number in range(1, objects + 1)
         if rng.random() < 0.8

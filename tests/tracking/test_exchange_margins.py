@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from random_networks import Case, cases, network_of
+from random_networks import SETTINGS, Case, cases, network_of
 
 from tracking.assist import exchange_margins, exchanges
 from tracking.network import Network
@@ -80,13 +80,7 @@ def test_in_whatever_order_the_objects_come_their_margins_are_the_same(case: Cas
 
 
 def test_objects_with_observations_of_their_own_have_nothing_to_exchange() -> None:
-    case = Case(2, 2, 2, shared=False, settings=replace(_plain(), layout=0.0), seed=4)
+    case = Case(2, 2, 2, shared=False, settings=replace(SETTINGS, layout=0.0), seed=4)
     network = network_of(case)
     with pytest.raises(ValueError, match="of their own"):
         exchanges(network, np.zeros((2, 2), dtype=np.int64))
-
-
-def _plain():  # noqa: ANN202
-    from random_networks import SETTINGS  # noqa: PLC0415
-
-    return SETTINGS

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from random_networks import Case, cases, network_of
+from random_networks import SETTINGS, Case, cases, network_of
 
 from tracking.assist import AssistSettings, Pointing
 from tracking.assist.pointing import farness, with_pointings
@@ -52,20 +52,14 @@ def test_only_the_nodes_of_who_is_pointed_at_cost_more_in_that_frame_and_by_the_
 
 def test_a_pointing_exchanges_two_who_could_be_either() -> None:
     """Both are alike and at one place before the window: without it the answer is an accident."""
-    case = Case(2, 3, 2, shared=True, settings=replace(_settings(), gate=None), seed=5)
+    case = Case(2, 3, 2, shared=True, settings=replace(SETTINGS, layout=0.0, gate=None), seed=5)
     network = network_of(case)
     even = replace(network, node=np.zeros_like(network.node), source=np.zeros_like(network.source))
     places = [np.flatnonzero(network.present[0, m]) for m in range(3)]
     assert all(len(it) == 2 for it in places)
     for owner in (0, 1):
-        at = network.boxes[0, 2, 0]
-        said = Pointing(2, owner, *((at[:2] + at[2:]) / 2.0).tolist(), 1.0)
+        left, top, right, bottom = network.boxes[0, 2, 0].tolist()
+        said = Pointing(2, owner, (left + right) / 2.0, (top + bottom) / 2.0, 1.0)
         pointed = with_pointings(even, 0, [0, 1], {2: {owner: said}}, ASSIST, 1.0)
         states = solver_named("exact").solve(pointed).states
         assert states[owner, 2] == 0
-
-
-def _settings():  # noqa: ANN202
-    from random_networks import SETTINGS  # noqa: PLC0415
-
-    return replace(SETTINGS, layout=0.0)
