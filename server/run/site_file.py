@@ -59,7 +59,7 @@ def read_site(path: Path) -> SiteFacts:
         facts = SiteFacts(float(content["fps"]), float(content["switch_cost_s"]), sizes)
     except OSError as error:
         raise UserError(f"{path}: cannot be read: {error.strerror}") from error
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
         raise UserError(f"{path}: is not what `myview render` writes: {error}") from error
     sensible = 0 < facts.fps < math.inf and 0 <= facts.switch_cost_s < math.inf
     if not sensible or any(side <= 0 for size in sizes.values() for side in size):
