@@ -14,12 +14,12 @@ import numpy as np
 
 from bestview.calibrate import MarkedPoints
 from server.wire.errors import UserError
+from server.wire.values import check_camera_name
 
 COLUMNS = ("camera", "image_x", "image_y", "floor_x", "floor_y")
 ENDINGS = (".json", ".csv")
 _FARTHEST = 1e9
 """Pixels, or the floor's units; beyond, squares of them say nothing any more."""
-_LONGEST_NAME = 64
 _SHOWN = 40
 """Characters of what is wrong that an error repeats."""
 
@@ -86,7 +86,8 @@ def _from_rows(rows: csv.DictReader[str], name: str) -> Iterator[_Pair]:
         camera = (row["camera"] or "").strip()
         if not camera:
             raise UserError(f"{where}: names no camera")
-        yield _Pair(_named(camera, where), _four([row[column] for column in COLUMNS[1:]], where))
+        check_camera_name(camera, where)
+        yield _Pair(camera, _four([row[column] for column in COLUMNS[1:]], where))
 
 
 def _json(text: str, name: str) -> dict[str, Any]:
@@ -112,7 +113,7 @@ def _unit(content: dict[str, Any], name: str) -> str | None:
 
 def _from_json(content: dict[str, Any], name: str) -> Iterator[_Pair]:
     for camera, pairs in content["cameras"].items():
-        _named(camera, name)
+        check_camera_name(camera, name)
         if not isinstance(pairs, list):
             raise UserError(f"{name}: camera {camera}: is a list of pairs")
         for number, pair in enumerate(pairs, start=1):
@@ -121,7 +122,7 @@ def _from_json(content: dict[str, Any], name: str) -> Iterator[_Pair]:
                 (x, y), (right, far) = pair["image"], pair["floor"]
             except (KeyError, TypeError, ValueError):
                 raise UserError(f'{where}: is not {{"image": [x, y], "floor": [x, y]}}') from None
-            yield _Pair(str(camera), _four([x, y, right, far], where))
+            yield _Pair(camera, _four([x, y, right, far], where))
 
 
 def _four(values: Sequence[Any], where: str) -> tuple[float, float, float, float]:
@@ -136,10 +137,3 @@ def _four(values: Sequence[Any], where: str) -> tuple[float, float, float, float
 
 def _shown(values: Sequence[Any]) -> str:
     return ", ".join(" ".join(str(value).split())[:_SHOWN] for value in values)
-
-
-def _named(camera: str, where: str) -> str:
-    """Give a camera's name, if it is one that can be written into a line."""
-    if not camera or len(camera) > _LONGEST_NAME or not camera.isprintable():
-        raise UserError(f"{where}: camera {camera[:_SHOWN]!a}: no name that can be read")
-    return camera

@@ -11,6 +11,8 @@ _MEANT = {
     "cm": ("centimeter", "centimeters", "centimetre", "centimetres"),
     "mm": ("millimeter", "millimeters", "millimetre", "millimetres"),
 }
+_SHOWN = 40
+"""Characters of what is no unit that an error repeats."""
 _CLOSE = 0.8
 """How like one of these a word is that was meant for it (difflib's ratio)."""
 
@@ -21,8 +23,8 @@ def checked_unit(unit: object) -> str:
     Raises:
         ValueError: in one line: it is no word, or another way to write m, cm or mm.
     """
-    if not isinstance(unit, str) or not unit.strip():
-        raise ValueError(f'{unit!r} is no unit; it is a word, such as "m"')
+    if not isinstance(unit, str) or not unit.strip() or not unit.isprintable():
+        raise ValueError(f'{repr(unit)[:_SHOWN]} is no unit; it is a word, such as "m"')
     if unit in METRES:
         return unit
     word = unit.strip(" .").lower()

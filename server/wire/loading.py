@@ -21,7 +21,7 @@ from server.wire.errors import UserError
 from server.wire.ground_unit import checked_unit
 from server.wire.sections import Camera, View, Zenoh, ZenohTls
 from server.wire.sources import resolved
-from server.wire.values import check_numbers, check_values, shortened
+from server.wire.values import check_camera_name, check_numbers, check_values, shortened
 from server.wire.yaml_file import read_yaml
 
 
@@ -176,12 +176,13 @@ def _homographies(path: Path, where: str) -> tuple[dict[str, list[list[float]]],
     """
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
-        matrices = dict(content["homography"])
+        matrices = dict(content["homography"].items())
     except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
         raise UserError(f"{where}: ground: cannot read {path}: {_reason(error)}") from error
-    except (KeyError, TypeError, ValueError, RecursionError) as error:
+    except (KeyError, TypeError, AttributeError, ValueError, RecursionError) as error:
         raise UserError(f'{where}: ground: {path} has no {{"homography": {{camera: 3x3}}}}') from error
     for camera_id, matrix in matrices.items():
+        check_camera_name(camera_id, f"{where}: ground: {path}")
         try:
             checked_homography(matrix, f"camera {camera_id}")
         except ValueError as error:

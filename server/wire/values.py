@@ -12,6 +12,7 @@ _MOST = 1_000_000
 """Values; an alias that YAML refers to again counts again, as it does for whoever reads it."""
 _LARGEST = 1e15
 _SHOWN = 40
+_LONGEST_NAME = 64
 
 
 def shortened(key: str) -> str:
@@ -19,18 +20,30 @@ def shortened(key: str) -> str:
     return key if len(key) <= _SHOWN else f"{key[:_SHOWN]}…"
 
 
+def check_camera_name(name: str, where: str) -> None:
+    """Look that a file's name for a camera can be written into a line; it need not be one of the site's.
+
+    Raises:
+        UserError: it cannot; the text begins with ``where``.
+    """
+    if not name or len(name) > _LONGEST_NAME or not name.isprintable():
+        raise UserError(f"{where}: camera {name[:_SHOWN]!a}: no name that can be read")
+
+
 def check_values(content: Any, where: str) -> None:
-    """Look that values end somewhere, and that their texts are texts.
+    """Look that values end somewhere, and that their texts are texts of one line, as what names them is.
 
     Raises:
         UserError: they do not, or are not; the text begins with ``where``.
     """
-    for _, value in _inside(content, where):
+    for place, value in _inside(content, where):
         if isinstance(value, str):
             try:
                 value.encode()
             except UnicodeEncodeError:
                 raise UserError(f"{where}: {value[:_SHOWN]!a}: has characters that are none") from None
+            if value and value.splitlines() != [value]:
+                raise UserError(f"{where}: {_named(place)}{value[:_SHOWN]!a} is more than a line")
 
 
 def check_numbers(content: Any, where: str) -> None:
@@ -41,10 +54,20 @@ def check_numbers(content: Any, where: str) -> None:
     """
     for place, value in _inside(content, where):
         if isinstance(value, int | float) and not abs(value) <= _LARGEST:
-            named = ".".join(shortened(str(it)) for it in place)
             # Python writes no number of thousands of digits, but in hexadecimal it does.
             written = str(value) if isinstance(value, float) else hex(value)
-            raise UserError(f"{where}: {named}: {written[:_SHOWN]} is a number beyond all measure")
+            raise UserError(f"{where}: {_named(place)}{written[:_SHOWN]} is a number beyond all measure")
+
+
+def _named(place: tuple[Any, ...]) -> str:
+    """Give the way to a value as a line begins with it, in a line whatever the keys are."""
+    words = (shortened(" ".join(it.split())) if isinstance(it, str) else _short(it) for it in place)
+    return f"{'.'.join(words)}: " if place else ""
+
+
+def _short(key: Any) -> str:
+    """Give a key that is no text; Python writes no number of thousands of digits."""
+    return "…" if isinstance(key, int) and abs(key) > _LARGEST else shortened(str(key))
 
 
 def _inside(content: Any, where: str) -> Iterator[tuple[tuple[Any, ...], Any]]:

@@ -32,6 +32,7 @@ from server.wire.inbox import Message
 from server.wire.loading import build_config, changed_view, load_config
 from server.wire.sections import View
 from server.wire.sound import SoundFormat
+from server.wire.tokens import read_tokens
 
 CAMERA = {"id": "c0", "source": "scene:room"}
 
@@ -73,6 +74,19 @@ def test_a_key_that_breaks_lines_is_named_in_one(tmp_path: Path) -> None:
     assert len(str(refused.value).splitlines()) == 1
 
 
+@pytest.mark.parametrize("end", ["\n", "\nb", "\x85b", "\u2028"])
+def test_a_word_of_two_lines_is_none(tmp_path: Path, end: str) -> None:
+    content = {"cameras": [{**CAMERA, "source": f"hall.mp4{end}"}]}
+    with pytest.raises(UserError, match=r"hall\.mp4.*is more than a line") as refused:
+        build_config(content, where="x", folder=tmp_path)
+    assert len(str(refused.value).splitlines()) == 1
+    path = tmp_path / "tokens.yaml"
+    path.write_text(json.dumps({"tokens": [{"name": f"hall{end}", "sha256": 64 * "a", "role": "watch"}] * 2}))
+    with pytest.raises(UserError) as refused:
+        read_tokens(path)
+    assert len(str(refused.value).splitlines()) == 1
+
+
 @pytest.mark.parametrize("place", ["site", "track.window"])
 def test_a_key_as_long_as_its_file_is_named_by_its_beginning(tmp_path: Path, place: str) -> None:
     inner: dict[str, Any] = {"stride" + 5000 * "9": 1}
@@ -106,11 +120,26 @@ def test_settings_to_try_out_must_be_text() -> None:
         changed_view(View(), {"\ud800": 1}, "to try out")
 
 
-@pytest.mark.parametrize("content", ['{"homography": {"c0": [[1' + "0" * 400 + "]]}}", "[" * 100_000])
+@pytest.mark.parametrize(
+    "content",
+    [
+        '{"homography": {"c0": [[1' + "0" * 400 + "]]}}",
+        "[" * 100_000,
+        '{"homography": {"c0\\nc1": [[0]]}}',
+        '{"homography": {"\\u2028": [[0]]}}',
+        '{"homography": {"' + "c" * 5000 + '": [[0]]}}',
+        '{"homography": ["ab"]}',
+        '{"homography": {}, "unit": "m\\nm"}',
+        '{"homography": {}, "unit": [' + "1," * 5000 + "1]}",
+    ],
+    ids=range(8),
+)
 def test_a_ground_file_that_cannot_be_read_is_refused_in_a_line(tmp_path: Path, content: str) -> None:
     (tmp_path / "ground.json").write_text(content)
-    with pytest.raises(UserError, match="ground"):
+    with pytest.raises(UserError, match="ground") as refused:
         build_config({"cameras": [CAMERA], "ground": "ground.json"}, where="site", folder=tmp_path)
+    assert len(str(refused.value).splitlines()) == 1
+    assert len(str(refused.value)) < 300 + len(str(tmp_path))
 
 
 def test_a_homography_of_numbers_too_large_is_refused() -> None:
