@@ -1,11 +1,13 @@
 """Everything that reads bytes from outside is given bytes that nobody meant: what comes of them.
 
-    python -m benchmarks.fuzz --part mot --inputs 1000000
+    python -m benchmarks.fuzz --part mot
+    python -m benchmarks.fuzz --target zenoh-sessions --first 5000 --inputs 5000
     python -m benchmarks.fuzz --replay out/fuzz/mot-text.ValueError-read_rows.1.bin
 
 An input that is wrong is refused in one clear line, or counted and dropped. A crash is anything else: another
 exception, a traceback in an answer or in the log, an answer 500, two seconds of processor time, 200 MB more
 memory, a process that dies. Inputs are made from their number and --seed: every run has the same ones.
+One may be a script of many messages: all that the reader was given are counted.
 """
 
 from __future__ import annotations
@@ -25,7 +27,8 @@ from benchmarks.report import Report
 from benchmarks.surroundings import ROOT
 
 PARTS = ("pulse", "zenoh", "http", "config", "mot", "calibration", "media", "kept")
-_COLUMNS = ("target", "inputs", "a second", "refused", "accepted", "crashes", "kinds of crash")
+MESSAGES = 1_000_000
+_COLUMNS = ("target", "inputs", "messages", "a second", "refused", "accepted", "crashes", "kinds of crash")
 
 
 def targets_of(part: str) -> tuple[type[Target], ...]:
@@ -67,12 +70,9 @@ def replay(path: Path) -> int:
 
 def row(name: str, tally: Tally) -> list[str]:
     """Give a line of the table."""
-    rate = tally.inputs / tally.seconds if tally.seconds else 0.0
-    return [
-        name,
-        *(str(it) for it in (tally.inputs, round(rate), tally.refused, tally.accepted, tally.crashes)),
-        str(tally.kinds),
-    ]
+    counts, rate = tally.counts, tally.counts.messages / tally.seconds if tally.seconds else 0.0
+    numbers = (counts.inputs, counts.messages, round(rate), counts.refused, counts.accepted, counts.crashes)
+    return [name, *map(str, numbers), str(tally.kinds)]
 
 
 def main() -> None:
@@ -80,7 +80,9 @@ def main() -> None:
     options = argparse.ArgumentParser(prog="python -m benchmarks.fuzz", description=__doc__.splitlines()[0])
     options.add_argument("--part", action="append", choices=PARTS, help="only this one; may be repeated")
     options.add_argument("--target", action="append", help="only this one of a part; may be repeated")
-    options.add_argument("--inputs", type=int, default=1_000_000, help="of each target")
+    options.add_argument("--messages", type=int, help=f"to each target; {MESSAGES}, if nothing else is said")
+    options.add_argument("--inputs", type=int, help="of each target, of however many messages")
+    options.add_argument("--first", type=int, default=0, help="the number of the first input")
     options.add_argument("--seconds", type=float, help="of each target at most")
     options.add_argument(
         "--jobs", type=int, default=len(os.sched_getaffinity(0)), help="targets at a time; each has a process"
@@ -100,15 +102,23 @@ def main() -> None:
     ]
     if not targets:
         options.error("no target of these parts has such a name")
-    plan = Plan(chosen.inputs, chosen.seconds, chosen.seed, chosen.out)
+    plan = Plan(
+        inputs=chosen.inputs,
+        seconds=chosen.seconds,
+        seed=chosen.seed,
+        out=chosen.out,
+        messages=MESSAGES if chosen.inputs is None and chosen.messages is None else chosen.messages,
+        first=chosen.first,
+    )
     tallies: dict[int, Tally] = {}
     for place, tally in side_by_side(targets, plan, max(1, chosen.jobs)):
         tallies[place] = tally
         print("  ".join(row(targets[place].name, tally)), file=sys.stderr, flush=True)
     rows = [row(it.name, tallies[place]) for place, it in enumerate(targets)]
     report.table("Inputs that nobody meant", _COLUMNS, rows)
-    report.save(chosen.out / f"fuzz-{'-'.join(chosen.part or ['all'])}.txt")
-    sys.exit(any(it.crashes for it in tallies.values()))
+    begun = [str(chosen.first)] if chosen.first else []
+    report.save(chosen.out / f"fuzz-{'-'.join([*(chosen.target or chosen.part or ['all']), *begun])}.txt")
+    sys.exit(any(it.counts.crashes for it in tallies.values()))
 
 
 if __name__ == "__main__":

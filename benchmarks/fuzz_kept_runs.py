@@ -13,7 +13,7 @@ from benchmarks.fuzz_loop import AtOnceLoop
 from benchmarks.fuzz_media_made import WORDS as MEDIA
 from benchmarks.fuzz_mutate import as_json, damaged, otherwise
 from benchmarks.fuzz_site import CAMERAS, Fed, feed_epoch, site
-from benchmarks.fuzz_target import Target, folder
+from benchmarks.fuzz_target import Scripts, folder
 from server.view.past.kept import kept_from, kept_until, known, shown
 from server.view.past.past import Past
 from server.view.past.play import CameraPast, ObjectPast, Source, last_before, play, sounds
@@ -36,7 +36,7 @@ _Files = list[tuple[str, bytes]]
 _files = msgspec.msgpack.Decoder(_Files)
 
 
-class Runs(Target):
+class Runs(Scripts):
     """A recorded run: what is told and played of it, and that it is taken away, and nothing else."""
 
     name = "kept-runs"
@@ -88,6 +88,7 @@ class Runs(Target):
         """Find the run, ask everything of it, and take it away."""
         files = _files.decode(data)
         for name, content in files:
+            self.messages += 1
             (self._run / name).write_bytes(content)
         service = self._service
         past = Past(self._config, service.shelves, service.agreement, 10, service.sound)

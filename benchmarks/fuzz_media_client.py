@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Iterable
 from io import BufferedWriter
 from pathlib import Path
@@ -48,13 +49,13 @@ class _Film(Target):
             return refused(error)
         return True
 
+    @abstractmethod
     def record(self, pieces: Iterable[bytes], file: BufferedWriter) -> None:
         """Write what comes as it comes."""
-        raise NotImplementedError
 
+    @abstractmethod
     def finish(self, part: Path) -> None:
         """Make the file that plays everywhere of it."""
-        raise NotImplementedError
 
     def close(self) -> None:
         """Take the folder away."""

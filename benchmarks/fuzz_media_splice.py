@@ -11,7 +11,7 @@ import msgspec
 
 from benchmarks.fuzz_media_made import wrong
 from benchmarks.fuzz_site import CAMERAS, STRIDE, Fed, pictures, site, tracks, video, word
-from benchmarks.fuzz_target import Target
+from benchmarks.fuzz_target import Scripts
 from benchmarks.fuzz_zenoh import ask, drink
 from server.camera.encode import AccessUnit
 from server.view.decide import GopDecision, ObjectChoice
@@ -30,7 +30,7 @@ _Units = list[tuple[int, int, bytes]]
 _script = msgspec.msgpack.Decoder(tuple[_Cuts, _Units])
 
 
-class _Splice(Target):
+class _Splice(Scripts):
     """Two cameras' frames, and where the streams of people are cut from one to the other."""
 
     codec: Literal["h264", "vp8"] = "h264"
@@ -86,7 +86,7 @@ class _Splice(Target):
         service._publish = publish  # type: ignore[method-assign]  # what a cut is made like
         viewers = [it.join() for it in _channels(service)]
         for epoch in range(_EPOCHS):
-            _show(service, units, epoch)
+            self._show(service, units, epoch)
             for name in CAMERAS:
                 service.handle(tracks(word(rng, name, epoch)))
             service.pulse = end_of_epoch(epoch, STRIDE)
@@ -102,7 +102,7 @@ class _Splice(Target):
         viewers = [it.join() for it in _channels(service)]
         before: dict[int, str | None] = dict.fromkeys(_PEOPLE)
         for gop, chosen in enumerate(cuts):
-            _show(service, units, gop)
+            self._show(service, units, gop)
             now = {
                 number: None if it is None else CAMERAS[it]
                 for number, it in zip(_PEOPLE, chosen, strict=True)
@@ -120,6 +120,13 @@ class _Splice(Target):
             drink(viewer)
         return not any(it.refused for it in service.intake.states.values())
 
+    def _show(self, service: Fed, units: _Units, gop: int) -> None:
+        for camera, pulse, data in units:
+            if pulse // STRIDE == gop:
+                self.messages += 1
+                unit = AccessUnit(pulse=pulse, key=pulse % STRIDE == 0, data=data)
+                service.handle(video(CAMERAS[camera], unit))
+
     def close(self) -> None:
         """Close the loop."""
         self._loop.close()
@@ -127,13 +134,6 @@ class _Splice(Target):
 
 def _channels(service: Fed) -> list[Any]:
     return [*service.splicer.cameras.values(), *service.splicer.decided.values()]
-
-
-def _show(service: Fed, units: _Units, gop: int) -> None:
-    for camera, pulse, data in units:
-        if pulse // STRIDE == gop:
-            unit = AccessUnit(pulse=pulse, key=pulse % STRIDE == 0, data=data)
-            service.handle(video(CAMERAS[camera], unit))
 
 
 class Splice(_Splice):

@@ -9,7 +9,7 @@ import msgspec
 
 from benchmarks.fuzz_pulse_lines import CLIENT_LINES, SERVER_LINES, some_line
 from benchmarks.fuzz_pulse_wire import Clock, Wire
-from benchmarks.fuzz_target import Target
+from benchmarks.fuzz_target import Scripts
 from camsync import ClientSettings, PulseClient, PulseServer
 from camsync.link import Link
 from camsync.protocol import parse_client_line, parse_server_line
@@ -31,7 +31,7 @@ def _scripted(rng: Random, lines: tuple[bytes, ...], connections: int) -> bytes:
     return msgspec.msgpack.encode(script)
 
 
-class ServerSessions(Target):
+class ServerSessions(Scripts):
     """Three connections to a server, which must go on to speak its own protocol to them all."""
 
     name = "pulse-server"
@@ -57,6 +57,7 @@ class ServerSessions(Target):
             peer.connection_made(wire)
         for who, said in script:
             if not wires[who].closed:
+                self.messages += said.count(b"\n")
                 peers[who].data_received(said)
             clock.now += 0.01
         server._begin_without() if server.epoch is None else None
@@ -83,7 +84,7 @@ class ServerSessions(Target):
         self._loop.close()
 
 
-class ClientSessions(Target):
+class ClientSessions(Scripts):
     """A client that is told anything by its server: numbers rise, and it ends in words or goes on."""
 
     name = "pulse-client"
@@ -111,6 +112,7 @@ class ClientSessions(Target):
         link.connection_made(wire)
         for _, said in script:
             if not wire.closed:
+                self.messages += said.count(b"\n")
                 link.data_received(said)
             clock.now += 0.01
         for _ in range(3):

@@ -8,7 +8,7 @@ from random import Random
 
 from benchmarks.fuzz_loop import HurryingLoop, leaves_no_trace
 from benchmarks.fuzz_pulse_lines import CLIENT_LINES, SERVER_LINES, some_line
-from benchmarks.fuzz_target import Target, refused
+from benchmarks.fuzz_target import Scripts, refused
 from camsync import PulseClient, PulseServer, SyncError, clients_of
 from camsync.messages import Clients, Refusal
 from camsync.protocol import parse_server_line
@@ -20,7 +20,7 @@ _SELDOM = 8
 """Who says that nothing more will come leaves a port that is taken for a minute."""
 
 
-class Sockets(Target):
+class Sockets(Scripts):
     """What somebody says to the server, or to a client."""
 
     name = "pulse-sockets"
@@ -47,7 +47,9 @@ class Sockets(Target):
     async def _to_server(self, data: bytes) -> bool:
         reader, writer = await asyncio.open_connection("127.0.0.1", self._server.port)
         leaves_no_trace(writer)
-        writer.write(data + b"\nWHO\n")
+        said = data + b"\n"
+        self.messages += said.count(b"\n")
+        writer.write(said + b"WHO\n")
         heard = []
         with contextlib.suppress(ConnectionError, TimeoutError):
             # Who has left too much unread is not told who is there.
@@ -74,6 +76,7 @@ class Sockets(Target):
 
     async def _to_client(self, data: bytes) -> bool:
         self._said = data
+        self.messages += data.count(b"\n")  # once, however often the client comes again for more
         port = self._stranger.sockets[0].getsockname()[1]
         client = PulseClient("127.0.0.1", port, "c0", clock=self._loop.time)
         client.start()

@@ -11,7 +11,7 @@ import msgspec
 from benchmarks.fuzz_mutate import damaged
 from benchmarks.fuzz_pulse_lines import CLIENT_LINES, WORDS, some_line
 from benchmarks.fuzz_pulse_wire import Clock, Wire
-from benchmarks.fuzz_target import Target
+from benchmarks.fuzz_target import Scripts
 from camsync import ClientSettings, Login, PulseClient, PulseServer
 from camsync.link import Link
 from camsync.messages import Beat, Challenge, Greeting, Hello, Ping, Refusal, ServerLine, Who
@@ -43,7 +43,7 @@ def _guessed(rng: Random, nonce: str) -> bytes:
     return seals.client.sealed(f"PROVE {user} nonce={_NONCES[1]}\n".encode() + rng.choice(CLIENT_LINES))
 
 
-class Strangers(Target):
+class Strangers(Scripts):
     """Two strangers at a closed server: they are told nothing, and who has the password notices nothing."""
 
     name = "pulse-strangers"
@@ -81,6 +81,7 @@ class Strangers(Target):
         for place, said in enumerate(script):
             who = 1 + place % 2
             if not wires[who].closed:
+                self.messages += said.count(b"\n")
                 peers[who].data_received(said)
             clock.now += 0.01
         assert server.missing() == ("c1",), "a stranger was let in"
@@ -107,7 +108,7 @@ class Strangers(Target):
         self._loop.close()
 
 
-class Between(Target):
+class Between(Scripts):
     """What a server says is tampered with on its way: the client believes the pulses before that alone."""
 
     name = "pulse-between"
@@ -156,6 +157,7 @@ class Between(Target):
         link.data_received(encode(Challenge(_NONCES[0], 1000.0)))
         for line in lines:
             if not wire.closed:
+                self.messages += line.count(b"\n")
                 link.data_received(line)
         whole = b"".join(lines).split(b"\n")[:-1]
         right = [line[:-1] for line in self._right]

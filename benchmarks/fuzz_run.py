@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import gc
 import logging
-import mmap
 import multiprocessing
 import multiprocessing.queues
 import re
 import resource
 import signal
-import struct
 import time
 import traceback
 import warnings
@@ -21,6 +19,7 @@ from pathlib import Path
 from random import Random
 from types import FrameType
 
+from benchmarks.fuzz_shared import ROOM, Counts, Shared
 from benchmarks.fuzz_target import Target
 
 HANG_S = 2.0
@@ -32,9 +31,6 @@ GROWTH_MB = 200
 DEAD, MOST_MB = "died", 4096
 _KEPT = 3
 """Inputs that are saved of each kind of crash."""
-_ROOM = 1 << 20
-_HEAD = struct.Struct("<5Q")
-"""The number of the input, how many were refused, accepted and crashed, and the bytes that follow."""
 
 
 class HangError(BaseException):
@@ -45,16 +41,13 @@ class GrowthError(Exception):
     """An input took too much memory."""
 
 
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True)
 class Tally:
-    """What came of a target's inputs."""
+    """What came of a target's inputs, in which time."""
 
-    inputs: int = 0
-    refused: int = 0
-    accepted: int = 0
-    crashes: int = 0
-    seconds: float = 0.0
-    kinds: int = 0
+    counts: Counts
+    seconds: float
+    kinds: int
     """Of crashes, by the place in the code."""
 
 
@@ -106,7 +99,7 @@ class Attempt:
         self._log.last = None
         signal.setitimer(signal.ITIMER_PROF, self._hang_s)
         try:
-            taken = self.target.feed(data)
+            taken = self.target.hand_over(data)
             signal.setitimer(signal.ITIMER_PROF, 0)
             if self._log.last is not None:
                 return Crash(_logged(self._log.last), self._log.last)
@@ -151,14 +144,24 @@ def _logged(text: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """How long and with what."""
+    """How many inputs and which; whichever bound is reached first is the end."""
 
-    inputs: int
+    inputs: int | None = None
     seconds: float | None = None
     seed: int = 1
     out: Path | None = None
     """Where crashes are saved; None: nowhere."""
     hang_s: float = HANG_S
+    messages: int | None = None
+    first: int = 0
+    """The number of the first input."""
+
+    def done(self, counts: Counts) -> bool:
+        """Tell whether these are as many as there were to be."""
+        return any(
+            most is not None and so_far >= most
+            for so_far, most in ((counts.inputs, self.inputs), (counts.messages, self.messages))
+        )
 
 
 def numbered(target: Target, seed: int, index: int) -> bytes:
@@ -176,34 +179,34 @@ class Runner:
     def run(self) -> Tally:
         """Run it in processes of its own; one that dies or grows is followed by another."""
         began = time.monotonic()
-        shared, fork = mmap.mmap(-1, _HEAD.size + _ROOM), multiprocessing.get_context("fork")
+        shared, fork, counts = Shared(), multiprocessing.get_context("fork"), Counts()
         until = None if self._plan.seconds is None else began + self._plan.seconds
-        index, refused, accepted, crashes = 0, 0, 0, 0
-        while index < self._plan.inputs and (index == 0 or until is None or time.monotonic() < until):
+        while not self._plan.done(counts) and (
+            not counts.inputs or until is None or time.monotonic() < until
+        ):
             kinds = fork.SimpleQueue()
             child = fork.Process(target=self._child, args=(shared, until, kinds))
             child.start()
             died = self._wait(child, shared)
             while not kinds.empty():
                 self._count(kinds.get())
-            index, refused, accepted, crashes, size = _HEAD.unpack_from(shared)
+            counts = shared.counts
             if died is not None:
-                crash = Crash(f"{DEAD}-{died}", f"the process {died}")
-                self._save(crash, shared[_HEAD.size : _HEAD.size + size])
-                index, crashes = index + 1, crashes + 1
-                _HEAD.pack_into(shared, 0, index, refused, accepted, crashes, 0)
-            elif not size:
-                break
-        return Tally(index, refused, accepted, crashes, time.monotonic() - began, len(self._kinds))
+                self._save(Crash(f"{DEAD}-{died}", f"the process {died}"), counts.inputs, shared.data)
+                counts.inputs, counts.messages, counts.crashes = (
+                    it + 1 for it in (counts.inputs, counts.messages, counts.crashes)
+                )
+                shared.keep(counts)
+        return Tally(counts, time.monotonic() - began, len(self._kinds))
 
-    def _wait(self, child: multiprocessing.process.BaseProcess, shared: mmap.mmap) -> str | None:
+    def _wait(self, child: multiprocessing.process.BaseProcess, shared: Shared) -> str | None:
         """Wait for a process; say how it died, None where it did not."""
         last, since = -1, time.monotonic()
         while child.is_alive():
             child.join(1.0)
-            index = _HEAD.unpack_from(shared)[0]
-            if index != last:
-                last, since = index, time.monotonic()
+            inputs = shared.counts.inputs
+            if inputs != last:
+                last, since = inputs, time.monotonic()
             elif time.monotonic() - since > STUCK_S:
                 child.kill()
                 child.join()
@@ -215,44 +218,45 @@ class Runner:
         return None
 
     def _child(
-        self, shared: mmap.mmap, until: float | None, kinds: multiprocessing.queues.SimpleQueue[str]
+        self, shared: Shared, until: float | None, kinds: multiprocessing.queues.SimpleQueue[str]
     ) -> None:
-        index, refused, accepted, crashes, _ = _HEAD.unpack_from(shared)
+        counts = shared.counts
         resource.setrlimit(resource.RLIMIT_AS, (MOST_MB << 20, MOST_MB << 20))
         target = self._make()
-        attempt, begun, grown = Attempt(target, self._plan.hang_s), index, 0
+        attempt, begun, grown = Attempt(target, self._plan.hang_s), counts.inputs, False
+        before = counts.messages - target.messages
         gc.freeze()
         with attempt.watching():
-            while not grown and index < self._plan.inputs:
-                if until is not None and time.monotonic() > until and index > begun:
+            while not grown and not self._plan.done(counts):
+                if until is not None and time.monotonic() > until and counts.inputs > begun:
                     break
-                data = numbered(target, self._plan.seed, index)[:_ROOM]
-                shared[_HEAD.size : _HEAD.size + len(data)] = data
-                _HEAD.pack_into(shared, 0, index, refused, accepted, crashes, len(data))
+                data = numbered(target, self._plan.seed, self._plan.first + counts.inputs)[:ROOM]
+                shared.keep(counts, data)
                 match attempt.feed(data):
                     case Crash() as crash:
-                        crashes += 1
-                        self._save(crash, data)
+                        counts.crashes += 1
+                        self._save(crash, counts.inputs, data)
                         if self._kinds[crash.kind] <= _KEPT:
                             kinds.put(crash.kind)
-                        grown = int(crash.kind.startswith(GrowthError.__name__))  # what it had it keeps
+                        grown = crash.kind.startswith(GrowthError.__name__)  # what it had it keeps
                     case True:
-                        accepted += 1
+                        counts.accepted += 1
                     case _:
-                        refused += 1
-                index += 1
-        _HEAD.pack_into(shared, 0, index, refused, accepted, crashes, grown)
+                        counts.refused += 1
+                counts.inputs += 1
+                counts.messages = before + target.messages
+        shared.keep(counts)
         target.close()
 
     def _count(self, kind: str) -> int:
         count = self._kinds[kind] = self._kinds.get(kind, 0) + 1
         return count
 
-    def _save(self, crash: Crash, data: bytes) -> None:
-        """Save what crashed, some of each kind."""
+    def _save(self, crash: Crash, place: int, data: bytes) -> None:
+        """Save what crashed, some of each kind, by the input's number."""
         count = self._count(crash.kind)
         if self._plan.out is not None and count <= _KEPT:
             self._plan.out.mkdir(parents=True, exist_ok=True)
-            stem = f"{self._name}.{crash.kind}.{count}"
+            stem = f"{self._name}.{crash.kind}.{self._plan.first + place}"
             (self._plan.out / f"{stem}.bin").write_bytes(data)
             (self._plan.out / f"{stem}.txt").write_text(crash.text, encoding="utf-8", errors="replace")

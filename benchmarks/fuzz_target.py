@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from pathlib import Path
 from random import Random
 from tempfile import TemporaryDirectory
@@ -23,25 +24,41 @@ class UnclearError(AssertionError):
     """An input was refused, but not in one readable line."""
 
 
-class Target:
+class Target(ABC):
     """One reader. Made in the process that runs it, once for many inputs."""
 
     name: ClassVar[str]
+    messages = 0
+    """That the reader was given so far: lines, messages, requests, access units, files; whatever it reads one
+    by one. Here an input is one."""
 
+    @abstractmethod
     def make(self, rng: Random) -> bytes:
         """Give an input: most are nearly right, some are right, some are anything."""
-        raise NotImplementedError
 
+    @abstractmethod
     def feed(self, data: bytes) -> bool:
         """Hand an input to the reader; say whether it was taken, or refused as it should be.
 
         Raises:
             Exception: anything at all, which is a crash.
         """
-        raise NotImplementedError
 
-    def close(self) -> None:
+    def hand_over(self, data: bytes) -> bool:
+        """Feed an input, and count it."""
+        self.messages += 1
+        return self.feed(data)
+
+    def close(self) -> None:  # noqa: B027 — most have opened nothing
         """Let go of what was opened."""
+
+
+class Scripts(Target):
+    """A reader whose inputs are several messages each: ``feed`` counts them as it hands them over."""
+
+    def hand_over(self, data: bytes) -> bool:
+        """Feed an input."""
+        return self.feed(data)
 
 
 def refused(error: BaseException | str) -> bool:

@@ -27,7 +27,7 @@ from benchmarks.fuzz_site import (
     video,
     word,
 )
-from benchmarks.fuzz_target import Target
+from benchmarks.fuzz_target import Scripts, Target
 from server.camera.earshot import Earshot
 from server.camera.exchange import Exchange
 from server.camera.pointed import Pointed as PointedAt
@@ -120,7 +120,7 @@ class Messages(Target):
         return not intake.bad_sounds and not any(it.bad_messages for it in intake.states.values())
 
 
-class Words(Target):
+class Words(Scripts):
     """What cameras tell each other of a frame."""
 
     name = "zenoh-found"
@@ -143,6 +143,7 @@ class Words(Target):
         """Hear them."""
         earshot, bad = Earshot(("c1",), 50, lambda _: True), self._exchange.bad_messages
         for pulse, (key, payload, _) in enumerate(_script.decode(data)):
+            self.messages += 1
             heard = self._exchange._read(Message(key, payload, b""))
             if heard is not None and heard.camera == "c1":
                 earshot.put(heard, 0.0)
@@ -153,7 +154,7 @@ class Words(Target):
         return self._exchange.bad_messages == bad
 
 
-class Places(Target):
+class Places(Scripts):
     """Where an operator points, as a camera hears it."""
 
     name = "zenoh-pointing"
@@ -174,12 +175,13 @@ class Places(Target):
         """Hear them."""
         heard = PointedAt("c0", 1)
         for key, payload, _ in _script.decode(data):
+            self.messages += 1
             heard.put(Message(key, payload, b""))
             assert len(heard.take()) <= POINTS_MOST
         return not heard.bad_messages
 
 
-class Sessions(Target):
+class Sessions(Scripts):
     """A site over some epochs: messages wrong, lost, doubled and out of order; then all is asked of it."""
 
     name = "zenoh-sessions"
@@ -228,6 +230,7 @@ class Sessions(Target):
         epoch = 0
         for key, payload, head in script:
             if key:
+                self.messages += 1
                 service.handle(Message(key, payload, head))
                 continue
             service.pulse = end_of_epoch(epoch, STRIDE)

@@ -13,7 +13,7 @@ import pytest
 from benchmarks.fuzz import PARTS, side_by_side, targets_of
 from benchmarks.fuzz_http_strangers import SECRETS, Strangers
 from benchmarks.fuzz_run import Attempt, Crash, Plan, Runner, numbered
-from benchmarks.fuzz_target import Target, UnclearError, refused
+from benchmarks.fuzz_target import Scripts, Target, UnclearError, refused
 from server.web import access
 from server.web.access_grant import Need
 
@@ -33,9 +33,11 @@ def _no_settings_from_outside(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_no_input_makes_it_crash(target: type[Target], tmp_path: Path) -> None:
     tally = Runner(target, target.name, Plan(INPUTS, SECONDS, seed=7, out=tmp_path)).run()
     found = "\n\n".join(it.read_text() for it in sorted(tmp_path.glob("*.txt")))
-    assert tally.crashes == 0, found
-    assert tally.inputs > 0
-    assert tally.accepted + tally.refused == tally.inputs
+    counts = tally.counts
+    assert counts.crashes == 0, found
+    assert counts.inputs > 0
+    assert counts.messages > 0
+    assert counts.accepted + counts.refused == counts.inputs
 
 
 @pytest.mark.parametrize("target", ALL, ids=[it.name for it in ALL])
@@ -77,15 +79,16 @@ class Broken(Target):
 
 
 def test_whatever_a_reader_does_wrong_is_counted_and_saved(tmp_path: Path) -> None:
-    tally = Runner(
-        Broken, "broken-reader", Plan(INPUTS_OF_ALL_KINDS, seed=SEED, out=tmp_path, hang_s=0.7)
-    ).run()
+    plan = Plan(INPUTS_OF_ALL_KINDS, seed=SEED, out=tmp_path, hang_s=0.7)
+    counts = Runner(Broken, Broken.name, plan).run().counts
     saved = {path.read_bytes() for path in tmp_path.glob("*.bin")}
     given = [numbered(Broken(), SEED, index) for index in range(INPUTS_OF_ALL_KINDS)]
-    assert tally.inputs == INPUTS_OF_ALL_KINDS
+    assert counts.inputs == counts.messages == INPUTS_OF_ALL_KINDS
     assert saved == set(given) - {b"right", b"wrong"}
-    assert tally.accepted == given.count(b"right")
-    assert tally.refused == given.count(b"wrong")
+    assert counts.accepted == given.count(b"right")
+    assert counts.refused == given.count(b"wrong")
+    for path in tmp_path.glob("*.bin"):
+        assert path.read_bytes() == given[int(path.stem.rpartition(".")[2])]
 
 
 class Raising(Broken):
@@ -109,11 +112,48 @@ class Sound(Raising):
 def test_targets_side_by_side_count_as_they_do_one_by_one() -> None:
     plan = Plan(INPUTS_OF_ALL_KINDS, seed=SEED)
     tallies = dict(side_by_side((Raising, Sound, Sound), plan, jobs=2))
-    alone = Runner(Raising, Raising.name, plan).run()
+    alone = Runner(Raising, Raising.name, plan).run().counts
     assert sorted(tallies) == [0, 1, 2]
-    assert (tallies[0].refused, tallies[0].crashes) == (alone.refused, alone.crashes)
+    assert tallies[0].counts == alone
     assert alone.crashes > 0
-    assert tallies[1].accepted == tallies[2].accepted == INPUTS_OF_ALL_KINDS
+    assert tallies[1].counts.accepted == tallies[2].counts.accepted == INPUTS_OF_ALL_KINDS
+
+
+class Talking(Scripts):
+    """Is told words one by one, and dies of one of them."""
+
+    name = "talking-reader"
+
+    def make(self, rng: Random) -> bytes:
+        return b" ".join(rng.choice((b"right", b"wrong", b"over")) for _ in range(5))
+
+    def feed(self, data: bytes) -> bool:
+        for word in data.split():
+            self.messages += 1
+            if word == b"over":
+                return False
+        if data.count(b"right") == len(data.split()):
+            os.kill(os.getpid(), signal.SIGKILL)
+        return True
+
+
+def test_messages_are_counted_that_were_handed_over_though_a_process_dies() -> None:
+    inputs = [numbered(Talking(), SEED, index).split() for index in range(INPUTS)]
+    handed = [it.index(b"over") + 1 if b"over" in it else len(it) for it in inputs]
+    died = [it == [b"right"] * 5 for it in inputs]
+    assert any(died)
+    counts = Runner(Talking, Talking.name, Plan(INPUTS, seed=SEED)).run().counts
+    assert counts.messages == sum(1 if dead else count for count, dead in zip(handed, died, strict=True))
+    assert counts.crashes == sum(died)
+
+
+def test_so_many_messages_end_it_and_it_goes_on_from_there() -> None:
+    whole = Runner(Talking, Talking.name, Plan(messages=300, seed=SEED)).run().counts
+    assert 300 <= whole.messages < 305
+    begun = Runner(Talking, Talking.name, Plan(20, seed=SEED)).run().counts
+    rest = Runner(Talking, Talking.name, Plan(whole.inputs - 20, seed=SEED, first=20)).run().counts
+    assert begun.messages + rest.messages == whole.messages
+    assert begun.accepted + rest.accepted == whole.accepted
 
 
 def test_a_saved_input_says_again_what_it_did() -> None:
