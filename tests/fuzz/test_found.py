@@ -41,6 +41,7 @@ CAMERA = {"id": "c0", "source": "scene:room"}
     "text",
     [
         "[" * 1200,
+        "- " * 100_000,
         "cameras: &a [*a]",
         "cameras: !!int ''",
         "cameras: !!bool x",
