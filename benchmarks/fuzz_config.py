@@ -7,6 +7,7 @@ import os
 from pathlib import Path
 from random import Random
 from typing import Any
+from unittest.mock import patch
 
 import msgspec
 from pydantic import TypeAdapter
@@ -46,8 +47,22 @@ _TOKENS = b"""tokens:
 """ % (b"a1" * 32, b"0f" * 32)
 _VARIABLE = "MYVIEW_"
 _MOST_CAMERAS = 20
-_SELDOM = 16
+_WHOLE = 1 / 16
+"""Of the inputs so many give whole sections; reading what is said of all else takes longer than all else."""
+_SELDOM = 256
 """Telling all settings takes longer than reading them: it is done for one in so many."""
+
+
+class _Undisturbed(Target):
+    """A configuration that the machine's own environment, which is read with it, has no part in."""
+
+    def __init__(self) -> None:
+        self._surroundings = patch.dict(os.environ, clear=True)
+        self._surroundings.start()
+
+    def close(self) -> None:
+        """Give the environment back."""
+        self._surroundings.stop()
 
 
 def _looked_at(config: Config, *, seldom: bool) -> None:
@@ -59,12 +74,13 @@ def _looked_at(config: Config, *, seldom: bool) -> None:
         BestViewService(config)
 
 
-class Text(Target):
+class Text(_Undisturbed):
     """A file."""
 
     name = "config-text"
 
     def __init__(self) -> None:
+        super().__init__()
         self._folder = folder()
         self._path = Path(self._folder.name) / "site.yaml"
 
@@ -84,6 +100,7 @@ class Text(Target):
 
     def close(self) -> None:
         """Take the folder away."""
+        super().close()
         self._folder.cleanup()
 
 
@@ -114,20 +131,24 @@ class Tokens(Target):
         self._folder.cleanup()
 
 
-class Values(Target):
-    """The sections of the reference, a few at a time, one value changed; sometimes from the environment."""
+class Values(_Undisturbed):
+    """Sections of the reference, some keys of a few, one value changed; sometimes from the environment."""
 
     name = "config-values"
 
     def __init__(self) -> None:
+        super().__init__()
         sections = {name: _plain(value) for name, value in site() if name != "ground"}
         self._cameras = sections.pop("cameras")
         self._sections: dict[str, Any] = sections
 
     def make(self, rng: Random) -> bytes:
         """Give sections, and variables of the environment."""
-        names = rng.sample(sorted(self._sections), 2)
+        names, whole = rng.sample(sorted(self._sections), 2), rng.random() < _WHOLE
         content: Any = {name: self._sections[name] for name in names} | {"cameras": self._cameras}
+        if not whole:
+            some = {name: _some(rng, content[name]) for name in names}
+            content = some | {"cameras": [_some(rng, it, ("id", "source")) for it in self._cameras]}
         variables: dict[str, str] = {}
         if rng.random() < 0.1:
             section = rng.choice(names)
@@ -193,6 +214,14 @@ class Tried(Target):
             return refused(error)
         self._service.decider.choose_by(view)
         return True
+
+
+def _some(rng: Random, section: Any, needed: tuple[str, ...] = ()) -> Any:
+    """Give some of a section's keys, and those that it cannot be without."""
+    if not isinstance(section, dict):
+        return section
+    names = {*needed, *rng.sample(list(section), min(len(section), rng.randrange(1, 5)))}
+    return {name: value for name, value in section.items() if name in names}
 
 
 def _plain(value: Any) -> Any:

@@ -6,6 +6,7 @@ Every default is documented in ``configs/demo.yaml``.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Self
@@ -18,6 +19,8 @@ from server.wire.library import validated
 from server.wire.sections import Access, Camera, Encode, Http, Record, Site, Sound, Sync, Track, View, Zenoh
 from tracking.yardsticks import TEMPORAL
 
+_PREFIX = "MYVIEW_"
+
 
 class Config(BaseSettings):
     """A whole site."""
@@ -25,7 +28,7 @@ class Config(BaseSettings):
     model_config = SettingsConfigDict(
         extra="forbid",
         frozen=True,
-        env_prefix="MYVIEW_",
+        env_prefix=_PREFIX,
         env_nested_delimiter="__",
     )
 
@@ -54,9 +57,10 @@ class Config(BaseSettings):
         dotenv_settings: PydanticBaseSettingsSource,
         file_secret_settings: PydanticBaseSettingsSource,
     ) -> tuple[PydanticBaseSettingsSource, ...]:
-        """Let the environment go before the file."""
+        """Let the environment go before the file; where it has nothing to say, it is not asked at length."""
         del settings_cls, dotenv_settings, file_secret_settings
-        return env_settings, init_settings
+        told = any(name.upper().startswith(_PREFIX) for name in os.environ)
+        return (env_settings, init_settings) if told else (init_settings,)
 
     @model_validator(mode="after")
     def _cameras_have_different_names(self) -> Self:

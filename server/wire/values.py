@@ -14,6 +14,8 @@ _LARGEST = 1e15
 _SHOWN = 40
 _LONGEST_NAME = 64
 
+_HOLDING = (dict, list, tuple, set)
+
 
 def shortened(key: str) -> str:
     """Give a key as a line can name it: it may be as long as its file."""
@@ -72,17 +74,17 @@ def _short(key: Any) -> str:
 
 def _inside(content: Any, where: str) -> Iterator[tuple[tuple[Any, ...], Any]]:
     """Give all values, keys too, and by what keys they are reached."""
-    left: list[tuple[tuple[Any, ...], Any]] = [((), content)]
+    left: list[tuple[tuple[Any, ...], Any]] = [((), content)] if isinstance(content, _HOLDING) else []
     seen = 0
     while left:
         place, value = left.pop()
-        seen += 1
+        seen += len(value)
         if len(place) > _DEEPEST or seen > _MOST:
             raise UserError(f"{where}: is nested without end, or larger than any configuration")
         if isinstance(value, dict):
-            left += ((place, key) for key in value)
-            left += (((*place, key), it) for key, it in value.items())
-        elif isinstance(value, list | tuple | set):
-            left += (((*place, number), it) for number, it in enumerate(value))
-        else:
-            yield place, value
+            yield from ((place, key) for key in value)
+        for key, it in value.items() if isinstance(value, dict) else enumerate(value):
+            if isinstance(it, _HOLDING):
+                left.append(((*place, key), it))
+            else:
+                yield (*place, key), it
