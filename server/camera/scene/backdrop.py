@@ -8,7 +8,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from server.camera.scene import gym, surfaces
+from server.camera.scene import house
+from server.camera.scene.finish import finish_of
 from server.camera.scene.perspective import Floats, Perspective
 from server.camera.scene.room import Block, Door, Room
 from server.camera.scene.solids import FAR, hit, may_hit
@@ -84,7 +85,7 @@ def _shell(room: Room, origin: Floats, rays: Floats) -> tuple[Floats, NDArray[np
     for axis in range(3):
         for upper in (False, True):
             mask = (side == axis) & ((rays[:, axis] > 0) == upper)
-            colour[mask] = _surface(room, points[mask], axis, upper=upper)
+            colour[mask] = finish_of(room).paint(room, points[mask], axis, upper=upper)
     ground = (side == 2) & (rays[:, 2] < 0)  # noqa: PLR2004 — the z axis
     colour[ground] *= _contact(room, points[ground])[:, None]
     label[ground] = _FLOOR
@@ -100,14 +101,6 @@ def _shell(room: Room, origin: Floats, rays: Floats) -> tuple[Floats, NDArray[np
     return colour, label, distance
 
 
-def _surface(room: Room, points: Floats, axis: int, *, upper: bool) -> Floats:
-    if room.style == "court":
-        return gym.paint(room, points, axis, upper=upper)
-    if axis == 2:  # noqa: PLR2004 — the z axis
-        return surfaces.ceiling(points) if upper else surfaces.floor(room, points)
-    return surfaces.wall(room, points, axis, far=upper)
-
-
 def _behind(room: Room, door: Door, origin: Floats, rays: Floats) -> Floats:
     axis, edge = (1, room.depth) if door.wall == "north" else (0, room.width)
     jambs = np.where(rays[:, 1 - axis] > 0, door.start + door.width, door.start)
@@ -119,7 +112,7 @@ def _behind(room: Room, door: Door, origin: Floats, rays: Floats) -> Floats:
     reach = np.where((beyond_jamb > 0) & (beyond_jamb < 0.15), np.minimum(reach, to_jamb), reach)  # noqa: PLR2004 — wall thickness
     points = origin + rays * reach[:, None]
     points[:, 2] = np.where(np.abs(points[:, 2]) < 1e-6, 0.0, points[:, 2])  # noqa: PLR2004 — rounding
-    return surfaces.corridor(points, points[:, axis] - edge)
+    return house.corridor(points, points[:, axis] - edge)
 
 
 def _contact(room: Room, points: Floats) -> Floats:
@@ -139,8 +132,8 @@ def _lit(room: Room, block: Block, points: Floats, normals: Floats) -> Floats:
     sun = _SUN / np.linalg.norm(_SUN)
     diffuse = 0.62 + 0.26 * np.clip(normals @ sun, -0.5, 1) + 0.20 * np.clip(normals[:, 2], 0, 1)
     low = 1 - 0.25 * np.exp(-np.maximum(points[:, 2], 0) / 0.2)
-    level = surfaces.daylight(room, points[:, 0], points[:, 1])
-    leaf = surfaces.lattice(np.floor(points[:, 0] * 28), np.floor(points[:, 1] * 28 + points[:, 2] * 31))
+    level = finish_of(room).light(room, points[:, 0], points[:, 1])
+    leaf = house.lattice(np.floor(points[:, 0] * 28), np.floor(points[:, 1] * 28 + points[:, 2] * 31))
     grain = 0.72 + 0.56 * leaf if block.shape == "ball" else np.ones(len(points))
     colour: Floats = np.array(block.colour) * (diffuse * low * level * grain * 1.15)[:, None]
     return colour

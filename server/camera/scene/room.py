@@ -15,6 +15,7 @@ from server.camera.scene.perspective import Floats, Viewpoint
 
 Colour: TypeAlias = tuple[float, float, float]  # red, green, blue in 0..1
 Point: TypeAlias = tuple[float, float]
+Style: TypeAlias = Literal["house", "court"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +67,7 @@ class Room:
     furniture: tuple[Furniture, ...]
     rug: tuple[float, float, float, float]  # west, south, east and north bound
     viewpoints: tuple[Viewpoint, ...]
-    style: Literal["house", "court"] = "house"  # what floor, walls and light are like
+    style: Style = "house"  # what floor, walls and light are like: finish.py
 
     def beyond(self, door: Door, along: float, out: float) -> Point:
         """Give the floor point `out` metres beyond a door's wall, `along` from the opening's middle."""

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from server.camera.scene.backdrop import Backdrop, paint
 from server.camera.scene.body import body
 from server.camera.scene.figure import Figure, clip, draw_figure
+from server.camera.scene.finish import finish_of
 from server.camera.scene.outfits import Outfit
 from server.camera.scene.perspective import Floats, Perspective
 from server.camera.scene.room import Furniture, Room
 from server.camera.scene.skeleton import joints
 from server.camera.scene.stroll import Pose
-from server.camera.scene.surfaces import daylight
 
 _THRESHOLD = 0.12  # metres behind the wall from which only the doorway shows a walker
 _GONE = 1.6  # metres to the side of a doorway's middle at which nothing of a walker is in it
@@ -53,7 +53,7 @@ class Stage:
             if beyond > _THRESHOLD and not self._near_door(pose):
                 continue
             skeleton = joints(pose, outfit.height)
-            light = _FULL * float(daylight(self.room, np.array(pose.x), np.array(pose.y)))
+            light = _FULL * float(finish_of(self.room).light(self.room, np.array(pose.x), np.array(pose.y)))
             figure = draw_figure(self.view, body(outfit), skeleton, light)
             if figure is None or clip(figure, self.view) is None:
                 continue

@@ -8,10 +8,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from server.camera.scene.house import lattice
 from server.camera.scene.perspective import Floats, Perspective
 from server.camera.scene.room import Block
 from server.camera.scene.solids import FAR, hit, may_hit
-from server.camera.scene.surfaces import lattice
 from server.camera.scene.tank.water import (
     TILE,
     Bytes,

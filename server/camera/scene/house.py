@@ -1,11 +1,10 @@
-"""What floor, walls and corridors look like: colour by place, as red, green, blue in 0..1."""
+"""What floor, walls and corridors of a house look like: colour by place, as red, green, blue in 0..1."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from server.camera.scene import gym
 from server.camera.scene.perspective import Floats
 from server.camera.scene.room import Room
 
@@ -35,16 +34,21 @@ def lattice(a: Floats, b: Floats) -> Floats:
     return ((mixed ^ (mixed >> np.uint32(16))) & np.uint32(0xFFFF)) / 65535.0
 
 
-def daylight(room: Room, x: Floats, y: Floats) -> Floats:
+def light(room: Room, x: Floats, y: Floats) -> Floats:
     """Say how bright a floor point is, about 0.6 .. 1.1: windows in the west and south, soft lamps within."""
-    if room.style == "court":
-        return gym.light(room, x, y)
     lamps = np.exp(-((x - room.width * 0.5) ** 2 + (y - room.depth * 0.55) ** 2) / 9.0)
     windows = 0.20 * np.exp(-np.maximum(x, 0) / 2.6) + 0.17 * np.exp(-np.maximum(y, 0) / 2.2)
     beyond = np.maximum(np.maximum(x - room.width, y - room.depth), 0)
     inside = 0.72 + 0.24 * lamps + windows
     shade: Floats = inside * (0.42 + 0.58 * np.exp(-beyond / 0.35))
     return shade
+
+
+def paint(room: Room, points: Floats, axis: int, *, upper: bool) -> Floats:
+    """Colour the points ``(N, 3)`` of the floor, the ceiling or a wall."""
+    if axis == 2:  # noqa: PLR2004 — the z axis
+        return ceiling(points) if upper else floor(room, points)
+    return wall(room, points, axis, far=upper)
 
 
 def floor(room: Room, points: Floats) -> Floats:
@@ -60,7 +64,7 @@ def floor(room: Room, points: Floats) -> Floats:
     near = np.minimum(np.minimum(x, room.width - x), np.minimum(y, room.depth - y))
     shade = (tone + grain) * seam * (1 - 0.30 * np.exp(-np.maximum(near, 0) / 0.28))
     colour = _carpet(room, x, y, _FLOOR * shade[:, None])
-    return colour * daylight(room, x, y)[:, None]
+    return colour * light(room, x, y)[:, None]
 
 
 def _carpet(room: Room, x: Floats, y: Floats, colour: Floats) -> Floats:

@@ -1,0 +1,28 @@
+"""Which floor, walls and light a room has: the one place that knows what styles there are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Protocol
+
+from server.camera.scene import gym, house
+from server.camera.scene.perspective import Floats
+from server.camera.scene.room import Room, Style
+
+
+class Finish(Protocol):
+    """How a style of room looks: colours are red, green, blue in 0..1."""
+
+    def light(self, room: Room, x: Floats, y: Floats, /) -> Floats:
+        """Say how bright floor points are."""
+
+    def paint(self, room: Room, points: Floats, axis: int, /, *, upper: bool) -> Floats:
+        """Colour the points ``(N, 3)`` of a surface across an axis; ``upper`` is the farther of the two."""
+
+
+_FINISHES: Mapping[Style, Finish] = {"house": house, "court": gym}
+
+
+def finish_of(room: Room) -> Finish:
+    """Give how a room looks."""
+    return _FINISHES[room.style]
