@@ -6,10 +6,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from av.video.frame import PictureType, VideoFrame
+from av.video.frame import PictureType
 from numpy.typing import NDArray
 
 from server.camera.codecs import CLOCK, libvpx, x264
+from server.wire.colours import yuv
 from server.wire.drawing import Canvas
 
 if TYPE_CHECKING:  # a drawing process encodes too, and has no second to load the configuration's libraries
@@ -46,7 +47,7 @@ class Encoder:
     def encode(self, pulse: int, image: NDArray[np.uint8]) -> AccessUnit:
         """Encode the picture, ``(height, width, 3)`` BGR of the site's size, of one pulse."""
         key = self._last is None or pulse // self._gop != self._last // self._gop
-        frame = VideoFrame.from_ndarray(image, format="bgr24").reformat(format="yuv420p")
+        frame = yuv(image)
         frame.pts = round(pulse * CLOCK.denominator / self._fps)
         frame.time_base = CLOCK
         frame.pict_type = PictureType.I if key else PictureType.NONE

@@ -17,6 +17,7 @@ from server.camera.encode import Encoder
 from server.draw.boxes import Image, draw_boxes
 from server.draw.unpack import frames
 from server.draw.unpack_webm import webm_frames
+from server.wire.colours import bgr
 from server.wire.drawing import Canvas, Draw, Drawn, Jpeg, Unit, belongs
 
 log = logging.getLogger(__name__)
@@ -35,7 +36,7 @@ class Painting:
     @cached_property
     def plain(self) -> Image:
         """The picture, ``(height, width, 3)`` BGR."""
-        return np.asarray(self.frame.to_ndarray(format="bgr24"), dtype=np.uint8)
+        return bgr(self.frame)
 
     @cached_property
     def boxed(self) -> Image:

@@ -14,8 +14,9 @@ from server.camera.own.annexb import is_key, packing_of
 from server.camera.own.fitting import Fitting, MisfitError, Wanted
 from server.camera.own.passing import Unit
 from server.camera.sources.base import Image, SourceEnded
-from server.camera.sources.opening import Opened, bgr, open_video
+from server.camera.sources.opening import Opened, open_video
 from server.camera.sources.recording import frames_at
+from server.wire.colours import bgr
 from server.wire.errors import UserError
 
 

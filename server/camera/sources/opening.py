@@ -6,13 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import av
-import numpy as np
 from av.container import InputContainer
 from av.video.codeccontext import VideoCodecContext
-from av.video.frame import VideoFrame
 from av.video.stream import VideoStream
 
-from server.camera.sources.base import Image
 from server.wire.addresses import shown
 from server.wire.errors import UserError
 from server.wire.sources import is_device
@@ -62,8 +59,3 @@ def open_video(
     context.thread_count = 1  # one process per camera already uses the cores
     fps = float(stream.average_rate) if stream.average_rate else _DEFAULT_FPS
     return Opened(container, stream, (context.width, context.height), fps, stream.frames)
-
-
-def bgr(picture: VideoFrame) -> Image:
-    """Give a decoded picture as ``(height, width, 3)`` BGR."""
-    return np.asarray(picture.to_ndarray(format="bgr24"), dtype=np.uint8)

@@ -9,8 +9,9 @@ from typing import Literal
 from av.video.frame import VideoFrame
 
 from server.camera.sources.base import Image, SourceEnded
-from server.camera.sources.opening import bgr, open_video
+from server.camera.sources.opening import open_video
 from server.camera.sources.pictures import pictures
+from server.wire.colours import bgr
 from server.wire.errors import UserError
 
 

@@ -15,8 +15,9 @@ from av.video.stream import VideoStream
 
 from server.camera.sound import LiveSound
 from server.camera.sources.base import Image
-from server.camera.sources.opening import Opened, bgr, open_video
+from server.camera.sources.opening import Opened, open_video
 from server.wire.addresses import shown
+from server.wire.colours import bgr
 from server.wire.errors import UserError
 
 log = logging.getLogger(__name__)

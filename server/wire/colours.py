@@ -1,0 +1,34 @@
+"""Pictures from the colours of a codec to BGR, and back."""
+
+from __future__ import annotations
+
+import threading
+
+import numpy as np
+from av.video.frame import VideoFrame
+from av.video.reformatter import VideoReformatter
+from numpy.typing import NDArray
+
+
+class _Kept(threading.local):
+    """What converts, kept from picture to picture: to set it up takes as long as many a picture does."""
+
+    def __init__(self) -> None:
+        self.to_bgr, self.to_yuv = VideoReformatter(), VideoReformatter()
+
+
+_kept = _Kept()
+_THREADS = 1
+"""FFmpeg would take one for each core, for a fraction of a millisecond's work."""
+
+
+def bgr(picture: VideoFrame) -> NDArray[np.uint8]:
+    """Give a decoded picture as ``(height, width, 3)`` BGR."""
+    found = _kept.to_bgr.reformat(picture, format="bgr24", threads=_THREADS)
+    return np.asarray(found.to_ndarray(), dtype=np.uint8)
+
+
+def yuv(image: NDArray[np.uint8]) -> VideoFrame:
+    """Give a picture, ``(height, width, 3)`` BGR, as it is encoded: colour at half the size."""
+    picture = VideoFrame.from_ndarray(image, format="bgr24")
+    return _kept.to_yuv.reformat(picture, format="yuv420p", threads=_THREADS)
