@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import combinations
 
 import numpy as np
 
@@ -94,14 +93,14 @@ def _check(points: MarkedPoints) -> None:
     for place, words in ((points.image, "in the picture"), (points.floor, "on the floor")):
         if not np.isfinite(place).all():
             raise CalibrationError(f"camera {points.camera}: a point {words} is not a finite number")
-    for first, second in combinations(range(count), 2):
-        same = [bool((it[first] == it[second]).all()) for it in (points.image, points.floor)]
-        if same[0] != same[1]:
-            raise CalibrationError(
-                f"camera {points.camera}: pairs {first + 1} and {second + 1} are one point "
-                f"{'in the picture' if same[0] else 'on the floor'} and two "
-                f"{'on the floor' if same[0] else 'in the picture'}"
-            )
+    seen, stood = ((it[:, None] == it).all(axis=-1) for it in (points.image, points.floor))
+    for first, second in np.argwhere(np.triu(seen != stood)):
+        one, two = "in the picture", "on the floor"
+        if stood[first, second]:
+            one, two = two, one
+        raise CalibrationError(
+            f"camera {points.camera}: pairs {first + 1} and {second + 1} are one point {one} and two {two}"
+        )
 
 
 def _fitted(source: Floats, target: Floats, camera: str) -> Floats:
