@@ -7,6 +7,7 @@ hash. Every request is checked, and by a slow one strangers could keep the serve
 from __future__ import annotations
 
 import hashlib
+from collections import Counter
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -68,8 +69,8 @@ def read_tokens(path: Path) -> tuple[Token, ...]:
         )
     tokens = tuple(_token(path, number, one) for number, one in enumerate(listed))
     for what in ("name", "sha256"):
-        given = [getattr(it, what) for it in tokens]
-        twice = next((it for it in given if given.count(it) > 1), None)
+        given = Counter(getattr(it, what) for it in tokens)
+        twice = next((it for it, count in given.items() if count > 1), None)
         if twice is not None:
             raise UserError(f"{path}: two tokens have the {what} {twice}; each has its own")
     return tokens
