@@ -19,6 +19,7 @@ from server.view.shelf import Shelf
 from server.view.sound import SoundShelf
 from server.wire.config import Config
 from server.wire.errors import UserError
+from server.wire.h264 import ParameterSets
 from server.wire.messages import GopChoices
 
 log = logging.getLogger(__name__)
@@ -48,6 +49,8 @@ class Past:
         self._patience = frames // 2
         self._read: WeakKeyDictionary[Run, Headers] = WeakKeyDictionary()
         """Of earlier runs: what their files begin with."""
+        self._begin: tuple[ParameterSets, Headers] | None = None
+        """What this service's files begin with, made of these parameters: every GOP that is played asks."""
         self.viewers = 0
         """How many are watching the past."""
         record = config.record
@@ -152,8 +155,12 @@ class Past:
         parameters, site, sound = self._agreement.parameters, self._config.site, self._config.sound.format
         if parameters is None:
             return None
-        pictures = init_segment(parameters, site.width, site.height)
-        return Headers(pictures, b"" if sound is None else sound_init_segment(sound))
+        begin = self._begin
+        if begin is None or begin[0] != parameters:
+            pictures = init_segment(parameters, site.width, site.height)
+            begin = parameters, Headers(pictures, b"" if sound is None else sound_init_segment(sound))
+            self._begin = begin
+        return begin[1]
 
     def _write(self, piece: Piece) -> None:
         """Write a piece, in the writer's thread."""
