@@ -80,6 +80,7 @@ def make_app(
     )
     app[SERVICE], app[EVENTS], app[PICTURES] = service, Events(service), Pictures(service)
     app[ON_DISK] = on_disk
+    app[openapi.DESCRIBED] = openapi.Described(app)
     app[READERS] = Readers(service.splicer.plan.target_s)
     what = f"{service.config.site.name}_{service.config.view.share.index}"
     app[ACCESS] = Access(service.config.access.tokens, service.board.resolve, what)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 import inspect
 import re
+from functools import cached_property
 from importlib.metadata import version
 from typing import Any
 
@@ -80,6 +81,26 @@ _SCHEMAS: dict[str, Any] = {
 }
 
 
+class Described:
+    """What an application tells of itself, made when it is first asked for: anybody may ask, and often."""
+
+    def __init__(self, app: web.Application) -> None:
+        self._app = app
+
+    @cached_property
+    def document(self) -> dict[str, Any]:
+        """The OpenAPI document."""
+        return describe(self._app)
+
+    @cached_property
+    def encoded(self) -> bytes:
+        """The same as JSON."""
+        return msgspec.json.encode(self.document)
+
+
+DESCRIBED = web.AppKey("described", Described)
+
+
 def describe(app: web.Application) -> dict[str, Any]:
     """Give the OpenAPI document of an application's routes."""
     _, components = msgspec.json.schema_components(
@@ -149,7 +170,7 @@ def _operation(path: str, summary: str) -> dict[str, Any]:
 @routes.get("/api/openapi.json")
 async def get_openapi(request: web.Request) -> web.Response:
     """Describe the API to programs."""
-    return web.Response(body=msgspec.json.encode(describe(request.app)), content_type="application/json")
+    return web.Response(body=request.app[DESCRIBED].encoded, content_type="application/json")
 
 
 @routes.get("/api")
@@ -158,7 +179,7 @@ async def get_readable(request: web.Request) -> web.Response:
     rows = "".join(
         f"<tr><td><code>GET {html.escape(path)}</code></td>"
         f"<td>{html.escape(item['get']['summary'])}</td></tr>"
-        for path, item in describe(request.app)["paths"].items()
+        for path, item in request.app[DESCRIBED].document["paths"].items()
     )
     page = (
         "<!doctype html><html lang=en><meta charset=utf-8><title>MyView: the API</title>"

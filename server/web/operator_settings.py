@@ -7,7 +7,6 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-import yaml
 from aiohttp import web
 from pydantic import BaseModel
 from pydantic_core import PydanticUndefined
@@ -23,6 +22,7 @@ from server.wire.config import Config
 from server.wire.errors import UserError
 from server.wire.loading import changed_view
 from server.wire.sections import TUNED, View
+from server.wire.yaml_file import as_lines, one_line
 
 routes = web.RouteTableDef()
 
@@ -107,7 +107,7 @@ def _written(value: Any) -> str:
         value = {it: HIDDEN if _SECRET.search(it) else _shown(inner) for it, inner in value.items()}
     value = _shown(value)
     plain = value if isinstance(value, bool | int | float | str | list | dict | None) else _plain(value)
-    return yaml.safe_dump(plain, default_flow_style=True, width=1000).removesuffix("...\n").strip()
+    return one_line(plain)
 
 
 def _shown(value: Any) -> Any:
@@ -121,7 +121,7 @@ def _plain(value: Any) -> Any:
 def _choosing(service: BestViewService) -> Choosing:
     now, file, usual = _flat(service.decider.view), _flat(service.config.view), _flat(View())
     lines = {key: value for key, value in now.items() if value != usual[key] or value != file[key]}
-    written = "" if not lines else yaml.safe_dump({"view": _nested(lines)}, sort_keys=False)
+    written = "" if not lines else as_lines({"view": _nested(lines)})
     least, most = service.config.least_lookahead, service.most_lookahead
     return Choosing(values=now, file=file, lines=written, least_lookahead=least, most_lookahead=most)
 

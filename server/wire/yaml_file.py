@@ -1,4 +1,4 @@
-"""Reading YAML, whatever is in the file."""
+"""Reading YAML, whatever is in the file; and writing a value of it."""
 
 from __future__ import annotations
 
@@ -10,9 +10,10 @@ import yaml
 from server.wire.errors import UserError
 
 try:
-    from yaml import CSafeLoader as SafeLoader  # libyaml's: five times as fast
+    from yaml import CSafeDumper as SafeDumper  # libyaml's: five times as fast
+    from yaml import CSafeLoader as SafeLoader
 except ImportError:  # PyYAML was built without it
-    from yaml import SafeLoader  # type: ignore[assignment]
+    from yaml import SafeDumper, SafeLoader  # type: ignore[assignment]
 
 _SHOWN = 300
 """Characters of what a library says that a line of ours repeats."""
@@ -20,6 +21,9 @@ _MOST_MERGED = 100_000
 """Keys that merges (``<<``) bring into mappings; each may refer to all of one before."""
 _DEEPEST = 200
 """Lists in lists: libyaml's loader calls itself for each, and with many the process would die."""
+
+_WIDTH = 1000
+"""Characters after which what is written is folded."""
 
 
 class _Loader(SafeLoader):
@@ -57,6 +61,18 @@ def read_yaml(path: Path, what: str) -> Any:
         raise UserError(f"{path}: is not valid YAML: {words[:_SHOWN]}") from error
     except (ValueError, LookupError, TypeError, AttributeError) as error:  # how PyYAML says `!!int x` is none
         raise UserError(f"{path}: is not valid YAML: a date, a number or a tag that cannot be one") from error
+
+
+def one_line(value: Any) -> str:
+    """Write a value as it may stand behind its key."""
+    written: str = yaml.dump(value, Dumper=SafeDumper, default_flow_style=True, width=_WIDTH)
+    return written.removesuffix("...\n").strip()
+
+
+def as_lines(content: Any) -> str:
+    """Write what a file holds, a line each, in its own order."""
+    written: str = yaml.dump(content, Dumper=SafeDumper, sort_keys=False)
+    return written
 
 
 def _check_depth(text: str) -> None:

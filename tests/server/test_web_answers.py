@@ -9,6 +9,7 @@ import pytest
 from cameras_by_hand import status, tracks, word
 from halls import A, B, Hall
 
+from server.web import openapi
 from server.web.app import make_app
 
 
@@ -145,6 +146,16 @@ async def test_the_description_has_every_route_that_is_not_the_page(busy: Hall) 
         assert inside == set(re.findall(r"\{(\w+)\}", path))
     asked = {it["name"]: it["required"] for it in described["paths"]["/api/past"]["get"]["parameters"]}
     assert asked == {"from": True, "to": False}
+
+
+async def test_who_asks_for_the_description_again_makes_no_work(
+    busy: Hall, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first = await busy.get_json("/api/openapi.json")
+    monkeypatch.setattr(openapi, "describe", None)
+    assert await busy.get_json("/api/openapi.json") == first
+    async with busy.session.get("/api") as answer:
+        assert answer.status == 200
 
 
 async def test_every_answer_is_as_the_description_says(busy: Hall) -> None:
