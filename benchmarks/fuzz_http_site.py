@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import socket
 from asyncio import AbstractEventLoop
 from collections.abc import Callable, Mapping
 from contextlib import AsyncExitStack
@@ -76,20 +77,17 @@ class Served:
         return self.loop.run_until_complete(self._ask(data, address))
 
     async def _ask(self, data: bytes, address: str) -> bytes:
-        reader, writer = await asyncio.open_connection("127.0.0.1", self.port, local_addr=(address, 0))
-        leaves_no_trace(writer)
         answer = b""
-        try:
-            writer.write(data)
-            async with asyncio.timeout(_WAIT_S):
-                while len(answer) < _MOST and (more := await reader.read(_MOST)):
-                    answer += more
-        except (TimeoutError, ConnectionError):
-            pass
-        finally:
-            writer.transport.abort()
-            with contextlib.suppress(ConnectionError):
-                await writer.wait_closed()
+        with socket.socket() as asking:
+            leaves_no_trace(asking)
+            asking.bind((address, 0))
+            asking.connect(("127.0.0.1", self.port))  # whoever listens need not take it up yet
+            asking.settimeout(0)
+            with contextlib.suppress(TimeoutError, ConnectionError):
+                async with asyncio.timeout(_WAIT_S):
+                    await self.loop.sock_sendall(asking, data)
+                    while len(answer) < _MOST and (more := await self.loop.sock_recv(asking, _MOST)):
+                        answer += more
         return answer
 
     def is_well(self) -> bool:

@@ -99,6 +99,6 @@ class AtOnceLoop(asyncio.SelectorEventLoop):
         return future
 
 
-def leaves_no_trace(writer: asyncio.StreamWriter) -> None:
+def leaves_no_trace(connection: socket.socket) -> None:
     """Have a connection end at once when it is closed: a million of them would use up all ports."""
-    writer.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _AT_ONCE)
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _AT_ONCE)

@@ -46,7 +46,7 @@ class Sockets(Scripts):
 
     async def _to_server(self, data: bytes) -> bool:
         reader, writer = await asyncio.open_connection("127.0.0.1", self._server.port)
-        leaves_no_trace(writer)
+        leaves_no_trace(writer.get_extra_info("socket"))
         said = data + b"\n"
         self.messages += said.count(b"\n")
         writer.write(said + b"WHO\n")
@@ -65,7 +65,7 @@ class Sockets(Scripts):
         return not any(isinstance(it, Refusal) for it in heard)
 
     async def _say(self, _: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        leaves_no_trace(writer)
+        leaves_no_trace(writer.get_extra_info("socket"))
         with contextlib.suppress(OSError):
             writer.write(self._said)
             await writer.drain()
