@@ -93,14 +93,18 @@ def _check(points: MarkedPoints) -> None:
     for place, words in ((points.image, "in the picture"), (points.floor, "on the floor")):
         if not np.isfinite(place).all():
             raise CalibrationError(f"camera {points.camera}: a point {words} is not a finite number")
-    seen, stood = ((it[:, None] == it).all(axis=-1) for it in (points.image, points.floor))
-    for first, second in np.argwhere(np.triu(seen != stood)):
-        one, two = "in the picture", "on the floor"
-        if stood[first, second]:
-            one, two = two, one
-        raise CalibrationError(
-            f"camera {points.camera}: pairs {first + 1} and {second + 1} are one point {one} and two {two}"
-        )
+    seen, stood = (list(map(tuple, it.tolist())) for it in (points.image, points.floor))
+    for here, there, words in (
+        (seen, stood, "in the picture and two on the floor"),
+        (stood, seen, "on the floor and two in the picture"),
+    ):
+        before: dict[tuple[float, ...], int] = {}
+        for second, spot in enumerate(here):
+            first = before.setdefault(spot, second)
+            if there[first] != there[second]:
+                raise CalibrationError(
+                    f"camera {points.camera}: pairs {first + 1} and {second + 1} are one point {words}"
+                )
 
 
 def _fitted(source: Floats, target: Floats, camera: str) -> Floats:
