@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zlib
 from pathlib import Path
 from random import Random
 
@@ -17,6 +18,8 @@ from server.wire.sound import SoundFormat
 
 _DRAWN = STRIDE + 1
 """Frames: a GOP, and the beginning of the next."""
+_FILMED_EVERY = 8
+"""Half of the time goes into opening an encoder, which knows nothing of what pictures were decoded from."""
 
 
 class Drawing(Target):
@@ -44,7 +47,8 @@ class Drawing(Target):
             jpeg_quality=80,
         )
         boxes = [[(1, 2.0, 3.0, 20.0, 40.0)]] * _DRAWN
-        drawn = Studio(canvas).draw(Draw(fragments=data, boxes=boxes, film=True, boxed=[2.0], still="plain"))
+        film = zlib.crc32(data) % _FILMED_EVERY == 0
+        drawn = Studio(canvas).draw(Draw(fragments=data, boxes=boxes, film=film, boxed=[2.0], still="plain"))
         return drawn.newest >= 0
 
 

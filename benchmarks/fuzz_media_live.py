@@ -10,10 +10,11 @@ from tempfile import TemporaryDirectory
 
 import av
 import numpy as np
+from av.video.stream import VideoStream
 
 from benchmarks.fuzz_media_made import wrong
 from benchmarks.fuzz_site import FPS, HEIGHT, STRIDE, WIDTH
-from benchmarks.fuzz_target import Target, folder, refused
+from benchmarks.fuzz_target import Scripts, folder, refused
 from server.camera.own.fitting import MisfitError, Wanted
 from server.camera.own.stream import OwnStream
 from server.camera.sound.live import LiveSound
@@ -31,6 +32,8 @@ class _Once(Stream):
     """Reads until what the camera sends ends; what its thread raises is kept."""
 
     failure: BaseException | None = None
+    units = 0
+    """That came out of what the camera sends."""
 
     def _run(self, opened: Opened | None) -> None:
         try:
@@ -39,12 +42,20 @@ class _Once(Stream):
         except BaseException as error:  # noqa: BLE001 — in a thread nobody would see it
             self.failure = error
 
+    def _decode(self, packet: av.Packet[VideoStream]) -> bool:
+        self.units += bool(packet.size)
+        return super()._decode(packet)
+
 
 class _OwnOnce(OwnStream, _Once):
     """The same where its access units are passed on."""
 
+    def _decode(self, packet: av.Packet[VideoStream]) -> bool:
+        self.units += bool(packet.size)
+        return super()._decode(packet)
 
-class Live(Target):
+
+class Live(Scripts):
     """A camera that sends whatever it likes. How it is reached is FFmpeg's: here it is in a file."""
 
     name = "media-live"
@@ -70,13 +81,14 @@ class Live(Target):
             else:
                 self._watch(_Once(str(self._path), {}, sound), range(1))
         except (UserError, MisfitError) as error:
+            self.messages += 1
             return refused(error)
         sound.at(0)
         return True
 
-    @staticmethod
-    def _watch(stream: _Once, pulses: Iterable[int]) -> None:
+    def _watch(self, stream: _Once, pulses: Iterable[int]) -> None:
         stream._thread.join()
+        self.messages += stream.units
         for pulse in pulses:
             stream.take(pulse)
         stream.close()
