@@ -15,7 +15,7 @@ from pydantic import AwareDatetime, Field, ValidationError, model_validator
 
 from server.wire.errors import UserError
 from server.wire.sections.base import Name, Section
-from server.wire.values import check_values
+from server.wire.values import check_values, shortened
 from server.wire.yaml_file import read_yaml
 
 Role = Literal["watch", "operate"]
@@ -81,7 +81,7 @@ def _token(path: Path, number: int, content: Any) -> Token:
         return Token.model_validate(content)
     except ValidationError as error:
         first = error.errors()[0]
-        place = ".".join(["tokens", str(number), *map(str, first["loc"])])
+        place = ".".join(["tokens", str(number), *(shortened(str(it)) for it in first["loc"])])
         said = "unknown key" if first["type"] == "extra_forbidden" else first["msg"]
         line = f"{path}: {place}: {said.removeprefix('Value error, ')}"
         raise UserError(" ".join(line.split())) from error

@@ -41,6 +41,10 @@ def test_a_file_without_tokens_lets_nobody_in(tmp_path: Path) -> None:
         ),
         ([{"name": "a", "sha256": SUM}], "tokens.0.role: Field required"),
         ([{"name": "a", "sha256": SUM, "role": "watch", "view": "c0"}], "tokens.0.view: unknown key"),
+        (
+            [{"name": "a", "sha256": SUM, "role": "watch", 9000 * "9": 1}],
+            f"tokens.0.{40 * '9'}…: unknown key",
+        ),
         ([{"name": "a", "sha256": SUM, "role": "watch", "object": 3}], "tokens.0: made: is missing"),
         (
             [{"name": "a", "sha256": SUM, "role": "operate", "camera": "c0"}],
