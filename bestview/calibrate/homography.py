@@ -33,7 +33,8 @@ def fit_homography(source: Floats, target: Floats) -> Floats:
         raise ValueError(f"{len(source)} points: a homography takes {LEAST_POINTS}")
     to_source, from_target = _normaliser(source), _normaliser(target)
     x, y = _apply(to_source, source), _apply(from_target, target)
-    _, sizes, rows = np.linalg.svd(_equations(x, y))
+    # Without the left vectors that are not used: all of them would be a square of twice the points.
+    _, sizes, rows = np.linalg.svd(_equations(x, y), full_matrices=False)
     if not sizes[7] > _LEAST_RANK * sizes[0]:
         raise ValueError("the points, or all but one of them, are on a line")
     found = _bettered(rows[-1].reshape(3, 3), x, y)

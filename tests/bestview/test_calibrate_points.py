@@ -46,6 +46,12 @@ def test_exact_pairs_give_the_homography(random: np.random.Generator, count: int
     assert fit.image_error.max() < 1e-3
 
 
+def test_ever_so_many_pairs_take_no_more_room_than_themselves() -> None:
+    points, truth = marked(np.random.default_rng(0), 50_000)  # a matrix that many to a side has 20 gigabytes
+    found = fit_homography(points.image, points.floor)
+    assert np.allclose(to_ground(found, points.image[:4]), to_ground(truth, points.image[:4]), atol=1e-4)
+
+
 @settings(deadline=None, max_examples=15)
 @given(seeds, st.integers(8, 20))
 def test_clicks_that_are_a_pixel_off_leave_an_error_of_about_a_pixel(
