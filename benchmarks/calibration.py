@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from benchmarks.calibration_errors import Agreement, agreement, error_of_known
+from benchmarks.calibration_errors import Agreement, agreement, error_of_known, in_common
 from benchmarks.recordings import Recording, track
 from benchmarks.report import Report
 from benchmarks.surroundings import CannotRunError, parser
@@ -139,11 +139,20 @@ def auditorium_rows(report: Report, data: Path, folder: Path, out: Path) -> None
     tracks, source = folder / "auditorium", data / "auditorium"
     if not source.is_dir():
         raise CannotRunError(f"needs {source}")
+    size = (1920, 1080)
+    common = in_common(source / "gt", _AUDITORIUM, size)
+    report.table(
+        "auditorium, true boxes that two cameras have at once: without any there is no link to be found",
+        ["cameras", "people", "boxes", "off a fitted plane, box heights"],
+        [
+            [f"{one}, {other}", str(it.people), str(it.boxes), f"{it.off:.2f}" if it.boxes else "-"]
+            for (one, other), it in common.items()
+        ],
+    )
     tracks.mkdir()
     for camera in _AUDITORIUM:
         given = Recording(camera, source / "det" / f"{camera}.txt.gz", source / "gt" / f"{camera}.txt.gz")
         write_rows(tracks / f"{camera}.txt", track(given))
-    size = (1920, 1080)
     walked = walks_from_tracks([tracks], Picture(size, 30.0))
     found = calibrate_walks(walked.walks, walk_settings(walked.fps, 0.0), _PERSON)
     _plot(found, out / "calibration_auditorium.png")

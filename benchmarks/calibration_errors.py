@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bestview import feet, person_heights, to_ground
-from bestview.calibrate import Walk, WalkCalibration
+from bestview.calibrate import Walk, WalkCalibration, fit_homography
+from bestview.calibrate.homography import mapped
 from tracking.motchallenge import read_rows
 
 Floats = NDArray[np.float64]
@@ -34,6 +35,22 @@ class Agreement:
     median: float
     most: float
     right: float
+
+
+@dataclass(frozen=True, slots=True)
+class Common:
+    """What two cameras have in common, whoever looks for it.
+
+    Attributes:
+        people: how many are in both at once, at some time.
+        boxes: how many whole boxes they have there.
+        off: how far their feet are from where a plane has them that fits the nearer half of them, in
+            heights of the other camera's boxes (median); NaN where there are too few, or all on a line.
+    """
+
+    people: int
+    boxes: int
+    off: float
 
 
 def error_of_known(found: WalkCalibration, truth: Mapping[str, Floats], walks: Sequence[Walk]) -> Floats:
@@ -64,6 +81,36 @@ def agreement(ground: Path, truth: Path, size: tuple[int, int]) -> dict[tuple[st
             )
     return found
 
+
+def in_common(truth: Path, cameras: Sequence[str], size: tuple[int, int]) -> dict[tuple[str, str], Common]:
+    """Tell of every two cameras whether there is anything by which they could be laid on one floor."""
+    people = {name: _people(path, size) for name in cameras if (path := _file(truth, name)) is not None}
+    found = {}
+    for one, other in combinations(people, 2):
+        both = sorted(people[one].keys() & people[other].keys())
+        here, there = (np.array([people[name][key] for key in both]) for name in (one, other))
+        off = _off_plane(here, there) if both else float("nan")
+        found[one, other] = Common(len({person for _, person in both}), len(both), off)
+    return found
+
+
+def _off_plane(here: Floats, there: Floats) -> float:
+    """Fit a plane to the nearer half again and again (least trimmed squares), from all of them on."""
+    source, target, tall = feet(here), feet(there), there[:, 3] - there[:, 1]
+    kept = np.ones(len(here), dtype=bool)
+    median = float("nan")
+    for _ in range(_TRIMS):
+        try:
+            plane = fit_homography(source[kept], target[kept])
+        except ValueError:
+            return median
+        off = np.nan_to_num(np.hypot(*(mapped(plane, source) - target).T) / tall, nan=np.inf)
+        median = float(np.nanmin([median, np.median(off)]))
+        kept = off <= np.median(off)
+    return median
+
+
+_TRIMS = 20
 
 _Boxes = Mapping[tuple[int, int], tuple[float, float, float, float]]
 """By frame and person."""
