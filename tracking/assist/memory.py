@@ -46,14 +46,20 @@ class Step:
     objects: tuple[RememberedObject, ...]
     told: Told | None
 
+    @property
+    def window(self) -> tuple[int, int]:
+        """Which window it is: they come in this order."""
+        return self.end, self.final_to
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Began:
-    """Somebody new: where and when, and the number that they were given."""
+    """Somebody new: where and when, the number that they were given, and the window that it was in."""
 
     frame: int
     box: Floats
     id: int
+    window: tuple[int, int]
 
 
 class Memory:
@@ -69,6 +75,8 @@ class Memory:
     def __init__(self, frames: int) -> None:
         self._frames = frames
         self._births: list[Began] = []
+        self._undone: list[Began] = []
+        """Those whose windows are solved again: who begins there once more has their number."""
         self.seen: dict[int, Detections] = {}
         self.where: dict[int, Mapping[int, int]] = {}
         self.places: dict[int, dict[int, int]] = {}
@@ -86,6 +94,7 @@ class Memory:
         self.where = {number: it for number, it in self.where.items() if number >= oldest}
         self.places = {number: it for number, it in self.places.items() if number >= oldest}
         self._births = [it for it in self._births if it.frame >= oldest - _SAME_TIME]
+        self._undone = [it for it in self._undone if it.frame >= oldest - _SAME_TIME]
 
     def place(self, pointing: Pointing, look: Floats) -> None:
         """Make a place for who is pointed at, where nothing like them is found, or move what was made."""
@@ -115,9 +124,11 @@ class Memory:
 
     def step(self, step: Step) -> None:
         """Take down that a window is solved; later ones are not valid any more."""
-        while self.steps and (self.steps[-1].end, self.steps[-1].final_to) >= (step.end, step.final_to):
+        while self.steps and self.steps[-1].window >= step.window:
             self.steps.pop()
         self.steps.append(step)
+        self._undone += [it for it in self._births if it.window >= step.window]
+        self._births = [it for it in self._births if it.window < step.window]
 
     def found(self, first: int, ids: Sequence[int], states: npt.NDArray[np.int64]) -> None:
         """Take down a window's answer, `(n, M)` from the frame `first` on, -1 where hidden."""
@@ -156,17 +167,20 @@ class Memory:
         now = settings.hidden if state is None else float(far[state])
         return settings.weight * (now - min(float(far.min(initial=1.0)), settings.hidden))
 
-    def began(self, frame: int, box: Floats, taken: set[int]) -> int | None:
-        """Give the number of who began there before, and is none of `taken`; `None`: nobody did."""
-        found = [
-            (float(iou(it.box, box)), -it.id)
-            for it in self._births
-            if it.id not in taken and abs(it.frame - frame) <= _SAME_TIME
-        ]
-        if not found or max(found)[0] < _SAME_PLACE:
-            return None
-        return -max(found)[1]
+    def number(self, frame: int, box: Floats, fresh: int) -> int:
+        """Number somebody new in the window that is being solved: `fresh`, or as before it was undone.
 
-    def born(self, began: Began) -> None:
-        """Take down who has begun."""
-        self._births.append(began)
+        Without anything undone nobody ever has a number that somebody else had.
+        """
+        known = self._began(frame, box)
+        if known is not None:
+            self._undone.remove(known)
+        number = fresh if known is None else known.id
+        self._births.append(Began(frame, box, number, self.steps[-1].window))
+        return number
+
+    def _began(self, frame: int, box: Floats) -> Began | None:
+        """Give who began there before, in a window that has been undone."""
+        near = [it for it in self._undone if abs(it.frame - frame) <= _SAME_TIME]
+        found = max(near, key=lambda it: (float(iou(it.box, box)), -it.id), default=None)
+        return found if found is not None and float(iou(found.box, box)) >= _SAME_PLACE else None

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from tracking.assist.carry import carried
 from tracking.assist.foresight import Foresight
-from tracking.assist.memory import Began, Memory, Step
+from tracking.assist.memory import Memory, Step
 from tracking.assist.placing import with_places
 from tracking.assist.pointing import Pointing, pointed_at, with_pointings
 from tracking.assist.settings import AssistSettings
@@ -225,9 +225,6 @@ class AssistedTracker(OnlineTracker):
         return network
 
     def _number(self, birth: Birth, frame: int) -> int:
-        taken = {item.id for item in self._objects}
-        number = self._memory.began(frame, birth.box, taken)
-        if number is None:
-            number = super()._number(birth, frame)
-            self._memory.born(Began(frame, birth.box, number))
+        number = self._memory.number(frame, birth.box, self._next_id)
+        self._next_id = max(self._next_id, number + 1)
         return number

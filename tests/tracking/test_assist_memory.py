@@ -1,0 +1,45 @@
+"""The tracker's memory: who has whose number when windows are solved again."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tracking.assist.memory import Memory, Step
+
+PLACE, ELSEWHERE = np.array([10.0, 10.0, 40.0, 90.0]), np.array([200.0, 10.0, 230.0, 90.0])
+
+
+def _window(end: int) -> Step:
+    return Step(first=end - 14, end=end, final_to=end - 10, objects=(), told=None)
+
+
+def _two_begin_in_one_place() -> Memory:
+    """One in each of two windows, as where the first one's track ended at once."""
+    memory = Memory(100)
+    memory.step(_window(19))
+    assert memory.number(12, PLACE, fresh=1) == 1
+    memory.step(_window(24))
+    assert memory.number(14, PLACE, fresh=2) == 2, "who begins where somebody else did is somebody else"
+    return memory
+
+
+def test_unless_windows_are_solved_again_nobody_has_a_number_that_was_used() -> None:
+    memory = _two_begin_in_one_place()
+    memory.step(_window(29))
+    assert memory.number(15, PLACE, fresh=3) == 3
+
+
+def test_when_windows_are_solved_again_each_number_of_theirs_is_given_once() -> None:
+    memory = _two_begin_in_one_place()
+    memory.step(_window(19))
+    assert memory.number(13, ELSEWHERE, fresh=3) == 3, "nobody began there"
+    assert memory.number(13, PLACE, fresh=4) == 1
+    assert memory.number(13, PLACE, fresh=4) == 2
+    assert memory.number(13, PLACE, fresh=4) == 4
+
+
+def test_who_began_in_a_window_that_stands_keeps_their_number_to_themselves() -> None:
+    memory = _two_begin_in_one_place()
+    memory.step(_window(24))
+    assert memory.number(13, PLACE, fresh=3) == 2
+    assert memory.number(13, PLACE, fresh=3) == 3
