@@ -1,8 +1,10 @@
 """Clips of a drawn scene, with what stands out from its background: one box for each piece of foreground.
 
-As in the thesis (Todor 2009, section 8.2): what differs enough from the median of pictures seen before is
-foreground, and every connected piece of it that is large enough is found, with how much it differs as its
-score; so are the parts that it falls into when it is eroded a little, since bodies that touch are one piece.
+As in the thesis (Todor 2009, section 8.2) every connected piece of foreground that is large enough is found;
+so are the parts that it falls into when it is eroded a little, since bodies that touch are one piece.
+Foreground is what has the colours of what differs from the median of pictures seen before: weeds that sway
+differ, too, but not their colours, and the pale bands of a fish belong to it. The score of a piece is how
+surely its colours are foreground.
 MyView's own detector looks for upright people: those of the court are found by it.
 """
 
@@ -16,20 +18,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.assist_clips import Clip
+from benchmarks.assist_colours import FamiliarColours
 from benchmarks.experiments_scene import Truth
 from server.camera.scene import Scene
 from tracking import Detections
 from tracking.boxes import BOX_SIDES, Floats
 from tracking.detectors import BackgroundDetector, Image
-from tracking.detectors.base import Mask
+from tracking.detectors.base import Mask, Plane
 from tracking.detectors.looks import Looks
 
 _AHEAD, _EVERY = 31, 20
 """Pictures of which the background is the median, and frames between them."""
 _DIFFERS = 32
 """Grey levels by which the changes of a pixel's channels must differ."""
-_SURE = 100.0
-"""Mean difference of a piece that is surely somebody."""
+_FAMILIAR = 0.3
+"""Share of foreground from which a colour is one."""
+_SURE = 0.7
+"""Mean share of the colours of a piece that is surely somebody."""
 _LEAST_AREA = 80
 """Pixels of a piece."""
 _THINNER, _LEAST_CORE = (2, 4), 25
@@ -54,21 +59,31 @@ class Blobs:
     """Finds pieces of foreground."""
 
     def __init__(self, ahead: Sequence[Image]) -> None:
-        self._background = np.median(np.stack(ahead), axis=0).astype(np.uint8)
+        background = np.median(np.stack(ahead), axis=0).astype(np.uint8)
         self._looks = Looks()
         self._round = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (3, 3))
-        self._wide = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (7, 7))
+        self._wide = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (9, 9))
+        self._familiar = FamiliarColours((image, self._differing(image, background)) for image in ahead)
+
+    def _differing(self, image: Image, background: Image) -> Mask:
+        """Give what differs from the background, `(H, W)`."""
+        # Light that plays on the ground changes all channels alike: what counts is that they change apart.
+        change = cv2.subtract(image, background, dtype=cv2.CV_16S)
+        mask = np.where(np.ptp(change, axis=2) >= _DIFFERS, np.uint8(255), np.uint8(0))
+        return np.asarray(cv2.morphologyEx(mask, cv2.MORPH_OPEN, self._round), dtype=np.uint8)
+
+    def _bodies(self, shares: Plane) -> Mask:
+        """Give what has familiar colours, `(H, W)`: whole bodies with their pale bands, and nothing thin."""
+        mask = np.where(shares >= _FAMILIAR, np.uint8(255), np.uint8(0))
+        whole = cv2.morphologyEx(cv2.medianBlur(mask, 3), cv2.MORPH_CLOSE, self._wide)
+        return np.asarray(cv2.morphologyEx(whole, cv2.MORPH_OPEN, self._round), dtype=np.uint8)
 
     def detect(self, image: Image) -> Detections:
         """Give what is found in a picture."""
-        # Light that plays on the ground changes all channels alike: what counts is that they change apart.
-        change = cv2.subtract(image, self._background, dtype=cv2.CV_16S)
-        difference = change.max(axis=2) - change.min(axis=2)
-        mask = np.where(difference >= _DIFFERS, np.uint8(255), np.uint8(0))
-        mask = cv2.morphologyEx(mask, cv2.MORPH_OPEN, self._round)
-        mask = np.asarray(cv2.morphologyEx(mask, cv2.MORPH_CLOSE, self._wide), dtype=np.uint8)
+        shares = self._familiar.shares(image)
+        mask = self._bodies(shares)
         sums = (
-            cv2.integral(difference.astype(np.float64) * (mask > 0)),
+            cv2.integral(shares.astype(np.float64) * (mask > 0)),
             cv2.integral((mask > 0).astype(np.float64)),
         )
         labels, whole = _pieces(mask, _LEAST_AREA)
@@ -88,24 +103,30 @@ def _pieces(mask: Mask, least: int) -> tuple[NDArray[np.int32], Floats]:
 
 
 def _parts(mask: Mask, labels: NDArray[np.int32], thinner: int) -> Floats:
-    """Give the boxes `(K, 4)` of the large parts that pieces fall into when eroded by so many pixels."""
+    """Give the boxes `(K, 4)` of the large parts that pieces fall into when eroded by so many pixels.
+
+    To a part belongs what of its piece is nearer to it than to the others: erosion takes tails off.
+    """
     size = 2 * thinner + 1
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
     cores = np.asarray(cv2.erode(mask, disc), dtype=np.uint8)
     left = np.bincount(labels[cores > 0], minlength=int(labels.max()) + 1)
     _, numbers, stats, _ = cv2.connectedComponentsWithStats(cores)
-    found: dict[int, list[NDArray[np.float64]]] = {}
-    for k in range(1, len(stats)):
-        x, y, wide, high, area = stats[k].tolist()
-        inside = np.flatnonzero(numbers[y : y + high, x : x + wide].ravel() == k)
-        piece = int(labels[y : y + high, x : x + wide].ravel()[inside[0]])
-        if area >= _LEAST_CORE and area >= _LEAST_PART * left[piece]:
-            box = np.array(
-                [x - thinner, y - thinner, x + wide + thinner, y + high + thinner], dtype=np.float64
-            )
-            found.setdefault(piece, []).append(box)
-    parts = [box for boxes in found.values() if len(boxes) > 1 for box in boxes]
-    return np.stack(parts) if parts else np.empty((0, BOX_SIDES))
+    area = stats[:, cv2.CC_STAT_AREA]
+    piece = np.zeros(len(stats), dtype=np.int64)
+    piece[numbers[cores > 0]] = labels[cores > 0]
+    large = (piece > 0) & (area >= _LEAST_CORE) & (area >= _LEAST_PART * left[piece])
+    large &= np.bincount(piece[large], minlength=len(left))[piece] > 1
+    if not large.any():
+        return np.empty((0, BOX_SIDES))
+    far = np.where(large[numbers], np.uint8(0), np.uint8(255))
+    _, nearest = cv2.distanceTransformWithLabels(far, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_CCOMP)
+    found = []
+    for k in np.flatnonzero(large):
+        own = nearest == nearest[numbers == k][0]
+        x, y, wide, high = cv2.boundingRect((own & (labels == piece[k])).astype(np.uint8))
+        found.append([x, y, x + wide, y + high])
+    return np.array(found, dtype=np.float64)
 
 
 def _inside(table: Floats, boxes: Floats) -> Floats:
