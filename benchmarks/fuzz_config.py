@@ -58,11 +58,11 @@ class _Undisturbed(Target):
 
     def __init__(self) -> None:
         self._surroundings = patch.dict(os.environ, clear=True)
-        self._surroundings.start()
 
-    def close(self) -> None:
-        """Give the environment back."""
-        self._surroundings.stop()
+    def hand_over(self, data: bytes) -> bool:
+        """Feed an input, and give the environment back."""
+        with self._surroundings:
+            return super().hand_over(data)
 
 
 def _looked_at(config: Config, *, seldom: bool) -> None:
@@ -100,7 +100,6 @@ class Text(_Undisturbed):
 
     def close(self) -> None:
         """Take the folder away."""
-        super().close()
         self._folder.cleanup()
 
 

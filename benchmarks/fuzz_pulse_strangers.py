@@ -51,7 +51,6 @@ class Strangers(Scripts):
     def __init__(self) -> None:
         self._loop = asyncio.new_event_loop()
         self._foreseen = patch("camsync.door.new_nonce", return_value=_NONCES[0])  # by who overhears, at best
-        self._foreseen.start()
 
     def make(self, rng: Random) -> bytes:
         """Give what they say in turn."""
@@ -65,7 +64,8 @@ class Strangers(Scripts):
 
     def feed(self, data: bytes) -> bool:
         """Let them say it, with pulses in between."""
-        return self._loop.run_until_complete(self._session(_said.decode(data)))
+        with self._foreseen:
+            return self._loop.run_until_complete(self._session(_said.decode(data)))
 
     async def _session(self, script: _Said) -> bool:
         clock = Clock()
@@ -103,8 +103,7 @@ class Strangers(Scripts):
         return refused == 0
 
     def close(self) -> None:
-        """Close the loop, and let nonces be unforeseen again."""
-        self._foreseen.stop()
+        """Close the loop."""
         self._loop.close()
 
 
@@ -116,7 +115,6 @@ class Between(Scripts):
     def __init__(self) -> None:
         self._loop = asyncio.new_event_loop()
         self._foreseen = patch("camsync.proof.new_nonce", return_value=_NONCES[1])
-        self._foreseen.start()
         seals = Seals.of(_LOGIN.password, "c0", _NONCES)
         beats = [Beat(number, 1000.0 + number / 25) for number in range(_BEATS)]
         lines: tuple[ServerLine, ...] = (Greeting(1, 25.0, 1000.0, None), *beats)
@@ -144,7 +142,8 @@ class Between(Scripts):
 
     def feed(self, data: bytes) -> bool:
         """Let it arrive."""
-        return self._loop.run_until_complete(self._session(_said.decode(data)))
+        with self._foreseen:
+            return self._loop.run_until_complete(self._session(_said.decode(data)))
 
     async def _session(self, lines: _Said) -> bool:
         clock = Clock()
@@ -172,6 +171,5 @@ class Between(Scripts):
         return same == len(whole)
 
     def close(self) -> None:
-        """Close the loop, and let nonces be unforeseen again."""
-        self._foreseen.stop()
+        """Close the loop."""
         self._loop.close()

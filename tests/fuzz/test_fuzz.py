@@ -14,6 +14,7 @@ from benchmarks.fuzz import PARTS, side_by_side, targets_of
 from benchmarks.fuzz_http_strangers import SECRETS, Strangers
 from benchmarks.fuzz_run import Attempt, Crash, Plan, Runner, numbered
 from benchmarks.fuzz_target import Scripts, Target, UnclearError, refused
+from camsync import door, proof
 from server.web import access
 from server.web.access_grant import Need
 
@@ -198,3 +199,15 @@ def test_a_site_that_lets_anybody_in_is_found_out(
 def test_a_refusal_that_nobody_can_read_is_none(text: str) -> None:
     with pytest.raises(UnclearError):
         refused(ValueError(text))
+
+
+@pytest.mark.parametrize("target", ALL, ids=[it.name for it in ALL])
+def test_it_leaves_everything_else_as_it_was(target: type[Target]) -> None:
+    """Two at once, and the first ended first: what they foresee or hide must not outlive them."""
+    before = dict(os.environ), dict(vars(door)), dict(vars(proof))
+    one, other = target(), target()
+    for it in (one, other):
+        it.hand_over(numbered(it, 1, 0))
+    one.close()
+    other.close()
+    assert (dict(os.environ), dict(vars(door)), dict(vars(proof))) == before
