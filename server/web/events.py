@@ -104,7 +104,8 @@ class Events:
         return line
 
     def _tell(self, sees: Scope, line: _Line) -> None:
-        for name, content in self._lists(sees).items():
+        lists = self._lists(sees)
+        for name, content in lists.items():
             if name == "site":
                 continue  # it carries the time of day and so always differs; it is for newcomers
             data = event(name, content)
@@ -112,13 +113,13 @@ class Events:
                 line.told[name] = data
                 line.channel.tell(Chunk(data, start=True))
         for viewer in line.channel.who_lost():
-            for chunk in self._again(sees):
+            for chunk in self._again(sees, lists):
                 viewer.put(chunk)
         line.channel.tell(Chunk(b": here\n\n", start=False))
 
-    def _again(self, sees: Scope) -> Iterator[Chunk]:
+    def _again(self, sees: Scope, lists: dict[str, Any]) -> Iterator[Chunk]:
         """Give all that holds, to who fell behind: what is told only once may be among what they lost."""
-        for name, content in self._lists(sees).items():
+        for name, content in lists.items():
             yield Chunk(event(name, content), start=True)
         flags = self._service.assist.flags
         for flag in [*reversed(flags.ended[:_FLAGS_AGAIN]), *flags.open]:

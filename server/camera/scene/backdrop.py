@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from server.camera.scene import house
-from server.camera.scene.finish import finish_of
+from server.camera.scene.finish import finish_of, surface
 from server.camera.scene.perspective import Floats, Perspective
 from server.camera.scene.room import Block, Door, Room
 from server.camera.scene.solids import FAR, hit, may_hit
@@ -85,7 +85,7 @@ def _shell(room: Room, origin: Floats, rays: Floats) -> tuple[Floats, NDArray[np
     for axis in range(3):
         for upper in (False, True):
             mask = (side == axis) & ((rays[:, axis] > 0) == upper)
-            colour[mask] = finish_of(room).paint(room, points[mask], axis, upper=upper)
+            colour[mask] = surface(room, points[mask], axis, upper=upper)
     ground = (side == 2) & (rays[:, 2] < 0)  # noqa: PLR2004 — the z axis
     colour[ground] *= _contact(room, points[ground])[:, None]
     label[ground] = _FLOOR

@@ -16,8 +16,14 @@ class Finish(Protocol):
     def light(self, room: Room, x: Floats, y: Floats, /) -> Floats:
         """Say how bright floor points are."""
 
-    def paint(self, room: Room, points: Floats, axis: int, /, *, upper: bool) -> Floats:
-        """Colour the points ``(N, 3)`` of a surface across an axis; ``upper`` is the farther of the two."""
+    def floor(self, room: Room, points: Floats, /) -> Floats:
+        """Colour the points ``(N, 3)`` of the floor."""
+
+    def ceiling(self, points: Floats, /) -> Floats:
+        """Colour the points ``(N, 3)`` of the ceiling."""
+
+    def wall(self, room: Room, points: Floats, axis: int, /, *, far: bool) -> Floats:
+        """Colour the points ``(N, 3)`` of a wall across an axis; ``far`` is the farther of the two."""
 
 
 _FINISHES: Mapping[Style, Finish] = {"house": house, "court": gym}
@@ -26,3 +32,11 @@ _FINISHES: Mapping[Style, Finish] = {"house": house, "court": gym}
 def finish_of(room: Room) -> Finish:
     """Give how a room looks."""
     return _FINISHES[room.style]
+
+
+def surface(room: Room, points: Floats, axis: int, *, upper: bool) -> Floats:
+    """Colour the points ``(N, 3)`` of a surface across an axis; ``upper`` is the farther of the two."""
+    finish = finish_of(room)
+    if axis == 2:  # noqa: PLR2004 — the z axis
+        return finish.ceiling(points) if upper else finish.floor(room, points)
+    return finish.wall(room, points, axis, far=upper)

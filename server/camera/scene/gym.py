@@ -36,13 +36,6 @@ def light(room: Room, x: Floats, y: Floats) -> Floats:
     return bright
 
 
-def paint(room: Room, points: Floats, axis: int, *, upper: bool) -> Floats:
-    """Colour the points ``(N, 3)`` of the floor, the ceiling or a wall."""
-    if axis == 2:  # noqa: PLR2004 — the z axis
-        return ceiling(points) if upper else floor(room, points)
-    return wall(room, points, axis)
-
-
 def floor(room: Room, points: Floats) -> Floats:
     """Colour floor points ``(N, 3)``: maple with the lines of a basketball court."""
     x, y = points[:, 0], points[:, 1]
@@ -66,8 +59,9 @@ def floor(room: Room, points: Floats) -> Floats:
     return colour * (light(room, x, y) * 0.94)[:, None]
 
 
-def wall(room: Room, points: Floats, axis: int) -> Floats:
-    """Colour the points ``(N, 3)`` of a wall; `axis` is 0 for the west and east walls."""
+def wall(room: Room, points: Floats, axis: int, *, far: bool) -> Floats:
+    """Colour the points ``(N, 3)`` of a wall; `axis` is 0 for the west and east walls. All are alike."""
+    del far
     along, z = points[:, 1 - axis], points[:, 2]
     length = room.depth if axis == 0 else room.width
     seam = np.abs((along / 1.2) % 1.0 - 0.5) > 0.485  # noqa: PLR2004 — pads of 1.2 m

@@ -44,13 +44,6 @@ def light(room: Room, x: Floats, y: Floats) -> Floats:
     return shade
 
 
-def paint(room: Room, points: Floats, axis: int, *, upper: bool) -> Floats:
-    """Colour the points ``(N, 3)`` of the floor, the ceiling or a wall."""
-    if axis == 2:  # noqa: PLR2004 — the z axis
-        return ceiling(points) if upper else floor(room, points)
-    return wall(room, points, axis, far=upper)
-
-
 def floor(room: Room, points: Floats) -> Floats:
     """Colour floor points ``(N, 3)``: oak planks, darker towards the walls."""
     x, y = points[:, 0], points[:, 1]
