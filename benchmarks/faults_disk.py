@@ -1,4 +1,4 @@
-"""A disk that is full while the site records: a small one in memory, which only the site's processes see."""
+"""A disk that is full while a site records and writes decisions: in memory, seen by its processes only."""
 
 from __future__ import annotations
 
@@ -19,11 +19,12 @@ _MB = 48
 _FULL_S = 6.0
 _MOUNTED = 'mount -t tmpfs -o size="$1" none "$2" && shift 2 && exec "$@"'
 _CHUNK = 1 << 20
+_DECIDED = "decided"
 
 
 @contextlib.asynccontextmanager
 async def on_small_disk(views: Views, folder: Path) -> AsyncIterator[Stand]:
-    """Run `myview up`, which records onto a disk of its own.
+    """Run `myview up`, which records onto a small disk, and writes what it decides there, too.
 
     Raises:
         CannotRunError: such a disk cannot be mounted here.
@@ -34,7 +35,7 @@ async def on_small_disk(views: Views, folder: Path) -> AsyncIterator[Stand]:
     config, url = await asyncio.to_thread(configured, views, folder)
     kept = folder / "kept"
     await asyncio.to_thread(kept.mkdir)
-    command = [sys.executable, "-m", "server.run.cli", "up", str(config)]
+    command = [sys.executable, "-m", "server.run.cli", "up", str(config), "--out", str(kept / _DECIDED)]
     with (folder / "up.log").open("w", encoding="utf-8") as log:
         process = await asyncio.create_subprocess_exec(
             *(unshare, "-m", "sh", "-c", _MOUNTED, "sh", f"{_MB}m", str(kept), *command),

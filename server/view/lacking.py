@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from server.view.align import Epoch
 from server.view.decide import GopDecision
 from server.view.intake import CameraState
-from server.view.record import Recorder
+from server.view.record_live import LiveRecorder
 from server.view.shelf import Shelf
 
 log = logging.getLogger(__name__)
@@ -19,7 +19,7 @@ class Lacking:
 
     def __init__(self, shelves: Mapping[str, Shelf], states: Mapping[str, CameraState], stride: int) -> None:
         self._shelves, self._states, self._stride = shelves, states, stride
-        self.recorder: Recorder | None = None
+        self.recorder: LiveRecorder | None = None
         self.late_epochs = 0
         """Windows that were decided without a camera that was there."""
         self.lost_pictures = dict.fromkeys(shelves, 0)

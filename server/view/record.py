@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TextIO
 
 import numpy as np
 
 from bestview import Merge, Split
 from server.view.decide import GopDecision
+from server.view.whole_files import WholeFiles
 from server.wire.fit import Fit
 from server.wire.messages import NumberedBox
 from tracking.motchallenge import MotRow, format_row
@@ -30,54 +31,60 @@ class Recorder:
     """
 
     def __init__(self, folder: Path, cameras: Sequence[str], fits: Mapping[str, Fit]) -> None:
+        """Begin new files in a folder, which may exist.
+
+        Raises:
+            OSError: one cannot be written.
+        """
         self._fits = fits
         (folder / "tracks").mkdir(parents=True, exist_ok=True)
-        self._tracks = {camera: _open(folder / "tracks" / f"{camera}.txt") for camera in cameras}
-        self._choices = _open(folder / "choices.csv", CHOICES_HEAD)
-        self._corrections = _open(folder / "corrections.csv", CORRECTIONS_HEAD)
-        self._late = _open(folder / "late.csv", LATE_HEAD)
+        self._tracks = {camera: folder / "tracks" / f"{camera}.txt" for camera in cameras}
+        self._choices = folder / "choices.csv"
+        self._corrections = folder / "corrections.csv"
+        self._late = folder / "late.csv"
+        heads = {self._choices: CHOICES_HEAD, self._corrections: CORRECTIONS_HEAD, self._late: LATE_HEAD}
+        self._files = WholeFiles(dict.fromkeys(self._tracks.values(), "") | heads)
 
-    def write(self, decision: GopDecision) -> None:
-        """Write one decision."""
+    def write(self, decision: GopDecision, late: Sequence[str] = ()) -> None:
+        """Write a decision, and rows of ``late.csv``.
+
+        Raises:
+            OSError: that cannot be written; the files are as they were.
+        """
+        texts: dict[Path, list[str]] = defaultdict(list)
         for camera, frames in decision.boxes.items():
             for place, boxes in enumerate(frames):
                 if boxes:
-                    self._write_tracks(camera, decision.first + place + 1, boxes)
+                    texts[self._tracks[camera]] += self._rows(camera, decision.first + place + 1, boxes)
         for place in range(decision.frames):
-            for choice in decision.choices:
-                if choice.camera is not None and not choice.away:
-                    frame = decision.first + place + 1
-                    self._choices.write(f"{frame},{choice.number},{choice.camera}\n")
-        for correction in decision.corrections:
-            self._corrections.write(f"{decision.first + 1},{_line(correction)}\n")
-        for file in (*self._tracks.values(), self._choices, self._corrections):
-            file.flush()
+            texts[self._choices] += (
+                f"{decision.first + place + 1},{choice.number},{choice.camera}\n"
+                for choice in decision.choices
+                if choice.camera is not None and not choice.away
+            )
+        texts[self._corrections] += (f"{decision.first + 1},{_line(it)}\n" for it in decision.corrections)
+        texts[self._late] += late
+        self._files.append({path: "".join(rows) for path, rows in texts.items() if rows})
 
-    def late(self, camera: str, pulses: Sequence[int], what: str) -> None:
-        """Note frames that came too late to count."""
-        for pulse in pulses:
-            self._late.write(f"{pulse + 1},{camera},{what}\n")
-        self._late.flush()
+    def write_late(self, rows: Sequence[str]) -> None:
+        """Write rows of ``late.csv`` alone.
+
+        Raises:
+            OSError: as :meth:`write`.
+        """
+        self._files.append({self._late: "".join(rows)})
 
     def close(self) -> None:
         """Close the files."""
-        for file in (*self._tracks.values(), self._choices, self._corrections, self._late):
-            file.close()
+        self._files.close()
 
-    def _write_tracks(self, camera: str, frame: int, boxes: Sequence[NumberedBox]) -> None:
+    def _rows(self, camera: str, frame: int, boxes: Sequence[NumberedBox]) -> Iterator[str]:
         own = self._fits[camera].boxes_to_own(np.array([box for _, *box in boxes], dtype=np.float64))
         for (number, *_), (left, top, right, bottom) in zip(boxes, own.tolist(), strict=True):
-            row = MotRow(frame, number, left, top, right - left, bottom - top)
-            self._tracks[camera].write(format_row(row) + "\n")
+            yield format_row(MotRow(frame, number, left, top, right - left, bottom - top)) + "\n"
 
 
 def _line(correction: Merge | Split) -> str:
     if isinstance(correction, Merge):
         return f"merged,{correction.kept},{correction.lost},"
     return f"split,{correction.kept},{correction.parted},{correction.camera}"
-
-
-def _open(path: Path, head: str = "") -> TextIO:
-    file = path.open("w", encoding="ascii", newline="\n")
-    file.write(head)
-    return file

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
 import time
 from collections.abc import Callable
@@ -21,7 +22,7 @@ from server.view.decide import Decider, GopDecision, homographies
 from server.view.intake import Intake
 from server.view.lacking import Lacking
 from server.view.past.past import Past
-from server.view.record import Recorder
+from server.view.record_live import LiveRecorder
 from server.view.shelf import Shelf
 from server.view.sound import SoundShelf
 from server.view.splice import Splicer
@@ -88,7 +89,7 @@ class BestViewService:
         """Where the bus's messages wait for the event loop."""
         self.on_decision: list[Callable[[GopChoices], None]] = []
         self._out = out
-        self._recorder: Recorder | None = None
+        self._recorder: LiveRecorder | None = None
         self._bus: Bus | None = None
         self.pulse_login: Login | None = None  # of whom the pulse server asks for none
         self._keys = Keys(config.site.name)
@@ -165,9 +166,9 @@ class BestViewService:
             self._step(epoch)
         return epoch is not None
 
-    def _record(self, out: Path) -> Recorder:
+    def _record(self, out: Path) -> LiveRecorder:
         try:
-            return Recorder(out, self.config.camera_ids, self.decider.people.fits)
+            return LiveRecorder(out, self.config.camera_ids, self.decider.people.fits)
         except OSError as error:
             raise UserError(f"{out}: cannot write there: {error.strerror}") from error
 
@@ -204,14 +205,15 @@ class BestViewService:
 
     def close(self) -> None:
         """End all streams and let go of the bus and the files."""
-        self.splicer.close()
-        self.walking.stop()
-        self.past.close()
-        self.by_hand.close()
-        if self._recorder is not None:
-            self._recorder.close()
-        if self._bus is not None:
-            self._bus.close()
+        with contextlib.ExitStack() as closing:  # all of them, whatever one of them says; the last one first
+            if self._bus is not None:
+                closing.callback(self._bus.close)
+            if self._recorder is not None:
+                closing.callback(self._recorder.close)
+            closing.callback(self.by_hand.close)
+            closing.callback(self.past.close)
+            closing.callback(self.walking.stop)
+            closing.callback(self.splicer.close)
 
     async def _follow_pulses(self) -> None:
         sync, fps = self.config.sync, self.config.site.fps

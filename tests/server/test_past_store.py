@@ -5,11 +5,8 @@ from __future__ import annotations
 import errno
 import json
 import os
-import resource
 import shutil
 import subprocess
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +15,7 @@ from cameras_by_hand import FPS, GOP
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from recorded_by_hand import AMPLE, PULSE0, A, B, filled, head, own_pictures, pictures, piece, written
+from small_disk import files_of_at_most
 
 from server.view.past.media import CameraFile, gops
 from server.view.past.run import Headers
@@ -204,17 +202,6 @@ def test_the_disk_takes_no_more_than_it_may_and_what_is_found_again_is_what_was_
                 range(it.first, it.end, GOP)
             )
     again.close()
-
-
-@contextmanager
-def files_of_at_most(size: int) -> Iterator[None]:
-    """Let the system refuse what is written beyond, as a full disk does."""
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
 @needs_ffmpeg

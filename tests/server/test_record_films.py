@@ -63,7 +63,7 @@ def test_the_files_are_these_bytes(tmp_path: Path) -> None:
             1, choice(1, B), choice(2, A, away=True), frames=1, corrections=turned_out, c1=[[(2, *LARGE)]]
         )
     )
-    recorder.late(B, range(3, 5), "tracks late")
+    recorder.write_late([f"{frame},{B},tracks late\n" for frame in (4, 5)])
     recorder.close()
     files = {str(path.relative_to(tmp_path / "out")): path.read_bytes() for path in tmp_path.rglob("*.*")}
     assert files == {
