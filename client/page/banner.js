@@ -1,7 +1,7 @@
 /** The quiet line at the top of every view: what may go wrong soon, and whom to point at. */
 
 import { element } from './element.js';
-import { Flags, when, words } from './flags.js';
+import { Flags, NOW_S, when, words } from './flags.js';
 import { label } from './names.js';
 
 /** @import {Flag} from './contract.js' */
@@ -25,7 +25,7 @@ export class Banner {
   constructor(viewer, pointing) {
     this.viewer = viewer;
     this.pointing = pointing;
-    this.#point.addEventListener('click', () => this.toggle());
+    this.#point.addEventListener('click', () => this.answer());
     this.#toggle.addEventListener('click', () => this.toggle());
   }
 
@@ -34,16 +34,23 @@ export class Banner {
     this.flags.take(flag);
     const { object } = this.pointing;
     const mine = object !== null && flag.objects.includes(object);
-    if (flag.state === 'answered' && mine && !this.flags.about(object)) this.#leave();
+    if (flag.state === 'answered' && mine && !this.flags.about(object, this.#now)) this.#leave();
     this.show();
   }
 
-  /** Point at whom the most urgent flag is about, or at who is watched; once more: no more. */
-  toggle() {
+  /** Point at whom the most urgent flag is about; once more: no more. */
+  answer() {
     if (this.pointing.object !== null) return this.#leave();
-    const [flag] = this.flags.all;
+    const [flag] = this.flags.urgent(this.#now);
     if (flag) this.#answer(flag);
-    else if (this.viewer.object !== null) this.pointing.begin(this.viewer.object);
+    this.show();
+  }
+
+  /** Point at who is watched, whatever flags there are; where nobody is, answer. Once more: no more. */
+  toggle() {
+    const { viewer, pointing } = this;
+    if (pointing.object !== null || viewer.object === null) return this.answer();
+    pointing.begin(viewer.object);
     this.show();
   }
 
@@ -51,8 +58,9 @@ export class Banner {
     const { flags, pointing, viewer } = this;
     const on = pointing.object !== null;
     // Who follows somebody is told what they are followed through, however urgent others are.
-    const flag = on ? flags.about(pointing.object) : flags.all[0];
     const { site, probe } = viewer;
+    const urgent = flags.urgent(this.#now);
+    const flag = on ? flags.about(pointing.object, this.#now) : urgent[0];
     this.#banner.hidden = !flag && !on;
     const target = pointing.object ?? flag?.objects[0] ?? null;
     const follow = on && target !== null ? `Follow ${label(target)}` : '';
@@ -61,9 +69,15 @@ export class Banner {
     this.#point.hidden = this.#toggle.hidden = !pointing.possible;
     write(this.#point, on ? 'Done' : `Point at ${target === null ? '' : label(target)}`);
     this.#toggle.setAttribute('aria-pressed', String(on));
-    probe.flags = flags.all;
+    probe.flags = urgent;
     probe.pointing = { object: pointing.object, taken: pointing.taken };
     if (!on && this.#held !== null) this.#leave();
+  }
+
+  /** The first frame of which what is expected there is not past for who looks at the picture. */
+  get #now() {
+    const { site, probe } = this.viewer;
+    return site && probe.pulse !== null ? probe.pulse - NOW_S * site.fps : 0;
   }
 
   /** @param {Flag} flag to be answered in the picture of the camera that has raised it */

@@ -2,7 +2,7 @@
 
 /** @import {Flag} from './contract.js' */
 
-const NOW_S = 0.5; // within so much of it, it happens now
+export const NOW_S = 0.5; // within so much of it, it happens now
 
 /** The flags that can be answered. */
 export class Flags {
@@ -20,17 +20,27 @@ export class Flags {
     this.#open.clear();
   }
 
-  /** @returns {Flag[]} the most urgent first */
-  get all() {
-    return [...this.#open.values()].sort((a, b) => a.pulse - b.pulse || a.margin - b.margin || a.id - b.id);
+  /**
+   * What is ahead before what is past, which can be answered for a while; the nearest first.
+   *
+   * @param {number} now the frame that is looked at; what was expected before it is past
+   * @returns {Flag[]} the most urgent first
+   */
+  urgent(now) {
+    const past = (/** @type {Flag} */ { pulse }) => Number(pulse < now);
+    const away = (/** @type {Flag} */ { pulse }) => Math.abs(pulse - now);
+    return [...this.#open.values()].sort(
+      (a, b) => past(a) - past(b) || away(a) - away(b) || a.margin - b.margin || a.id - b.id,
+    );
   }
 
   /**
    * @param {number | null} object
+   * @param {number} now as of {@link urgent}
    * @returns {Flag | undefined} the most urgent that somebody is in
    */
-  about(object) {
-    return this.all.find(({ objects }) => object !== null && objects.includes(object));
+  about(object, now) {
+    return this.urgent(now).find(({ objects }) => object !== null && objects.includes(object));
   }
 }
 

@@ -40,7 +40,7 @@ class Budget:
         self._per_minute, self._least, self._fps = settings.per_minute, settings.risk, fps
         self._first: int | None = None
         self._told: dict[frozenset[int], _Told] = {}
-        self._before: deque[_Told] = deque()
+        self._before: list[_Told] = []
         self._left = float(settings.per_minute)
         """Flags that may be raised now."""
         self._raised: deque[tuple[int, frozenset[int]]] = deque()
@@ -74,6 +74,8 @@ class Budget:
     def _go_on(self, now: int) -> None:
         """Let time pass: what may be spent grows, and what is long ago is forgotten."""
         self._first = now if self._first is None else self._first
+        if now == self._last:
+            return
         passed = (now - (now if self._last is None else self._last)) / (_MINUTE_S * self._fps)
         self._left = min(self._left + self._per_minute * passed, self._per_minute * _SAVED_MINUTES)
         self._last = now
@@ -81,5 +83,5 @@ class Budget:
             self._raised.popleft()
         for who in [it for it, told in self._told.items() if told.pulse < now - _SAME_S * self._fps]:
             del self._told[who]
-        while self._before and self._before[0].pulse < now - _LOOKS_BACK_S * self._fps:
-            self._before.popleft()
+        # What lasts is told again and again: who began first need not be the first to be over.
+        self._before = [it for it in self._before if it.pulse >= now - _LOOKS_BACK_S * self._fps]

@@ -113,6 +113,20 @@ async def test_by_keyboard_one_can_point_at_whoever_is_watched(browser: Browser)
         await visit.until("myview.pointing.object === null")
 
 
+async def test_whoever_is_watched_can_be_pointed_at_while_there_is_a_flag_about_others(browser: Browser) -> None:
+    site = FakeSite(operates=True)
+    site.flags.append(flag(site, objects=[2], reason="fading"))
+    async with visiting(browser, site) as visit:
+        await visit.playing(1)
+        await visit.until("!document.querySelector('#point').hidden && myview.flags.length === 1")
+        camera = await visit.get("myview.camera")
+        await visit.page.keyboard.press("h")
+        await expect(visit.page.locator("#flag-words")).to_have_text("Follow 1")
+        assert await visit.get("[myview.object, myview.pointing.object, myview.camera]") == [1, 1, camera]
+        await visit.page.keyboard.press("h")
+        await expect(visit.page.locator("#flag-words")).to_have_text("2 fades, or is lost from sight")
+
+
 async def test_a_finger_points_while_it_is_down(browser: Browser) -> None:
     site = FakeSite(operates=True)
     async with visiting(browser, site) as visit:

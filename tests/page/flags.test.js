@@ -15,21 +15,28 @@ function flag(changes) {
 test('the most urgent flag comes first, and one that is over does not come', () => {
   const flags = new Flags();
   for (const it of [flag({ pulse: 130 }), flag({ id: 2, pulse: 90 }), flag({ id: 3, pulse: 90, margin: 0.1 })]) flags.take(it);
-  assert.deepEqual(flags.all.map(({ id }) => id), [3, 2, 1]);
+  assert.deepEqual(flags.urgent(80).map(({ id }) => id), [3, 2, 1]);
   flags.take(flag({ id: 3, state: 'followed', pulse: 140 }));
-  assert.deepEqual(flags.all.map(({ id }) => id), [2, 1, 3]);
+  assert.deepEqual(flags.urgent(80).map(({ id }) => id), [2, 1, 3]);
   flags.take(flag({ id: 2, state: 'expired' }));
   flags.take(flag({ id: 1, state: 'answered' }));
-  assert.deepEqual(flags.all.map(({ id }) => id), [3]);
+  assert.deepEqual(flags.urgent(80).map(({ id }) => id), [3]);
+});
+
+test('what is past is less urgent than anything ahead, and the longer ago the less', () => {
+  const flags = new Flags();
+  for (const [id, pulse] of [[1, 100], [2, 150], [3, 260], [4, 210], [5, 200]]) flags.take(flag({ id, pulse }));
+  assert.deepEqual(flags.urgent(200).map(({ id }) => id), [5, 4, 3, 2, 1]);
+  assert.equal(flags.about(7, 230)?.id, 3);
 });
 
 test('of somebody the most urgent flag that they are in is found, whatever others are in', () => {
   const flags = new Flags();
   for (const it of [flag({ objects: [5, 7] }), flag({ id: 2, pulse: 90 }), flag({ id: 3, pulse: 10, objects: [4] })]) flags.take(it);
-  assert.equal(flags.about(7)?.id, 2);
-  assert.equal(flags.about(5)?.id, 1);
-  assert.equal(flags.about(8), undefined);
-  assert.equal(flags.about(null), undefined);
+  assert.equal(flags.about(7, 0)?.id, 2);
+  assert.equal(flags.about(5, 0)?.id, 1);
+  assert.equal(flags.about(8, 0), undefined);
+  assert.equal(flags.about(null, 0), undefined);
 });
 
 test('it is said who, what and when', () => {

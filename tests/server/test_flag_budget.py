@@ -55,6 +55,19 @@ def test_of_many_troubles_those_that_are_likelier_to_fail_have_the_flags() -> No
     assert sum(now in flags for now in risky) > 0.6 * len(risky)
 
 
+def test_a_trouble_that_lasts_leaves_the_others_their_flags() -> None:
+    """For three hours two people are in little trouble; once a minute others are in much more."""
+    hours, told, rng = 3, [], np.random.default_rng(5)
+    for second in range(hours * 3600):
+        told.append((second * round(FPS), 0, 0.2))
+        if second % 60 == 30:
+            told.append((second * round(FPS), 1 + second, 0.5 + 0.5 * float(rng.random())))
+    flags = raised(2, told)
+    risky = [now for now, who, _ in told if who]
+    last = {it for it in risky if it > (hours - 1) * 60 * MINUTE}
+    assert len(last & set(flags)) >= 0.9 * len(last)
+
+
 def test_risks_that_are_all_wrong_by_a_factor_change_nothing() -> None:
     rng = np.random.default_rng(4)
     told = [(n * 100, n, float(rng.random())) for n in range(200)]
