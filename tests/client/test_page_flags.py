@@ -113,7 +113,7 @@ async def test_by_keyboard_one_can_point_at_whoever_is_watched(browser: Browser)
         await visit.until("myview.pointing.object === null")
 
 
-async def test_whoever_is_watched_can_be_pointed_at_while_there_is_a_flag_about_others(browser: Browser) -> None:
+async def test_who_is_watched_can_be_pointed_at_while_a_flag_is_about_others(browser: Browser) -> None:
     site = FakeSite(operates=True)
     site.flags.append(flag(site, objects=[2], reason="fading"))
     async with visiting(browser, site) as visit:
