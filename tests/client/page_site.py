@@ -51,6 +51,7 @@ class FakeSite:
         operates: Whoever looks at the page may operate.
         flags: What an operator is asked to look at.
         pointed: Where the operator pointed, as it was sent.
+        busy: What cameras say that they leave out.
         pulse0: Unix seconds at which pulse 0 was due.
     """
 
@@ -72,6 +73,7 @@ class FakeSite:
     operates: bool = False
     flags: list[dict[str, Any]] = field(default_factory=list)
     pointed: list[dict[str, Any]] = field(default_factory=list)
+    busy: dict[str, str] = field(default_factory=dict)
     pulse0: float = field(init=False)
 
     def __post_init__(self) -> None:
@@ -126,7 +128,8 @@ class FakeSite:
     def cameras(self) -> dict[str, Any]:
         return {
             "cameras": [
-                {"camera": c, "state": "live", "pulse": self.edge, "late": 0, "fps": FPS, "message": ""}
+                {"camera": c, "pulse": self.edge, "late": 0, "fps": FPS}
+                | {"state": "live", "message": self.busy.get(c, "")}
                 for c in CAMERAS
             ]
         }
