@@ -171,7 +171,10 @@ class CameraPipeline:
         pulse, detections = searched.pulse, searched.detections
         if self._last is not None:
             self._reporter.shed(range(self._last + 1, pulse))
+            self._reporter.unsearched(range(self._last + 1, pulse))
         self._last = pulse
+        if not searched.looked:
+            self._reporter.unsearched([pulse])
         if searched.image is None and pulse >= self.begins:
             self._reporter.shed([pulse])
         if self.witness is not None and searched.asks:

@@ -23,11 +23,16 @@ class Reporter:
     def __init__(self, camera: str, boot: int, size: tuple[int, int], stride: int) -> None:
         self._camera, self._boot, self._size, self._stride = camera, boot, size, stride
         self._shed: list[int] = []
+        self._unsearched: list[int] = []
         self._alone: list[int] = []
 
     def shed(self, pulses: Iterable[int]) -> None:
         """Note frames that nobody was looked for in; the next message says so."""
         self._shed.extend(pulses)
+
+    def unsearched(self, pulses: Iterable[int]) -> None:
+        """Note frames in which nobody could have been found; the next message says so."""
+        self._unsearched.extend(pulses)
 
     def alone(self, pulse: int) -> None:
         """Note a frame for which some other camera's word was not there; the next message says so."""
@@ -52,6 +57,7 @@ class Reporter:
             final_to=last,
             ended=True,
             shed=self._taken_shed(),
+            unsearched=self._taken_unsearched(),
             alone=self._taken_alone(),
             tracks=[],
             solve=None,
@@ -68,6 +74,7 @@ class Reporter:
             final_to=result.final_to,
             ended=ended,
             shed=self._taken_shed(),
+            unsearched=self._taken_unsearched(),
             alone=self._taken_alone(),
             tracks=[_track(track) for track in result.tracks],
             solve=_solve(result.report),
@@ -78,6 +85,10 @@ class Reporter:
     def _taken_shed(self) -> list[int]:
         shed, self._shed = self._shed, []
         return shed
+
+    def _taken_unsearched(self) -> list[int]:
+        unsearched, self._unsearched = self._unsearched, []
+        return unsearched
 
     def _taken_alone(self) -> list[int]:
         alone, self._alone = self._alone, []

@@ -134,7 +134,7 @@ class _Told:
         person: (B,) place in `who`; -1: nobody's yet.
         time: (B,) at which look.
         camera: (B,) by place among the C.
-        said: (S, C) whether the camera said anything.
+        said: (S, C) whether the camera would have found them if they showed.
         found: (P, S, C) whether it found them.
     """
 
@@ -153,7 +153,8 @@ def _told(line: Line, person: Ints, cameras: Ints, count: int, every: int, frame
     column[cameras] = np.arange(len(cameras))
     now = (line.frame % every == 0) & (column[line.camera] >= 0)
     said = np.zeros((-(-frames // every), len(cameras)), dtype=np.bool_)
-    said[line.frame[now] // every, column[line.camera[now]]] = True
+    searched = now & line.searched
+    said[line.frame[searched] // every, column[line.camera[searched]]] = True
     places = np.flatnonzero(now[line.row] & (line.quality >= 0.0))
     row, index = line.row[places], person[places]
     who, place = np.unique(index, return_inverse=True)

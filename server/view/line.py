@@ -19,16 +19,20 @@ Ints = NDArray[np.int64]
 class Line:
     """All tracks of all cameras in the frames from `first` on; hidden ones too: windows are read as they are.
 
-    ``said`` has each camera's stretches. One frame of one camera is a row.
+    ``said`` has each camera's stretches, ``unsearched`` (C, F) the frames in which it could not have found
+    anybody. One frame of one camera is a row.
 
     Attributes:
         quality: (L,) of each place in line, NaN where hidden.
         row: (L,) which row it is in.
         frame: of each row, from 0 on.
         camera: of each row, by index.
+        searched: of each row, whether anybody could have been found.
     """
 
-    def __init__(self, said: Sequence[Sequence[Stretch[SeenWindow]]], first: int) -> None:
+    def __init__(
+        self, said: Sequence[Sequence[Stretch[SeenWindow]]], first: int, unsearched: NDArray[np.bool_]
+    ) -> None:
         self._stretches = list(chain.from_iterable(said))
         self._first = first
         camera = np.repeat(np.arange(len(said)), [len(own) for own in said])
@@ -37,6 +41,7 @@ class Line:
         self._camera = camera
         self.camera: Ints = np.repeat(camera, lengths)
         self.frame = _joined([np.arange(it.first - first, it.last - first + 1) for it in self._stretches])
+        self.searched = ~unsearched[self.camera, self.frame]
         self.row: Ints = np.repeat(np.arange(len(self.frame)), np.repeat(self._tracks, lengths))
         self.quality: Floats = np.concatenate([np.zeros(0), *(_quality(it) for it in self._stretches)])
         self._begins = np.cumsum(np.concatenate([[0], lengths * self._tracks]))

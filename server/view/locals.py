@@ -32,6 +32,8 @@ class LocalNumbers:
 
     def of(self, message: CameraTracks) -> tuple[TrackKey, ...]:
         """Say what the tracks of a message are called here."""
+        if not message.tracks:
+            return ()
         keys = self._keys.setdefault((message.camera, message.boot), {})
         for track in message.tracks:
             if track.id not in keys:

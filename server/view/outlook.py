@@ -50,8 +50,9 @@ class Outlook:
         self.cameras, self.first = cameras, first
         self.numbers: Ints = np.array(people.known, dtype=np.int64)
         """(K,) everybody's, rising."""
-        line = Line([sight.over(camera, first, last) for camera in cameras], first)
         pulses, everybody = range(first, last + 1), len(self.numbers)
+        unsearched = np.array([people.unsearched.over(camera, first, len(pulses)) for camera in cameras])
+        line = Line([sight.over(camera, first, last) for camera in cameras], first, unsearched)
         shown = np.array([[has(camera, it) for camera in cameras] for it in pulses], dtype=np.bool_)
         numbers: Ints = np.array(people.everybody, dtype=np.int64)
         anybody, mine = line.persons(people, numbers, len(pulses)), indices_of(numbers, self.numbers)

@@ -19,6 +19,7 @@ from server.view.parts import NOBODY_YET, UNKNOWN, Part, numbers_over, parts_of,
 from server.view.reading import CameraWindow, Reader
 from server.view.share import served
 from server.view.told_tracks import ToldTracks
+from server.view.unsearched import Unsearched
 from server.wire.fit import Fit
 from server.wire.messages import NumberedBox
 from server.wire.sections import Share
@@ -53,6 +54,8 @@ class People:
         self._reader = Reader(site_size)
         self._lag = lag
         self._mending = Mending(self._registry, self._reader)
+        self.unsearched = Unsearched()
+        """Frames in which cameras could not have found anybody."""
         self.told = ToldTracks()
         """By which tracks people were shown in GOPs that are told."""
         self._parts: dict[TrackKey, Sequence[Part]] = {}
@@ -77,7 +80,7 @@ class People:
         late = [self._taken(window) for window in self._reader.read_late(epoch)]
         windows = [self._taken(window) for window in self._reader.read(epoch)]
         tracks = [track for window in windows for track in window.local_tracks()]
-        pictures = {window.message.camera: window.message.size for window in windows}
+        pictures = self._pictures(windows, self._now + 1 - self._lag, epoch.last - self._lag)
         self._now = epoch.last
         update = self._by_hand.read(self._registry.update(tracks, epoch.last - self._lag, pictures))
         for key, parts in parts_of(update.numbers).items():
@@ -204,12 +207,22 @@ class People:
             for it in sorted(said, key=lambda it: it.last):
                 self.told.note(it, self.numbers(it.window.keys, it.last, 1)[:, 0])
         self._asked_from = max(self._asked_from, pulse)
+        self.unsearched.forget_before(pulse)
         self._mending.keep_only(self._parts, self._asked_from)
         for history in self._histories.values():
             history.forget_before(pulse)
 
+    def _pictures(self, windows: Sequence[CameraWindow], first: int, last: int) -> dict[str, tuple[int, int]]:
+        """Give the pictures of the cameras that could have seen anybody in the frames that are final now."""
+        return {
+            it.message.camera: it.message.size
+            for it in windows
+            if not self.unsearched.over(it.message.camera, first, last + 1 - first).all()
+        }
+
     def _taken(self, window: CameraWindow) -> CameraWindow:
         """Take a window over, by what its tracks are called if its past was mended."""
+        self.unsearched.note(window.message)
         history = self._histories[window.message.camera]
         if window.message.mended_from is not None:
             before = history.over(window.first, window.fresh - 1)

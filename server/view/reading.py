@@ -90,7 +90,7 @@ class Reader:
         self._site_size = site_size
         self.locals = LocalNumbers()
         self.fits: dict[str, Fit] = {}
-        """Of each camera, known from its first word on."""
+        """Of each camera, known from its first word on; its picture has another size after another source."""
         self._final: dict[str, int] = {}
         """By camera, the last frame that was final."""
 
@@ -110,7 +110,7 @@ class Reader:
 
     def _window(self, message: CameraTracks) -> CameraWindow:
         fit = self.fits.get(message.camera)
-        if fit is None:
+        if fit is None or fit.own != message.size:
             fit = self.fits[message.camera] = Fit(message.size, self._site_size)
         keys = self.locals.of(message)
         frames = max(0, message.last - message.first + 1)

@@ -19,6 +19,7 @@ def makes_sense(message: CameraTracks, stride: int) -> bool:
         0 <= frames <= _WINDOW_MAX
         and message.last <= end_of_epoch(message.epoch, stride)
         and len(message.shed) <= _WINDOW_MAX
+        and len(message.unsearched) <= _WINDOW_MAX
         and len(message.alone) <= _WINDOW_MAX
         and len(ids) == len(dict.fromkeys(ids))
         and all(count == bins[0] > 0 for count in bins)

@@ -17,7 +17,7 @@ class Fit:
     """
 
     def __init__(self, own: tuple[int, int], site: tuple[int, int]) -> None:
-        self._site = site
+        self.own, self._site = own, site
         self._exact = own == site
         self.scale = min(site[0] / own[0], site[1] / own[1])
         self._inner = (

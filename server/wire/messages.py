@@ -121,6 +121,9 @@ class CameraTracks(msgspec.Struct, frozen=True, kw_only=True):
     """The recording is over: nothing follows."""
     shed: list[Pulse]
     """Frames of this epoch that were missed or not searched for people because the machine was too busy."""
+    unsearched: list[Pulse] = []
+    """Frames of this epoch in which nobody could have been found: those that are shed, and those before the
+    recording begins or while the detector does not know its background yet."""
     alone: list[Pulse] = []
     """Frames in which people were followed without what some other camera found: its word was not there."""
     tracks: list[Track]

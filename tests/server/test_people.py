@@ -113,6 +113,27 @@ def test_feet_that_the_lower_edge_cuts_off_do_not_say_where_somebody_stands() ->
     np.testing.assert_allclose(track.boxes, np.tile(np.array(SMALL) / 2, (STRIDE, 1)))
 
 
+def test_a_camera_that_could_not_see_anybody_is_not_asked_who_is_there() -> None:
+    it = People(IdentitySettings(), CAMERAS, dict.fromkeys(CAMERAS), (WIDTH, HEIGHT), lag=STRIDE)
+    asked = []
+    for epoch in range(8):
+        it._registry = registry = Heard([])  # type: ignore[assignment]
+        away = range(epoch * STRIDE + (epoch == 6), (epoch + 1) * STRIDE) if 3 <= epoch < 7 else ()
+        it.update(epoch_of(epoch, word("c0", epoch, {1: SMALL}), word("c1", epoch, {}, unsearched=[*away])))
+        asked.append("c1" in registry.pictures)
+    assert asked == [True, True, True, True, False, False, False, True], "a stride later, when it is final"
+
+
+def test_a_camera_whose_source_is_exchanged_has_boxes_in_its_new_picture() -> None:
+    it = people()
+    for epoch, size in enumerate([(WIDTH, HEIGHT), (WIDTH // 2, HEIGHT // 2)]):
+        heard: list[LocalTrack] = []
+        it._registry = Heard(heard)  # type: ignore[assignment]
+        it.update(epoch_of(epoch, word("c0", epoch, {1: SMALL}, size=size, boot=1 + epoch)))
+        [track] = heard
+        np.testing.assert_allclose(track.boxes, np.tile(np.array(SMALL) * size[0] / WIDTH, (STRIDE, 1)))
+
+
 def test_people_are_where_their_tracks_are() -> None:
     it = people()
     it.update(epoch_of(0, word("c0", 0, {1: SMALL, 2: LARGE}), word("c1", 0, {1: None})))

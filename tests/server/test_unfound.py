@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from cameras_by_hand import CAMERAS, TrackNumbers, epoch_of, small_config, word
+from cameras_by_hand import CAMERAS, STRIDE, TrackNumbers, epoch_of, small_config, word
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -86,13 +86,14 @@ def test_a_camera_that_never_finds_anybody_at_a_place_shows_nobody_there() -> No
     assert shown(decide(decider(missed_s=0.0), [FOUND] * 60 + learned[:12]))[-1] == B
 
 
-def test_nothing_is_learned_of_a_camera_that_says_nothing() -> None:
-    silent: Told = {A: FOUND[A]}
+@pytest.mark.parametrize("speaks", [False, True], ids=["is silent", "sees nothing"])
+def test_nothing_is_learned_of_a_camera_that_is_not_there(speaks: bool) -> None:
     it = decider()
     decide(it, [FOUND] * 20)
     trust = it._elsewhere._findable._shares.copy()
     for number in range(20, 40):
-        it.step(epoch_of(number, word(A, number, silent[A])))
+        away = word(B, number, {}, unsearched=[*range(number * STRIDE, (number + 1) * STRIDE)])
+        it.step(epoch_of(number, word(A, number, FOUND[A]), *([away] if speaks else [])))
     changed = np.abs(it._elsewhere._findable._shares - trust)
     assert changed.max() < 0.05, "but for forgetting"
 
