@@ -106,10 +106,12 @@ def _compared(camera: str, why: Explanation) -> str:
     if shown is not None and not shown.seen and shown.unfound:
         return f"{camera} does not find this person, but others know that they stand before it."
     possible = {name: view.cost for name, view in why.views.items() if view.cost is not None}
+    if camera not in possible:  # it has a hole ahead
+        return f"{camera} is shown for as long as it can be: some of its next frames are missing."
     if len(possible) == 1:
         return f"{camera} is the only camera whose picture can be shown."
-    if camera in possible and possible[camera] <= min(possible.values()):
+    if possible[camera] <= min(possible.values()):
         return f"{camera} sees this person best over the next frames."
     if why.stay is not None and why.cut is not None and why.stay > why.cut:
-        return f"Another camera sees this person better, but {camera} has not been shown for long enough."
+        return f"Another camera will see this person better than {camera}: it is too soon to cut."
     return f"Another camera sees this person a little better than {camera}, but not enough to be worth a cut."

@@ -208,6 +208,20 @@ def test_what_was_seen_ahead_of_a_death_is_decided_again_without_the_camera() ->
     sum_ahead = early[0].why.of(1)
     assert sum_ahead.stay is None
     assert sum_ahead.views[A].cost is None, "it cannot be shown to the end of the look-ahead"
+    assert said(early[0]) == "c0 is shown for as long as it can be: some of its next frames are missing."
+
+
+def test_before_a_cut_that_is_planned_it_is_said_to_come() -> None:
+    story: list[Seen] = [{A: {1: LARGE}, B: {1: SMALL}}] * 3 + [{A: {1: SMALL}, B: {1: LARGE}}] * 7
+    decisions = decide(decider(view={"lookahead": 4 * GOP, "switch_cost_s": 0.04}), story)
+    last = shown(decisions).index(B) - 1
+    why = decisions[last].why.of(1)
+    assert why.stay is not None
+    assert why.cut is not None
+    assert why.stay > why.cut, "for the whole look-ahead the other one would be better"
+    assert (
+        said(decisions[last]) == "Another camera will see this person better than c0: it is too soon to cut."
+    )
 
 
 @pytest.mark.parametrize(("min_shot_s", "cuts"), [(0.0, 4), (0.5, 2)])
