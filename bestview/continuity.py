@@ -79,6 +79,7 @@ def lost_and_found(
     two: NDArray[np.int64],
     settings: IdentitySettings,
     height: float,
+    pace: float,
 ) -> tuple[Floats, NDArray[np.bool_]]:
     """Compare where one of a pair ends with where the other one begins a moment later.
 
@@ -91,6 +92,7 @@ def lost_and_found(
         two: (P,) others; which of a pair comes first does not matter.
         settings: `found` and what belongs to it.
         height: of a person in ground units; NaN: not known yet.
+        pace: how far somebody can walk in a frame, in heights.
 
     Returns:
         (P,) evidence of being one person, of pairs in one camera; (P,) too far.
@@ -101,7 +103,7 @@ def lost_and_found(
     gap = places.first[found] - places.last[lost]
     pair = np.flatnonzero((gap > 0) & (gap <= settings.found_frames))
     lost, found, gap = lost[pair], found[pair], gap[pair]
-    reach = settings.reach_heights + settings.speed_heights * gap
+    reach = settings.reach_heights + pace * gap
     same_camera = places.camera[lost] == places.camera[found]
     apart = np.hypot(*(places.end_ground[lost] - places.begin_ground[found]).T) / height
     # A camera that has a ground but does not see the feet knows nothing: pixels would not tell better.

@@ -30,6 +30,7 @@ class Evidence:
         calibrated: by camera, whether it has a ground.
         settings: of identity.
         height: of a person in ground units.
+        pace: how far somebody can walk in a frame, in heights.
     """
 
     def __init__(
@@ -40,8 +41,9 @@ class Evidence:
         calibrated: Mapping[str, bool],
         settings: IdentitySettings,
         height: float,
+        pace: float,
     ) -> None:
-        self._tables, self._settings, self._height = tables, settings, height
+        self._tables, self._settings, self._height, self._pace = tables, settings, height, pace
         number_of = {camera: i for i, camera in enumerate(calibrated)}
         self._camera = np.array([number_of[it.key.camera] for it in episodes], dtype=np.int64)
         ground = np.array([calibrated[it.key.camera] for it in episodes], dtype=np.bool_)
@@ -72,7 +74,7 @@ class Evidence:
         The lower row comes first, and is an open episode.
         """
         same_camera = pairs_within(self._camera)
-        found, _ = lost_and_found(self._places, *same_camera, self._settings, self._height)
+        found, _ = lost_and_found(self._places, *same_camera, self._settings, self._height, self._pace)
         one, two = self._tables.met()
         near = self._tables.near(one, two) > 0
         alike = self._tables.all_alike()
@@ -95,7 +97,7 @@ class Evidence:
         order, too_far = np.zeros(one.size), np.zeros(one.size, dtype=np.bool_)
         both = np.flatnonzero(two < count)
         order[both], too_far[both] = lost_and_found(
-            self._places, one[both], two[both], self._settings, self._height
+            self._places, one[both], two[both], self._settings, self._height, self._pace
         )
         follows = self._goes_on.find(one, two)
         goes_on_ = follows >= 0

@@ -61,6 +61,7 @@ class IdentityRegistry:
         settings: see there.
         homographies: by camera name, image pixels -> common ground plane; None: not calibrated.
         overhead: the cameras that look straight down.
+        fps: frames a second, by which it is known how far somebody can have walked.
 
     Raises:
         ValueError: a homography that is none.
@@ -71,6 +72,7 @@ class IdentityRegistry:
         settings: IdentitySettings,
         homographies: Mapping[str, NDArray[np.float64] | None],
         overhead: Collection[str] = (),
+        fps: float = 25.0,
     ) -> None:
         self._settings, self._overhead = settings, frozenset(overhead)
         self._foot_error = FootError(settings.foot_sideways, settings.foot_upwards)
@@ -90,7 +92,7 @@ class IdentityRegistry:
         )
         self._pictures: Mapping[str, tuple[int, int]] = {}
         self._tables = PairTables(settings)
-        self._weighing = Weighing(settings, calibrated)
+        self._weighing = Weighing(settings, calibrated, settings.speed_heights / fps)
         self._corrections = Corrections()
         self._here: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
         self._last_frame: int | None = None

@@ -46,10 +46,10 @@ class IdentitySettings:
     goes_on_frames: float = 40.0
     # Evidence that who begins where somebody of the same camera was just lost is the same person.
     found: float = 2.0
-    # How far that may be at once, and the fastest plausible walk per frame (0.06: 2.5 m/s at 25/s), in person
+    # How far that may be at once, and the fastest plausible walk in a second (1.5: 2.5 m/s), in person
     # heights. Twice as far, and it is somebody else.
     reach_heights: float = 0.6
-    speed_heights: float = 0.06
+    speed_heights: float = 1.5
     # Frames within which place tells who was lost and found.
     found_frames: int = 75
     # Evidence that who was told to be one person is one.

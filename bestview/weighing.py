@@ -27,10 +27,11 @@ class Weighing:
     Args:
         settings: of identity.
         calibrated: by camera, whether it has a ground.
+        pace: how far somebody can walk in a frame, in person heights.
     """
 
-    def __init__(self, settings: IdentitySettings, calibrated: Mapping[str, bool]) -> None:
-        self._settings, self._calibrated = settings, calibrated
+    def __init__(self, settings: IdentitySettings, calibrated: Mapping[str, bool], pace: float) -> None:
+        self._settings, self._calibrated, self._pace = settings, calibrated, pace
         self._scales = LookScales(settings.look_frames)
         self._weights = LookWeights(settings.look, settings.look_cap, settings.look_frames)
 
@@ -52,7 +53,7 @@ class Weighing:
             height: of a person in ground units.
         """
         count = len(episodes) + len(past)
-        evidence = Evidence(episodes, past, tables, self._calibrated, self._settings, height)
+        evidence = Evidence(episodes, past, tables, self._calibrated, self._settings, height, self._pace)
         looks = self._looks(episodes, past, tables)
         links = Links.found(evidence, looks, self._weights, len(episodes), count)
         gone = np.concatenate([np.zeros(len(episodes), dtype=np.bool_), ~here])

@@ -80,9 +80,16 @@ class Decider:
         self._cameras: Sequence[str] = config.camera_ids
         self._has = has
         size = (config.site.width, config.site.height)
-        lag, share = config.track.lag(config.site.fps), config.view.share
+        fps, share = config.site.fps, config.view.share
         self.people = People(
-            config.view.identity, self._cameras, homographies, size, lag, share, config.overhead
+            config.view.identity,
+            self._cameras,
+            homographies,
+            size,
+            config.track.lag(fps),
+            share,
+            config.overhead,
+            fps,
         )
         stride, gop = config.track.window.stride, config.encode.gop
         self._at_once = -(-stride // gop) + 1

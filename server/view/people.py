@@ -34,7 +34,7 @@ class People:
     ``homographies`` map each camera's own picture to the ground; None where there is none. ``share`` says
     whom this service decides for; who is who is worked out for everybody, the same in every service. ``lag``
     frames before an epoch's end tracks are final: who is who is worked out up to there. ``overhead`` are the
-    cameras that look straight down.
+    cameras that look straight down; ``fps`` are the site's frames a second.
     """
 
     def __init__(
@@ -46,8 +46,9 @@ class People:
         lag: int,
         share: Share = ALL,
         overhead: Collection[str] = (),
+        fps: float = 25.0,
     ) -> None:
-        self._registry = IdentityRegistry(settings, homographies, overhead)
+        self._registry = IdentityRegistry(settings, homographies, overhead, fps)
         self._remembered = settings.forget_after
         self._share = share
         self._histories = {camera: History[CameraWindow]() for camera in cameras}

@@ -207,6 +207,14 @@ def test_in_a_crowd_dressed_alike_nobody_gets_anothers_number_back() -> None:
     assert numbers(play(registry(recent=250), stays, 600)[-1]) == {("south", 10): 4}
 
 
+@pytest.mark.parametrize(("fps", "people"), [(5.0, 1), (25.0, 2)])
+def test_how_far_somebody_walks_unseen_goes_by_the_time_and_not_the_frames(fps: float, people: int) -> None:
+    here = Stay("south", 1, 0, 30, (-4, 0), coat=3)
+    there = Stay("south", 2, 46, 999, (1.7, 0), coat=3)
+    who = IdentityRegistry(replace(IdentitySettings(), confirm=5, regroup=5), CALIBRATED, fps=fps)
+    assert len({*known(play(who, [here, there], 200)).values()}) == people
+
+
 def test_without_calibration_coats_that_differ_join_and_coats_that_do_not_do_not() -> None:
     def dressed(coats: Sequence[int]) -> dict[tuple[str, int], int]:
         stays = [

@@ -23,6 +23,7 @@ CAMERAS = {"c0": True, "c1": True, "c2": False}
 SETTINGS = IdentitySettings(crowd_frames=1)
 WEIGHTS = LookWeights(SETTINGS.look, SETTINGS.look_cap, SETTINGS.look_frames)
 HEIGHT, FRAMES, COATS = 1.8, 100, 4
+PACE = 0.06
 
 
 @dataclass(frozen=True)
@@ -96,7 +97,7 @@ def sites(draw: st.DrawFn) -> Site:
 def plainly(site: Site, gone: np.ndarray) -> tuple[set[tuple[int, int]], list[int]]:
     """Links and groups with tables of everybody and everybody."""
     rows, count = len(site.tables), len(site.episodes)
-    evidence = Evidence(site.episodes, site.past, site.tables, CAMERAS, SETTINGS, HEIGHT)
+    evidence = Evidence(site.episodes, site.past, site.tables, CAMERAS, SETTINGS, HEIGHT, PACE)
     one, two = np.triu_indices(rows, 1)
     value, apart = (np.zeros((rows, rows), dtype=kind) for kind in (np.float64, np.bool_))
     value[one, two], apart[one, two] = evidence.of(one, two)
@@ -120,7 +121,7 @@ def test_chains_of_links_give_the_groups_of_everybody_at_once(site: Site, seed: 
     rows, count = len(site.tables), len(site.episodes)
     gone = (np.arange(rows) >= count) & (np.random.default_rng(seed).random(rows) < 0.7)
     links, groups = plainly(site, gone)
-    evidence = Evidence(site.episodes, site.past, site.tables, CAMERAS, SETTINGS, HEIGHT)
+    evidence = Evidence(site.episodes, site.past, site.tables, CAMERAS, SETTINGS, HEIGHT, PACE)
     found = Links.found(evidence, site.looks, WEIGHTS, count, rows)
     assert set(zip(found.one.tolist(), found.two.tolist(), strict=True)) == links
     assert len(found.one) == len(links)
@@ -136,7 +137,7 @@ def test_chains_of_links_give_the_groups_of_everybody_at_once(site: Site, seed: 
 @settings(deadline=None, max_examples=50)
 @given(sites())
 def test_what_is_known_of_a_pair_does_not_hang_on_the_others(site: Site) -> None:
-    evidence = Evidence(site.episodes, site.past, site.tables, CAMERAS, SETTINGS, HEIGHT)
+    evidence = Evidence(site.episodes, site.past, site.tables, CAMERAS, SETTINGS, HEIGHT, PACE)
     one, two = np.triu_indices(len(site.tables), 1)
     value, apart = evidence.of(one, two)
     for pair in range(one.size):
