@@ -49,7 +49,7 @@ class People:
         fps: float = 25.0,
     ) -> None:
         self._registry = IdentityRegistry(settings, homographies, overhead, fps)
-        self._remembered = settings.forget_after
+        self._remembered, self._most_merged = settings.forget_after, settings.remember
         self._share = share
         self._histories = {camera: History[CameraWindow]() for camera in cameras}
         self._reader = Reader(site_size)
@@ -68,7 +68,7 @@ class People:
         self.away: set[int] = set()
         """Those whom no camera has seen for a while; they are remembered."""
         self.merged: dict[int, int] = {}
-        """Numbers that turned out to be another's."""
+        """Numbers that turned out to be another's; the newest, as many as people are remembered."""
         self._corrections: list[Merge | Split] = []
         self._by_hand = ByHand()
         self._now = -1
@@ -241,7 +241,8 @@ class People:
                 self.last_seen[part.number] = max(ends, self.last_seen.get(part.number, ends))
 
     def _merge(self, kept: int, lost: int) -> None:
-        self.merged = {old: kept if new == lost else new for old, new in self.merged.items()} | {lost: kept}
+        merged = {old: kept if new == lost else new for old, new in self.merged.items()} | {lost: kept}
+        self.merged = dict(list(merged.items())[-self._most_merged :] if self._most_merged else [])
         name = self.names.pop(lost, "")
         if name:
             self.names.setdefault(kept, name)

@@ -268,7 +268,7 @@ class BestViewService:
         for tell in self.on_decision:
             tell(choices)
         self.splicer.decision(decision)
-        self.splicer.forget({*self.decider.people.known, *decision.merged})
+        self.splicer.forget(self.decider.people.known, decision.merged)
         if self._bus is not None:
             key = self._keys.bestview("choices", self.config.view.share.index)
             self._bus.publish(key, msgspec.json.encode(choices))

@@ -74,13 +74,17 @@ class Splicer:
             live.fill(decision.first - round(_SILENT_S * fps))
         self._forget_gone(decision.first)
 
-    def forget(self, known: Collection[int]) -> None:
-        """End the streams of those whom nobody remembers any more."""
-        for number in [number for number in self.objects if number not in known]:
+    def forget(self, known: Collection[int], merged: Collection[int]) -> None:
+        """End the streams of those whom nobody remembers any more, and of numbers that are another's now.
+
+        The latter last as long as anybody watches them: who comes later is given that person's.
+        """
+        watched = {it for it in merged if it in self.objects and self.objects[it].viewers}
+        for number in [it for it in self.objects if it not in known and it not in watched]:
             del self.objects[number]
             self._gone[number] = self._people.pop(number)
             self._gone[number].close()
-        self.preferring.forget(known)
+        self.preferring.forget({*known, *merged})
 
     def reel(self, number: int) -> Reel | None:
         """Give the newest segments of an object's stream, for a while even when it has ended."""

@@ -185,7 +185,7 @@ async def test_the_memory_is_the_past_where_nothing_is_recorded() -> None:
 async def test_what_was_somebodys_can_be_fetched_when_they_are_forgotten(hall: Hall) -> None:
     shows(hall, range(21))
     await until_written(hall, 21)
-    hall.service.splicer.forget([])
+    hall.service.splicer.forget([], [])
     hall.service.splicer._gone.clear()
     listed = await text(hall, "/objects/1/hls/index.m3u8?from=p0")
     assert numbers(listed) == list(range(11))

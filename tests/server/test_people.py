@@ -210,6 +210,15 @@ def test_a_restarted_cameras_people_do_not_inherit_the_boxes_of_others() -> None
     assert it.whose("c0", 2, 1, STRIDE) == after
 
 
+def test_of_merged_numbers_the_newest_are_remembered() -> None:
+    """Whoever stays all day has many short tracks merged into them."""
+    it = people(remember=5)
+    for lost in range(2, 40):
+        it.merge(1, lost)
+    assert it.merged == dict.fromkeys(range(35, 40), 1)
+    assert it.also(1) == [*range(35, 40)]
+
+
 def test_a_merged_number_lives_on_as_the_others_and_chains_are_followed() -> None:
     it = dictated(
         said({("c0", 1): 1, ("c0", 2): 2, ("c1", 1): 3}),

@@ -103,7 +103,7 @@ async def test_it_goes_on_with_whom_the_person_turned_out_to_be() -> None:
     viewer = site.splicer.preferring.channel(1, A).join()
     site.decide(GOP, number=2, merged={1: 2})
     site.decide(GOP, number=2, merged={1: 2})
-    site.splicer.forget({1, 2})
+    site.splicer.forget({1, 2}, [])
     assert await site.cameras(viewer) == "000"
 
 
@@ -111,6 +111,6 @@ async def test_the_stream_of_somebody_forgotten_ends() -> None:
     site = Site()
     site.decide(GOP)
     viewer = site.splicer.preferring.channel(1, A).join()
-    site.splicer.forget({2})
+    site.splicer.forget({2}, [])
     async with asyncio.timeout(PATIENCE):
         assert len([data async for data in viewer]) == 1

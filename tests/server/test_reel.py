@@ -168,7 +168,7 @@ def test_the_end_of_somebody_forgotten_can_be_fetched_for_a_while() -> None:
     site = Site()
     for gop in range(5):
         site.show(gop, CAMERAS[0])
-    site.splicer.forget(set())
+    site.splicer.forget([], [])
     reel = site.reel
     assert reel.ended
     assert [it.number for it in reel.listed] == [0, 1, 2]

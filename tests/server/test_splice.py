@@ -83,15 +83,27 @@ async def test_the_stream_of_a_number_that_was_anothers_goes_on_with_that_person
     splicer.decision(decision(1, choice(1, A), merged={2: 1}))
     splicer.decision(decision(2, choice(1, None), merged={2: 1}))
     splicer.decision(decision(3, choice(1, B), merged={2: 1}))
-    splicer.forget({1, 2})
+    splicer.forget({1}, {2: 1})
     assert await received(viewer) == gops(shelves, [B, A, A, B])
+
+
+async def test_the_stream_of_a_number_that_was_anothers_ends_when_nobody_watches_it_any_more() -> None:
+    splicer, _ = filled()
+    splicer.decision(decision(0, choice(1, A), choice(2, B), choice(3, B)))
+    viewer = splicer.objects[2].join()
+    splicer.decision(decision(1, choice(1, A), merged={2: 1, 3: 1}))
+    splicer.forget({1}, {2: 1, 3: 1})
+    assert list(splicer.objects) == [1, 2], "nobody watched 3: who asks for it now is given 1"
+    splicer.objects[2].leave(viewer)
+    splicer.forget({1}, {2: 1, 3: 1})
+    assert list(splicer.objects) == [1]
 
 
 async def test_the_streams_of_the_forgotten_end() -> None:
     splicer, shelves = filled()
     splicer.decision(decision(0, choice(1, A), choice(2, B)))
     viewer = splicer.objects[2].join()
-    splicer.forget({1})
+    splicer.forget({1}, [])
     async with asyncio.timeout(60):
         assert [data async for data in viewer] == gops(shelves, [B])
     assert list(splicer.objects) == [1]

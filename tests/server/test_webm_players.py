@@ -95,7 +95,7 @@ LOST = 22
 @needs_chromium
 async def test_chromium_plays_over_cuts_and_what_is_missing_to_the_end(free: Hall) -> None:
     splicer, shelves = free.service.splicer, free.service.shelves
-    splicer.forget([])  # begin with somebody new
+    splicer.forget([], [])  # begin with somebody new
     for seed, camera in enumerate((A, B)):
         for unit in encoded(seed, codec="vp8"):
             if unit.pulse // GOP not in SILENT and unit.pulse != LOST:
