@@ -17,12 +17,14 @@ from camsync.pulse import (
     VersionError,
 )
 from camsync.server import PulseServer
+from camsync.spell import Ended, Spell
 
 __all__ = [
     "VERSION",
     "AxisLostError",
     "ClientInfo",
     "ClientSettings",
+    "Ended",
     "Listener",
     "Login",
     "Pulse",
@@ -30,6 +32,7 @@ __all__ = [
     "PulseServer",
     "ReplacedError",
     "ServerLimits",
+    "Spell",
     "SyncError",
     "SyncStatus",
     "VersionError",

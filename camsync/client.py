@@ -24,6 +24,7 @@ from camsync.pulse import (
     SyncStatus,
     VersionError,
 )
+from camsync.spell import Spell
 
 _log = logging.getLogger(__name__)
 _STALLED = 0.02  # seconds that a timer may be late in a process that runs
@@ -88,6 +89,7 @@ class PulseClient:
         self._started_at = self._connected_at = self._clock()
         self._missed = self._own = self._connections = 0
         self._waiting_for: tuple[str, ...] = ()
+        self._away, self._refused = Spell(self._clock, calm=0.0), Spell(self._clock)
 
     @property
     def missed(self) -> int:
@@ -165,14 +167,12 @@ class PulseClient:
 
     async def _stay_connected(self) -> None:
         backoff = self._settings.backoff_first
-        silent = False  # an absence is logged once, not at every attempt
         while self._failure is None:
             greeted, why = await self._connection()
             if greeted:
-                backoff, silent = self._settings.backoff_first, False
-            if not silent and self._failure is None:
-                _log.warning("pulse server %s:%d is away: %s", self._host, self._port, why)
-                silent = True
+                backoff = self._settings.backoff_first
+            if self._failure is None and (more := self._away.happened(why)) is not None:
+                _log.warning("pulse server %s:%d is away: %s%s", self._host, self._port, why, more)
             self._schedule()
             await asyncio.sleep(backoff)
             backoff = min(2.0 * backoff, self._settings.backoff_most)
@@ -211,7 +211,8 @@ class PulseClient:
             case Wait(names):
                 self._waiting_for = names
             case Refusal(code, text):
-                _log.warning("pulse server: %s", text)
+                if (more := self._refused.happened(text)) is not None:
+                    _log.warning("pulse server: %s%s", text, more)
                 if code == "replaced":
                     self._fail(ReplacedError(f"{self._name} has given way: {text}"))
                 elif code == "version":
@@ -228,7 +229,9 @@ class PulseClient:
         self._offset.greeted(greeting.now, now)
         self._fps = greeting.fps
         self._follower.set_rate(greeting.fps)
-        _log.info("pulse server %s:%d: %g pulses per second", self._host, self._port, greeting.fps)
+        if (ended := self._away.over()) or self._connections == 1:
+            rate = f"{greeting.fps:g} pulses per second" + (f", after {ended.seconds:.0f} s" if ended else "")
+            _log.info("pulse server %s:%d: %s", self._host, self._port, rate)
 
     def _beat(self, number: int, due: float, now: float) -> None:
         self._waiting_for = ()

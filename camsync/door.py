@@ -14,10 +14,10 @@ from camsync.limits import ServerLimits
 from camsync.messages import Challenge, Prove
 from camsync.protocol import ProtocolError, encode, parse_client_line
 from camsync.seal import SealError, Seals, new_nonce
+from camsync.spell import Spell
 
 _log = logging.getLogger(__name__)
 _REFUSED = "closed"  # the code of a refusal
-_TELL_EVERY = 60.0  # seconds between two lines of the log about strangers, who may be many
 
 
 class Visitor(Protocol):
@@ -55,7 +55,7 @@ class Door:
         self._clock = clock
         self._waiting: dict[int, _Waiting] = {}  # by id(), in the order of coming
         self._refused = 0
-        self._told_at = -_TELL_EVERY
+        self._refusals = Spell(clock)  # strangers may be many
 
     @property
     def refused(self) -> int:
@@ -111,8 +111,6 @@ class Door:
     def _refuse(self, visitor: Visitor, why: str) -> None:
         self.left(visitor)
         self._refused += 1
-        now = self._clock()
-        if now - self._told_at >= _TELL_EVERY:
-            self._told_at = now
+        if self._refusals.happened() is not None:
             _log.warning("%s is not let in (%d so far): %s", visitor.address, self._refused, why)
         visitor.end(_REFUSED, why)

@@ -97,7 +97,8 @@ class Hub:
         for other in older:
             other.name = None
             other.end("replaced", f"another {hello.name} has come")
+        if peer.name is None:  # it may say so again and again
+            _log.info("%s is here", hello.name)
         peer.name = hello.name
-        _log.info("%s is here", hello.name)
         self._heard(hello)
         self._changed()

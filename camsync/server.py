@@ -16,6 +16,7 @@ from camsync.limits import ServerLimits
 from camsync.messages import Beat, Greeting, Hello, Wait
 from camsync.peer import ClientInfo
 from camsync.protocol import MAX_FPS, MIN_FPS, VERSION, encode, is_name
+from camsync.spell import Spell
 
 _log = logging.getLogger(__name__)
 _FARTHEST = 2**39  # pulses that a client may claim to have counted: centuries at any camera's rate
@@ -76,6 +77,7 @@ class PulseServer:
         self._next = 0
         self._pulse: int | None = None
         self._skipped = 0
+        self._stalls, self._boasts = Spell(self._clock), Spell(self._clock)
         self._begun = asyncio.Event()
         self._ended = asyncio.Event()
 
@@ -182,7 +184,8 @@ class PulseServer:
         first = axis.number_at(now) + 1
         if first > _FARTHEST:
             # Pulses from there on would soon be numbers that no line and no message can carry.
-            _log.warning("%s claims to have counted to %d: not believed", hello.name, first - 1)
+            if (more := self._boasts.happened()) is not None:
+                _log.warning("%s claims to have counted to %d%s: not believed", hello.name, first - 1, more)
         elif self._axis is None:
             _log.info("%s has counted to %d: going on from there", hello.name, hello.known.number)
             self._begin(axis, first)
@@ -233,7 +236,8 @@ class PulseServer:
         now = self._clock()
         current = self._axis.number_at(now)
         if now - self._axis.due(self._next) > self._limits.catch_up:
-            _log.warning("late by %d pulses: skipping to %d", current - self._next, current)
+            if (more := self._stalls.happened()) is not None:
+                _log.warning("late by %d pulses: skipping to %d%s", current - self._next, current, more)
             self._skipped += current - self._next
             self._next = current
         while self._next <= current and not self._full():

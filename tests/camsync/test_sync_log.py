@@ -1,0 +1,78 @@
+"""What fails for every attempt, line or stall is one event of the log, and not a line for each."""
+
+from __future__ import annotations
+
+import logging
+
+import pytest
+from pulses_by_hand import PATIENCE, Connect, JumpingClock
+from test_pulse_client import FPS, QUICK, pretended_server, take
+
+from camsync import PulseClient, PulseServer
+from camsync.axis import PulseAxis
+from camsync.clock import steady_unix_clock
+from camsync.messages import Beat, Greeting, Pong
+from camsync.protocol import encode
+
+
+async def test_a_server_that_comes_and_goes_is_not_told_of_each_time(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    caplog.set_level(logging.INFO, "camsync.client")
+    clock = steady_unix_clock()
+    axis = PulseAxis.through(7, clock(), FPS)
+
+    def one_pulse() -> bytes:
+        number = axis.number_at(clock())
+        return encode(Greeting(1, FPS, clock(), None)) + encode(Beat(number, axis.due(number)))
+
+    async with (
+        pretended_server(one_pulse) as (port, _),
+        PulseClient("127.0.0.1", port, "c0", settings=QUICK) as client,
+    ):
+        while client.status().connections < 6:
+            await take(client, 1)
+    there, away, back = caplog.messages
+    assert there.endswith(f": {FPS:g} pulses per second")
+    assert away.endswith(" is away: nothing heard for 0.3 seconds")
+    assert f": {FPS:g} pulses per second, after " in back
+
+
+async def test_who_says_hello_again_and_again_has_come_once(
+    by_hand: Connect, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level(logging.INFO, "camsync")
+    async with PulseServer(FPS) as server:
+        client = await by_hand(server.port)
+        client.say(b"HELLO 1 c0\n" * 10 + b"PING 1\n")
+        while not isinstance(await client.message(), Pong):
+            pass
+    assert caplog.messages == ["c0 is here"]
+
+
+async def test_who_claims_too_much_again_and_again_is_told_of_once(
+    by_hand: Connect, caplog: pytest.LogCaptureFixture
+) -> None:
+    async with PulseServer(FPS) as server:
+        liar = await by_hand(server.port)
+        liar.say(b"HELLO 1 c0 last=9999999999999\n" * 10 + b"PING 1\n")
+        while not isinstance(await liar.message(), Pong):
+            pass
+    assert len(caplog.messages) == 1
+    assert caplog.messages[0].endswith(": not believed")
+
+
+async def test_a_machine_that_stalls_again_and_again_is_told_of_once(
+    by_hand: Connect, jumping_clock: JumpingClock, caplog: pytest.LogCaptureFixture
+) -> None:
+    async with PulseServer(FPS, clock=jumping_clock) as server:
+        listener = await by_hand(server.port)
+        number = (await listener.beat()).number
+        for _ in range(5):
+            skipped = server.skipped
+            jumping_clock.jumped += 2.0
+            while server.skipped == skipped:
+                number = (await listener.beat()).number
+    assert number < PATIENCE * FPS
+    assert len(caplog.messages) == 1
+    assert "late by " in caplog.messages[0]
