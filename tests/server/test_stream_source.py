@@ -116,6 +116,30 @@ def test_a_camera_that_was_away_is_shown_again_and_nothing_old_meanwhile(
         source.close()
 
 
+def test_a_camera_that_is_away_for_long_is_told_of_once_and_when_it_is_back(
+    camera: MotionJpeg, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level("INFO", "server.camera.sources.stream")
+    monkeypatch.setattr(stream, "_RETRY_FIRST_S", 0.01)
+    monkeypatch.setattr(stream, "_RETRY_MAX_S", 0.01)
+    port = camera.plug_in()
+    source = Stream(f"http://127.0.0.1:{port}/", {})
+    try:
+        until(lambda: shown(source) == 0)
+        camera.unplug()
+        until(lambda: source._away._times > 30)
+        camera.plug_in(port)
+        until(lambda: not source._away._times)
+    finally:
+        source.close()
+    *away, back = caplog.records
+    whys = [it.getMessage() for it in away]
+    assert {it.levelname for it in away} == {"WARNING"}
+    assert "Connection refused" in whys[-1]
+    assert len(whys) == len(set(whys)) <= 3, "one for each reason, not for each attempt"
+    assert back.getMessage().startswith(f"http://127.0.0.1:{port}/: pictures come again, after ")
+
+
 def test_closing_ends_the_thread(camera: MotionJpeg) -> None:
     source = Stream(f"http://127.0.0.1:{camera.plug_in()}/", {})
     source.close()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import threading
 from collections.abc import Mapping
 from fractions import Fraction
@@ -20,8 +19,6 @@ from server.camera.sources.base import Image
 from server.camera.sources.opening import Opened, open_video
 from server.camera.sources.stream import OPEN_S, READ_S, Stream
 from server.wire.addresses import shown
-
-log = logging.getLogger(__name__)
 
 _LOOKED_AT_GOPS = 2
 """GOPs that a camera sends before it is known to fit."""
@@ -63,8 +60,8 @@ class OwnStream(Stream):
         try:
             Fitting(self._wanted).opened(opened)
         except MisfitError as misfit:
-            log.warning("%s: what it sends does not fit any more: %s", shown(self._url), misfit)
             opened.container.close()
+            self._lost(f"{shown(self._url)}: what it sends does not fit any more: {misfit}")
             return False
         at_once(opened)
         self._unbroken = False

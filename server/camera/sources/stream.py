@@ -13,6 +13,7 @@ from av.audio.stream import AudioStream
 from av.video.frame import VideoFrame
 from av.video.stream import VideoStream
 
+from camsync import Spell
 from server.camera.sound import LiveSound
 from server.camera.sources.base import Image
 from server.camera.sources.opening import Opened, open_video
@@ -44,6 +45,7 @@ class Stream:
         self._newest: VideoFrame | None = None
         self._newest_at = 0.0
         self._closing = threading.Event()
+        self._away = Spell(calm=0.0)
         self._thread = threading.Thread(target=self._run, args=(opened,), name="source", daemon=True)
         self._thread.start()
 
@@ -75,24 +77,37 @@ class Stream:
                 opened = open_video(self._url, self._options, (OPEN_S, READ_S))
             except UserError as error:
                 opened = None
-                log.warning("%s; trying again in %.1f s", error, pause)
+                self._lost(str(error))
 
     def _read(self, opened: Opened) -> bool:
         """Read until the connection ends; tell whether any picture came."""
-        any_picture = False
+        any_picture, why = False, "the connection has ended"
         try:
             for packet in opened.container.demux(opened.stream, *self._listened_to(opened)):
                 if self._closing.is_set():
                     break
                 if packet.stream is opened.stream:
-                    any_picture |= self._decode(cast("av.Packet[VideoStream]", packet))
+                    if self._decode(cast("av.Packet[VideoStream]", packet)):
+                        any_picture = True
+                        self._back()
                 elif self._listener is not None:
                     self._listener.packet(cast("av.Packet[AudioStream]", packet))
         except (av.error.FFmpegError, OSError) as error:
-            log.warning("%s: reading stopped: %s", shown(self._url), shown(str(error)))
+            why = f"reading stopped: {shown(str(error))}"
         finally:
             opened.container.close()
+        if not self._closing.is_set():
+            self._lost(f"{shown(self._url)}: {why}")
         return any_picture
+
+    def _lost(self, why: str) -> None:
+        """Say that the camera is away; one that comes and goes, or stays away, is not told of each time."""
+        if (more := self._away.happened(why)) is not None:
+            log.warning("%s%s; it is tried again", why, more)
+
+    def _back(self) -> None:
+        if ended := self._away.over():
+            log.info("%s: pictures come again, after %.0f s", shown(self._url), ended.seconds)
 
     def _listened_to(self, opened: Opened) -> tuple[AudioStream, ...]:
         """Give what else is to be read than the pictures."""
