@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import logging
+import time
 from collections.abc import Mapping
 
+from camsync import Spell
+from camsync.clock import Clock
 from server.view.align import Epoch
 from server.view.decide import GopDecision
 from server.view.intake import CameraState
@@ -17,8 +20,15 @@ log = logging.getLogger(__name__)
 class Lacking:
     """Notes what was lacking when it was decided. ``recorder``, once there is one, is told of all of it."""
 
-    def __init__(self, shelves: Mapping[str, Shelf], states: Mapping[str, CameraState], stride: int) -> None:
+    def __init__(
+        self,
+        shelves: Mapping[str, Shelf],
+        states: Mapping[str, CameraState],
+        stride: int,
+        clock: Clock = time.monotonic,
+    ) -> None:
         self._shelves, self._states, self._stride = shelves, states, stride
+        self._late = {camera: Spell(clock) for camera in shelves}
         self.recorder: LiveRecorder | None = None
         self.late_epochs = 0
         """Windows that were decided without a camera that was there."""
@@ -29,9 +39,14 @@ class Lacking:
         """Note whose tracks are late, and what cameras say that they did not do or hear."""
         for camera in epoch.late:
             self.late_epochs += 1
-            log.warning("camera %s: its tracks for pulses up to %d came too late", camera, epoch.last)
+            if (more := self._late[camera].happened()) is not None:
+                told = "camera %s: its tracks for pulses up to %d came too late%s"
+                log.warning(told, camera, epoch.last, more)
         for camera, message in epoch.tracks.items():
             self._states[camera].unheard += len(message.alone)
+            if ended := self._late[camera].over():
+                told = "camera %s: its tracks come in time again; those of %d windows in %.0f s did not"
+                log.info(told, camera, ended.times, ended.seconds)
         if self.recorder is None:
             return
         for camera in epoch.late:
