@@ -142,9 +142,10 @@ class Words(Scripts):
     def feed(self, data: bytes) -> bool:
         """Hear them."""
         earshot, bad = Earshot(("c1",), 50, lambda _: True), self._exchange.bad_messages
-        for pulse, (key, payload, _) in enumerate(_script.decode(data)):
+        for pulse, (_, payload, _) in enumerate(_script.decode(data)):
             self.messages += 1
-            heard = self._exchange._read(Message(key, payload, b""))
+            # The key is what was asked for: the bus hands nothing else on.
+            heard = self._exchange._read(Message(KEYS.camera("c1", "found"), payload, b""))
             if heard is not None and heard.camera == "c1":
                 earshot.put(heard, 0.0)
             earshot.ask(pulse, 1.0)

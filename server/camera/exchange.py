@@ -5,10 +5,12 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+from collections import defaultdict
 from collections.abc import Callable
 
 import msgspec
 
+from camsync import Spell
 from server.camera.earshot import Earshot
 from server.camera.witness import Heard, Witness
 from server.wire.bus import Bus
@@ -23,8 +25,6 @@ _JOINED_S = 2.0
 _AGAIN_S = 1.0
 _LISTENERS_S = 1.0
 """How long the first word waits until all the others can hear it: all have come when pulses begin."""
-_TOLD_EVERY_S = 60.0
-"""Words that come too late are told of so often at most: on a machine with too much to do there are many."""
 _DECODER = msgspec.json.Decoder(Found)
 
 
@@ -47,9 +47,11 @@ class Exchange:
         self._opening: asyncio.Task[Bus] | None = None
         self._bus: Bus | None = None
         self._told = False
-        self._late: dict[str, tuple[float, int]] = {}
-        """When it was told last that a camera's words come too late, and how many have come since."""
+        self._waits = Spell(calm=0.0)
+        self._late: dict[str, Spell] = defaultdict(Spell)
+        self._bad: dict[str, Spell] = defaultdict(Spell)
         self.bad_messages = 0
+        """Messages of the others that were none."""
 
     async def join(self) -> None:
         """Join the others; where the router is not there yet, that goes on meanwhile."""
@@ -78,8 +80,11 @@ class Exchange:
                 bus = await asyncio.shield(self._opening)
                 break
             except UserError as problem:
-                log.info("camera %s: cannot hear the others yet: %s", self._camera, problem)
+                if (more := self._waits.happened(str(problem))) is not None:
+                    log.info("camera %s: cannot hear the others yet: %s%s", self._camera, problem, more)
                 await asyncio.sleep(_AGAIN_S)
+        if self._waits.over():
+            log.info("camera %s: hears the others", self._camera)
         for other in self._others:
             self._listen(bus, other)
         bus.watch_alive(self._keys.camera("*", "hears"), self._alive)
@@ -104,17 +109,20 @@ class Exchange:
             await self._until(lambda: not self._earshot.misses(pulse), until)
         for camera in self._earshot.give_up(pulse):
             self._tell_late(camera, pulse)
-        return self._earshot.heard(pulse)
+        heard = self._earshot.heard(pulse)
+        for it in heard.words:
+            self._tell_in_time(it.camera)
+        return heard
 
     def _tell_late(self, camera: str, pulse: int) -> None:
-        now = asyncio.get_running_loop().time()
-        told, since = self._late.get(camera, (-_TOLD_EVERY_S, 0))
-        if now - told < _TOLD_EVERY_S:
-            self._late[camera] = (told, since + 1)
-            return
-        more = f", and {since} times before" if since else ""
-        log.info("camera %s: what %s found in frame %d came too late%s", self._camera, camera, pulse, more)
-        self._late[camera] = (now, 0)
+        more = self._late[camera].happened()
+        if more is not None:
+            told = "camera %s: what %s found in frame %d came too late%s"
+            log.info(told, self._camera, camera, pulse, more)
+
+    def _tell_in_time(self, camera: str) -> None:
+        if self._late[camera].over():
+            log.info("camera %s: what %s finds comes in time again", self._camera, camera)
 
     async def end(self, word: Found | None) -> None:
         """Tell the others that nothing follows."""
@@ -150,14 +158,20 @@ class Exchange:
         end = bus.listen(self._keys.camera(other, "found"), take)
 
     def _read(self, message: Message) -> Found | None:
+        other = camera_of(message.key)
         try:
             word = _DECODER.decode(message.payload)
-            if word.camera != camera_of(message.key):
+            if word.camera != other:
                 raise msgspec.ValidationError("it is another camera's")
         except UNREADABLE as problem:
             self.bad_messages += 1
-            log.warning("camera %s: a message on %s is none: %s", self._camera, message.key, problem)
+            if (more := self._bad[other].happened(str(problem))) is not None:
+                told = "camera %s: a message on %s is none: %s%s"
+                log.warning(told, self._camera, message.key, problem, more)
             return None
+        if ended := self._bad[other].over():
+            told = "camera %s: what %s says is understood again; %d messages were not"
+            log.info(told, self._camera, other, ended.times)
         return word
 
     def _alive(self, key: str, there: bool) -> None:

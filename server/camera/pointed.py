@@ -7,6 +7,7 @@ from collections import deque
 
 import msgspec
 
+from camsync import Spell
 from server.wire.help import POINTS_MOST, Pointings
 from server.wire.inbox import Message
 from server.wire.messages import UNREADABLE
@@ -26,6 +27,7 @@ class Pointed:
         self.taken = 0
         """Places that the tracker was given."""
         self.bad_messages = 0
+        self._bad = Spell()
 
     def put(self, message: Message) -> None:
         """Take a message in; what is said of another run's tracks is of nobody here."""
@@ -33,8 +35,13 @@ class Pointed:
             said = _DECODER.decode(message.payload)
         except UNREADABLE as error:
             self.bad_messages += 1
-            log.warning("camera %s: a message on %s is none: %s", self._camera, message.key, error)
+            if (more := self._bad.happened(str(error))) is not None:
+                told = "camera %s: a message on %s is none: %s%s"
+                log.warning(told, self._camera, message.key, error, more)
             return
+        if ended := self._bad.over():
+            told = "camera %s: where somebody points is understood again; %d messages were not"
+            log.info(told, self._camera, ended.times)
         if said.boot == self._boot:
             self._waiting.extend(Pointing(it.pulse, it.track, it.x, it.y, it.reach) for it in said.points)
 

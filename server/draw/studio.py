@@ -54,6 +54,8 @@ class Studio:
         self._decoder = _decoder(canvas.codec)
         self._whole = False
         """What comes can be decoded: nothing has been damaged since the last key frame."""
+        self._told = False
+        """That something could not be decoded."""
         self._encoder: Encoder | None = None
         self._encoded_last = -1
         self._last: Painting | None = None
@@ -92,7 +94,9 @@ class Studio:
             try:
                 pictures = self._decoder.decode(packet)
             except av.FFmpegError as error:
-                log.warning("frame %d cannot be decoded: %s", unit.pulse, error)
+                if not self._told:  # there may be one in every GOP
+                    log.warning("frame %d cannot be decoded: %s; others are not told of", unit.pulse, error)
+                self._told = True
                 self._decoder, self._whole = _decoder(self._canvas.codec), False
                 continue
             for frame in pictures:

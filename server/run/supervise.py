@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from camsync import Spell
 from server.run.ending import OVER, SUPERVISED
 from server.wire.config import Config
 from server.wire.errors import UserError
@@ -32,6 +33,7 @@ class Child:
     arguments: Sequence[str]
     process: asyncio.subprocess.Process | None = None
     restarts: int = 0
+    dies: Spell = field(default_factory=Spell)
     done: asyncio.Event = field(default_factory=asyncio.Event)
     """It has ended by itself with nothing left to do."""
 
@@ -108,7 +110,9 @@ class Supervisor:
                 raise UserError(f"{child.name} could not start")
             if loop.time() - started > _SETTLED_S:
                 pause = _RETRY_FIRST_S
-            log.warning("%s %s; starting it again in %.1f s", child.name, _cause(code), pause)
+            cause = _cause(code)
+            if (more := child.dies.happened(cause)) is not None:
+                log.warning("%s %s%s; starting it again in %.1f s", child.name, cause, more, pause)
             await asyncio.sleep(pause)
             pause = min(2 * pause, _RETRY_MAX_S)
             child.restarts += 1

@@ -6,9 +6,10 @@ import asyncio
 import errno
 import logging
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
+from camsync import Spell
 from server.run.checks import check_recording
 from server.run.exposed import check_bus, check_pulses, check_viewers
 from server.run.hang_up import reloads
@@ -31,16 +32,18 @@ async def run_up(running: Running, environment: Mapping[str, str], out: Path | N
         UserError: a process refused its input.
     """
     with _folder() as folder:
-        kept = Path(folder) / "site.yaml"
+        kept, failing = Path(folder) / "site.yaml", Spell()
         # Anew each time: what is old and temporary may be tidied away, and sites run for months.
         supervisor = Supervisor(
             running.path,
             running.now,
             {**environment, IN_FORCE: str(kept)},
             out,
-            before_start=lambda: _keep(running, kept),
+            before_start=lambda: _keep(running, kept, failing),
         )
-        following = asyncio.create_task(_follow(running, supervisor, kept), name="reload")
+        following = asyncio.create_task(
+            _follow(running, supervisor, lambda: _keep(running, kept, failing)), name="reload"
+        )
         try:
             await supervisor.run()
         finally:
@@ -58,12 +61,12 @@ def check_exposed(config: Config) -> None:
         check(config)
 
 
-async def _follow(running: Running, supervisor: Supervisor, kept: Path) -> None:
+async def _follow(running: Running, supervisor: Supervisor, keep: Callable[[], None]) -> None:
     """Tell those processes whose settings have changed, whenever the configuration is read again."""
     async for reload in reloads(running, _check):
         log.info("%s", reload.line)
         running.now = reload.now
-        _keep(running, kept)
+        keep()
         supervisor.hang_up("bestview")
         for number, camera in enumerate(reload.cameras):
             if number:
@@ -90,7 +93,7 @@ def _check(wanted: Config, reload: Reload) -> None:
         check_recording(reload.now, camera)
 
 
-def _keep(running: Running, kept: Path) -> None:
+def _keep(running: Running, kept: Path, failing: Spell) -> None:
     """Write down what the site runs by, for processes that begin: all of it or nothing."""
     new = kept.with_suffix(".new")
     try:
@@ -100,4 +103,5 @@ def _keep(running: Running, kept: Path) -> None:
         new.write_text(written(running.now, running.path.parent), encoding="utf-8")
         new.replace(kept)
     except OSError as error:
-        log.warning("%s: cannot write what is in force: %s", kept, error.strerror)
+        if (more := failing.happened(str(error.strerror))) is not None:
+            log.warning("%s: cannot write what is in force: %s%s", kept, error.strerror, more)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import msgspec
 
+from camsync import Spell
 from server.view.followed import LONGEST_S, Returning, SaidByHand, said_by_hand
 from server.view.people import People
 from server.wire.errors import UserError
@@ -66,7 +67,7 @@ class ByHandFile:
         self._writing: Future[None] | None = None
         self._written: SaidByHand | None = None
         """What was written last; None: nothing, and there is no file."""
-        self._failed = False
+        self._failing = Spell(calm=0.0)
 
     def open(self) -> None:
         """Take what an earlier run of the service has left."""
@@ -106,8 +107,9 @@ class ByHandFile:
         assert self._path is not None  # noqa: S101 — there is a thread only where there is a path
         try:
             write(self._path, said)
-            self._failed = False
         except UserError as error:
-            if not self._failed:
-                log.warning("what was said by hand is not kept: %s", error)
-            self._failed = True
+            if (more := self._failing.happened(str(error))) is not None:
+                log.warning("what was said by hand is not kept: %s%s", error, more)
+        else:
+            if self._failing.over():
+                log.info("what was said by hand is kept again")

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 import msgspec
 
+from camsync import Spell
 from server.view.agreement import ParameterMismatchError
 from server.view.align import Aligner
 from server.view.gauge import Gauge
@@ -107,6 +108,7 @@ class Intake:
         self._now, self._ahead = now, ahead
         self._shelves, self._aligner, self._on_frame = shelves, aligner, on_frame
         self._sound = sound
+        self._unknown = Spell()
         self.bad_sounds = 0
         self.states = {camera: CameraState() for camera in shelves}
         self.thumbnails: dict[tuple[str, int, int], Thumbnail] = {}
@@ -122,7 +124,8 @@ class Intake:
         camera = camera_of(key)
         state = self.states.get(camera)
         if state is None:
-            log.warning("camera %s is not in the configuration; it is ignored", camera)
+            if (more := self._unknown.happened(camera)) is not None:
+                log.warning("camera %s is not in the configuration%s; it is ignored", camera, more)
             return
         state.alive = there
         state.status = None  # what was said before is of another time

@@ -9,6 +9,7 @@ from contextlib import asynccontextmanager
 
 from aiohttp import web
 
+from camsync import Spell
 from server.view.pictures import Pictures
 from server.view.service import BestViewService
 from server.web import api, hls, openapi, operator_routes, page, past, pictures, session, site, video
@@ -32,6 +33,7 @@ from server.wire.sections import Http
 
 log = logging.getLogger(__name__)
 
+_MISTAKES = web.AppKey("mistakes", Spell)
 _CLOSE_S = 1.0
 """How long viewers have to take what was sent before the server ends."""
 
@@ -55,8 +57,9 @@ async def one_line_errors(
         return problem(error.status, error.reason)
     except (ConnectionError, asyncio.CancelledError):
         raise
-    except Exception:
-        log.exception("answering %s %s failed", request.method, request.path)
+    except Exception as error:
+        if (more := request.app[_MISTAKES].happened(repr(error))) is not None:
+            log.exception("answering %s %s failed%s", request.method, request.path, more)
         return problem(500, "the server made a mistake; its log says more")
 
 
@@ -79,7 +82,7 @@ def make_app(
         ]
     )
     app[SERVICE], app[EVENTS], app[PICTURES] = service, Events(service), Pictures(service)
-    app[ON_DISK] = on_disk
+    app[ON_DISK], app[_MISTAKES] = on_disk, Spell()
     app[openapi.DESCRIBED] = openapi.Described(app)
     app[READERS] = Readers(service.splicer.plan.target_s)
     what = f"{service.config.site.name}_{service.config.view.share.index}"

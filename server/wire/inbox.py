@@ -9,6 +9,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
+from camsync import Spell
+
 log = logging.getLogger(__name__)
 
 PENDING_MAX = 4096
@@ -39,6 +41,7 @@ class Inbox(Generic[Item]):
         self._pending: deque[Item] = deque(maxlen=pending_max)
         self._woken = False
         self.lost = 0
+        self._failing = Spell()
 
     @property
     def waiting(self) -> int:
@@ -63,5 +66,6 @@ class Inbox(Generic[Item]):
             item = self._pending.popleft()
             try:
                 self._handler(item)
-            except Exception:  # one bad item must not keep back those behind it
-                log.exception("handling what came failed")
+            except Exception as error:  # one bad item must not keep back those behind it
+                if (more := self._failing.happened(repr(error))) is not None:
+                    log.exception("handling what came failed%s", more)

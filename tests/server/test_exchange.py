@@ -304,17 +304,3 @@ def test_a_site_with_one_homography_or_none_has_nobody_to_ask(recording: Path) -
         pipeline.close()
     assert config.witnesses("c1") == ("c0", "c2")
     assert not config_of(recording, use=False).witnesses("c1")
-
-
-async def test_words_that_come_too_late_again_and_again_are_told_of_once_a_minute(
-    recording: Path, caplog: pytest.LogCaptureFixture
-) -> None:
-    caplog.set_level("INFO")
-    exchange = Exchange(config_of(recording), "c0", None, 10)
-    for pulse in range(3):
-        exchange._tell_late("c1", pulse)
-    assert [it.message for it in caplog.records] == ["camera c0: what c1 found in frame 0 came too late"]
-    told, since = exchange._late["c1"]
-    exchange._late["c1"] = (told - 60.0, since)
-    exchange._tell_late("c1", 9)
-    assert caplog.records[-1].message.endswith("in frame 9 came too late, and 2 times before")

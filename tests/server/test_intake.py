@@ -177,11 +177,13 @@ def test_a_word_that_cannot_be_true_is_refused(changes: dict[str, Any]) -> None:
     assert hall.bad() == 1
 
 
-def test_cameras_that_nobody_configured_are_ignored() -> None:
+def test_cameras_that_nobody_configured_are_ignored(caplog: pytest.LogCaptureFixture) -> None:
     hall = Hall()
     hall.intake.video(video("cellar", encoded(0)[0]))
     hall.intake.tracks(tracks(word("cellar", 0, {})))
-    hall.intake.alive(KEYS.camera("cellar", "alive"), there=True)
+    for there in (True, False) * 5:
+        hall.intake.alive(KEYS.camera("cellar", "alive"), there=there)
+    assert len(caplog.messages) == 1
     assert list(hall.intake.states) == list(CAMERAS)
     assert not hall.frames
 

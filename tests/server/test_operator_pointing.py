@@ -149,7 +149,9 @@ async def test_a_flag_is_raised_followed_answered_and_counted(helped: Hall) -> N
         assert line in lines
 
 
-def test_a_camera_takes_what_is_said_of_its_own_tracks_and_no_more_than_it_can_hold() -> None:
+def test_a_camera_takes_what_is_said_of_its_own_tracks_and_no_more_than_it_can_hold(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
     pointed = Pointed("c0", boot=2)
     point = {"track": 1, "x": 1.0, "y": 2.0, "reach": 3.0}
 
@@ -164,5 +166,7 @@ def test_a_camera_takes_what_is_said_of_its_own_tracks_and_no_more_than_it_can_h
     for bad in (b"", b"[" * 100_000, b"{}", {"boot": 2, "points": [{"pulse": -1, **point}]}, sharp):
         hear(bad)
     assert pointed.bad_messages == 5
+    hear(b"{}")
+    assert len(caplog.messages) == 5, "one for each reason"
     assert [it.frame for it in pointed.take()] == list(range(400 - 256, 400))
     assert pointed.take() == []

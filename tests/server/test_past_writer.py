@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import threading
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -90,7 +91,30 @@ def test_a_full_disk_is_told_once_tried_again_and_counted(caplog: pytest.LogCapt
     assert (writer.written, writer.lost, writer.trouble) == (1, 3, "")
     told, goes_on = (it.getMessage() for it in caplog.records)
     assert told.startswith("recording: cannot write: No space left on device; nothing is recorded")
-    assert goes_on == "recording: goes on"
+    assert goes_on.startswith("recording: goes on, after ")
+
+
+def test_a_disk_that_is_full_again_and_again_is_not_told_of_each_time(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    caplog.set_level(logging.INFO)
+    disk = Disk()
+    writer = writer_on(disk, most=100)
+    for gop in range(0, 20, 2):
+        disk.refuses = True
+        writer.put(piece(gop, {1: A}))
+        until(lambda gop=gop: writer.lost == gop // 2 + 1)
+        disk.refuses = False
+        writer.put(piece(gop + 1, {1: A}))
+        until(lambda gop=gop: writer.written == gop // 2 + 1)
+    writer.close()
+    assert len(caplog.messages) == 2
+
+
+def until(condition: Callable[[], bool]) -> None:
+    """Wait for what the writer's thread does."""
+    while not condition():
+        threading.Event().wait(0.001)
 
 
 def test_a_mistake_does_not_end_the_recording(caplog: pytest.LogCaptureFixture) -> None:

@@ -90,7 +90,9 @@ async def test_everything_is_started_and_ended_together(machine: Machine) -> Non
 
 
 @pytest.mark.parametrize("code", [-9, 1, 0])
-async def test_what_dies_or_is_told_to_end_is_started_again_alone(machine: Machine, code: int) -> None:
+async def test_what_dies_or_is_told_to_end_is_started_again_alone(
+    machine: Machine, code: int, caplog: pytest.LogCaptureFixture
+) -> None:
     machine.run()
     processes = await machine.processes(4)
     for _ in range(3):
@@ -98,6 +100,7 @@ async def test_what_dies_or_is_told_to_end_is_started_again_alone(machine: Machi
         processes |= await machine.processes(1)
         assert processes["c0"].returncode is None
     assert machine.started.empty()
+    assert len(caplog.messages) == 1, "told of once for one cause"
 
 
 async def test_what_is_needed_to_start_is_seen_to_before_every_start(machine: Machine) -> None:

@@ -9,6 +9,7 @@ from fractions import Fraction
 
 from av.audio.stream import AudioStream
 
+from camsync import Spell
 from server.camera.sound.frames import Frame, Packet, Way
 from server.camera.sound.ways import way_for
 from server.wire.sections import Sound
@@ -43,13 +44,17 @@ class LiveSound:
         self._frames: deque[Frame] = deque(maxlen=round(_WAITING_S * form.rate / form.samples))
         self._way: Way | None = None
         self._last = -1
+        self._silent = Spell(calm=0.0)
 
     def opened(self, stream: AudioStream | None) -> None:
         """Begin with a connection."""
         self._way = None
         if stream is None:
-            log.warning("there is no sound in what the camera sends; the site is silent")
+            if (more := self._silent.happened()) is not None:
+                log.warning("there is no sound in what the camera sends%s; the site is silent", more)
         else:
+            if self._silent.over():
+                log.info("there is sound again in what the camera sends")
             self._way = way_for(stream, self._form, self._kbps)
 
     def picture(self, time: Fraction) -> None:

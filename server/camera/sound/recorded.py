@@ -53,6 +53,8 @@ class RecordedSound:
             container.close()
         self._packets: Iterator[tuple[Fraction, Packet]] | None = None
         self._waiting: tuple[Fraction, Packet] | None = None
+        self._told = False
+        """That it cannot be read to its end."""
 
     def at(self, pulse: int) -> list[Frame]:
         """Give what is to be sent at a pulse: it is recorded, so it can be sent a moment early.
@@ -100,7 +102,9 @@ class RecordedSound:
                 if packet.pts is not None and packet.time_base is not None and packet.size:
                     yield (packet.pts * packet.time_base - self._start) * self._speed, packet
         except av.error.FFmpegError as error:
-            log.warning("%s: its sound cannot be read any further: %s", self._path, error.strerror)
+            if not self._told:  # it may be read over and over
+                log.warning("%s: its sound cannot be read any further: %s", self._path, error.strerror)
+            self._told = True
         finally:
             container.close()
 

@@ -14,13 +14,13 @@ from server.camera.sources.opening import Opened
 log = logging.getLogger(__name__)
 
 
-def pictures(opened: Opened) -> Iterator[VideoFrame | None]:
+def pictures(opened: Opened, *, again: bool = False) -> Iterator[VideoFrame | None]:
     """Give the pictures in order; None stands for one that could not be decoded.
 
-    A file that cannot be read any further ends there.
+    A file that cannot be read any further ends there, and that is said; not where it is read ``again``.
     """
     line = _Line(_half_a_frame(opened.stream))
-    for packet in _packets(opened):
+    for packet in _packets(opened, again=again):
         yield from line.after(packet)
     yield from line.rest()
 
@@ -74,11 +74,12 @@ class _Line:
                 yield None
 
 
-def _packets(opened: Opened) -> Iterator[av.Packet[VideoStream]]:
+def _packets(opened: Opened, *, again: bool) -> Iterator[av.Packet[VideoStream]]:
     try:
         yield from opened.container.demux(opened.stream)
     except av.error.FFmpegError as error:
-        log.warning("%s: cannot be read any further: %s", opened.container.name, error.strerror)
+        if not again:
+            log.warning("%s: cannot be read any further: %s", opened.container.name, error.strerror)
 
 
 def _half_a_frame(stream: VideoStream) -> int:

@@ -75,7 +75,7 @@ class Recording:
     def _rewind(self) -> None:
         self._opened.container.close()
         self._opened = open_video(self._path)
-        self._pictures, self._next, self._newest = pictures(self._opened), 0, None
+        self._pictures, self._next, self._newest = pictures(self._opened, again=True), 0, None
 
     def _forward(self, index: int) -> Image:
         """Decode up to frame ``index``."""

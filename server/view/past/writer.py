@@ -8,6 +8,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 
+from camsync import Spell
 from server.view.past.store import Piece
 
 log = logging.getLogger(__name__)
@@ -36,6 +37,7 @@ class Writer:
         self._waiting: deque[Piece] = deque()
         self._changed = threading.Condition()
         self._closing = False
+        self._failing = Spell(calm=0.0)
         self._thread = threading.Thread(target=self._run, name="recording", daemon=True)
         self.written = 0
         """GOPs."""
@@ -92,25 +94,26 @@ class Writer:
         try:
             self._write(piece)
         except OSError as error:
-            if not self.trouble:
-                reason = error.strerror or str(error)
+            self.trouble = error.strerror or str(error)
+            if (more := self._failing.happened(self.trouble)) is not None:
                 log.error(  # noqa: TRY400 — says all there is
-                    "recording: cannot write: %s; nothing is recorded until it can be written again, "
+                    "recording: cannot write: %s%s; nothing is recorded until it can be written again, "
                     "which is tried every %.0f s; the streams go on",
-                    reason,
+                    self.trouble,
+                    more,
                     self._retry_s,
                 )
-                self.trouble = reason
             self._give_up()
             return False
-        except Exception:
-            log.exception("recording: a mistake in MyView; it is tried again")
+        except Exception as error:
+            if (more := self._failing.happened(repr(error))) is not None:
+                log.exception("recording: a mistake in MyView%s; it is tried again", more)
             self.trouble = "a mistake in MyView"
             self._give_up()
             return False
-        if self.trouble:
-            log.info("recording: goes on")
-            self.trouble = ""
+        self.trouble = ""
+        if ended := self._failing.over():
+            log.info("recording: goes on, after %.0f s", ended.seconds)
         self.written += 1
         return True
 

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 
+from camsync import Spell
 from server.view.pictures.decided import NOTHING, Decided, Told
 from server.view.pictures.source import Source
 from server.view.service import BestViewService
@@ -82,6 +83,7 @@ class Pictures:
         self._tasks: set[asyncio.Task[None]] = set()
         """Those of sources that are running, or ending."""
         self._restarts = self._lost = 0
+        self._failing = Spell()
 
     @property
     def sources(self) -> dict[Subject, Source]:
@@ -193,8 +195,9 @@ class Pictures:
         self._forget(subject, running)
 
     def _ended(self, subject: Subject, running: _Running) -> None:
-        if not running.task.cancelled() and (error := running.task.exception()) is not None:
-            log.error("drawing %s failed", subject, exc_info=error)
+        error = None if running.task.cancelled() else running.task.exception()
+        if error is not None and (more := self._failing.happened(repr(error))) is not None:
+            log.error("drawing %s failed%s", subject, more, exc_info=error)
         self._forget(subject, running)
 
     def _forget(self, subject: Subject, running: _Running) -> None:

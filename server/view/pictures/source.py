@@ -7,6 +7,7 @@ import contextlib
 import logging
 from collections.abc import Callable
 
+from camsync import Spell
 from server.view.channel import Channel, Viewer
 from server.view.pictures.decided import Told
 from server.view.pictures.film import Film
@@ -58,6 +59,7 @@ class Source:
         self.restarts = 0
         self._viewer: Viewer | None = None
         self._lost = 0
+        self._dies = Spell()
         self.pid: int | None = None
         """The process that draws now."""
 
@@ -118,7 +120,9 @@ class Source:
                     await self._run_process()
                 except ProcessDiedError as error:
                     pause = _RETRY_FIRST_S if self._answered else min(2 * pause, _RETRY_MAX_S)
-                    log.warning("drawing %s: the process %s; starting another", self._name, error)
+                    if (more := self._dies.happened(str(error))) is not None:
+                        told = "drawing %s: the process %s%s; starting another"
+                        log.warning(told, self._name, error, more)
                     self.restarts += 1
                     self.film.interrupted()
                     await asyncio.sleep(pause)
