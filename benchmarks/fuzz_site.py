@@ -200,7 +200,7 @@ class Fed(BestViewService):
     @property
     def dropped(self) -> int:
         """Messages that were counted and dropped."""
-        return sum(it.bad_messages for it in self.intake.states.values()) + self.intake.bad_sounds
+        return sum(it.bad_messages for it in self.intake.states.values())
 
 
 def feed_epoch(service: Fed, rng: Random, epoch: int, epochs: int, word: Word = word) -> None:

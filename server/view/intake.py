@@ -92,7 +92,7 @@ class Intake:
     """Takes the cameras' messages in. What cannot be understood is counted and dropped.
 
     So is what is of pulses more than ``ahead`` after the newest, which ``now`` gives (below 0: none):
-    it would be waited for as long as that takes.
+    it would be waited for as long as that takes. ``sounding`` is the camera that sends the ``sound``.
     """
 
     def __init__(
@@ -102,14 +102,14 @@ class Intake:
         on_frame: Callable[[str, Shelved], None],
         sound: SoundShelf | None = None,
         *,
+        sounding: str | None = None,
         now: Callable[[], int] = lambda: -1,
         ahead: int = 0,
     ) -> None:
         self._now, self._ahead = now, ahead
         self._shelves, self._aligner, self._on_frame = shelves, aligner, on_frame
-        self._sound = sound
+        self._sound, self._sounding = sound, sounding
         self._unknown = Spell()
-        self.bad_sounds = 0
         self.states = {camera: CameraState() for camera in shelves}
         self.thumbnails: dict[tuple[str, int, int], Thumbnail] = {}
         """By camera, boot and track."""
@@ -164,12 +164,12 @@ class Intake:
 
     def sound(self, message: Message) -> None:
         """Shelve some of the site's sound."""
-        if self._sound is None:
+        if self._sound is None or self._sounding is None:
             return
         try:
             self._sound.put(self._sound_head.decode(message.attachment), message.payload)
-        except (*UNREADABLE, ValueError):
-            self.bad_sounds += 1
+        except (*UNREADABLE, ValueError) as error:
+            self.states[self._sounding].bad(f"sound: {error}")
 
     def tracks(self, message: Message) -> None:
         """Hand a window's tracks to the aligner."""

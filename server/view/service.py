@@ -65,6 +65,7 @@ class BestViewService:
             self.aligner,
             self.splicer.frame,
             self.sound,
+            sounding=config.sounding,
             now=lambda: self.pulse,
             ahead=round(_AHEAD_S * fps),
         )

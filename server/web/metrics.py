@@ -89,7 +89,11 @@ class ServiceCollector(Collector):
             "Frames in which people were followed without what some other camera found.",
             labels=["camera"],
         )
-        bad = CounterMetricFamily("myview_camera_bad_messages", "Messages not understood.", labels=["camera"])
+        bad = CounterMetricFamily(
+            "myview_camera_bad_messages",
+            "Messages not understood: those that the camera has sent, and those that it has heard.",
+            labels=["camera", "way"],
+        )
         offset = GaugeMetricFamily(
             "myview_camera_clock_offset_seconds",
             "Pulse server's clock minus the camera's.",
@@ -100,10 +104,11 @@ class ServiceCollector(Collector):
             live.add_metric(labels, float(state.word == "live"))
             frames.add_metric(labels, state.frames)
             unheard.add_metric(labels, state.unheard)
-            bad.add_metric(labels, state.bad_messages)
+            bad.add_metric([camera, "sent"], state.bad_messages)
             if state.status is not None:
                 missed.add_metric(labels, state.status.missed)
                 shed.add_metric(labels, state.status.shed)
+                bad.add_metric([camera, "heard"], state.status.bad_messages)
                 offset.add_metric(labels, state.status.clock_offset)
         return [live, frames, missed, shed, unheard, bad, offset]
 

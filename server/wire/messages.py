@@ -183,6 +183,8 @@ class CameraStatus(msgspec.Struct, frozen=True, kw_only=True):
     """What is left out, for people: printable, since it stands on pages and in terminals."""
     pointed: Number = 0
     """Places that an operator pointed at and the tracker was given, since the start."""
+    bad_messages: Number = 0
+    """Messages to the camera that it could not understand, since the start."""
     in_step: bool
     """Pulses come from the server; otherwise the camera goes on at its own rate."""
     clock_offset: float

@@ -18,6 +18,7 @@ from videos_by_hand import write_video
 
 from camsync import Spell
 from server.camera.exchange import Exchange
+from server.camera.process import CameraProcess
 from server.camera.sound import LiveSound
 from server.camera.sources import recording
 from server.camera.sources.pictures import pictures
@@ -30,7 +31,7 @@ from server.view.pictures.decided import NOTHING
 from server.view.pictures.process import ProcessDiedError
 from server.wire.drawing import Draw
 from server.wire.inbox import Message
-from server.wire.messages import Found, Keys
+from server.wire.messages import CameraStatus, Found, Keys
 from server.wire.sections import Sound
 
 KEYS = Keys("hall")
@@ -84,6 +85,21 @@ async def test_a_camera_that_nobody_understands_is_told_of_once_and_not_by_frame
     assert none.startswith("camera c0: a message on myview/hall/camera/c1/found is none: Object missing")
     assert well == "camera c0: what c1 says is understood again; 250 messages were not"
     assert exchange.bad_messages == 250
+
+
+async def test_what_a_camera_does_not_understand_is_in_its_status(monkeypatch: pytest.MonkeyPatch) -> None:
+    config = small_config()
+    cameras = [it.model_copy(update={"source": "scene:room?camera=0&objects=1"}) for it in config.cameras]
+    camera = CameraProcess(config.model_copy(update={"cameras": cameras}), "c0")
+    said: list[bytes] = []
+    monkeypatch.setattr(camera, "_publish", lambda _, payload: said.append(payload))
+    camera._exchange._read(Message(KEYS.camera("c1", "found"), b"{", b""))
+    for _ in range(2):
+        camera._pointed.put(Message(KEYS.camera("c0", "pointing"), b"{", b""))
+    camera._send_status()
+    camera._pipeline.close()
+    [status] = [msgspec.json.decode(it, type=CameraStatus) for it in said]
+    assert status.bad_messages == 3
 
 
 def test_a_camera_without_sound_is_told_of_once_however_often_it_is_opened(

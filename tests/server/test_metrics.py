@@ -11,7 +11,9 @@ from cameras_by_hand import CAMERAS, FPS, GOP, LARGE, SMALL, encoded, status, tr
 from halls import A, B, Hall, see
 from hypothesis import given
 from hypothesis import strategies as st
+from monitoring_files import ALERTS
 from prometheus_client.parser import text_string_to_metric_families
+from promql_series import selectors
 
 from server.view.channel import Chunk, Viewer
 from server.view.histogram import Histogram
@@ -73,6 +75,22 @@ async def test_what_a_camera_says_of_itself_is_there_once_it_has_said_it(busy: H
     assert told["myview_camera_waiting_frames", A] == 7
     assert told["myview_camera_fps", A] == 12.5
     assert told["myview_camera_in_step", A] == 0
+
+
+async def test_messages_that_were_not_understood_are_counted_whoever_heard_them(hall: Hall) -> None:
+    hall.service.intake.tracks(Message(Keys("hall").camera(A, "tracks"), b"{", b""))
+    hall.service.intake.status(status(B, bad_messages=3))
+    told = {key[1:]: value for key, value in (await samples(hall)).items() if key[0] == _BAD}
+    assert told == {(A, "sent"): 1, (B, "sent"): 0, (B, "heard"): 3}
+
+
+def test_the_alert_is_about_both() -> None:
+    [alert] = [it for it in ALERTS if it["alert"] == "MyViewMessagesBad"]
+    assert [it.name for it in selectors(alert["expr"])] == [_BAD]
+    assert "way" not in alert["expr"]
+
+
+_BAD = "myview_camera_bad_messages_total"
 
 
 async def test_deciding_and_sending_are_counted_by_epoch_and_by_gop(busy: Hall) -> None:
