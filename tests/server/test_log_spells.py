@@ -19,7 +19,7 @@ from videos_by_hand import write_video
 from camsync import Spell
 from server.camera.exchange import Exchange
 from server.camera.process import CameraProcess
-from server.camera.sound import LiveSound
+from server.camera.sound import LiveSound, RecordedSound, recorded
 from server.camera.sources import recording
 from server.camera.sources.pictures import pictures
 from server.camera.sources.recording import Recording
@@ -124,6 +124,21 @@ def test_a_damaged_recording_that_repeats_is_told_of_once(caplog: pytest.LogCapt
     for _ in range(5):
         assert not list(pictures(opened, again=True))
     assert caplog.messages == ["hall.mp4: cannot be read any further: damaged"]
+
+
+def test_damaged_sound_that_repeats_is_told_of_once(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def demux(_: Any) -> Any:
+        raise av.error.InvalidDataError(1, "damaged")
+
+    container = SimpleNamespace(demux=demux, close=lambda: None)
+    monkeypatch.setattr(recorded, "_open", lambda _: (container, None))
+    sound = RecordedSound.__new__(RecordedSound)
+    sound._path, sound._told = "hall.mp4", False
+    for _ in range(5):
+        assert not list(sound._once())
+    assert caplog.messages == ["hall.mp4: its sound cannot be read any further: damaged"]
 
 
 def test_a_recording_that_repeats_is_read_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
