@@ -28,7 +28,10 @@ def kind_of(source: str) -> SourceKind:
         return SourceKind.SCENE
     if "://" in source or is_device(source):
         return SourceKind.STREAM
-    return SourceKind.FOLDER if Path(source).is_dir() else SourceKind.FILE
+    try:
+        return SourceKind.FOLDER if Path(source).is_dir() else SourceKind.FILE
+    except OSError:
+        return SourceKind.FILE  # not for this user, or no name that a file can have: opening it says so
 
 
 def is_device(source: str) -> bool:
@@ -40,6 +43,17 @@ def is_device(source: str) -> bool:
         return path.is_char_device() or (not path.exists() and _MEMORY not in path.parents)
     except OSError:
         return True  # it is there, and not for this user
+
+
+def is_missing(path: str) -> bool:
+    """Tell whether nothing is at a path; what only cannot be reached is not missing: opening it says why."""
+    try:
+        Path(path).stat()
+    except (FileNotFoundError, NotADirectoryError):
+        return True
+    except (OSError, ValueError):
+        return False
+    return False
 
 
 def resolved(source: str, folder: Path) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from server.camera.scene import Scene
+from server.camera.sources import Recording
 from server.camera.sources.opening import open_video
 from server.camera.sources.stage import Stage
 from server.run.scene_ground import with_scene_ground
@@ -69,6 +70,7 @@ def test_a_wrong_address_is_refused_with_the_reason(source: str, why: str) -> No
         ("/devices/a.mp4", SourceKind.FILE),
         ("/", SourceKind.FOLDER),
         ("a.mp4", SourceKind.FILE),
+        (300 * "a" + ".mp4", SourceKind.FILE),  # no name that a file can have, which opening it says
     ],
 )
 def test_the_kind_of_a_source_shows_in_how_it_is_written(source: str, kind: SourceKind) -> None:
@@ -84,6 +86,11 @@ def test_a_recording_in_memory_is_one_though_it_is_below_dev() -> None:
         assert kind_of(folder) is SourceKind.FOLDER
         with pytest.raises(UserError, match="cannot open this video"):
             open_video(str(recording))
+
+
+def test_a_name_that_no_file_can_have_is_refused_in_a_line() -> None:
+    with pytest.raises(UserError, match="cannot open this video: File name too long"):
+        Recording(300 * "a" + ".mp4", 0, "stop")
 
 
 def test_a_scene_without_a_floor_gives_its_cameras_none() -> None:

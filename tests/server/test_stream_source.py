@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import errno
 import http.server
+import os
+import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
 
+import av
 import cv2
 import numpy as np
 import pytest
@@ -167,3 +171,20 @@ def test_options_are_passed_on(camera: MotionJpeg) -> None:
     port = camera.plug_in()
     source = Stream(f"http://127.0.0.1:{port}/", {"user_agent": "MyView"})
     source.close()
+
+
+def test_a_host_that_nobody_knows_is_told_from_a_camera_that_fails(monkeypatch: pytest.MonkeyPatch) -> None:
+    """FFmpeg says the same of both."""
+
+    def refused(*_: object, **__: object) -> None:
+        raise OSError(errno.EIO, os.strerror(errno.EIO))
+
+    def unknown(*_: object) -> None:
+        raise socket.gaierror(socket.EAI_NONAME, "Name or service not known")
+
+    monkeypatch.setattr(av, "open", refused)
+    with pytest.raises(UserError, match=r"127.0.0.1/live: .*: Input/output error"):
+        open_video("rtsp://127.0.0.1/live")
+    monkeypatch.setattr(socket, "getaddrinfo", unknown)
+    with pytest.raises(UserError, match=r"\(not shown\)@gate/live: .*: Name or service not known"):
+        open_video("rtsp://me:hunter2@gate/live")

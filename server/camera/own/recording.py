@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 from typing import Literal
 
 import av
@@ -18,6 +17,7 @@ from server.camera.sources.opening import Opened, open_video
 from server.camera.sources.recording import frames_at
 from server.wire.colours import bgr
 from server.wire.errors import UserError
+from server.wire.sources import is_missing
 
 
 class OwnRecording:
@@ -31,7 +31,7 @@ class OwnRecording:
     recorded = True
 
     def __init__(self, path: str, offset: int, at_end: Literal["stop", "loop"], wanted: Wanted) -> None:
-        if not Path(path).exists():
+        if is_missing(path):
             raise UserError(f"{path}: no such file or folder")
         self._path, self._offset, self._loop = path, offset, at_end == "loop"
         self._length = _checked(path, offset, wanted)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterator
 from fractions import Fraction
-from pathlib import Path
 from typing import Literal
 
 import av
@@ -16,6 +15,7 @@ from server.camera.sound.frames import Frame, Packet, Way
 from server.camera.sound.ways import way_for
 from server.wire.errors import UserError
 from server.wire.sections import Sound
+from server.wire.sources import is_missing
 
 log = logging.getLogger(__name__)
 
@@ -136,7 +136,7 @@ class RecordedSound:
 
 
 def _open(path: str) -> tuple[InputContainer, AudioStream]:
-    if not Path(path).exists():
+    if is_missing(path):
         raise UserError(f"{path}: is neither a camera of this site nor a file")
     try:
         container = av.open(path)

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import errno
+import socket
 from collections.abc import Mapping
 from dataclasses import dataclass
+from urllib.parse import urlsplit
 
 import av
 from av.container import InputContainer
@@ -44,8 +47,7 @@ def open_video(
             source, format="v4l2" if is_device(source) else None, options=dict(options or {}), timeout=timeout
         )
     except (av.error.FFmpegError, OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or " ".join(shown(str(error)).split())
-        raise UserError(f"{name}: cannot open this video: {reason}") from error
+        raise UserError(f"{name}: cannot open this video: {_reason(source, error)}") from error
     if not container.streams.video:
         container.close()
         raise UserError(f"{name}: there is no video in this file")
@@ -59,3 +61,15 @@ def open_video(
     context.thread_count = 1  # one process per camera already uses the cores
     fps = float(stream.average_rate) if stream.average_rate else _DEFAULT_FPS
     return Opened(container, stream, (context.width, context.height), fps, stream.frames)
+
+
+def _reason(source: str, error: Exception) -> str:
+    """Say why; of a host that nobody knows FFmpeg says no more than that it was an input/output error."""
+    if isinstance(error, OSError) and error.errno == errno.EIO and "://" in source:
+        try:
+            socket.getaddrinfo(urlsplit(source).hostname, None)
+        except socket.gaierror as unknown:
+            return str(unknown.strerror)
+        except ValueError:
+            pass  # no address that could be taken apart
+    return getattr(error, "strerror", None) or " ".join(shown(str(error)).split())

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 from typing import Literal
 
 from av.video.frame import VideoFrame
@@ -13,6 +12,7 @@ from server.camera.sources.opening import open_video
 from server.camera.sources.pictures import pictures
 from server.wire.colours import bgr
 from server.wire.errors import UserError
+from server.wire.sources import is_missing
 
 
 class Recording:
@@ -27,7 +27,7 @@ class Recording:
     recorded = True
 
     def __init__(self, path: str, offset: int, at_end: Literal["stop", "loop"]) -> None:
-        if not Path(path).exists():
+        if is_missing(path):
             raise UserError(f"{path}: no such file or folder")
         self._path, self._offset, self._loop = path, offset, at_end == "loop"
         self._opened = open_video(path)
