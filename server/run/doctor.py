@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import AsyncIterator, Callable, Sequence
 from pathlib import Path
 
 import msgspec
@@ -12,57 +13,114 @@ from rich.console import Console
 from server.run.doctor_cameras import camera_findings, probe_all, sound_findings
 from server.run.doctor_disk import disk_findings
 from server.run.doctor_files import file_findings
-from server.run.doctor_findings import Finding, Findings, all_of, bad, ok, show
+from server.run.doctor_findings import (
+    Finding,
+    Findings,
+    all_of,
+    bad,
+    kept_apart,
+    ok,
+    show,
+    show_counts,
+)
 from server.run.doctor_machine import clock_findings, machine_findings
 from server.run.doctor_ports import port_findings
+from server.run.doctor_probe import Probe
+from server.run.doctor_ways import way_findings
 from server.run.scene_ground import with_scene_ground
 from server.wire.config import Config
 from server.wire.errors import UserError
 from server.wire.loading import load_config
 
+_LONGEST = "record.most_mb"
+"""The longest name of a check, but for those that have a camera's in it."""
+_MEND = "mend it there; configs/demo.yaml explains every setting"
+
 
 def run_doctor(path: Path, seconds: float, *, as_json: bool) -> bool:
-    """Check a configuration, print what was found; tell whether nothing is bad."""
-    findings = all_of(asyncio.run(_checked(path, seconds)))
-    _tell(findings, as_json=as_json)
-    return findings.well
+    """Check a configuration, print what is found as it is found; tell whether nothing is bad."""
+    return asyncio.run(_told(path, seconds, as_json=as_json)).well
 
 
-async def _checked(path: Path, seconds: float) -> list[Finding]:
-    try:
-        config = load_config(path)
-    except UserError as error:
-        return [bad("configuration", str(error).removeprefix(f"{path}: "))]
-    site = config.site
-    head = ok(
-        "configuration",
-        f"{path}: {len(config.cameras)} cameras, {site.width}x{site.height} at {site.fps:g} a second",
+async def _told(path: Path, seconds: float, *, as_json: bool) -> Findings:
+    found: list[Finding] = []
+    config = _read(path, found)
+    names = [] if config is None else [f"camera {it}" for it in config.camera_ids]
+    width, console = max(map(len, [_LONGEST, *names])), Console()
+
+    def tell(it: Finding) -> None:
+        if not as_json:
+            show(it, width, console)
+
+    for it in found:
+        tell(it)
+    if config is not None:
+        async for it in checked(config, seconds):
+            found.append(it)
+            tell(it)
+    findings = all_of(found)
+    if as_json:
+        typer.echo(msgspec.json.format(msgspec.json.encode(findings)).decode())
+    else:
+        show_counts(findings, console)
+    return findings
+
+
+def _read(path: Path, found: list[Finding]) -> Config | None:
+    with kept_apart("configuration", found):
+        try:
+            config = load_config(path)
+        except UserError as error:
+            found.append(bad("configuration", str(error), _MEND))
+            return None
+        site = config.site
+        what = f"{len(config.cameras)} cameras, {site.width}x{site.height} at {site.fps:g} a second"
+        found.append(ok("configuration", f"{path}: {what}"))
+        return config
+    return None
+
+
+async def checked(config: Config, seconds: float) -> AsyncIterator[Finding]:
+    """Give all findings about a configuration, as they are found."""
+    found: list[Finding] = []
+    runs, probes = False, {it: Probe("it was not tried") for it in config.camera_ids}
+    with kept_apart("ports", found):
+        ports, runs = await port_findings(config)
+        found += ports
+    with kept_apart("zenoh.connect", found):
+        found += await way_findings(config)
+    for it in [*found, *file_findings(_placed(config))]:
+        yield it
+    found = []
+    with kept_apart("clock", found):
+        found += await clock_findings(config)
+    for it in found:
+        yield it
+    found = []
+    with kept_apart("cameras", found):
+        probes = await asyncio.to_thread(probe_all, config, seconds)
+    for it in found + _last(config, probes, runs=runs):
+        yield it
+
+
+def _last(config: Config, probes: dict[str, Probe], *, runs: bool) -> list[Finding]:
+    """Give what is known once the cameras were tried."""
+    checks: Sequence[tuple[str, Callable[[], list[Finding]]]] = (
+        ("cameras", lambda: camera_findings(config, probes, runs=runs)),
+        ("sound", lambda: sound_findings(config)),
+        ("disk", lambda: disk_findings(config, probes)),
+        ("machine", lambda: machine_findings(config, probes)),
     )
-    ports, runs = await port_findings(config)
-    clock = await clock_findings(config)
-    probes = await asyncio.to_thread(probe_all, config, seconds)
-    return [
-        head,
-        *ports,
-        *file_findings(_placed(config)),
-        *clock,
-        *camera_findings(config, probes, runs=runs),
-        *sound_findings(config),
-        *disk_findings(config, probes),
-        *machine_findings(config, probes),
-    ]
+    found: list[Finding] = []
+    for check, find in checks:
+        with kept_apart(check, found):
+            found += find()
+    return found
 
 
 def _placed(config: Config) -> Config:
     """Give the configuration with its scenes' floors; where there is no such scene, the camera says so."""
     try:
         return with_scene_ground(config)
-    except UserError:
+    except (UserError, OSError):
         return config
-
-
-def _tell(findings: Findings, *, as_json: bool) -> None:
-    if as_json:
-        typer.echo(msgspec.json.format(msgspec.json.encode(findings)).decode())
-    else:
-        show(findings, Console())

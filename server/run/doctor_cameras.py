@@ -8,11 +8,12 @@ import time
 from collections.abc import Mapping
 
 from server.camera.sound import open_sound
-from server.run.doctor_findings import Finding, bad, ok, warning
+from server.run.doctor_findings import Finding, bad, ok, reason_of, warning
 from server.run.doctor_probe import Probe, probe
 from server.wire.addresses import shown
 from server.wire.config import Config
 from server.wire.errors import UserError
+from server.wire.sources import SourceKind, is_device, kind_of
 
 _GRACE_S = 3.0
 """What a busy machine takes longer than a camera was given."""
@@ -29,6 +30,8 @@ def probe_all(config: Config, seconds: float) -> dict[str, Probe]:
     def run(camera: str) -> None:
         try:
             found[camera] = probe(config, camera, seconds)
+        except OSError as error:
+            found[camera] = Probe(reason_of(error))
         except Exception as error:  # noqa: BLE001 — of one camera; the others are still to be told of
             found[camera] = Probe(f"a mistake in MyView: {type(error).__name__}: {error}")
 
@@ -65,7 +68,20 @@ def sound_findings(config: Config) -> list[Finding]:
 
 def camera_findings(config: Config, probes: Mapping[str, Probe], *, runs: bool) -> list[Finding]:
     """Say of each camera how it is; ``runs``: the site runs, and may hold a device that only one can have."""
-    return [it for camera, found in probes.items() for it in _of(config, camera, found, runs=runs)]
+    found = [it for camera, probed in probes.items() for it in _of(config, camera, probed, runs=runs)]
+    return found + _shared(config)
+
+
+def _shared(config: Config) -> list[Finding]:
+    """Tell of devices that two cameras are to have."""
+    found, whose = [], dict[str, str]()
+    for it in config.cameras:
+        if is_device(it.source):
+            first = whose.setdefault(os.path.realpath(it.source), it.id)  # it has other names in /dev/v4l
+            if first != it.id:
+                text = f"{it.source} is camera {first}'s, too, and only one can have it"
+                found.append(bad(f"camera {it.id}", text, "a device of its own, or one camera less"))
+    return found
 
 
 def _of(config: Config, camera: str, found: Probe, *, runs: bool) -> list[Finding]:
@@ -75,7 +91,7 @@ def _of(config: Config, camera: str, found: Probe, *, runs: bool) -> list[Findin
         if runs:
             do = "the site runs, and may have it to itself: see /api/cameras"
             return [warning(check, problem, do)]
-        return [bad(check, problem, "try its source in ffplay; address, password, cable, file")]
+        return [bad(check, problem, _remedy(config.camera(camera).source))]
     parts = [f"{_size(found.size)} pixels"]
     rate = found.recorded_fps if found.sent is None else found.sent.fps
     if rate is not None:
@@ -83,6 +99,14 @@ def _of(config: Config, camera: str, found: Probe, *, runs: bool) -> list[Findin
     how = "its own H.264 passes" if found.passes else f"{found.kbps:.0f} kbit/s"
     parts += [how, f"{found.cores:.2f} of a core"]
     return [ok(check, ", ".join(parts)), *_doubts(config, check, found)]
+
+
+def _remedy(source: str) -> str:
+    if is_device(source):
+        return "plug it in, let this user have it (group video), and end what else has it"
+    if kind_of(source) is SourceKind.STREAM:
+        return "try its source in ffplay; address, password, cable"
+    return "mend what the configuration says of it, or the file, which this user has to be able to read"
 
 
 def _doubts(config: Config, check: str, found: Probe) -> list[Finding]:

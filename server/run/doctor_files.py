@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import stat
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 
-from server.run.doctor_certificate import certificate_finding
-from server.run.doctor_findings import Finding, bad, ok, warning
+from server.run.doctor_certificate import authority_finding, certificate_finding, router_finding
+from server.run.doctor_findings import Finding, bad, kept_apart, ok, warning
+from server.run.doctor_ways import place_of
 from server.run.exposed import check_bus, check_pulses, check_viewers
 from server.wire.config import Config
 from server.wire.errors import UserError
@@ -15,29 +17,57 @@ from server.wire.pulse_users import SETTING, SHORTEST, pulse_clients
 from server.wire.tokens import read_tokens
 from server.wire.users import read_users
 
+_LINES = "name:password, one a line, in a file that this user can read: docs/security.md"
+
 
 def file_findings(config: Config) -> list[Finding]:
     """Say of each file whether it can be used, and who else may read or write it."""
-    found = [*_exposed(config), *_tokens(config), _ground(config)]
-    for check, tls in (("http.tls", config.http.tls), ("zenoh.tls", config.zenoh.tls)):
-        if tls.certificate is not None and tls.key is not None:
-            found.append(certificate_finding(check, tls.certificate, tls.key))
-            found += _private(f"{check}.key", tls.key)
-    for check, users, names in (
-        (SETTING, config.sync.users, pulse_clients(config)),
-        ("zenoh.users", config.zenoh.users, config.camera_ids),
-    ):
-        if users is not None:
-            found += _users(check, users, names)
+    found: list[Finding] = []
+    for check, find in _checks(config):
+        with kept_apart(check, found):
+            found += find()
+    return found
+
+
+def _checks(config: Config) -> Iterator[tuple[str, Callable[[], list[Finding]]]]:
+    yield "access", lambda: _exposed(config)
+    yield "access.tokens", lambda: _tokens(config)
+    yield "ground", lambda: [_ground(config)]
+    yield "http.tls", lambda: _pair("http.tls", config.http.tls.certificate, config.http.tls.key)
+    yield "zenoh.tls", lambda: _bus(config)
+    if config.sync.users is not None:
+        yield SETTING, partial(_users, SETTING, config.sync.users, pulse_clients(config))
+    if config.zenoh.users is not None:
+        yield "zenoh.users", partial(_users, "zenoh.users", config.zenoh.users, config.camera_ids)
     for camera in config.cameras:
         if camera.password is not None:
-            found += _private(f"camera {camera.id}", camera.password)
+            yield f"camera {camera.id}", partial(_private, f"camera {camera.id}", camera.password)
+
+
+def _pair(check: str, certificate: Path | None, key: Path | None) -> list[Finding]:
+    if certificate is None or key is None:
+        return []
+    return [certificate_finding(check, certificate, key), *_private(f"{check}.key", key)]
+
+
+def _bus(config: Config) -> list[Finding]:
+    tls, there = config.zenoh.tls, place_of(config.zenoh.connect)
+    found = _pair("zenoh.tls", tls.certificate, tls.key)
+    if tls.authority is None:
+        return found
+    found.append(authority_finding("zenoh.tls", tls.authority))
+    if tls.certificate is not None and tls.key is not None and there is not None:
+        refused = router_finding("zenoh.tls", tls.certificate, tls.key, tls.authority, there[0])
+        found += [] if refused is None else [refused]
     return found
 
 
 def _exposed(config: Config) -> list[Finding]:
-    found = []
-    for check in (check_viewers, check_pulses, check_bus):
+    found: list[Finding] = []
+    checks = [check_pulses, check_bus]
+    if config.access.tokens is None:  # else it is a matter of their file, of which its own line tells
+        checks.insert(0, check_viewers)
+    for check in checks:
         try:
             check(config)
         except UserError as error:
@@ -52,7 +82,7 @@ def _tokens(config: Config) -> list[Finding]:
     try:
         tokens = read_tokens(path)
     except UserError as error:
-        return [bad("access.tokens", str(error))]
+        return [bad("access.tokens", str(error), "`myview token NAME` prints a line for it")]
     operators = sum(it.role == "operate" for it in tokens)
     found = [ok("access.tokens", f"{path}: {len(tokens)} tokens, {operators} of them operate")]
     if not tokens:
@@ -68,7 +98,7 @@ def _users(check: str, path: Path, names: Sequence[str]) -> list[Finding]:
     try:
         users = read_users(path, check)
     except UserError as error:
-        return [bad(check, str(error).removeprefix(f"{check}: "))]
+        return [bad(check, str(error).removeprefix(f"{check}: "), _LINES)]
     missing = [it for it in names if it not in users]
     short = [name for name, password in users.items() if len(password) < SHORTEST]
     found = [ok(check, f"{path}: {len(users)} users")]

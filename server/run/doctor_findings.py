@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from enum import Enum
 
 import msgspec
@@ -10,6 +11,8 @@ from rich.console import Console
 from rich.markup import escape
 
 from server.run.printable import printable
+from server.wire.addresses import shown
+from server.wire.errors import UserError
 
 
 class Level(Enum):
@@ -60,16 +63,36 @@ def all_of(findings: Sequence[Finding]) -> Findings:
     return Findings(all(it.level is not Level.BAD for it in findings), list(findings))
 
 
+@contextmanager
+def kept_apart(check: str, found: list[Finding]) -> Iterator[None]:
+    """Let it be a finding, too, that a check fails itself: those of the others are still told."""
+    try:
+        yield
+    except (OSError, UserError) as error:
+        found.append(bad(check, shown(reason_of(error)), "mend that, and try again"))
+    except Exception as error:  # noqa: BLE001 — a mistake in one check is no reason to say nothing of the others
+        found.append(bad(check, shown(f"a mistake in MyView: {type(error).__name__}: {error}"), "tell of it"))
+
+
+def reason_of(error: Exception) -> str:
+    """Give an error as a part of a line."""
+    if isinstance(error, OSError) and error.strerror:
+        return f"{error.filename}: {error.strerror}" if error.filename else error.strerror
+    return str(error)
+
+
 _COLOURS = {Level.OK: "green", Level.WARNING: "yellow", Level.BAD: "red"}
 
 
-def show(findings: Findings, console: Console) -> None:
-    """Print a line for each finding, with what to do behind an arrow."""
-    width = max((len(it.check) for it in findings.findings), default=0)
-    for it in findings.findings:
-        colour = _COLOURS[it.level]
-        do = f" → {it.do}" if it.do else ""
-        head = f"[{colour}]{it.level.value:7}[/{colour}] {escape(f'{it.check:{width}}')}"
-        console.print(f"{head}  {escape(printable(f'{it.text}{do}'))}", soft_wrap=True, highlight=False)
+def show(it: Finding, width: int, console: Console) -> None:
+    """Print a line for a finding, with what to do behind an arrow; ``width`` is that of all checks' names."""
+    colour = _COLOURS[it.level]
+    do = f" → {it.do}" if it.do else ""
+    head = f"[{colour}]{it.level.value:7}[/{colour}] {escape(f'{it.check:{width}}')}"
+    console.print(f"{head}  {escape(printable(f'{it.text}{do}'))}", soft_wrap=True, highlight=False)
+
+
+def show_counts(findings: Findings, console: Console) -> None:
+    """Print how many there are of each level."""
     counts = {level: sum(it.level is level for it in findings.findings) for level in Level}
     console.print(", ".join(f"{count} {level.value}" for level, count in counts.items()), highlight=False)

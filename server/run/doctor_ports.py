@@ -8,12 +8,15 @@ import os
 import client
 from camsync import Login, SyncError, clients_of
 from server.run.checks import check_port_free
-from server.run.doctor_findings import Finding, bad, ok
+from server.run.doctor_findings import Finding, bad, kept_apart, ok
 from server.wire.config import Config
 from server.wire.errors import UserError
 from server.wire.pulse_users import pulse_clients, pulse_login
 
 _END_IT = "end it, or take another port; if it is this site, set MYVIEW_TOKEN to a token of it"
+
+
+_ALL = frozenset({"0.0.0.0", "::"})  # noqa: S104 — it is not listened on
 
 
 async def port_findings(config: Config) -> tuple[list[Finding], bool]:
@@ -22,7 +25,8 @@ async def port_findings(config: Config) -> tuple[list[Finding], bool]:
     protocol, _, address = zenoh.listen.partition("/")
     bus, _, bus_port = address.rpartition(":")
     runs = False
-    found = []
+    found: list[Finding] = []
+    places: dict[str, tuple[str, int]] = {}
     for check, host, port in (
         ("http.port", http.host, http.port),
         ("sync.port", sync.bind, sync.port),
@@ -32,21 +36,33 @@ async def port_findings(config: Config) -> tuple[list[Finding], bool]:
         if check == "zenoh.listen" and protocol not in {"tcp", "tls"}:
             found.append(ok(check, f"{zenoh.listen} is tried when the site starts"))
             continue
-        taken = _taken(host, port, check)
-        if taken is None:
-            found.append(ok(check, f"{where} is free"))
-        elif isinstance(taken, str):
-            found.append(bad(check, taken, "an address of this machine, and a port that this user may have"))
-        else:
-            whose = runs if check == "zenoh.listen" else await _is_ours(config, check)
-            runs = runs or whose
-            here = f"{where} is taken"
-            found.append(
-                ok(check, f"{here} by this very site, which runs")
-                if whose
-                else bad(check, f"{here} by something else", _END_IT)
-            )
+        twice = [it for it, place in places.items() if _overlap(place, (host, port))]
+        places[check] = (host, port)
+        if twice:
+            found.append(bad(check, f"{where} is what {twice[0]} says, too", "a port for each"))
+            continue
+        with kept_apart(check, found):
+            taken = _taken(host, port, check)
+            if taken is None:
+                found.append(ok(check, f"{where} is free"))
+            elif isinstance(taken, str):
+                do = "an address of this machine, and a port that this user may have"
+                found.append(bad(check, taken, do))
+            else:
+                whose = runs if check == "zenoh.listen" else await _is_ours(config, check)
+                runs = runs or whose
+                here = f"{where} is taken"
+                found.append(
+                    ok(check, f"{here} by this very site, which runs")
+                    if whose
+                    else bad(check, f"{here} by something else", _END_IT)
+                )
     return found, runs
+
+
+def _overlap(one: tuple[str, int], other: tuple[str, int]) -> bool:
+    """Tell whether two cannot be listened on by two processes of one machine."""
+    return one[1] == other[1] and (one[0] == other[0] or not _ALL.isdisjoint({one[0], other[0]}))
 
 
 def _taken(host: str, port: int, check: str) -> bool | str | None:
