@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import subprocess
 from pathlib import Path
@@ -133,6 +134,25 @@ def test_the_secure_site_trusts_nobody_by_where_they_are(monkeypatch: pytest.Mon
         assert config.zenoh.listen.startswith("tls/")
         assert config.zenoh.users == Path(SECRETS + "bus")
         assert (config.access.tokens is not None) == (config.http.tls.key is not None) == (name == "bestview")
+
+
+@pytest.mark.parametrize("file", [SERVER, CAMERAS])
+def test_what_a_machine_has_to_be_told_stands_in_the_example_of_its_env_file(file: str) -> None:
+    """Or the next command of compose, typed in another shell, would not have it."""
+    needed = set(re.findall(r"\$\{(MYVIEW_\w+):\?", (ROOT / file).read_text(encoding="utf-8")))
+    assert needed
+    text = (ROOT / "docs" / "operating.md").read_text(encoding="utf-8")
+    blocks = [it.partition("\n")[2] for it in text.split("```")[1::2]]
+    (env,) = [it for it in blocks if it.startswith("COMPOSE_FILE=") and file in it]
+    assert needed | {"MYVIEW_CONFIG"} <= {line.partition("=")[0] for line in env.splitlines()}
+
+
+def test_a_port_that_is_published_is_the_one_that_is_listened_on() -> None:
+    plain, server = content(PLAIN)["services"], content(SERVER)["services"]
+    published = {name: [it.rpartition(":")[2] for it in service["ports"]] for name, service in server.items()}
+    assert published["sync"] == [str(plain["sync"]["environment"]["MYVIEW_SYNC__PORT"])]
+    listened = plain["bestview"]["environment"]["MYVIEW_ZENOH__LISTEN"]
+    assert published["bestview"] == [listened.rpartition(":")[2]]
 
 
 def _config(environment: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> Config:

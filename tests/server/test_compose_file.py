@@ -62,3 +62,4 @@ def test_the_services_find_each_other(services: dict[str, Any], monkeypatch: pyt
         assert config.zenoh.connect == "tcp/bestview:7447"
         assert {config.sync.bind, config.http.host} == {"0.0.0.0"}  # noqa: S104 — a container's own addresses
         assert config.http.port == 8080
+        assert service["environment"]["MYVIEW_SYNC__PORT"] == 7400, "whatever the configuration says"
