@@ -9,12 +9,13 @@ import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import av
 import cv2
 import numpy as np
 import pytest
-from videos_by_hand import HEIGHT, STEP, WIDTH, frame_in
+from videos_by_hand import HEIGHT, STEP, WIDTH, frame_in, write_video
 
 from server.camera.sources import open_source, stream
 from server.camera.sources.opening import open_video
@@ -142,6 +143,65 @@ def test_a_camera_that_is_away_for_long_is_told_of_once_and_when_it_is_back(
     assert "Connection refused" in whys[-1]
     assert len(whys) == len(set(whys)) <= 3, "one for each reason, not for each attempt"
     assert back.getMessage().startswith(f"http://127.0.0.1:{port}/: pictures come again, after ")
+
+
+class Halting:
+    """A camera that sends MPEG-TS up to a frame, and the rest when it is told to go on."""
+
+    def __init__(self, film: Path, halt: int) -> None:
+        with av.open(str(film)) as container:
+            places = [packet.pos or 0 for packet in container.demux(video=0) if packet.size]
+        data, at = film.read_bytes(), places[halt]
+        self._parts, self.goes_on = (data[:at], data[at:]), threading.Event()
+        self._server = socket.create_server(("127.0.0.1", 0))
+        self.port = int(self._server.getsockname()[1])
+        self._thread = threading.Thread(target=self._serve)
+        self._thread.start()
+
+    def _serve(self) -> None:
+        connection, _ = self._server.accept()
+        with connection:
+            connection.recv(65536)
+            connection.sendall(b"HTTP/1.0 200 OK\r\n\r\n" + self._parts[0])
+            assert self.goes_on.wait(PATIENCE)
+            connection.sendall(self._parts[1])
+
+    def close(self) -> None:
+        self._thread.join()
+        self._server.close()
+
+
+class Frames:
+    """Notes which frames became the newest: what a camera's sound goes by."""
+
+    def __init__(self) -> None:
+        self.shown: list[int] = []
+
+    def opened(self, stream: object) -> None:
+        assert stream is None
+
+    def picture(self, time: float) -> None:
+        self.shown.append(round(float(time) * 25))
+
+
+def test_a_picture_of_before_a_silence_is_not_shown_after_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(stream, "_STALE_S", 0.2)
+    camera = Halting(write_video(tmp_path / "film.ts", 25), halt=20)
+    frames = Frames()
+    quick = {"analyzeduration": "100000", "probesize": "5000"}
+    source = Stream(f"http://127.0.0.1:{camera.port}/", quick, frames)
+    try:
+        until(lambda: len(frames.shown) == 18)  # where the others end is not known yet
+        until(lambda: source.take(0) is None)
+        camera.goes_on.set()
+        until(lambda: len(frames.shown) > 20)
+        assert frames.shown[:20] == [*range(18), 20, 21]
+    finally:
+        camera.goes_on.set()
+        camera.close()
+        source.close()
 
 
 def test_closing_ends_the_thread(camera: MotionJpeg) -> None:

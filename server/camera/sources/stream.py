@@ -30,6 +30,9 @@ _LET_GO_S = 0.5
 _STALE_S = 1.5
 """A picture older than this is not shown again: the camera counts as away, and others have half a second
 to take over within the two that are promised."""
+_HELD_BACK = 2
+"""Pictures that wait for the next one's beginning: one in what takes a stream apart, one in what finds its
+pictures."""
 
 
 class Stream:
@@ -44,6 +47,7 @@ class Stream:
         self._lock = threading.Lock()
         self._newest: VideoFrame | None = None
         self._newest_at = 0.0
+        self._silence = _Silence()
         self._closing = threading.Event()
         self._away = Spell(calm=0.0)
         self._thread = threading.Thread(target=self._run, args=(opened,), name="source", daemon=True)
@@ -82,6 +86,7 @@ class Stream:
     def _read(self, opened: Opened) -> bool:
         """Read until the connection ends; tell whether any picture came."""
         any_picture, why = False, "the connection has ended"
+        self._silence = _Silence()
         try:
             for packet in opened.container.demux(opened.stream, *self._listened_to(opened)):
                 if self._closing.is_set():
@@ -118,14 +123,43 @@ class Stream:
         return streams
 
     def _decode(self, packet: av.Packet[VideoStream]) -> bool:
+        old = self._silence.was_before(packet, time.monotonic())
         try:
             pictures = [picture for picture in packet.decode() if isinstance(picture, VideoFrame)]
         except av.error.InvalidDataError:
             return False
-        if pictures:
+        if pictures and not old:
             with self._lock:
                 self._newest, self._newest_at = pictures[-1], time.monotonic()
             newest = pictures[-1]
             if self._listener is not None and newest.pts is not None and newest.time_base is not None:
                 self._listener.picture(newest.pts * newest.time_base)
         return bool(pictures)
+
+
+class _Silence:
+    """Knows when a camera was silent, and whether what comes first after that is of before.
+
+    In some formats, such as MPEG-TS, a picture ends where the next one begins. So the last ones before a
+    silence come when it is over, as if they were new.
+    """
+
+    def __init__(self) -> None:
+        self._at: float | None = None
+        self._time = 0.0
+        self._until, self._left = 0.0, 0
+
+    def was_before(self, packet: av.Packet[VideoStream], now: float) -> bool:
+        """Tell whether a packet was sent before a silence that has just ended, as far as its time says."""
+        if packet.pts is None or packet.time_base is None:
+            return False
+        at, last = self._at, self._time
+        self._at, self._time = now, float(packet.pts * packet.time_base)
+        if at is not None and now - at > _STALE_S:
+            # Times may have jumped, too: then a few new pictures are taken for old ones, and that is all.
+            self._until, self._left = last + (now - at) / 2, _HELD_BACK
+        if not self._left or self._time >= self._until:
+            self._left = 0
+            return False
+        self._left -= 1
+        return True
