@@ -104,15 +104,16 @@ class NetworkCamera:
     async def _send(self, writer: asyncio.StreamWriter) -> None:
         noise = random.Random(1)
         muxer: _Muxer | None = None
-        sent = self.film, self.shift_s
+        sent = self._sent()
         number = self._now()
         while not writer.is_closing():
+            if sent != self._sent():
+                muxer, sent, number = None, self._sent(), self._now()
             if number > self._now():
                 await asyncio.sleep(0.5 / FPS)
                 continue
-            if self.frozen or self.garbage or sent != (self.film, self.shift_s):
+            if self.frozen or self.garbage:
                 muxer = None  # what follows begins with a key picture, as an encoder does that starts anew
-                sent = self.film, self.shift_s
             if self.garbage:
                 writer.write(noise.randbytes(_GARBAGE_BYTES))
             elif not self.frozen and (muxer is not None or number % _GOP == 0):
@@ -120,6 +121,10 @@ class NetworkCamera:
                 writer.write(muxer.pack(number, self.shift_s))
                 await writer.drain()
             number += 1  # none is left out: the next ones are decoded by it
+
+    def _sent(self) -> tuple[Film, int, float]:
+        """Give what all that is sent at a stretch has in common."""
+        return self.film, self.shift_s, self.began
 
     def _now(self) -> int:
         return int((time.time() - self.began) * FPS)

@@ -31,9 +31,10 @@ FRAMES = 1000
 _PEOPLE, _SEED = 3, 1
 _START, _DRAWN = 300, 50
 """All are in sight. What is drawn is played forwards and backwards, so that nobody jumps."""
-_BLOCK = 8
-"""Pixels of one bit; there are 32 of them: 4 of the camera, 12 of the number, and the same inverted."""
-_CAMERA_BITS, _BITS = 4, 16
+BLOCK, EDGE = 8, 2
+"""Pixels of one bit, and how many at its sides are not read."""
+BITS, NUMBER_BITS = 16, 12
+"""Of a strip, which has them twice, then inverted; of the number in it: the others are the camera's."""
 _TOPS, _WIDTHS = np.random.default_rng(1).permuted(np.tile(np.arange(FRAMES), (2, 1)), axis=1).tolist()
 """The thousandths of a box's top and width, by its frame; means of boxes, which trackers make, fit none."""
 _DARK, _BRIGHT, _MIDDLE = 40, 215, 128
@@ -69,25 +70,24 @@ class Views:
 
 def stamped(image: NDArray[np.uint8], camera: int, frame: int) -> NDArray[np.uint8]:
     """Give a picture ``(H, W, 3)`` with its strip: a copy."""
-    value = camera << (_BITS - _CAMERA_BITS) | frame
-    bits = [value >> place & 1 for place in range(_BITS)]
+    value = camera << NUMBER_BITS | frame
+    bits = [value >> place & 1 for place in range(BITS)]
     bits += [1 - bit for bit in bits]
-    strip = np.repeat(np.where(np.array(bits) > 0, _BRIGHT, _DARK).astype(np.uint8), _BLOCK)
+    strip = np.repeat(np.where(np.array(bits) > 0, _BRIGHT, _DARK).astype(np.uint8), BLOCK)
     marked = image.copy()
-    marked[-_BLOCK:, : len(strip)] = strip[None, :, None]
+    marked[-BLOCK:, : len(strip)] = strip[None, :, None]
     return marked
 
 
 def read_stamp(grey: NDArray[np.uint8]) -> Stamp | None:
     """Read the strip of a picture ``(H, W)``; None where it cannot be read."""
-    edge = _BLOCK // 4
-    rows = grey[-_BLOCK + edge : grey.shape[0] - edge, : 2 * _BITS * _BLOCK].astype(np.float64)
-    blocks = rows.reshape(len(rows), 2 * _BITS, _BLOCK)[:, :, edge:-edge].mean(axis=(0, 2)) > _MIDDLE
-    bits, inverse = blocks[:_BITS], blocks[_BITS:]
+    rows = grey[-BLOCK + EDGE : grey.shape[0] - EDGE, : 2 * BITS * BLOCK].astype(np.float64)
+    blocks = rows.reshape(len(rows), 2 * BITS, BLOCK)[:, :, EDGE:-EDGE].mean(axis=(0, 2)) > _MIDDLE
+    bits, inverse = blocks[:BITS], blocks[BITS:]
     if (bits == inverse).any():
         return None
     value = sum(1 << place for place in np.flatnonzero(bits).tolist())
-    camera, frame = divmod(value, 1 << (_BITS - _CAMERA_BITS))
+    camera, frame = divmod(value, 1 << NUMBER_BITS)
     return Stamp(f"c{camera}", frame)
 
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from benchmarks.faults_film import FPS, FRAMES, Views
+from benchmarks.faults_film import FPS, FRAMES, Stamp, Views
+from benchmarks.faults_live import Course
 from benchmarks.faults_viewer import Picture, Told
 from client import Box, Gop
 
@@ -18,6 +19,7 @@ class Received:
     Attributes:
         frames: how many came.
         wrong: of another camera than the events named, of another moment, or not to be read.
+        unnamed: of pulses of which no event was heard, so that any camera may be right.
         repeated: the picture before, shown again because there was none.
         boxes: drawn on these pictures.
         wrong_boxes: found in another frame than the picture shows.
@@ -27,6 +29,7 @@ class Received:
 
     frames: int
     wrong: int
+    unnamed: int
     repeated: int
     boxes: int
     wrong_boxes: int
@@ -34,6 +37,8 @@ class Received:
     fresh: tuple[tuple[float, str], ...]
     notes: tuple[str, ...]
     """What was wrong, in words."""
+    courses: Mapping[str, Course]
+    """What was shown of each network camera."""
 
     def without(self, since: float, until: float) -> float:
         """Give the longest time without a fresh picture, seconds, that ends or begins within a span.
@@ -49,27 +54,28 @@ class Received:
 def judge(
     pictures: Sequence[Picture], told: Told, number: int, views: Views, live: Iterable[str] = ()
 ) -> Received:
-    """Judge every picture; a picture of a camera of ``live`` has no number that is known beforehand."""
+    """Judge every picture; of the cameras of ``live`` it is known within bounds only which comes when."""
     said = dict(_said(told, number))
-    live = frozenset(live)
+    courses = {camera: Course() for camera in live}
     fresh, notes = [], []
-    wrong = repeated = boxes = wrong_boxes = blurred = 0
+    wrong = unnamed = repeated = boxes = wrong_boxes = blurred = 0
     before: Picture | None = None
     for picture in pictures:
-        stamp, last = picture.stamp, before
-        before = picture
+        stamp, last, before = picture.stamp, before, picture
+        named = picture.pulse in said
+        unnamed += not named
         camera, found = said.get(picture.pulse, (None, ()))
         if last is not None and stamp is not None and stamp == last.stamp:
             repeated += 1
-        elif stamp is None or (camera is not None and stamp.camera != camera):
+        elif stamp is None or (named and stamp.camera != camera):
             wrong += 1
             notes.append(f"pulse {picture.pulse}: {stamp}, not {camera}")
-        elif stamp.camera not in live and stamp.frame != picture.pulse % FRAMES:
+        elif trouble := _of_another_moment(picture.pulse, stamp, courses):
             wrong += 1
-            notes.append(f"pulse {picture.pulse}: {stamp}")
+            notes.append(f"pulse {picture.pulse}: {stamp}{trouble}")
         else:
             fresh.append((picture.at, stamp.camera))
-        if camera is None or camera in live or stamp is None:
+        if camera is None or stamp is None:
             continue
         for box in found:
             frame = views.frame_of(camera, box)
@@ -78,7 +84,16 @@ def judge(
             if frame is not None and frame != stamp.frame:
                 wrong_boxes += 1
                 notes.append(f"pulse {picture.pulse} of {camera}: a box of frame {frame} on {stamp}")
-    return Received(len(pictures), wrong, repeated, boxes, wrong_boxes, blurred, tuple(fresh), tuple(notes))
+    counts = len(pictures), wrong, unnamed, repeated, boxes, wrong_boxes, blurred
+    return Received(*counts, tuple(fresh), tuple(notes), courses)
+
+
+def _of_another_moment(pulse: int, stamp: Stamp, courses: Mapping[str, Course]) -> str:
+    """Say in what way a picture is not the one of its pulse; empty: it is."""
+    course = courses.get(stamp.camera)
+    if course is not None:
+        return course.wrong(pulse, stamp.frame)
+    return "" if stamp.frame == pulse % FRAMES else ", another frame"
 
 
 def _said(told: Told, number: int) -> Iterator[tuple[int, tuple[str | None, tuple[Box, ...]]]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,6 +10,7 @@ import av
 import numpy as np
 
 from benchmarks.faults_film import FPS, FRAMES, read_stamp
+from benchmarks.faults_live import Course, differ
 from benchmarks.faults_run import Outcome
 from benchmarks.faults_viewer import Told
 
@@ -23,13 +24,13 @@ class File:
 
     Attributes:
         first: its first pulse, by its name.
-        pulses: of the pictures in it.
+        frames: which frame each picture says it is, by its pulse.
         plays: to its end, and every picture is what it should be.
     """
 
     camera: str
     first: int
-    pulses: frozenset[int]
+    frames: Mapping[int, int]
     plays: bool
 
 
@@ -39,26 +40,41 @@ def read(folder: Path, live: Collection[str] = ()) -> list[File]:
 
 
 def _read(path: Path, live: Collection[str]) -> File:
-    camera, pulses, plays = path.parent.name, set(), True
+    camera, plays = path.parent.name, True
+    frames: dict[int, int] = {}
+    course = Course() if camera in live else None
     try:
         with av.open(str(path)) as container:
-            for frame in container.decode(video=0):
-                pulse = round(float(frame.time or 0.0) * FPS)
-                stamp = read_stamp(np.asarray(frame.to_ndarray(format="gray"), dtype=np.uint8))
-                pulses.add(pulse)
-                plays &= stamp is not None and stamp.camera == camera
-                plays &= camera in live or (stamp is not None and stamp.frame == pulse % FRAMES)
+            for picture in container.decode(video=0):
+                pulse = round(float(picture.time or 0.0) * FPS)
+                stamp = read_stamp(np.asarray(picture.to_ndarray(format="gray"), dtype=np.uint8))
+                frames[pulse] = -1 if stamp is None else stamp.frame
+                if stamp is None or stamp.camera != camera:
+                    plays = False
+                elif course is None:
+                    plays &= stamp.frame == pulse % FRAMES
+                else:
+                    plays &= not course.wrong(pulse, stamp.frame)
     except (av.error.FFmpegError, OSError):
         plays = False
-    return File(camera, int(path.stem), frozenset(pulses), plays)
+    return File(camera, int(path.stem), frames, plays)
 
 
 def note(outcomes: Sequence[Outcome], told: Told, files: Sequence[File]) -> None:
-    """Note with each fault what is not on the disk of what was shown meanwhile, and what does not play."""
-    there: dict[str, set[int]] = {}
+    """Note with each fault what is not on the disk of what was shown meanwhile, and what does not play.
+
+    Of a network camera also what is there as another picture than the one that was shown.
+    """
+    there: dict[str, dict[int, int]] = {}
     for file in files:
-        there.setdefault(file.camera, set()).update(file.pulses)
+        there.setdefault(file.camera, {}).update(file.frames)
     for number, outcome in enumerate(outcomes):
+        outcome.unlike = [
+            note
+            for received in outcome.received
+            for camera, course in received.courses.items()
+            for note in differ(course.frames, there.get(camera, {}))
+        ]
         first, end = outcome.gops
         shown = [gop for _, gop in told.gops[first:end]]
         if not shown:
@@ -67,7 +83,7 @@ def note(outcomes: Sequence[Outcome], told: Told, files: Sequence[File]) -> None
             gop.first
             for gop in shown
             for camera in sorted({camera for camera in gop.choices.values() if camera})
-            if not there.get(camera, set()).issuperset(range(gop.first, gop.first + gop.frames))
+            if not there.get(camera, {}).keys() >= set(range(gop.first, gop.first + gop.frames))
         ]
         outcome.lost = len(missing)
         if outcome.fault.unrecorded and missing and missing[-1] >= shown[-min(_GOES_ON, len(shown))].first:

@@ -44,6 +44,8 @@ class Outcome:
     lost: int | None = None
     """GOPs that were shown but are not recorded; None: not known."""
     broken_files: int | None = None
+    unlike: list[str] = field(default_factory=list)
+    """What was recorded of a network camera as another picture than viewers were shown, in words."""
     ended: list[Ended] = field(default_factory=list)
     failed: str = ""
     """What kept it from being measured."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Iterable
 from contextlib import AbstractAsyncContextManager
 from dataclasses import replace
 from pathlib import Path
@@ -11,10 +12,11 @@ import numpy as np
 import pytest
 
 from benchmarks.faults import _group
-from benchmarks.faults_bus import Way
-from benchmarks.faults_film import FRAMES, Stamp, Views, read_stamp, stamped
+from benchmarks.faults_film import FRAMES, HEIGHT, WIDTH, Stamp, Views, read_stamp, stamped
 from benchmarks.faults_judge import judge
+from benchmarks.faults_live import MOST_AHEAD, MOST_BEHIND
 from benchmarks.faults_processes import FAULTS
+from benchmarks.faults_reader import write_reader
 from benchmarks.faults_recorded import File, note
 from benchmarks.faults_run import Outcome, _injected
 from benchmarks.faults_site import Stand
@@ -22,7 +24,7 @@ from benchmarks.faults_table import kept
 from benchmarks.faults_viewer import Picture, Told
 from benchmarks.report import Report
 from client import Box, Gop
-from server.wire.inbox import Message
+from tracking.detectors.onnx import OnnxDetector, OnnxSettings
 
 GOP = 10
 SIDES = (10, 20, 30, 60)
@@ -46,10 +48,15 @@ def told(gops: int, camera: str | None = "c0") -> Told:
     return heard
 
 
-def watched(gops: int) -> list[Picture]:
+def watched(gops: int, behind: int = 0) -> list[Picture]:
     return [
-        Picture(pulse, 100.0 + pulse // GOP * 0.4, Stamp("c0", pulse % FRAMES)) for pulse in range(gops * GOP)
+        Picture(pulse, 100.0 + pulse // GOP * 0.4, Stamp("c0", (pulse - behind) % FRAMES))
+        for pulse in range(gops * GOP)
     ]
+
+
+def kept_of(pulses: Iterable[int]) -> dict[int, int]:
+    return {pulse: pulse % FRAMES for pulse in pulses}
 
 
 @pytest.mark.parametrize(("camera", "frame"), [(0, 0), (1, 517), (2, 999)])
@@ -87,6 +94,52 @@ def test_a_picture_that_is_shown_again_is_not_fresh_and_boxes_of_the_next_one_do
     assert (received.wrong, received.repeated, received.wrong_boxes, len(received.fresh)) == (0, 1, 1, 29)
 
 
+def test_a_picture_that_no_event_named_a_camera_of_may_be_of_the_wrong_one() -> None:
+    received = judge(watched(3), told(2), 1, VIEWS)
+    assert (received.wrong, received.unnamed) == (0, 10)
+    unproven = Outcome(FAULTS[0], received=[received])
+    assert not kept(unproven)
+    assert kept(replace(unproven, fault=replace(FAULTS[0], breaks=True), back=1.0)), "nobody is there to say"
+
+
+def test_a_picture_of_any_camera_is_wrong_where_none_is_to_be_shown() -> None:
+    assert judge(watched(1), told(1, camera=None), 1, VIEWS).wrong == GOP
+
+
+def test_of_a_network_camera_the_bounds_are_known_and_that_it_never_goes_back() -> None:
+    for behind, wrong in ((0, 0), (3, 0), (MOST_BEHIND, 0), (MOST_BEHIND + 1, 30), (-MOST_AHEAD - 1, 30)):
+        assert judge(watched(3, behind), told(3), 1, VIEWS, ["c0"]).wrong == wrong
+    assert judge(watched(3, 3), told(3), 1, VIEWS).wrong == 30, "a recording's are known exactly"
+    pictures = watched(3, 3)
+    pictures[14] = replace(pictures[14], stamp=Stamp("c0", 14 - 3 - 5))
+    assert judge(pictures, told(3), 1, VIEWS, ["c0"]).wrong == 1
+
+
+def test_of_a_network_camera_a_box_is_right_on_the_picture_it_was_found_in() -> None:
+    assert judge(watched(3), told(3), 1, VIEWS, ["c0"]).wrong_boxes == 0
+    assert judge(watched(3, 3), told(3), 1, VIEWS, ["c0"]).wrong_boxes == 30
+
+
+def test_of_a_network_camera_what_is_recorded_is_what_was_shown() -> None:
+    outcome = Outcome(FAULTS[0], received=[judge(watched(3), told(3), 1, VIEWS, ["c0"])], gops=(0, 3))
+    for there, unlike in ((kept_of(range(30)), 0), ({**kept_of(range(30)), 14: 13}, 1)):
+        note([outcome], told(3), [File("c0", 0, there, plays=True)])
+        assert len(outcome.unlike) == unlike
+        assert kept(outcome) == (unlike == 0)
+
+
+def test_the_reader_finds_people_where_they_are_in_the_picture_that_it_is_given(tmp_path: Path) -> None:
+    pytest.importorskip("onnx")
+    pytest.importorskip("onnxruntime")
+    model = write_reader(VIEWS, "c0", tmp_path / "reader.onnx")
+    detector = OnnxDetector(OnnxSettings(model=model, apart=1.0))
+    noise = np.random.default_rng(1).integers(0, 255, (HEIGHT, WIDTH, 3), dtype=np.uint8)
+    for frame in (0, 517, 999):
+        (box,) = detector.detect(stamped(noise, 2, frame)).boxes.tolist()
+        assert VIEWS.frame_of("c0", Box(1, *box)) == frame
+    assert len(detector.detect(noise)) == 0
+
+
 def test_who_gets_nothing_waits() -> None:
     pictures = [it for it in watched(10) if not 30 <= it.pulse < 70]
     assert judge(pictures, told(10), 1, VIEWS).without(100.0, 104.0) == pytest.approx(2.0)
@@ -95,11 +148,9 @@ def test_who_gets_nothing_waits() -> None:
 
 def test_a_gop_that_was_shown_and_is_not_on_the_disk_is_lost() -> None:
     outcome = Outcome(FAULTS[0], gops=(0, 3))
-    there = frozenset(range(25))
+    there = kept_of(range(25))
     note(
-        [outcome],
-        told(3),
-        [File("c0", 0, there, plays=True), File("c1", 0, frozenset(range(30)), plays=False)],
+        [outcome], told(3), [File("c0", 0, there, plays=True), File("c1", 0, kept_of(range(30)), plays=False)]
     )
     assert (outcome.lost, outcome.broken_files) == (1, 1)
     assert not kept(outcome)
@@ -107,7 +158,7 @@ def test_a_gop_that_was_shown_and_is_not_on_the_disk_is_lost() -> None:
 
 def test_a_recording_that_does_not_go_on_after_the_disk_was_full_is_no_recording() -> None:
     full = replace(FAULTS[0], unrecorded=True)
-    before, after = frozenset(range(50)), frozenset(range(100, 200))
+    before, after = kept_of(range(50)), kept_of(range(100, 200))
     for pulses, lost, goes_on in ((before, 15, False), (before | after, 5, True)):
         outcome = Outcome(full, gops=(0, 20))
         note([outcome], told(20), [File("c0", 0, pulses, plays=True)])
@@ -141,35 +192,3 @@ async def test_a_stream_that_ends_meanwhile_fails_its_fault_and_no_other() -> No
     await _injected(outcome.fault, Stand("here", Path(), 0), outcome)
     assert outcome.failed.startswith("IncompleteReadError: 4 bytes read")
     assert not kept(outcome)
-
-
-class Heard:
-    """Notes what is published."""
-
-    def __init__(self) -> None:
-        self.of: dict[str, list[int]] = {"video": [], "tracks": []}
-
-    def publish(self, key: str, payload: bytes, attachment: bytes | None = None) -> None:
-        del attachment
-        self.of[key.rpartition("/")[2]].append(int(payload))
-
-
-@pytest.mark.parametrize("how", ["plain", "lost", "doubled", "disordered"])
-def test_messages_are_lost_doubled_or_disordered_and_pictures_are_not(how: str) -> None:
-    heard = Heard()
-    way = Way(heard)
-    way.how = how
-    for number in range(1000):
-        for what in ("video", "tracks"):
-            way.take(Message(f"myview/faults/camera/c0/{what}", b"%d" % number, b""))
-    tracks, everything = heard.of["tracks"], list(range(1000))
-    assert heard.of["video"] == everything
-    if how == "plain":
-        assert (way.faulty, tracks) == (0, everything)
-        return
-    assert 250 < way.faulty < 350
-    held_back = 1000 - len(tracks) if how == "disordered" else 0
-    assert 0 <= held_back <= 3, "those that would still come"
-    assert len(tracks) == 1000 + {"lost": -way.faulty, "doubled": way.faulty, "disordered": -held_back}[how]
-    assert (sorted(tracks) == tracks) == (how != "disordered")
-    assert len(set(tracks)) == 1000 - held_back - (way.faulty if how == "lost" else 0)
