@@ -5,14 +5,14 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import sys
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Mapping
 from pathlib import Path
 from typing import IO, Any
 
 import yaml
 
 from benchmarks.faults_film import CAMERAS, Views
-from benchmarks.faults_processes import SHOWN
+from benchmarks.faults_pairs import BESTVIEW, DRAWING, names, title, turns
 from benchmarks.faults_site import SETTINGS, Fault, Inject, Stand, listening, told_to_end
 from benchmarks.surroundings import one_thread_environment
 from server.run.setup import free_port
@@ -21,10 +21,12 @@ NAMES = ("bestview", "sync", *CAMERAS)
 
 
 class Apart:
-    """Processes that are started one by one."""
+    """Processes that are started one by one; ``own`` is what the environment of each says besides."""
 
-    def __init__(self, config: Path, log: IO[str]) -> None:
-        self._config, self._log = config, log
+    def __init__(
+        self, config: Path, log: IO[str], own: Mapping[str, Mapping[str, str]] | None = None
+    ) -> None:
+        self._config, self._log, self._own = config, log, own or {}
         self.processes: dict[str, asyncio.subprocess.Process] = {}
 
     async def start(self, name: str) -> None:
@@ -32,14 +34,19 @@ class Apart:
         words = ["camera", str(self._config), name] if name in CAMERAS else [name, str(self._config)]
         self.processes[name] = await asyncio.create_subprocess_exec(
             *(sys.executable, "-m", "server.run.cli", *words),
-            env={**one_thread_environment(), "MYVIEW_SUPERVISED": "1"},
+            env={**one_thread_environment(), "MYVIEW_SUPERVISED": "1", **self._own.get(name, {})},
             stdout=self._log,
             stderr=self._log,
         )
 
 
-def configured(views: Views, folder: Path) -> tuple[Path, str]:
-    """Write the configuration of a site on free ports; give it, and the site's address."""
+def configured(
+    views: Views, folder: Path, settings: Mapping[str, Mapping[str, Any]] | None = None
+) -> tuple[Path, str]:
+    """Write the configuration of a site on free ports; give it, and the site's address.
+
+    `settings`, by section, are set besides.
+    """
     bus, http = f"tcp/127.0.0.1:{free_port()}", free_port()
     content: dict[str, Any] = {
         "site": views.site,
@@ -50,17 +57,24 @@ def configured(views: Views, folder: Path) -> tuple[Path, str]:
         "http": {"port": http},
         "record": {**SETTINGS["record"], "folder": str(folder / "kept")},
     }
+    for section, values in (settings or {}).items():
+        content[section] = {**content.get(section, {}), **values}
     config = folder / "site.yaml"
     config.write_text(yaml.safe_dump(content), encoding="utf-8")
     return config, f"http://127.0.0.1:{http}/"
 
 
 @contextlib.asynccontextmanager
-async def apart(views: Views, folder: Path) -> AsyncIterator[Stand]:
-    """Run a site's processes one by one; in the end tell them to end."""
-    config, url = configured(views, folder)
+async def apart(
+    views: Views,
+    folder: Path,
+    settings: Mapping[str, Mapping[str, Any]] | None = None,
+    own: Mapping[str, Mapping[str, str]] | None = None,
+) -> AsyncIterator[Stand]:
+    """Run a site's processes one by one, each with an environment of its own; in the end tell them to end."""
+    config, url = configured(views, folder, settings)
     with (folder / "site.log").open("w", encoding="utf-8") as log:
-        control = Apart(config, log)
+        control = Apart(config, log, own)
         stand = Stand(url, folder, 0, control=control, recorded=folder / "kept")
         try:
             for name in NAMES:
@@ -73,7 +87,7 @@ async def apart(views: Views, folder: Path) -> AsyncIterator[Stand]:
             )
 
 
-def restarted(*names: str) -> Inject:
+def restarted(*processes: str) -> Inject:
     """Tell processes to end, and start them again as soon as they have."""
 
     async def restart(stand: Stand, name: str) -> None:
@@ -81,16 +95,20 @@ def restarted(*names: str) -> Inject:
         await stand.control.start(name)
 
     async def inject(stand: Stand) -> None:
-        chosen = [stand.shown() if name == SHOWN else name for name in names]
-        await asyncio.gather(*(restart(stand, name) for name in chosen))
+        await asyncio.gather(*(restart(stand, name) for name in names(stand, processes)))
 
     return inject
 
 
+def _restart(processes: tuple[str, ...]) -> Fault:
+    name, inject = f"restart {title(processes)}", restarted(*processes)
+    if BESTVIEW in processes:
+        return Fault(name, apart, inject, 12.0, None, breaks=True)
+    return Fault(name, apart, inject)
+
+
+# A drawing process is told to end by nobody but the best view, whose child it is.
 FAULTS = (
-    Fault("restart camera", apart, restarted(SHOWN)),
-    Fault("restart sync", apart, restarted("sync")),
-    Fault("restart sync+camera", apart, restarted("sync", SHOWN)),
-    Fault("restart bestview", apart, restarted("bestview"), 12.0, None, breaks=True),
-    Fault("restart bestview+camera", apart, restarted("bestview", SHOWN), 12.0, None, breaks=True),
+    *map(_restart, turns(BESTVIEW, DRAWING)),
+    *map(_restart, (it for it in turns(DRAWING) if BESTVIEW in it)),
 )

@@ -24,7 +24,7 @@ import yaml
 from benchmarks.faults import measure
 from benchmarks.faults_compose import PLAIN, ComposeError, ComposeSite, composed, missing
 from benchmarks.faults_film import CAMERAS, Views
-from benchmarks.faults_processes import SHOWN
+from benchmarks.faults_pairs import SHOWN
 from benchmarks.faults_site import LEASE_S, SETTINGS, Ended, Fault, Inject, Stand, listening
 from benchmarks.faults_table import describe
 from benchmarks.report import Report
@@ -81,7 +81,7 @@ def _site(views: Views) -> dict[str, Any]:
 def _named(stand: Stand, name: str) -> tuple[ComposeSite, str, str]:
     """Give the site, the service and its container."""
     site: ComposeSite = stand.control
-    service = stand.shown() if name == SHOWN else name
+    service = stand.shown()[0] if name == SHOWN else name
     return site, service, site.container(service)
 
 

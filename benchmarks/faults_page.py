@@ -32,7 +32,7 @@ async def killed(stand: Stand) -> None:
         await open_when_there(page, f"{stand.url}?object={stand.viewers[0].number}")
         await page.wait_for_function("myview.state === 'playing'", timeout=_PLAYING_MS)
         stand.returned.clear()  # a browser that starts may have kept a busy machine from being ready
-        stand.send("bestview", signal.SIGKILL)
+        stand.send(signal.SIGKILL, "bestview")
         await asyncio.sleep(_POLL_S)
         before = await page.evaluate(_END)
         give_up = time.monotonic() + _PATIENCE_S

@@ -1,78 +1,87 @@
-"""Processes that die, freeze, or are started again, one by one and in pairs."""
+"""Processes that die or freeze: each in turn, and any two of them at once."""
 
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import signal
-from collections.abc import Sequence
 
 import aiohttp
 
+from benchmarks.faults_pairs import BESTVIEW, DRAWING, SHOWN, names, title, turns
 from benchmarks.faults_site import LEASE_S, Fault, Inject, Stand, with_up
 
-SHOWN = "shown"
-"""The camera that most viewers are shown."""
 _FROZEN_S = 4.0
+_SOME_BYTES, _MORE_BYTES = 10_000, 100_000
+_AGAIN_S = 0.2
 
 
-def _names(stand: Stand, names: Sequence[str]) -> list[str]:
-    return [stand.shown() if name == SHOWN else name for name in names]
-
-
-def killed(*names: str) -> Inject:
+def killed(*processes: str) -> Inject:
     """Kill processes at once."""
 
     async def inject(stand: Stand) -> None:
-        for name in _names(stand, names):
-            stand.send(name, signal.SIGKILL)
+        stand.send(signal.SIGKILL, *names(stand, processes))
 
     return inject
 
 
-def frozen(*names: str, seconds: float = _FROZEN_S) -> Inject:
+def frozen(*processes: str, seconds: float = _FROZEN_S) -> Inject:
     """Stop processes for a while."""
 
     async def inject(stand: Stand) -> None:
-        chosen = _names(stand, names)
-        for name in chosen:
-            stand.send(name, signal.SIGSTOP)
+        chosen = names(stand, processes)
+        stand.send(signal.SIGSTOP, *chosen)
         try:
             await asyncio.sleep(seconds)
         finally:
-            for name in chosen:
-                stand.send(name, signal.SIGCONT)
+            stand.send(signal.SIGCONT, *chosen)
 
     return inject
 
 
-def while_drawing(inject: Inject) -> Inject:
-    """Have a viewer of JPEG, so that there is a drawing process."""
+def while_drawing(inject: Inject, *, breaks: bool) -> Inject:
+    """Have a viewer of JPEG, so that there is a drawing process.
+
+    Their stream goes on; where it breaks with its server, it is opened again until pictures come.
+    """
 
     async def injected(stand: Stand) -> None:
-        number = stand.viewers[0].number
-        async with (
-            aiohttp.ClientSession(stand.url) as session,
-            session.get(f"/objects/{number}/best.mjpeg") as answer,
-        ):
-            await answer.content.readexactly(10_000)
-            await inject(stand)
-            await answer.content.readexactly(100_000)
+        path = f"/objects/{stand.viewers[0].number}/best.mjpeg"
+        async with aiohttp.ClientSession(stand.url, raise_for_status=True) as session:
+            async with session.get(path) as answer:
+                await answer.content.readexactly(_SOME_BYTES)
+                await inject(stand)
+                if not breaks:
+                    await answer.content.readexactly(_MORE_BYTES)
+                    return
+            while True:
+                with contextlib.suppress(aiohttp.ClientError, asyncio.IncompleteReadError):
+                    async with session.get(path) as answer:
+                        await answer.content.readexactly(_MORE_BYTES)
+                        return
+                await asyncio.sleep(_AGAIN_S)
 
     return injected
 
 
+def _kill(processes: tuple[str, ...]) -> Fault:
+    name, inject, breaks = f"kill {title(processes)}", killed(*processes), BESTVIEW in processes
+    if DRAWING in processes:
+        inject = while_drawing(inject, breaks=breaks)
+    return Fault(name, with_up, inject, 15.0, None, breaks=True) if breaks else Fault(name, with_up, inject)
+
+
+def _freeze(processes: tuple[str, ...]) -> Fault:
+    inject = frozen(*processes)
+    if DRAWING in processes:
+        inject = while_drawing(inject, breaks=False)
+    within = None if BESTVIEW in processes else LEASE_S + 1.0 if SHOWN in processes else 1.0
+    return Fault(f"freeze {title(processes)}", with_up, inject, 9.0, within)
+
+
 FAULTS = (
-    Fault("kill camera", with_up, killed(SHOWN)),
-    Fault("kill sync", with_up, killed("sync")),
-    Fault("kill drawing", with_up, while_drawing(killed("drawing"))),
-    Fault("kill sync+camera", with_up, killed("sync", SHOWN)),
-    Fault("kill camera+drawing", with_up, while_drawing(killed(SHOWN, "drawing"))),
-    Fault("freeze camera", with_up, frozen(SHOWN), 9.0, LEASE_S + 1.0),
-    Fault("freeze sync", with_up, frozen("sync"), 9.0),
-    Fault("freeze drawing", with_up, while_drawing(frozen("drawing")), 9.0),
-    Fault("freeze sync+camera", with_up, frozen("sync", SHOWN), 9.0, LEASE_S + 1.0),
-    Fault("freeze bestview", with_up, frozen("bestview"), 9.0, None),
-    Fault("kill bestview", with_up, killed("bestview"), 15.0, None, breaks=True),
-    Fault("kill bestview+camera", with_up, killed("bestview", SHOWN), 15.0, None, breaks=True),
-    Fault("kill bestview+sync", with_up, killed("bestview", "sync"), 15.0, None, breaks=True),
+    *map(_kill, turns(BESTVIEW)),
+    *map(_freeze, turns(BESTVIEW)),
+    *map(_freeze, (it for it in turns() if BESTVIEW in it)),
+    *map(_kill, (it for it in turns() if BESTVIEW in it)),
 )

@@ -9,6 +9,7 @@ import signal
 import time
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from dataclasses import dataclass, field
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -73,22 +74,24 @@ class Stand:
         """Give the processes of a name: sync, bestview, drawing, or a camera's id; none where it is down."""
         return running_pids(f"camera {name}" if name in CAMERAS else name)
 
-    def send(self, name: str, number: signal.Signals) -> None:
-        """Send a signal to the process of that name.
+    def send(self, number: signal.Signals, *names: str) -> None:
+        """Send a signal to the processes of these names, as nearly at once as can be.
 
         Raises:
-            RuntimeError: there is none.
+            RuntimeError: there is none of a name.
         """
-        pids = self.pids(name)
-        if not pids:
-            raise RuntimeError(f"there is no process {name}")
-        for pid in pids:
-            os.kill(pid, number)
+        pids = {name: self.pids(name) for name in names}
+        for name in names:
+            if not pids[name]:
+                raise RuntimeError(f"there is no process {name}")
+        for pid in chain.from_iterable(pids.values()):
+            with contextlib.suppress(ProcessLookupError):  # it has ended since, with the one before it
+                os.kill(pid, number)
 
-    def shown(self) -> str:
-        """Give the camera that most viewers are shown, the first of them by its name."""
+    def shown(self) -> list[str]:
+        """Give the cameras, first the one that most viewers are shown; of several the first by its name."""
         cameras = [self.told.shown(viewer.number) for viewer in self.viewers]
-        return max(CAMERAS, key=lambda name: (cameras.count(name), -CAMERAS.index(name)))
+        return sorted(CAMERAS, key=lambda name: (-cameras.count(name), name))
 
     async def settle(self) -> None:
         """Wait until all cameras are live, and decisions come one after the other, of people who are shown.

@@ -1,0 +1,32 @@
+"""Which processes the faults' benchmark breaks."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from benchmarks.faults import FAULTS
+from benchmarks.faults_pairs import BESTVIEW, DRAWING, OTHER, SHOWN, names, title, turns
+from benchmarks.faults_site import Stand
+from benchmarks.faults_viewer import Viewer
+from client import Gop
+
+
+def test_each_process_fails_and_any_two_of_them() -> None:
+    assert [title(it) for it in turns()] == [
+        *("bestview", "sync", "camera", "drawing"),
+        *("bestview+sync", "bestview+camera", "bestview+drawing"),
+        *("sync+camera", "sync+drawing", "camera+camera", "camera+drawing"),
+    ]
+    assert all(BESTVIEW not in it for it in turns(BESTVIEW))
+    named = [fault.name for fault in FAULTS]
+    assert len(set(named)) == len(named)
+    for how, left_out in (("kill", ()), ("freeze", ()), ("restart", (DRAWING,))):
+        assert {f"{how} {title(it)}" for it in turns(*left_out)} <= set(named)
+
+
+def test_the_cameras_that_fail_are_those_that_are_watched() -> None:
+    stand = Stand("here", Path(), 0)
+    stand.told.take(Gop(first=0, frames=10, choices={1: "c2", 2: "c1", 3: "c2"}, boxes={}, cuts=()))
+    assert names(stand, ("sync", SHOWN, OTHER)) == ["sync", "c0", "c1"]
+    stand.viewers = [Viewer("http://localhost/", number) for number in (1, 2, 3)]
+    assert names(stand, ("sync", SHOWN, OTHER)) == ["sync", "c2", "c1"]
