@@ -13,9 +13,23 @@ moment and a box on another picture than its own are counted, not assumed. Colum
   all that viewers see is later by it. Where the viewers' own server dies: from when it says that it is ready
   to the next picture, and in brackets all the time without;
 * *wrong pictures*: of another camera than the events named, of another frame than the pulse, or not legible;
-* *wrong boxes*: drawn on a picture of another frame;
+  *unnamed* are those of which no event was heard, so that their camera may be the wrong one: only where the
+  server dies, and the events with it, is that let pass;
+* *wrong boxes*: drawn on a picture of another frame than they were found in; *means* of several boxes, which
+  trackers make where they saw nothing, do not say where they were found, and are not judged;
 * *recorded*: GOPs that were shown and are not on the disk; files that do not play;
 * *ended*: of processes that were told to end, the slowest and its exit code.
+
+Which picture a network camera has at a pulse nobody knows beforehand. In the faults of a source, wrong is one
+of its pictures that is older than the one before, is more than 2 s behind its pulse or half a second ahead,
+or is not the one that was recorded of this pulse; how far behind they were stands below the table. Its boxes
+are judged as all are: its detector reads in which picture it finds them.
+
+Processes fail one by one, and any two of them at once; *camera* is the one that most viewers are shown, and
+*camera+camera* the next one, too. Messages are all that cameras say and hear, but pictures: tracks, states,
+small pictures of people, what they find (for the other cameras), and where an operator points. A camera that
+comes back after an hour was away for 20 s, in which it comes to be tried as seldom as ever, and is an hour
+ahead by its time stamps; the hour itself is not waited for.
 """
 
 from __future__ import annotations
