@@ -20,7 +20,7 @@ import cv2
 import matplotlib as mpl
 import matplotlib.pyplot as plt
 
-from benchmarks import assist_curve
+from benchmarks import assist_curve, assist_table
 from benchmarks.assist_cases import CAUSES, Cases, count
 from benchmarks.assist_desk import Desk
 from benchmarks.assist_kinds import Kind, kinds
@@ -61,7 +61,7 @@ def measure(options: argparse.Namespace) -> None:
         ["risk from", "flags/min", "failures/min", "flags per failure", "foreseen", "possible at most"],
         assist_curve.rows(points),
     )
-    _tell(report, found)
+    _tell(report, found, thesis=options.kind != "court" and options.objects in {None, 9})
     assist_curve.plot(points, options.out / f"{name}-flags.png")
     _plot(found, options.out / f"{name}.png")
     report.save(options.out / f"{name}.txt")
@@ -73,14 +73,15 @@ def _helped(alone: list[Watched], kind: Kind, person: Person, flags: Flags) -> l
     return [(it, watch(it.clip, kind.setup, person, desk)) for it in alone]
 
 
-def _tell(report: Report, found: dict[str, Cases]) -> None:
+def _tell(report: Report, found: dict[str, Cases], *, thesis: bool) -> None:
     report.table(
         "What helping is worth",
         ["operator", "flags/min", "failures", "foreseen", "with help", "avoided", "new", "saved"],
         [[name, *_row(cases)] for name, cases in found.items()],
     )
     for name, cases in found.items():
-        report.table(f"Every flag and every failure: {name}", ["", "count"], _table(cases))
+        title = f"Every flag and every failure: {name}"
+        report.table(title, assist_table.head(thesis=thesis), assist_table.texts(cases, thesis=thesis))
 
 
 def _row(cases: Cases) -> list[str]:
@@ -98,26 +99,6 @@ def _row(cases: Cases) -> list[str]:
 
 def _share(part: int, whole: int) -> str:
     return f"{100.0 * part / whole:.0f} %" if whole else "-"
-
-
-def _table(cases: Cases) -> list[list[str]]:
-    flags, crossing = cases.flags, cases.crossings
-    right = flags["helped"] + flags["not needed"]
-    return [
-        ["flagged, tracked rightly", str(right)],
-        ["  crossings", str(crossing["helped"] + crossing["not needed"])],
-        ["    the operator helped", str(crossing["helped"])],
-        ["    was not needed: a false flag", str(crossing["not needed"])],
-        ["  alone", str(right - crossing["helped"] - crossing["not needed"])],
-        ["    the operator helped", str(flags["helped"] - crossing["helped"])],
-        ["    was not needed: a false flag", str(flags["not needed"] - crossing["not needed"])],
-        ["flagged, tracked wrongly", str(flags["harmed"] + flags["no help"])],
-        ["  the operator harmed", str(flags["harmed"])],
-        ["  could not help", str(flags["no help"])],
-        ["failures with help", str(cases.left.total())],
-        *([f"  {kind}", str(cases.kinds[kind])] for kind in ("2 way", "3 way", "alone")),
-        *([f"  {cause}", str(cases.left[cause])] for cause in CAUSES),
-    ]
 
 
 def _plot(found: dict[str, Cases], path: Path) -> None:

@@ -10,7 +10,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.assist_failures import Failure, matches
+from benchmarks.assist_failures import Failure, Kind, involved, kind_of, matches
 from benchmarks.assist_operator import Flag, Person
 from benchmarks.assist_watch import Watched
 from tracking.assist import Trouble
@@ -36,7 +36,7 @@ class Cases:
     Attributes:
         minutes: of video.
         clips: how many.
-        flags: by outcome, and whether others were in the way when it was raised.
+        flags: by whether others were in the way of whom it was about, and by outcome.
         unaided: failures without help, by kind.
         foreseen: those that a trouble told of early enough to be answered.
         left: failures with help, by cause.
@@ -47,12 +47,11 @@ class Cases:
 
     minutes: float
     clips: int
-    flags: Counter[Outcome]
-    crossings: Counter[Outcome]
-    unaided: Counter[str]
+    flags: Counter[tuple[Kind, Outcome]]
+    unaided: Counter[Kind]
     foreseen: int
     left: Counter[Cause]
-    kinds: Counter[str]
+    kinds: Counter[Kind]
     avoided: int
     made: int
 
@@ -64,57 +63,56 @@ class Cases:
 
 def count(pairs: Sequence[tuple[Watched, Watched]], person: Person) -> Cases:
     """Count over clips that were watched twice: without help, and with it."""
-    cases = Cases(
-        sum(alone.clip.minutes for alone, _ in pairs),
-        len(pairs),
-        Counter(),
-        Counter(),
-        Counter(),
-        0,
-        Counter(),
-        Counter(),
-        0,
-        0,
-    )
+    flags: Counter[tuple[Kind, Outcome]] = Counter()
+    unaided: Counter[Kind] = Counter()
+    left: Counter[Cause] = Counter()
+    kinds: Counter[Kind] = Counter()
     foreseen = avoided = made = 0
     for alone, helped in pairs:
         fps = alone.clip.fps
+        found = matches(helped.clip.truth, helped.tracks)
         for flag in helped.flags:
-            outcome = _outcome(flag, alone, helped, fps)
-            cases.flags[outcome] += 1
-            if flag.trouble.reason != "fading":
-                cases.crossings[outcome] += 1
+            about = _about(flag, found)
+            flags[_kind(flag, about, helped), _outcome(flag, about, alone, helped)] += 1
         for failure in alone.failures:
-            cases.unaided[failure.kind] += 1
+            unaided[failure.kind] += 1
             foreseen += any(tells(it, at, failure, fps, person) for at, it in alone.troubles)
             avoided += not _again(failure, helped.failures, fps)
-        found = matches(helped.clip.truth, helped.tracks)
         for failure in helped.failures:
-            cases.kinds[failure.kind] += 1
-            cases.left[_cause(failure, helped, found)] += 1
+            kinds[failure.kind] += 1
+            left[_cause(failure, helped, found)] += 1
             made += not _again(failure, alone.failures, fps)
-    return Cases(
-        cases.minutes,
-        cases.clips,
-        cases.flags,
-        cases.crossings,
-        cases.unaided,
-        foreseen,
-        cases.left,
-        cases.kinds,
-        avoided,
-        made,
-    )
+    minutes = sum(alone.clip.minutes for alone, _ in pairs)
+    return Cases(minutes, len(pairs), flags, unaided, foreseen, left, kinds, avoided, made)
 
 
-def _outcome(flag: Flag, alone: Watched, helped: Watched, fps: float) -> Outcome:
+def _about(flag: Flag, found: NDArray[np.int64]) -> set[int]:
+    """Give the fish that a flag is about: on whom its tracks were when it was raised, or last before.
+
+    And who was followed, whom the operator took for one of them. Nobody, where the tracks were on no fish.
+    `found` is which track each fish was matched with, `(n, T)`.
+    """
+    about = set() if flag.fish is None else {flag.fish}
+    for number in flag.trouble.objects:
+        fish, frames = np.nonzero(found[:, : flag.raised + 1] == number)
+        about |= set(fish[frames == frames.max(initial=-1)].tolist())
+    return about
+
+
+def _kind(flag: Flag, about: set[int], helped: Watched) -> Kind:
+    """Say whether others were in the way of whom a flag was about, from when it was raised to its trouble."""
+    first, last = sorted((flag.trouble.frame, flag.raised))
+    return kind_of(involved(helped.clip.truth, about, first, last, helped.clip.fps))
+
+
+def _outcome(flag: Flag, about: set[int], alone: Watched, helped: Watched) -> Outcome:
     """Say what a flag was good for: whom it was about failed without help, with it, both, or neither."""
-    ended = flag.ended if flag.ended is not None else flag.raised
-    first, last = min(flag.trouble.frame, flag.raised) - _BEFORE_S * fps, ended + fps
-    fish = {flag.fish} if flag.fish is not None else set()
+    fps = helped.clip.fps
+    ended = flag.until if flag.ended is None else max(flag.ended, flag.until)
+    first, last = min(flag.trouble.frame, flag.raised) - _BEFORE_S * fps, max(ended, flag.raised) + fps
 
     def failed(watched: Watched) -> bool:
-        return any(fish & {*it.fish} and it.before <= last and it.frame >= first for it in watched.failures)
+        return any(about & {*it.fish} and it.before <= last and it.frame >= first for it in watched.failures)
 
     without, with_help = failed(alone), failed(helped)
     if without:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,12 @@ _LASTS_S = 1.0 / 3.0
 _TOGETHER_S = 1.0
 """Seconds within which failures of the same fish or tracks are one: an exchange is one failure of two."""
 
+_IN_THE_WAY = 0.05
+"""Overlap (IoU) with another fish from which it is in the way."""
+
+Kind = Literal["alone", "2 way", "3 way"]
+"""Whether others were in the way: nobody, one, or two and more."""
+
 Tracks = Mapping[int, Mapping[int, Floats]]
 """The boxes `(4,)` of tracks, by frame and id."""
 
@@ -33,7 +40,7 @@ class Failure:
         before: the last frame in which it was under its own.
         fish: whose number changes, ascending.
         tracks: the numbers that they had and have, ascending.
-        involved: fish that overlap each other or one of these around the failure, these included.
+        involved: fish that overlap each other around the failure, as of `involved`; 1 where none does.
     """
 
     frame: int
@@ -43,9 +50,30 @@ class Failure:
     involved: int
 
     @property
-    def kind(self) -> str:
-        """Whether others were in the way: `alone`, `2 way` or `3 way` (or more)."""
-        return "alone" if self.involved < 2 else "2 way" if self.involved == 2 else "3 way"
+    def kind(self) -> Kind:
+        """Whether others were in the way."""
+        return kind_of(self.involved)
+
+
+def kind_of(together: int) -> Kind:
+    """Name by how many fish are in each other's way what was or could have been a failure."""
+    return "alone" if together < 2 else "2 way" if together == 2 else "3 way"
+
+
+def involved(truth: Truth, fish: Collection[int], first: int, last: int, fps: float) -> int:
+    """Count who is in whose way: those of some fish whom others overlap, and these others; 1: nobody.
+
+    From a third of a second before the frame `first` to as long after the frame `last`.
+    """
+    around = round(_LASTS_S * fps)
+    boxes = np.nan_to_num(truth.boxes[:, max(first - around, 0) : last + around])
+    together: set[int] = set()
+    for one in fish:
+        overlaps = (iou(boxes[one], boxes) > _IN_THE_WAY).any(axis=1)
+        others = {*np.flatnonzero(overlaps).tolist()} - {one}
+        if others:
+            together |= {one, *others}
+    return max(1, len(together))
 
 
 def matches(truth: Truth, tracks: Tracks) -> NDArray[np.int64]:
@@ -88,7 +116,7 @@ def failures(truth: Truth, tracks: Tracks, fps: float) -> list[Failure]:
                 break
         else:
             groups.append([change])
-    return [_failure(truth, group, least) for group in groups]
+    return [_failure(truth, group, fps) for group in groups]
 
 
 def _changes(numbers: NDArray[np.int64], least: int) -> list[tuple[int, int, int, int]]:
@@ -111,15 +139,9 @@ def _changes(numbers: NDArray[np.int64], least: int) -> list[tuple[int, int, int
     return [(old[2], new[1], old[0], new[0]) for old, new in pairwise(lasting)]
 
 
-def _failure(truth: Truth, group: Sequence[tuple[int, int, int, int, int]], around: int) -> Failure:
+def _failure(truth: Truth, group: Sequence[tuple[int, int, int, int, int]], fps: float) -> Failure:
     fish = sorted({it[2] for it in group})
     first, last = min(it[1] for it in group), max(it[0] for it in group)
-    span = slice(max(first - around, 0), last + around)
-    touching = set(fish)
-    boxes = np.nan_to_num(truth.boxes[:, span])
-    for one in fish:
-        shared = iou(boxes[one], boxes)
-        touching |= set(np.flatnonzero((shared > 0.05).any(axis=1)).tolist())
-    crossed = max(1, len(touching))
     tracks = sorted({number for it in group for number in it[3:]})
+    crossed = involved(truth, fish, first, last, fps)
     return Failure(min(it[0] for it in group), first, tuple(fish), tuple(tracks), crossed)

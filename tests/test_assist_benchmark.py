@@ -7,15 +7,18 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from benchmarks.assist_cases import count
+from benchmarks.assist_cases import Outcome, count
+from benchmarks.assist_clips import Clip
 from benchmarks.assist_desk import Desk
-from benchmarks.assist_failures import failures, matches
-from benchmarks.assist_operator import Operator, Person
+from benchmarks.assist_failures import Kind, failures, matches
+from benchmarks.assist_operator import Flag, Operator, Person
 from benchmarks.assist_school import school
-from benchmarks.assist_watch import FISH, watch
+from benchmarks.assist_table import texts
+from benchmarks.assist_watch import FISH, Watched, watch
 from benchmarks.experiments_scene import Truth
 from server.wire.sections import Flags
-from tracking.assist import Trouble
+from tracking import Detections
+from tracking.assist import Reason, Trouble
 
 FRAMES = 200
 FPS = 25.0
@@ -103,6 +106,87 @@ def test_flags_go_to_the_riskiest_and_once_to_the_same_two() -> None:
 
 def _trouble(objects: tuple[int, int], frame: int, risk: float) -> Trouble:
     return Trouble("exchange", objects, frame, 0.1, 5, risk)
+
+
+RIGHT = [[1] * FRAMES, [2] * FRAMES]
+EXCHANGED = [[1] * 100 + [2] * 100, [2] * 100 + [1] * 100]
+
+
+def _watched(truth: Truth, numbers: Sequence[Sequence[int]], flags: Sequence[Flag] = ()) -> Watched:
+    """A clip of which is known what its tracks were, and what somebody was asked."""
+    clip = Clip(0, FPS, (Detections.empty(4),) * FRAMES, truth)
+    tracks = _tracks(truth, numbers)
+    return Watched(clip, failures(truth, tracks, FPS), [], list(flags), tracks)
+
+
+@pytest.mark.parametrize(
+    ("alone", "helped", "outcome"),
+    [
+        (EXCHANGED, EXCHANGED, "no help"),
+        (EXCHANGED, RIGHT, "helped"),
+        (RIGHT, EXCHANGED, "harmed"),
+        (RIGHT, RIGHT, "not needed"),
+    ],
+)
+@pytest.mark.parametrize("followed", [None, 0], ids=["nobody saw to it", "followed"])
+def test_what_a_flag_was_good_for_is_told_by_the_fish_that_its_tracks_were_on(
+    alone: list[list[int]], helped: list[list[int]], outcome: Outcome, followed: int | None
+) -> None:
+    truth = _truth()
+    flag = Flag(_trouble((1, 2), 105, 0.5), 1, raised=90, until=105, fish=followed)
+    cases = count([(_watched(truth, alone), _watched(truth, helped, [flag]))], Person())
+    assert {it for _, it in cases.flags} == {outcome}
+
+
+def test_a_flag_about_others_than_those_who_fail_was_not_needed() -> None:
+    truth = _truth()
+    still = np.tile([500.0, 600.0, 560.0, 620.0], (1, FRAMES, 1))
+    truth = Truth(np.concatenate([truth.boxes, still]), np.ones((3, FRAMES)))
+    numbers = [*EXCHANGED, [3] * FRAMES]
+    flag = Flag(_trouble((3, 9), 100, 0.5), 3, raised=100, until=100)
+    cases = count([(_watched(truth, numbers), _watched(truth, numbers, [flag]))], Person())
+    assert dict(cases.flags) == {("alone", "not needed"): 1}
+
+
+@pytest.mark.parametrize("reason", ["alike", "fading"])
+@pytest.mark.parametrize(("others", "kind"), [([], "alone"), ([100], "2 way"), ([98, 104], "3 way")])
+def test_whether_others_were_in_the_way_is_told_by_where_they_were_and_not_by_the_reason(
+    others: list[int], kind: Kind, reason: Reason
+) -> None:
+    """Of the first fish, which the others meet in these frames, and nowhere else."""
+    boxes = _truth().boxes
+    for number, frame in enumerate(others):
+        rises = np.abs(np.arange(FRAMES) - frame)[:, None] * [0.0, 10.0, 0.0, 10.0]
+        boxes = np.concatenate([boxes, (boxes[0] + (1 - 2 * number) * rises)[None]])
+    truth = Truth(boxes, np.ones((len(boxes), FRAMES)))
+    numbers = [[n + 1] * FRAMES for n in range(len(boxes))]
+    numbers[0] = [1] * 100 + [9] * 100
+    flag = Flag(Trouble(reason, (1,), 100, 0.1, 5, 0.5), 1, raised=99, until=100)
+    watched = _watched(truth, numbers, [flag])
+    cases = count([(watched, watched)], Person())
+    assert dict(cases.flags) == {(kind, "no help"): 1}
+    assert dict(cases.kinds) == {kind: 1}, "of the failure and of its flag, the same"
+
+
+def test_who_meets_others_long_before_or_after_its_flag_was_alone() -> None:
+    boxes = _truth().boxes
+    rises = np.abs(np.arange(FRAMES) - 30)[:, None] * [0.0, 10.0, 0.0, 10.0]
+    truth = Truth(np.concatenate([boxes, (boxes[0] + rises)[None]]), np.ones((3, FRAMES)))
+    flag = Flag(_trouble((1, 3), 100, 0.5), 1, raised=99, until=100)
+    watched = _watched(truth, [*RIGHT, [3] * FRAMES], [flag])
+    assert dict(count([(watched, watched)], Person()).flags) == {("alone", "not needed"): 1}
+
+
+def test_the_table_has_the_thesis_beside_it_for_as_many_minutes() -> None:
+    truth = _truth()
+    flag = Flag(_trouble((1, 2), 100, 0.5), 1, raised=99, until=100)
+    cases = count([(_watched(truth, RIGHT), _watched(truth, EXCHANGED, [flag]))], Person())
+    rows = {it[0].strip(): it[1:] for it in texts(cases, thesis=True)}
+    as_56_clips = str(56 * 20 * 25 // FRAMES)
+    assert rows["flagged, tracked rightly"] == ["0", "0", "53"]
+    assert rows["flagged, tracked wrongly"] == ["1", as_56_clips, "-"]
+    assert rows["failures with help"] == ["1", as_56_clips, "39"]
+    assert {len(it) for it in texts(cases, thesis=False)} == {2}
 
 
 @pytest.mark.slow
