@@ -126,6 +126,25 @@ def test_a_beep_is_where_the_flash_is_shown_also_after_the_camera_has_begun_anew
     assert moments(one + two, settings.format) == pytest.approx(expected, abs=0.04)
 
 
+@pytest.mark.parametrize(("rate", "channels"), [(48_000, 1), (44_100, 2), (32_000, 1)])
+def test_a_camera_is_heard_on_when_its_sound_changes_while_it_sends(
+    tmp_path: Path, rate: int, channels: int
+) -> None:
+    before = write_flashes(tmp_path / "before.aac", FRAMES, rate=rate, channels=channels, pictures=False)
+    after = write_flashes(tmp_path / "after.aac", FRAMES, pictures=False)
+    both = tmp_path / "both.aac"
+    both.write_bytes(before.read_bytes() + after.read_bytes())
+    sound, frames = LiveSound(Sound(source="c0"), FPS), []
+    with av.open(str(both)) as container:
+        sound.opened(container.streams.audio[0])
+        for packet in container.demux(audio=0):
+            if packet.pts is not None:
+                sound.picture(Fraction(packet.pts * packet.time_base))
+                frames += sound.at(round(packet.pts * packet.time_base * FPS))
+                sound.packet(packet)
+    assert len(moments(frames)) == 2 * len(range(EVERY, FRAMES, EVERY))
+
+
 def test_a_camera_without_sound_is_no_mistake(tmp_path: Path) -> None:
     path = write_flashes(tmp_path / "own.mp4", 10)
     sound = LiveSound(Sound(source="c0"), FPS)

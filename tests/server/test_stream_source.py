@@ -15,13 +15,15 @@ import av
 import cv2
 import numpy as np
 import pytest
+from av.audio.stream import AudioStream
 from videos_by_hand import HEIGHT, STEP, WIDTH, frame_in, write_video
 
+from server.camera.sound import LiveSound
 from server.camera.sources import open_source, stream
 from server.camera.sources.opening import open_video
 from server.camera.sources.stream import Stream
 from server.wire.errors import UserError
-from server.wire.sections import Camera, Site
+from server.wire.sections import Camera, Site, Sound
 
 PATIENCE = 60.0  # seconds until a test that awaits something has failed
 
@@ -202,6 +204,31 @@ def test_a_picture_of_before_a_silence_is_not_shown_after_it(
         camera.goes_on.set()
         camera.close()
         source.close()
+
+
+def test_a_mistake_while_reading_ends_the_connection_and_not_the_camera(
+    camera: MotionJpeg, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(stream, "_RETRY_FIRST_S", 0.05)
+
+    class Stumbling(LiveSound):
+        connections = 0
+
+        def opened(self, stream: AudioStream | None) -> None:
+            self.connections += 1
+            if self.connections == 1:
+                raise ValueError("nobody has thought of this")
+            super().opened(stream)
+
+    listener = Stumbling(Sound(source="c0"), 25)
+    source = Stream(f"http://127.0.0.1:{camera.plug_in()}/", {}, listener)
+    try:
+        until(lambda: shown(source) == 0)
+    finally:
+        source.close()
+    assert listener.connections == 2
+    (mistake,) = [it for it in caplog.records if it.exc_info]
+    assert "nobody has thought of this" in str(mistake.exc_info)
 
 
 def test_closing_ends_the_thread(camera: MotionJpeg) -> None:

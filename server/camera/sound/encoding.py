@@ -33,6 +33,8 @@ class Encoding:
         self._layout = "mono" if form.channels == 1 else "stereo"
         self._format = "fltp" if form.coding == "aac" else "flt"
         self._resampler = self._new_resampler()
+        self._heard: tuple[str, str, int] | None = None
+        """What the resampler is given: format, layout, rate. It takes nothing else."""
         self._encoder = self._new_encoder(form, kbps)
         self._samples: NDArray[np.float32] = np.zeros((form.channels, 0), dtype=np.float32)
         """``(channels, samples)`` that are no whole frame yet."""
@@ -69,6 +71,9 @@ class Encoding:
         self._samples = np.pad(self._samples, ((0, 0), (0, max(0, ahead))))
 
     def _append(self, frame: AudioFrame) -> None:
+        heard = frame.format.name, frame.layout.name, frame.sample_rate
+        if heard != self._heard:  # an encoder's settings may change while it sends
+            self._heard, self._resampler = heard, self._new_resampler()
         for out in self._resampler.resample(frame):
             samples = out.to_ndarray()[:, self._too_many :]
             self._too_many -= out.samples - samples.shape[1]

@@ -72,7 +72,7 @@ class Stream:
     def _run(self, opened: Opened | None) -> None:
         pause = _RETRY_FIRST_S
         while not self._closing.is_set():
-            if opened is not None and self._read(opened):
+            if opened is not None and self._read_alive(opened):
                 pause = _RETRY_FIRST_S
             if self._closing.wait(pause):
                 return
@@ -105,14 +105,23 @@ class Stream:
             self._lost(f"{shown(self._url)}: {why}")
         return any_picture
 
-    def _lost(self, why: str) -> None:
+    def _lost(self, why: str, *, mistake: bool = False) -> None:
         """Say that the camera is away; one that comes and goes, or stays away, is not told of each time."""
         if (more := self._away.happened(why)) is not None:
-            log.warning("%s%s; it is tried again", why, more)
+            log.warning("%s%s; it is tried again", why, more, exc_info=mistake)
 
     def _back(self) -> None:
         if ended := self._away.over():
             log.info("%s: pictures come again, after %.0f s", shown(self._url), ended.seconds)
+
+    def _read_alive(self, opened: Opened) -> bool:
+        """Do the same, and outlive mistakes: nobody would begin this thread anew."""
+        try:
+            return self._read(opened)
+        except Exception as error:  # noqa: BLE001 — it is said, with its traceback
+            self._lost(f"{shown(self._url)}: a mistake of type {type(error).__name__}", mistake=True)
+            opened.container.close()
+            return False
 
     def _listened_to(self, opened: Opened) -> tuple[AudioStream, ...]:
         """Give what else is to be read than the pictures."""
