@@ -10,7 +10,7 @@ import contextlib
 import math
 import os
 import re
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -53,6 +53,8 @@ class Playlist:
         self._tail: int | None = None
         """Where the end line begins in the file; None: there is no file yet."""
         self._end: int | None = None
+        self.stale = False
+        """The file has more entries than it needs, or such as refer to what is gone: :meth:`tidy` is due."""
 
     @property
     def bytes(self) -> int:
@@ -65,6 +67,11 @@ class Playlist:
         self.tape = Tape(_parsed(text))
         stretches = self.tape.all
         self._end = stretches[-1].end if stretches else None
+
+    def drop(self, files: Collection[int]) -> None:
+        """Forget what is in these files; the playlist's own file is as it was, until it is tidied."""
+        if files:
+            self.stale |= self.tape.drop(files)
 
     def append(self, stretch: Stretch) -> None:
         """Add to the file, then to what is known.
@@ -99,7 +106,7 @@ class Playlist:
             self._replace(stretches)
         else:
             self.path.unlink(missing_ok=True)
-            self._tail = None
+            self._tail, self.stale = None, False
 
     def _replace(self, stretches: Iterable[Stretch]) -> None:
         stretches = list(stretches)
@@ -122,7 +129,7 @@ class Playlist:
         except OSError:
             draft.unlink(missing_ok=True)
             raise
-        self._tail = len(text.encode())
+        self._tail, self.stale = len(text.encode()), False
 
     def _entry(self, stretch: Stretch, end: int | None) -> str:
         hole = "" if end in (None, stretch.first) else "#EXT-X-DISCONTINUITY\n"

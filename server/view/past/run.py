@@ -16,6 +16,7 @@ Pulses and people's numbers may begin anew when a service does; so every run has
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
@@ -118,6 +119,9 @@ class Run:
                 first = int(path.stem)
                 size = sum(it.stat().st_size for it in run.files(first) if it.exists())
                 run.segments.append(Segment(first, size, path.stat().st_mtime))
+        firsts = {segment.first for segment in run.segments}
+        for playlist in run._playlists:  # the files may be gone, and the playlist not written since
+            playlist.drop({it.file for it in playlist.tape.all} - firsts)
         return run
 
     @property
@@ -169,20 +173,38 @@ class Run:
         return [*cameras, self.sound_file(first), self.index_file(first)]
 
     def drop(self, segments: Collection[Segment]) -> None:
-        """Take segments away, and what refers to them: first from the playlists, then from the disk.
+        """Take segments away: from what is known, from the disk, and then from the playlists' files.
+
+        Only the last of it takes space, so that a full disk has some by then. What the disk does not let go
+        of stays among the segments.
 
         Raises:
-            OSError: a file cannot be written or taken away.
+            OSError: a file cannot be taken away.
         """
         files = {segment.first for segment in segments}
-        self.segments = [segment for segment in self.segments if segment.first not in files]
         for playlist in self._playlists:
-            if playlist.tape.drop(files):
-                playlist.tidy()
-        self.objects = {number: it for number, it in self.objects.items() if it.tape.all}
+            playlist.drop(files)
+        kept: set[int] = set()
+        failed: OSError | None = None
         for first in sorted(files):
-            for path in self.files(first):
-                path.unlink(missing_ok=True)
+            try:
+                for path in self.files(first):
+                    path.unlink(missing_ok=True)
+            except OSError as error:
+                kept.add(first)
+                failed = error
+        self.segments = [it for it in self.segments if it.first not in files or it.first in kept]
+        self.tidy()
+        if failed is not None:
+            raise failed
+
+    def tidy(self) -> None:
+        """Write the playlists anew that need it; one that the disk does not take stays as it is, and due."""
+        for playlist in self._playlists:
+            if playlist.stale:
+                with contextlib.suppress(OSError):
+                    playlist.tidy()
+        self.objects = {number: it for number, it in self.objects.items() if it.tape.all or it.stale}
 
     def _playlist(self, path: Path, cameras: str = "", header: str = _HEADER) -> Playlist:
         return Playlist(path, cameras, header, self.head.fps, self.head.pulse0, self._longest_s)

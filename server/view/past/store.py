@@ -5,6 +5,7 @@ Everything here waits for the disk: it is for one thread of its own.
 
 from __future__ import annotations
 
+import contextlib
 import fcntl
 import os
 import shutil
@@ -71,7 +72,8 @@ class Store:
                 self.earlier.append(Run.found(head.parent, self._bounds.segment_s))
             except UNREADABLE:
                 continue  # not written by us, or not to its end: nothing that could be played
-        self._retain()
+        with contextlib.suppress(OSError):  # it is tried again before anything is written, and told then
+            self._retain()
 
     def write(self, piece: Piece, head: RunHead, headers: Headers) -> None:
         """Write a GOP; ``head`` and ``headers`` are what a run begins with, if it has not begun.
@@ -80,14 +82,16 @@ class Store:
             OSError: the disk does not take it; :meth:`abandon` is to be called.
         """
         first = piece.choices.first
-        if self.run is None or first < self._end:
-            self._begin(head, headers)
-        run = self.run
-        assert run is not None  # noqa: S101 — just begun
-        if self._open is not None and self._is_full(self._open.segment, first):
+        begins = self.run is None or first < self._end
+        if self._open is not None and (begins or self._is_full(self._open.segment, first)):
             self._finish()
         if self._open is None:
-            self._retain()
+            self._retain()  # before anything that takes space: the disk may be full
+        if begins:
+            self._begin(head, headers)
+        run = self.run
+        assert run is not None  # noqa: S101 — it has begun
+        if self._open is None:
             self._open = OpenSegment(run, Segment(first, 0, self._now()), headers)
             run.segments.append(self._open.segment)
         self._open.write(piece.choices, piece.cameras, piece.heard, self._now())
@@ -110,7 +114,6 @@ class Store:
                 self._lock = None
 
     def _begin(self, head: RunHead, headers: Headers) -> None:
-        self._finish()
         name = datetime.fromtimestamp(head.began, UTC).strftime("%Y%m%dT%H%M%SZ")
         taken = sorted(it.name for it in self.folder.glob(f"{name}*"))
         folder = self.folder / (f"{name}-{len(taken)}" if taken else name)
@@ -130,20 +133,26 @@ class Store:
         return long_enough or segment.bytes * _SHARE >= self._bounds.most_mb * _MEGA
 
     def _finish(self) -> None:
-        """End the open segment; the playlists that have grown in it become short."""
+        """End the open segment; the playlists that have grown in it become short, if the disk takes it."""
         if self._open is None:
             return
-        grown = self._open.grown
+        for playlist in self._open.grown:
+            playlist.stale = True
         self.abandon()
-        for playlist in grown:
-            playlist.tidy()
+        if self.run is not None:
+            self.run.tidy()
 
     def _retain(self) -> None:
-        """Take away the oldest segments: those that are too old, and as many as one more needs."""
+        """Take away the oldest segments: those that are too old, and as many as one more needs.
+
+        Raises:
+            OSError: some cannot be taken away; all others are.
+        """
         runs = [*self.earlier, *([self.run] if self.run else [])]
         oldest = self._now() - self._bounds.keep_s
         most = self._bounds.most_mb * _MEGA
         too_much = sum(run.size for run in runs) - (most - most / _SHARE)
+        failed: OSError | None = None
         for run in runs:
             old: list[Segment] = []
             for segment in run.segments:
@@ -151,12 +160,16 @@ class Store:
                     break
                 old.append(segment)
                 too_much -= segment.bytes
-            if old:
+            try:
                 run.drop(old)
+            except OSError as error:
+                failed = error
         for run in [run for run in self.earlier if not run.segments]:
             self.earlier.remove(run)
             shutil.rmtree(run.folder, ignore_errors=True)
         self._closed_bytes = sum(run.size for run in runs)
+        if failed is not None:
+            raise failed
 
     @property
     def bytes(self) -> int:
