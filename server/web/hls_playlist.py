@@ -56,20 +56,25 @@ def playlist(
     are further lines about the whole of it, ``hint`` names the part that comes next.
     """
     listed = list(segments)
-    lines = [
+    lines = head_lines(plan, listed[0].number if listed else 0, extra)
+    for segment in listed:
+        lines += segment_lines(segment, plan, pulse0)
+    lines += [] if hint is None else [f'#EXT-X-PRELOAD-HINT:TYPE=PART,URI="{hint}"']
+    lines += ["#EXT-X-ENDLIST"] if ended else []
+    return "\n".join(lines) + "\n"
+
+
+def head_lines(plan: Plan, first: int, extra: Iterable[str] = ()) -> list[str]:
+    """Give the lines before the first segment, whose number is ``first``."""
+    return [
         "#EXTM3U",
         f"#EXT-X-VERSION:{_VERSION}",
         f"#EXT-X-TARGETDURATION:{plan.target_s}",
-        f"#EXT-X-MEDIA-SEQUENCE:{listed[0].number if listed else 0}",
+        f"#EXT-X-MEDIA-SEQUENCE:{first}",
         *extra,
         "#EXT-X-INDEPENDENT-SEGMENTS",
         '#EXT-X-MAP:URI="init.mp4"',
     ]
-    for segment in listed:
-        lines += _lines(segment, plan, pulse0)
-    lines += [] if hint is None else [f'#EXT-X-PRELOAD-HINT:TYPE=PART,URI="{hint}"']
-    lines += ["#EXT-X-ENDLIST"] if ended else []
-    return "\n".join(lines) + "\n"
 
 
 def master(address: str, bandwidth: int, codecs: str, site: Site) -> str:
@@ -82,7 +87,8 @@ def master(address: str, bandwidth: int, codecs: str, site: Site) -> str:
     return "\n".join([*lines, f"#EXT-X-STREAM-INF:{told}", address]) + "\n"
 
 
-def _lines(segment: Listed, plan: Plan, pulse0: float | None) -> list[str]:
+def segment_lines(segment: Listed, plan: Plan, pulse0: float | None) -> list[str]:
+    """Give the lines of a segment, with its time of day where ``pulse0`` is known."""
     lines = [_part_line(segment.number, index, it, plan.fps) for index, it in enumerate(segment.parts)]
     if segment.whole:
         seconds = (segment.until - segment.first) / plan.fps

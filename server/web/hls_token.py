@@ -16,7 +16,8 @@ def with_token(request: web.Request, answer: web.Response) -> web.Response:
     token = request.query.get("token")
     if token is not None and answer.status == HTTPStatus.OK and answer.text is not None:
         told = f"token={quote(token, safe='')}"
-        answer.text = "\n".join(_told(line, told) for line in answer.text.split("\n"))
+        lines = answer.text.split("\n")  # thousands, and in most there is no address
+        answer.text = "\n".join([it if it.startswith("#EXTINF") else _told(it, told) for it in lines])
     return answer
 
 

@@ -73,7 +73,7 @@ _SCHEMAS: dict[str, Any] = {
     "_HLS_part": {"type": "integer", "minimum": 0, "description": "Waits until this part of it is there."},
     "overlay": {"enum": [0, 1], "default": 0, "description": "1: boxes are burnt in."},
     "from": {**_MOMENT, "description": "Begins there: seconds back, a pulse, or a time."},
-    "to": {**_MOMENT, "description": "Ends there, likewise."},
+    "to": {**_MOMENT, "description": "Ends there, likewise; HLS also live: it goes on."},
     "at": {**_MOMENT, "description": "Of the last minute; what was before the first question is not kept."},
     "held": {"type": "string", "description": "Shows this camera, not the best: held by hand."},
     "prefer": {"type": "string", "description": "Shows this camera while it sees the person, else the best."},

@@ -100,10 +100,18 @@ def object_past(service: BestViewService, number: int) -> ObjectPast:
     return ObjectPast(service.past, (number,) if number == now else (now, number))
 
 
-def wish_of(request: web.Request, service: BestViewService, now: int, *, start: int | None = None) -> Wish:
+def wish_of(
+    request: web.Request,
+    service: BestViewService,
+    now: int,
+    *,
+    start: int | None = None,
+    endless: str | None = None,
+) -> Wish:
     """Read from= and to=; ``now`` is the pulse that seconds back are counted from.
 
-    ``start`` is from when on where from= is left out; None: it must not be.
+    ``start`` is from when on where from= is left out; None: it must not be. ``endless`` is a word that to=
+    may be, and means no end.
 
     Raises:
         MomentError: they are no moments, or the second is not after the first.
@@ -111,7 +119,7 @@ def wish_of(request: web.Request, service: BestViewService, now: int, *, start: 
     fps, pulse0 = service.config.site.fps, service.pulse0
     moments: dict[str, int] = {}
     for name in ("from", "to"):
-        if name in request.query:
+        if name in request.query and (name, request.query[name]) != ("to", endless):
             try:
                 moments[name] = pulse_at(request.query[name], now=now, fps=fps, pulse0=pulse0)
             except MomentError as error:

@@ -144,7 +144,7 @@ async def test_a_playlist_names_its_segments_with_the_token_it_was_asked_for_wit
     for epoch in range(3, 12):
         site.service.feed(epoch, {A: {1: SMALL, 2: SMALL}, B: {1: LARGE}})
     token = token_of("family")
-    for query in ({}, {"from": "p0"}):
+    for query in ({}, {"from": "p0", "to": "live"}):
         async with site.session.get("/objects/1/hls/index.m3u8", params={**query, "token": token}) as answer:
             assert answer.status == 200, await answer.text()
             text = await answer.text()

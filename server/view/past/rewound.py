@@ -5,7 +5,7 @@ So a segment has one address, whether it is new or long past, and who plays the 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import aclosing
 from dataclasses import dataclass, replace
 
@@ -22,12 +22,27 @@ from server.view.ts import Counters
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
-    """One segment in a list: pulses ``first … until - 1``."""
+class Listing:
+    """Consecutive segments of ``frames`` pulses, as far as they are in ``first … until - 1``."""
 
-    number: int
+    numbers: range
+    frames: int
     first: int
     until: int
+
+    def pulses_of(self, number: int) -> range:
+        """Give the pulses of one of them."""
+        begin = number * self.frames
+        return range(max(self.first, begin), min(self.until, begin + self.frames))
+
+    @property
+    def end(self) -> int:
+        """The pulse after the last segment's last."""
+        return self.pulses_of(self.numbers[-1]).stop
+
+    def since(self, number: int) -> Listing:
+        """Leave out those before one."""
+        return replace(self, numbers=range(max(number, self.numbers.start), self.numbers.stop))
 
 
 class Rewound:
@@ -49,31 +64,29 @@ class Rewound:
     ) -> None:
         self._source, self._plan, self._gop = source, plan, gop
         self._timeline, self._hearing = timeline, hearing
-        self._over = over
+        self.over = over
         self.end = min(decided, kept_until(source)) if over else decided
         """The pulse after the last that there is, or will ever be where it is over."""
 
-    def entries(self, start: int, end: int | None) -> Sequence[Entry]:
+    def listing(self, start: int, end: int | None) -> Listing | None:
         """List the segments from the one that holds pulse ``start``, or what is kept after it, to the end.
 
         Only whole ones, and the last one where it is over. In between, the last picture stands where
-        nothing was shown: no number is left out.
+        nothing was shown: no number is left out. None where there is none.
         """
         frames = self._plan.frames
         begin, earliest = kept_from(self._source, start), kept_from(self._source, 0)
         if begin is None or earliest is None:
-            return []
-        last = -(-self.end // frames) if self._over else self.end // frames
+            return None
+        last = -(-self.end // frames) if self.over else self.end // frames
         last = last if end is None else min(last, -(-end // frames))
-        return [
-            Entry(number, max(earliest, number * frames), min((number + 1) * frames, self.end))
-            for number in range(begin // frames, last)
-        ]
+        numbers = range(begin // frames, last)
+        return Listing(numbers, frames, earliest, self.end) if numbers else None
 
     async def segment(self, number: int) -> Segment | None:
         """Put a segment together; None where it is not whole yet, or nothing is kept of it or before it."""
         first, until = number * self._plan.frames, (number + 1) * self._plan.frames
-        until = min(until, self.end) if self._over else until
+        until = min(until, self.end) if self.over else until
         if not first < until <= self.end:
             return None
         lead = await last_before(self._source, first)
