@@ -97,11 +97,16 @@ def _of_another_moment(pulse: int, stamp: Stamp, courses: Mapping[str, Course]) 
 
 
 def _said(told: Told, number: int) -> Iterator[tuple[int, tuple[str | None, tuple[Box, ...]]]]:
-    """Give for every pulse the camera that was chosen and the boxes in its picture."""
+    """Give for every pulse the camera to be shown and the boxes in its picture.
+
+    Where none is chosen, since nobody sees the person, a stream stays with the last one.
+    """
+    shown: str | None = None
     for _, gop in told.gops:
         camera = told.choice(gop, number)
+        shown = camera or shown
         for place in range(gop.frames):
-            yield gop.first + place, (camera, _boxes(gop, camera, place))
+            yield gop.first + place, (shown, _boxes(gop, camera, place))
 
 
 def _boxes(gop: Gop, camera: str | None, place: int) -> tuple[Box, ...]:

@@ -64,7 +64,7 @@ async def run(fault: Fault, stand: Stand, views: Views) -> Outcome:
     tasks = [asyncio.create_task(viewer.run()) for viewer in stand.viewers]
     first = len(stand.told.gops)
     try:
-        await _all_watch(stand.viewers)
+        await _all_watch(stand)
         await asyncio.sleep(_BEFORE_S)
         before = [viewer.reconnections for viewer in stand.viewers]
         stand.returned.clear()
@@ -93,9 +93,13 @@ async def _injected(fault: Fault, stand: Stand, outcome: Outcome) -> None:
         outcome.failed = f"{type(error).__name__}: {error}"
 
 
-async def _all_watch(viewers: Sequence[Viewer]) -> None:
+async def _all_watch(stand: Stand) -> None:
+    """Wait, not for ever, until something has come for all viewers, and one is shown what may break."""
     give_up = time.monotonic() + _JOIN_S
-    while any(not it.last_came for it in viewers) and time.monotonic() < give_up:  # noqa: ASYNC110
+    while time.monotonic() < give_up:
+        shown = {stand.told.shown(it.number) for it in stand.viewers}
+        if all(it.last_came for it in stand.viewers) and shown.issuperset(stand.live[:1]):
+            return
         await asyncio.sleep(_POLL_S)
 
 

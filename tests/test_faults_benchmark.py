@@ -39,12 +39,12 @@ FOUND = {("c0", *(1000 * side + frame for side in SIDES)): frame for frame in ra
 VIEWS = Views([], {}, None, FOUND)
 
 
-def told(gops: int, camera: str | None = "c0") -> Told:
+def told(gops: int) -> Told:
     heard = Told()
     for number in range(gops):
         first = number * GOP
         boxes = {"c0": tuple((box_of(frame % FRAMES),) for frame in range(first, first + GOP))}
-        heard.take(Gop(first=first, frames=GOP, choices={1: camera}, boxes=boxes, cuts=()))
+        heard.take(Gop(first=first, frames=GOP, choices={1: "c0"}, boxes=boxes, cuts=()))
     return heard
 
 
@@ -102,8 +102,13 @@ def test_a_picture_that_no_event_named_a_camera_of_may_be_of_the_wrong_one() -> 
     assert kept(replace(unproven, fault=replace(FAULTS[0], breaks=True), back=1.0)), "nobody is there to say"
 
 
-def test_a_picture_of_any_camera_is_wrong_where_none_is_to_be_shown() -> None:
-    assert judge(watched(1), told(1, camera=None), 1, VIEWS).wrong == GOP
+def test_where_no_camera_is_chosen_the_last_one_stays() -> None:
+    heard = told(1)
+    heard.take(Gop(first=GOP, frames=GOP, choices={}, boxes={}, cuts=()))
+    pictures = watched(2)
+    assert judge(pictures, heard, 1, VIEWS).wrong == 0
+    pictures[14] = replace(pictures[14], stamp=Stamp("c1", 14))
+    assert judge(pictures, heard, 1, VIEWS).wrong == 1
 
 
 def test_of_a_network_camera_the_bounds_are_known_and_that_it_never_goes_back() -> None:
