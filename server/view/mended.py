@@ -26,16 +26,20 @@ class Mending:
         """Since when a track is whose, until the evidence speaks of that time no more."""
 
     def read(
-        self, window: CameraWindow, before: Sequence[Stretch[CameraWindow]], parts: Parts
+        self,
+        window: CameraWindow,
+        before: Sequence[Stretch[CameraWindow]],
+        parts: Parts,
+        asked_from: int,
     ) -> tuple[CameraWindow, list[Split]]:
         """Give a window by what its tracks are called now, and what has turned out about numbers.
 
-        ``before`` is what was said of its frames that were final; ``parts``, whose tracks are, is changed.
+        ``before`` is what was said of its frames that were final; ``parts``, whose tracks are, is changed:
+        of frames before ``asked_from`` it may be forgotten.
         """
         splits: list[Split] = []
         for one, two, frame in exchanged(window, before):
-            was = [numbers_over([parts.get(it, UNKNOWN)], frame - 1, 1)[0, 0] for it in (one, two)]
-            first, second = (0 if it == NOBODY_YET else int(it) for it in was)
+            first, second = (_whose(parts.get(it, UNKNOWN), frame - 1, asked_from) for it in (one, two))
             self._reader.locals.exchange(one, two)
             splits += self._registry.exchange(one, two, frame, (first, second))
             if first and second and first != second:
@@ -62,3 +66,11 @@ class Mending:
             for key, it in self._said.items()
             if key in parts and not any(it.first < part.first <= asked_from for part in parts[key])
         }
+
+
+def _whose(parts: Sequence[Part], frame: int, asked_from: int) -> int:
+    """Give whose a track was in a frame, 0: nobody's; where that is forgotten, in the first that is not."""
+    if frame < parts[0].first <= asked_from:
+        frame = parts[0].first
+    number = int(numbers_over([parts], frame, 1)[0, 0])
+    return 0 if number == NOBODY_YET else number

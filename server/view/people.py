@@ -227,7 +227,7 @@ class People:
         history = self._histories[window.message.camera]
         if window.message.mended_from is not None:
             before = history.over(window.first, window.fresh - 1)
-            window, splits = self._mending.read(window, before, self._parts)
+            window, splits = self._mending.read(window, before, self._parts, self._asked_from)
             self._corrections += self._by_hand.read_splits(splits)
         history.put(window, window.first, window.message.last)
         return window

@@ -63,7 +63,7 @@ def at(people: People, pulse: int) -> dict[int, float]:
 
 
 def played(
-    said_at: int, of: Sequence[int], *, late: bool = False
+    said_at: int, of: Sequence[int], *, late: bool = False, frames: int = FRAMES
 ) -> tuple[People, dict[int, dict[int, float]]]:
     """Let the two meet; say at a window's end where the first was in some frames.
 
@@ -74,7 +74,7 @@ def played(
     people.told.frames = ASSIST.memory
     camera, told, first = Camera(), {}, 0
     held: list[CameraTracks] = []
-    for frame in range(FRAMES):
+    for frame in range(frames):
         said: list[Pointing] = []
         if frame == said_at:
             [left] = [number for number, where in told[20].items() if where < 300]
@@ -119,6 +119,18 @@ def test_numbers_follow_from_what_is_told_next(said_at: int, *, late: bool) -> N
         assert sides(told, pulse) == [left, right]
     splits, all_ = people.take_corrections(), (Split(left, right, "c0"), Split(right, left, "c0"))
     assert splits == all_ or (splits == () and said_at == 84), "soon after, nobody was told to be anybody"
+
+
+@pytest.mark.parametrize("said_at", [249, 299])
+def test_numbers_follow_where_the_meeting_was_long_ago(said_at: int) -> None:
+    """Of that time nobody is asked any more who was who; what was seen in it is remembered for as long."""
+    frames = said_at + 51
+    people, told = played(said_at, range(MET + 8, MET + 14), frames=frames)
+    left, right = sides(told, 30)
+    assert sides(told, said_at - 20 - WINDOW.stride) == [right, left]
+    for pulse in range(said_at - 19, frames - 20):
+        assert sides(told, pulse) == [left, right]
+    assert people.take_corrections() == (Split(left, right, "c0"), Split(right, left, "c0"))
 
 
 def test_who_points_again_after_it_was_mended_still_means_the_same() -> None:
