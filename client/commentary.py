@@ -6,7 +6,7 @@ import asyncio
 import contextlib
 import logging
 from bisect import bisect_right, insort
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Iterator, Sequence
 from dataclasses import dataclass
 
 import msgspec
@@ -15,6 +15,7 @@ from client.api import past, site
 from client.events import events
 from client.http import ClientError, HttpSettings
 from client.model import Box, Event, Gop, Site
+from client.spool import Place, Spool
 
 _log = logging.getLogger(__name__)
 _GOPS = 64  # remembered where nothing is recorded: far more than the picture is behind the events
@@ -34,14 +35,17 @@ class Frame:
 class _Shown:
     frames: int
     camera: str | None
-    boxes: bytes
-    """Packed: an hour of them is a few megabytes."""
+    boxes: Place | None
+    """Packed; an hour of five people's is some 17 MB. None: they are not known, or not kept."""
 
 
 class Commentary:
-    """Remembers the choices for one object and the boxes in its pictures: the last ones, or all of them."""
+    """Remembers the choices for one object: the last ones, or all of them and the boxes in its pictures.
 
-    def __init__(self, number: int, *, keep: bool = False) -> None:
+    ``keep`` is where the boxes are put; None: only the last choices are remembered.
+    """
+
+    def __init__(self, number: int, *, keep: Spool | None = None) -> None:
         self.number = number
         self.site: Site | None = None
         self._keep = keep
@@ -85,24 +89,38 @@ class Commentary:
                     await self._heard.wait()
 
     def frames(self, first: int, last: int) -> Iterator[Frame]:
-        """Give what is known of the frames from one pulse to another, both included, in order."""
+        """Give what is known of the frames from one pulse to another, both included, in order.
+
+        Raises:
+            OSError: what was kept cannot be read.
+        """
         for begin in self._firsts:
             shown = self._shown[begin]
-            if shown.camera is None or begin > last or begin + shown.frames <= first:
+            outside = begin > last or begin + shown.frames <= first
+            if self._keep is None or shown.camera is None or shown.boxes is None or outside:
                 continue
-            boxes = msgspec.msgpack.decode(shown.boxes, type=tuple[tuple[Box, ...], ...])
+            boxes = msgspec.msgpack.decode(self._keep.get(shown.boxes), type=tuple[tuple[Box, ...], ...])
             for pulse, some in enumerate(boxes, start=begin):
                 if first <= pulse <= last:
                     yield Frame(pulse, shown.camera, some)
 
     def _take_gop(self, gop: Gop) -> None:
         camera = gop.choices.get(self.number)
-        boxes = gop.boxes.get(camera, ()) if camera is not None and self._keep else ()
+        boxes = None if camera is None else self._kept(gop.boxes.get(camera, ()))
         if gop.first not in self._shown:
             insort(self._firsts, gop.first)
-        self._shown[gop.first] = _Shown(gop.frames, camera, msgspec.msgpack.encode(boxes))
-        if not self._keep and len(self._firsts) > _GOPS:
+        self._shown[gop.first] = _Shown(gop.frames, camera, boxes)
+        if self._keep is None and len(self._firsts) > _GOPS:
             del self._shown[self._firsts.pop(0)]
+
+    def _kept(self, boxes: Sequence[Sequence[Box]]) -> Place | None:
+        if self._keep is None:
+            return None
+        try:
+            return self._keep.put(msgspec.msgpack.encode(boxes))
+        except OSError as error:  # the disk that the film is on: the recording will say so
+            _log.debug("boxes are not kept: %s", error)
+            return None
 
 
 @contextlib.asynccontextmanager

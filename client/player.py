@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from client.http import ClientError, HttpSettings, server_url
 from client.recording import Recording, recording
 from client.session import Report, Session
 from client.sidecar import write_sidecars
+from client.spool import Spool
 from client.webm_recording import WebmRecording
 
 _DEFAULT = HttpSettings()
@@ -63,17 +65,20 @@ async def watch(
         OSError: the file cannot be written.
     """
     server = server_url(url)
-    commentary = Commentary(number, keep=out is not None)
     container = await _container(url, out, settings)
-    with recording(out, seconds, container) as record:
+    record: Recording | WebmRecording | None = None
+    with closing(Spool(Path() if out is None else out.parent)) as spool:
+        commentary = Commentary(number, keep=None if out is None else spool)
         try:
-            async with following(url, commentary, settings, start, end):
-                session = Session(record, commentary, progress, start, end)
-                complete = await session.run(server / f"objects/{number}/best.{container}", settings)
-                if out is not None and record.media_time is not None:
-                    await commentary.reach(record.media_time)
-        finally:
-            _write_beside(out, record, commentary)
+            with recording(out, seconds, container) as record:
+                async with following(url, commentary, settings, start, end):
+                    session = Session(record, commentary, progress, start, end)
+                    complete = await session.run(server / f"objects/{number}/best.{container}", settings)
+                    if out is not None and record.media_time is not None:
+                        await commentary.reach(record.media_time)
+        finally:  # the film is there first
+            if record is not None:
+                _write_beside(out, record, commentary)
     return Watched(
         out,
         record.seconds,
@@ -107,4 +112,4 @@ def _write_beside(out: Path | None, record: Recording | WebmRecording, commentar
     if out is None or site is None or record.begin is None or record.media_time is None:
         return
     first, last = round(record.begin * site.fps), round(record.media_time * site.fps)
-    write_sidecars(out, list(commentary.frames(first, last)), first, commentary.number, site)
+    write_sidecars(out, commentary.frames(first, last), first, commentary.number, site)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import msgspec
@@ -34,32 +34,40 @@ def sidecars(film: Path) -> tuple[Path, Path]:
     return film.with_suffix(".vtt"), film.with_suffix(".ass")
 
 
-def write_sidecars(film: Path, frames: Sequence[Frame], first: int, number: int, site: Site) -> None:
+def write_sidecars(film: Path, frames: Iterable[Frame], first: int, number: int, site: Site) -> None:
     """Write who is where in a film whose time 0 is pulse ``first``; ``number`` is whom it shows.
+
+    Frame by frame, as they are taken from ``frames``: a film may be of a day.
 
     Raises:
         OSError: they cannot be written.
     """
-    vtt, ass = sidecars(film)
-    vtt.write_text(_vtt(frames, first, number, site), encoding="utf-8", newline="\n")
-    ass.write_text(_ass(frames, first, number, site), encoding="utf-8", newline="\n")
+    vtt, ass = (path.open("w", encoding="utf-8", newline="\n") for path in sidecars(film))
+    with vtt, ass:
+        vtt.write(_vtt_head(number, site))
+        ass.write(_ASS_HEAD.format(width=site.width, height=site.height, size=max(8, site.height // 24)))
+        between = ""
+        for frame in frames:
+            vtt.write(f"\n\n{_cue(frame, first, site)}")
+            for line in _lines(frame, first, number, site):
+                ass.write(f"{between}Dialogue: {line}")
+                between = "\n"
+        vtt.write("\n")
+        ass.write("\n")
 
 
-def _vtt(frames: Sequence[Frame], first: int, number: int, site: Site) -> str:
-    """Give a metadata track: a cue per frame, its pulse as the name, JSON as the text (W3C WebVTT)."""
-    cues = [
-        f"p{frame.pulse}\n"
-        f"{' --> '.join(_clock((at - first) / site.fps, 3) for at in (frame.pulse, frame.pulse + 1))}\n"
-        + msgspec.json.encode(
-            {"camera": frame.camera, "boxes": [_rounded(it) for it in frame.boxes]}
-        ).decode()
-        for frame in frames
-    ]
-    note = (
-        f"NOTE the best view of object {number} of {site.name}; boxes: object, left, top, right, bottom "
-        f"in pixels of a picture of {site.width}x{site.height}"
+def _vtt_head(number: int, site: Site) -> str:
+    return (
+        f"WEBVTT\n\nNOTE the best view of object {number} of {site.name}; boxes: object, left, top, right, "
+        f"bottom in pixels of a picture of {site.width}x{site.height}"
     )
-    return "\n\n".join(["WEBVTT", note, *cues]) + "\n"
+
+
+def _cue(frame: Frame, first: int, site: Site) -> str:
+    """Give a frame of a metadata track: its pulse as the name, JSON as the text (W3C WebVTT)."""
+    times = " --> ".join(_clock((at - first) / site.fps, 3) for at in (frame.pulse, frame.pulse + 1))
+    told = {"camera": frame.camera, "boxes": [_rounded(it) for it in frame.boxes]}
+    return f"p{frame.pulse}\n{times}\n{msgspec.json.encode(told).decode()}"
 
 
 def _rounded(box: Box) -> Box:
@@ -67,21 +75,11 @@ def _rounded(box: Box) -> Box:
     return Box(box.object, *(round(side, 1) for side in (box.left, box.top, box.right, box.bottom)))
 
 
-def _ass(frames: Sequence[Frame], first: int, number: int, site: Site) -> str:
-    """Give subtitles that are the boxes (Advanced SubStation Alpha, drawn by libass)."""
-    lines = [
-        f"Dialogue: {line}"
-        for frame in frames
-        for box in frame.boxes
-        for line in _drawn(
-            box,
-            _clock((frame.pulse - first) / site.fps, 2),
-            _clock((frame.pulse + 1 - first) / site.fps, 2),
-            "Shown" if box.object == number else "Other",
-        )
-    ]
-    head = _ASS_HEAD.format(width=site.width, height=site.height, size=max(8, site.height // 24))
-    return head + "\n".join(lines) + "\n"
+def _lines(frame: Frame, first: int, number: int, site: Site) -> Iterator[str]:
+    """Give subtitles that are a frame's boxes (Advanced SubStation Alpha, drawn by libass)."""
+    begin, end = (_clock((at - first) / site.fps, 2) for at in (frame.pulse, frame.pulse + 1))
+    for box in frame.boxes:
+        yield from _drawn(box, begin, end, "Shown" if box.object == number else "Other")
 
 
 def _drawn(box: Box, begin: str, end: str, style: str) -> tuple[str, str]:

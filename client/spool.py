@@ -1,0 +1,56 @@
+"""What is kept until the end of a recording, on the disk: memory must not grow with its length."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryFile
+from typing import IO
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where something is in the spool."""
+
+    offset: int
+    length: int
+
+
+class Spool:
+    """Bytes in a file without a name in ``folder``, which goes with the process. It is there when needed."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._file: IO[bytes] | None = None
+
+    def put(self, data: bytes) -> Place:
+        """Keep something.
+
+        Raises:
+            OSError: the disk does not take it.
+        """
+        if self._file is None:
+            self._file = TemporaryFile(dir=self._folder, buffering=0)  # noqa: SIM115 — see close
+        offset = self._file.seek(0, os.SEEK_END)
+        if self._file.write(data) < len(data):
+            self._file.truncate(offset)
+            raise OSError(f"{self._folder}: no room for {len(data)} bytes")
+        return Place(offset, len(data))
+
+    def get(self, place: Place) -> bytes:
+        """Give back what was kept.
+
+        Raises:
+            OSError: it cannot be read.
+        """
+        if self._file is None:
+            return b""
+        self._file.seek(place.offset)
+        return self._file.read(place.length)
+
+    def close(self) -> None:
+        """Forget all of it."""
+        if self._file is not None:
+            self._file.close()
+            self._file = None
