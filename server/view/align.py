@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Container, Sequence
+from collections.abc import Callable, Container, Sequence
 from dataclasses import dataclass, field
 
 from server.wire.epochs import end_of_epoch
@@ -26,6 +26,8 @@ class Epoch:
     """Cameras that were waited for in vain, and cameras whose word on it was lost on the way."""
     mended: tuple[CameraTracks, ...] = ()
     """Words on earlier epochs that came too late for these, and say who was who before."""
+    skipped: int = 0
+    """Epochs before it that are left out: nobody spoke of them, and they are long past."""
 
 
 @dataclass(slots=True)
@@ -48,14 +50,24 @@ class Aligner:
     ``grace`` is how many pulses a camera that is there is waited for, after an epoch's end and the first
     word on it. While none has, they are all ``behind``: the first is waited for so many pulses more.
     Without any of them it could only go on with nobody.
+
+    What is more than ``far`` pulses away from the present is of another time: epochs begin with what is not,
+    and where nobody has a word on one that is so long past, they go on with what is not. None: there is no
+    present, as of recordings, and nothing is left out.
     """
 
-    def __init__(self, cameras: Sequence[str], stride: int, grace: int, behind: int = 0) -> None:
-        self.stride, self._grace, self._behind = stride, grace, behind
+    def __init__(
+        self, cameras: Sequence[str], stride: int, grace: int, behind: int = 0, far: int | None = None
+    ) -> None:
+        self.stride, self._grace, self._behind, self._far = stride, grace, behind, far
         self._places = {camera: _Place() for camera in cameras}
         self._next: int | None = None
+        self._shown: dict[str, int] = {}
+        """By camera: the first epoch of which a frame has come, while it is not known where to begin."""
         self._heard: int | None = None
         """The pulse at which somebody had spoken of the next epoch, or of a later one."""
+        self._left_out = 0
+        """Epochs that are, before the next one."""
         self.late_messages = dict.fromkeys(cameras, 0)
         self._mended: deque[CameraTracks] = deque(maxlen=_MENDED_MOST)
 
@@ -75,20 +87,15 @@ class Aligner:
         if place.boot != boot:
             place.boot, place.first, place.ended, place.trusted = boot, pulse, False, True
         if self._next is None:
-            self._next = pulse // self.stride
+            epoch = pulse // self.stride
+            self._shown[camera] = min(epoch, self._shown.get(camera, epoch))
 
     def tracks(self, message: CameraTracks) -> None:
         """A camera's window came."""
-        place = self._places[message.camera]
-        if self._next is None:
-            self._next = message.epoch
-        if message.epoch < self._next:
-            self.late_messages[message.camera] += 1
-            if message.mended_from is not None:
-                self._mended.append(message)  # that the past was mended is not said again
-            # It ended while nobody waited for it: that must not be lost, or its end is waited for.
-            place.ended |= message.ended
+        if self._next is not None and message.epoch < self._next:
+            self._too_late(message)
             return
+        place = self._places[message.camera]
         place.waiting[message.epoch] = message
         place.trusted = True
 
@@ -111,9 +118,11 @@ class Aligner:
 
     def next_ready(self, now: int) -> Epoch | None:
         """Take out the next one of them; None: there is none."""
-        number = self._next
-        if number is None or self.all_ended:
+        if self._next is None:
+            self._begin(now)
+        if self._next is None or self.all_ended:
             return None
+        number = self._next = self._caught_up(now, self._next)
         end = end_of_epoch(number, self.stride)
         missing = [name for name, place in self._places.items() if self._awaited(place, end)]
         any_word = any(place.waiting for place in self._places.values())
@@ -132,7 +141,45 @@ class Aligner:
                 taken[name] = message
                 place.ended |= message.ended
         mended, self._mended = tuple(self._mended), deque(maxlen=_MENDED_MOST)
-        return Epoch(number, end, taken, (*late, *self._skipped(end, taken)), mended)
+        skipped, self._left_out = self._left_out, 0
+        return Epoch(number, end, taken, (*late, *self._skipped(end, taken)), mended, skipped)
+
+    def _begin(self, now: int) -> None:
+        """Begin with the first epoch that anybody has spoken of, but for words of another time."""
+        self._drop(lambda epoch: not self._is_near(epoch, now))
+        words = [*self._words(), *(it for it in self._shown.values() if self._is_near(it, now))]
+        self._next = min(words, default=None)
+        self._shown.clear()
+
+    def _caught_up(self, now: int, number: int) -> int:
+        """Give the epoch to go on with: where ``number`` is long past, one of the present."""
+        if end_of_epoch(number, self.stride) > now or self._is_near(number, now) or number in self._words():
+            return number
+        to = min((it for it in self._words() if self._is_near(it, now)), default=now // self.stride)
+        self._drop(lambda epoch: epoch < to)
+        self._left_out, self._heard = self._left_out + to - number, None
+        return to
+
+    def _words(self) -> list[int]:
+        """List the epochs of all words that wait."""
+        return [epoch for place in self._places.values() for epoch in place.waiting]
+
+    def _is_near(self, epoch: int, now: int) -> bool:
+        """Tell whether an epoch is of about now; all are while nobody knows what is now."""
+        return self._far is None or now < 0 or abs(end_of_epoch(epoch, self.stride) - now) <= self._far
+
+    def _drop(self, which: Callable[[int], bool]) -> None:
+        """Drop the words on some epochs, as those that come too late."""
+        for place in self._places.values():
+            for epoch in [epoch for epoch in place.waiting if which(epoch)]:
+                self._too_late(place.waiting.pop(epoch))
+
+    def _too_late(self, message: CameraTracks) -> None:
+        self.late_messages[message.camera] += 1
+        if message.mended_from is not None:
+            self._mended.append(message)  # that the past was mended is not said again
+        # It ended while nobody waited for it: that must not be lost, or its end is waited for.
+        self._places[message.camera].ended |= message.ended
 
     def _patience(self, end: int) -> int:
         """Give the last pulse at which an epoch with this end is waited for."""

@@ -128,9 +128,12 @@ class Decider:
         self._goes_on = view.goes_on_s * fps
 
     def step(self, epoch: Epoch) -> list[GopDecision]:
-        """Take an epoch in; give the GOPs whose look-ahead it completes."""
+        """Take an epoch in; give the GOPs whose look-ahead it completes.
+
+        Where epochs before it are left out, so are the GOPs that were not decided by then.
+        """
         gop, lookahead = self._config.encode.gop, self._config.view.lookahead
-        if self._next_gop is None:
+        if self._next_gop is None or epoch.skipped:  # nobody can say any more what was before
             start = epoch.last - self._config.track.window.stride + 1
             self._next_gop = -(-start // gop) * gop
         self._sight.put(self.people.update(epoch))

@@ -34,6 +34,8 @@ class Lacking:
         """Windows that were decided without a camera that was there."""
         self.lost_pictures = dict.fromkeys(shelves, 0)
         """By camera: pictures of decided GOPs that did not come though it was delivering."""
+        self._until: int | None = None
+        """The first pulse of which nothing is decided yet."""
 
     def epoch(self, epoch: Epoch) -> None:
         """Note whose tracks are late, and what cameras say that they did not do or hear."""
@@ -57,8 +59,17 @@ class Lacking:
 
     def gop(self, decision: GopDecision) -> None:
         """Note the pictures of a GOP that did not come, of cameras that were delivering."""
+        if self._until is not None and decision.first > self._until:
+            self._hole(range(self._until, decision.first))
+        self._until = decision.first + decision.frames
         for camera, shelf in self._shelves.items():
             lost = shelf.lost(decision.first, decision.frames)
             self.lost_pictures[camera] += len(lost)
             if self.recorder is not None:
                 self.recorder.late(camera, lost, "no picture")
+
+    def _hole(self, pulses: range) -> None:
+        """Note frames that nobody spoke of until they were long past: in one line, there may be millions."""
+        log.warning("pulses %d to %d are not decided: they were long past", pulses.start, pulses.stop - 1)
+        if self.recorder is not None:
+            self.recorder.late("", [pulses.start], f"not decided up to {pulses.stop}")

@@ -38,8 +38,11 @@ from server.wire.sections import View
 
 log = logging.getLogger(__name__)
 
-_AHEAD_S = 60.0
-"""How far a camera may have counted ahead of this service, which may have been held up."""
+_FAR_S = 60.0
+"""How far a camera may have counted ahead of this service, which may have been held up; or this service be
+behind the pulses, and still go through all that it has missed."""
+_FIRST_PULSE_S = 3.0
+"""How long the first pulse is waited for: where there is no pulse server, cameras count alone."""
 
 
 class BestViewService:
@@ -56,7 +59,8 @@ class BestViewService:
         """Frames that can be looked ahead while this runs: half as many as what is kept could do for."""
         self.agreement = agreement_for(config)
         self.shelves = {camera: Shelf(config.site.fps, frames, self.agreement) for camera in cameras}
-        self.aligner = Aligner(cameras, stride, grace, behind)
+        far = round(_FAR_S * fps)
+        self.aligner = Aligner(cameras, stride, grace, behind, far + grace + behind)
         form = config.sound.format
         self.sound = None if form is None else SoundShelf(form, config.site.fps, frames / config.site.fps)
         self.splicer = Splicer(self.shelves, self.agreement, config, self.sound)
@@ -67,7 +71,7 @@ class BestViewService:
             self.sound,
             sounding=config.sounding,
             now=lambda: self.pulse,
-            ahead=round(_AHEAD_S * fps),
+            ahead=far,
         )
         self.decider = Decider(
             config, homographies(config), lambda camera, pulse: self.shelves[camera].has(pulse)
@@ -95,6 +99,8 @@ class BestViewService:
         self.pulse_login: Login | None = None  # of whom the pulse server asks for none
         self._keys = Keys(config.site.name)
         self._changed = asyncio.Event()
+        self._without_pulses = False
+        """Whether the first pulse is not waited for any more."""
 
     def open(self) -> None:
         """Open the bus, which the cameras connect to; of several services the first one's.
@@ -131,6 +137,7 @@ class BestViewService:
             self._recorder = self.lacking.recorder = self._record(self._out)
         self.past.open()
         self.by_hand.open()
+        patience = asyncio.get_running_loop().call_later(_FIRST_PULSE_S, self._go_without_pulses)
         follow = asyncio.create_task(self._follow_pulses(), name="pulses")
         follow.add_done_callback(lambda _: self._changed.set())
         try:
@@ -139,14 +146,20 @@ class BestViewService:
                 self._changed.clear()
                 if follow.done():
                     await follow  # raises what ended it
-                await self.decide_by_turns()
+                if self.pulse >= 0 or self._without_pulses:
+                    await self.decide_by_turns()
             last = max(shelf.newest for shelf in self.shelves.values())
             for decision in self.decider.finish(last):
                 self._publish(decision)
             log.info("every camera's recording is over")
         finally:
+            patience.cancel()
             follow.cancel()
             await asyncio.gather(follow, return_exceptions=True)
+
+    def _go_without_pulses(self) -> None:
+        self._without_pulses = True
+        self._changed.set()
 
     def decide(self) -> None:
         """Decide and publish whatever can be decided by now."""

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from server.view.mp4_sound import sound_fragment
+from server.view.timeline import LONGEST_S
 from server.wire.messages import SoundHead
 from server.wire.sound import SoundFormat
 
@@ -96,7 +97,9 @@ class Following:
         shelf = self._shelf
         form, fps = shelf.format, shelf.fps
         begin, end = form.frame_at(first, fps), form.frame_at(until, fps)
-        if self._next is None or begin < self._next - _ANEW_S * form.rate // form.samples:
+        # A hole that the pictures leave one too, as of a machine that slept, is no silence of hours.
+        second = form.rate / form.samples
+        if self._next is None or not -_ANEW_S * second <= begin - self._next <= LONGEST_S * second:
             self._next = begin
         late = end - shelf.patience
         heard = shelf.come(self._next, end, late)

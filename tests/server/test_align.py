@@ -124,6 +124,69 @@ def test_a_camera_whose_word_on_an_epoch_was_lost_is_not_waited_for_and_the_loss
     assert heard(aligner.ready(now=0)) == [(0, ("c1",), ("c0",)), (1, ("c0", "c1"), ())]
 
 
+FAR = 300
+
+
+def taken(aligner: Aligner, now: int, count: int) -> list[Epoch]:
+    """Take out the next epochs; with nobody to wait for there may be one for each of the last pulses."""
+    return [epoch for _ in range(count) if (epoch := aligner.next_ready(now)) is not None]
+
+
+def test_what_nobody_spoke_of_and_is_long_past_is_left_out_at_once() -> None:
+    aligner = Aligner(CAMERAS, STRIDE, GRACE, far=FAR)
+    for camera in ("c0", "c1"):
+        aligner.frame(camera, 1, 0)
+        aligner.tracks(word(camera, 0))
+    assert heard(aligner.ready(now=4)) == [(0, ("c0", "c1"), ())]
+    aligner.tracks(word("c0", 2))
+    aligner.tracks(word("c1", 1_000_000))
+    aligner.tracks(word("c0", 1_000_001, ended=True))
+    (leap,) = taken(aligner, 5_000_020, 2)
+    (after,) = taken(aligner, 5_000_021 + GRACE, 1)
+    assert heard([leap, after]) == [(1_000_000, ("c1",), ("c0",)), (1_000_001, ("c0",), ("c1",))]
+    assert (leap.skipped, after.skipped) == (999_999, 0)
+    assert aligner.late_messages == {"c0": 1, "c1": 0, "c2": 0}
+
+
+def test_with_nobody_left_it_goes_on_with_now() -> None:
+    aligner = Aligner(CAMERAS, STRIDE, GRACE, far=FAR)
+    aligner.frame("c0", 1, 0)
+    assert aligner.ready(now=0) == []
+    aligner.gone("c0")
+    assert aligner.ready(now=5_000_000) == []
+    (epoch,) = aligner.ready(now=5_000_004 + GRACE + 1)
+    assert (epoch.number, epoch.skipped) == (1_000_000, 1_000_000)
+
+
+def test_what_is_not_long_past_and_what_somebody_spoke_of_are_taken_out_one_by_one() -> None:
+    aligner = Aligner(CAMERAS, STRIDE, GRACE, far=FAR)
+    aligner.frame("c0", 1, 0)
+    assert aligner.ready(now=0) == []
+    one_by_one = (FAR - GRACE) // STRIDE
+    assert [it.number for it in aligner.ready(now=FAR)] == list(range(one_by_one))
+    aligner.tracks(word("c0", one_by_one))
+    (spoken,) = taken(aligner, 1000 * FAR, 2)
+    (leap,) = taken(aligner, 1000 * FAR + STRIDE + GRACE, 1)
+    assert (spoken.number, spoken.skipped) == (one_by_one, 0)
+    assert leap.skipped
+
+
+def test_words_of_another_time_do_not_say_where_to_begin() -> None:
+    aligner = Aligner(CAMERAS, STRIDE, GRACE, far=FAR)
+    for camera, epoch in (("c0", 3), ("c1", 1_000_000), ("c2", 9_000_000)):
+        aligner.frame(camera, 1, epoch * STRIDE)
+        aligner.tracks(word(camera, epoch))
+    assert taken(aligner, 5_000_004, 1) == [], "c0 may still come to its senses"
+    assert heard(taken(aligner, 5_000_005 + GRACE, 1)) == [(1_000_000, ("c1",), ("c0",))]
+    assert aligner.late_messages == {"c0": 1, "c1": 0, "c2": 1}
+
+
+def test_of_recordings_nothing_is_left_out() -> None:
+    aligner = begun("c0")
+    aligner.tracks(word("c0", 1000))
+    assert [it.number for it in taken(aligner, 10**9, 1001)] == list(range(1001))
+
+
 BEHIND = 50
 
 
