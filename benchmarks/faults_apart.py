@@ -103,7 +103,7 @@ def restarted(*processes: str) -> Inject:
 def _restart(processes: tuple[str, ...]) -> Fault:
     name, inject = f"restart {title(processes)}", restarted(*processes)
     if BESTVIEW in processes:
-        return Fault(name, apart, inject, 12.0, None, breaks=True)
+        return Fault(name, apart, inject, 15.0, None, breaks=True)
     return Fault(name, apart, inject)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import signal
+from collections.abc import AsyncIterator
 
 import aiohttp
 
@@ -42,26 +43,35 @@ def frozen(*processes: str, seconds: float = _FROZEN_S) -> Inject:
 def while_drawing(inject: Inject, *, breaks: bool) -> Inject:
     """Have a viewer of JPEG, so that there is a drawing process.
 
-    Their stream goes on; where it breaks with its server, it is opened again until pictures come.
+    Their stream goes on; where it breaks with its server, it is opened again, and pictures come.
     """
 
     async def injected(stand: Stand) -> None:
         path = f"/objects/{stand.viewers[0].number}/best.mjpeg"
         async with aiohttp.ClientSession(stand.url, raise_for_status=True) as session:
-            async with session.get(path) as answer:
-                await answer.content.readexactly(_SOME_BYTES)
+            async with _pictures(session, path) as content:
+                await content.readexactly(_SOME_BYTES)
                 await inject(stand)
                 if not breaks:
-                    await answer.content.readexactly(_MORE_BYTES)
+                    await content.readexactly(_MORE_BYTES)
                     return
-            while True:
-                with contextlib.suppress(aiohttp.ClientError, asyncio.IncompleteReadError):
-                    async with session.get(path) as answer:
-                        await answer.content.readexactly(_MORE_BYTES)
-                        return
-                await asyncio.sleep(_AGAIN_S)
+            async with _pictures(session, path) as content:
+                await content.readexactly(_MORE_BYTES)
 
     return injected
+
+
+@contextlib.asynccontextmanager
+async def _pictures(session: aiohttp.ClientSession, path: str) -> AsyncIterator[aiohttp.StreamReader]:
+    """Open a stream of JPEG; a busy server, or one that is not there yet, is asked again."""
+    while True:
+        try:
+            answer = await session.get(path)
+            break
+        except aiohttp.ClientError:
+            await asyncio.sleep(_AGAIN_S)
+    async with answer:
+        yield answer.content
 
 
 def _kill(processes: tuple[str, ...]) -> Fault:
