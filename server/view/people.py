@@ -26,6 +26,8 @@ from server.wire.sections import Share
 
 ALL = Share()
 """One service for everybody."""
+_LATELY = 100
+"""Frames that tell whether a camera looks; at least those of an epoch."""
 
 
 class People:
@@ -81,7 +83,8 @@ class People:
         late = [self._taken(window) for window in self._reader.read_late(epoch)]
         windows = [self._taken(window) for window in self._reader.read(epoch)]
         tracks = [track for window in windows for track in window.local_tracks()]
-        pictures = self._pictures(windows, self._now + 1 - self._lag, epoch.last - self._lag)
+        since = max(self._now + 1, epoch.last + 1 - _LATELY)  # there may be a long time in between
+        pictures = self._pictures(windows, since - self._lag, epoch.last - self._lag)
         self._now = epoch.last
         update = self._by_hand.read(self._registry.update(tracks, epoch.last - self._lag, pictures))
         for key, parts in parts_of(update.numbers).items():
