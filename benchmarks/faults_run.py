@@ -15,6 +15,7 @@ from benchmarks.faults_viewer import Viewer
 _VIEWERS = 2
 _BEFORE_S = 4.0
 _JOIN_S = 20.0
+_BACK_S = 40.0
 _LONGEST_S = 150.0
 """A fault may take so much longer than it should: a browser starts, a process is slow to load."""
 _POLL_S = 0.05
@@ -71,6 +72,8 @@ async def run(fault: Fault, stand: Stand, views: Views) -> Outcome:
         stand.page_at = None
         outcome.began = time.monotonic()
         await asyncio.gather(_injected(fault, stand, outcome), asyncio.sleep(fault.seconds))
+        if fault.breaks:
+            await _all_back(stand)
         outcome.until = time.monotonic()
         outcome.reconnections = sum(viewer.reconnections for viewer in stand.viewers) - sum(before)
     finally:
@@ -99,6 +102,15 @@ async def _all_watch(stand: Stand) -> None:
     while time.monotonic() < give_up:
         shown = {stand.told.shown(it.number) for it in stand.viewers}
         if all(it.last_came for it in stand.viewers) and shown.issuperset(stand.live[:1]):
+            return
+        await asyncio.sleep(_POLL_S)
+
+
+async def _all_back(stand: Stand) -> None:
+    """Wait, not for ever, until the server is back and all viewers have some of it: machines may be busy."""
+    give_up = time.monotonic() + _BACK_S
+    while time.monotonic() < give_up:
+        if stand.returned and all(it.last_came > stand.returned[0] + RHYTHM_S for it in stand.viewers):
             return
         await asyncio.sleep(_POLL_S)
 
