@@ -24,6 +24,7 @@ from server.web.access_here import is_from_here
 from server.web.access_sessions import Sessions
 from server.web.api import problem
 from server.web.operator_permission import path_of, refused_to_other_sites
+from server.web.turns import again_and_again
 from server.wire.tokens import Token, digest_of
 
 COOKIE = "myview"
@@ -146,9 +147,14 @@ class Access:
 
     async def run(self) -> None:
         """Look at the file again and again, and end what nobody may have any more."""
-        while self._file is not None:
-            await asyncio.sleep(_LOOK_EVERY_S)
+        if self._file is not None:
+            await again_and_again(_LOOK_EVERY_S, self._look, "looking at the file of tokens")
+
+    async def _look(self) -> None:
+        assert self._file is not None  # noqa: S101 — nobody looks where there is none
+        try:
             await asyncio.to_thread(self._file.look)  # a long file takes longer to read than a frame
+        finally:
             self.end_what_is_over()
 
     def end_what_is_over(self) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import logging
 from collections import deque
 from collections.abc import Iterator
@@ -16,6 +15,7 @@ from server.view.flags import Flag
 from server.view.service import BestViewService
 from server.web.access_grant import Scope
 from server.web.narrow import cameras_for, choices_for, flag_for, objects_for, site_for
+from server.web.turns import again_and_again
 from server.web.views import cameras_info, objects_info, site_info
 from server.wire.messages import GopChoices
 
@@ -84,10 +84,7 @@ class Events:
 
     async def run(self) -> None:
         """Tell about people and cameras, and keep silent connections alive."""
-        while True:
-            await asyncio.sleep(_LIST_EVERY_S)
-            for sees, line in self._lines.items():
-                self._tell(sees, line)
+        await again_and_again(_LIST_EVERY_S, self._tell_all, "telling about people and cameras")
 
     def close(self) -> None:
         """End all readers' streams."""
@@ -102,6 +99,10 @@ class Events:
         if self._closed:
             line.channel.close()
         return line
+
+    async def _tell_all(self) -> None:
+        for sees, line in self._lines.items():
+            self._tell(sees, line)
 
     def _tell(self, sees: Scope, line: _Line) -> None:
         lists = self._lists(sees)

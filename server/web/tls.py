@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import asyncio
 import logging
 import ssl
 from pathlib import Path
 
+from server.web.turns import again_and_again
 from server.wire.changed import State, state_of
 from server.wire.errors import UserError
 from server.wire.sections import Tls
@@ -27,6 +27,9 @@ class Certificate:
         """
         self._certificate, self._key = certificate, key
         self._seen = self._state()
+        """As it is in force."""
+        self._trouble = ""
+        """Why what is there now is not."""
         self._newest = self._load()
         self.context = self._newest
         # A context keeps what it has loaded beside a later key of another kind: each pair has its own.
@@ -45,21 +48,25 @@ class Certificate:
 
     def look(self) -> None:
         """Read the files again if they have changed; what cannot be read leaves the old one in force."""
-        before, self._seen = self._seen, self._state()
-        if self._seen == before:
+        now = self._state()
+        if now == self._seen:
             return
         try:
             self._newest = self._load()
-        except UserError as error:
-            log.warning("%s; the certificate as it was stays in force", error)
+        except UserError as error:  # read again at the next look: it may be half of a renewal
+            if str(error) != self._trouble:
+                log.warning("%s; the certificate as it was stays in force", error)
+            self._trouble = str(error)
         else:
+            self._seen, self._trouble = now, ""
             log.info("%s: is in force for new connections", self._certificate)
 
     async def run(self) -> None:
         """Look again and again."""
-        while True:
-            await asyncio.sleep(_LOOK_EVERY_S)
-            self.look()
+        await again_and_again(_LOOK_EVERY_S, self._look, "looking at the certificate")
+
+    async def _look(self) -> None:
+        self.look()
 
     def _hand_over(self, connection: ssl.SSLObject, _: str | None, __: ssl.SSLContext) -> None:
         connection.context = self._newest
@@ -73,8 +80,8 @@ class Certificate:
                 raise UserError(f"http.tls.{what}: cannot read {path}: {error.strerror}") from error
         try:
             context.load_cert_chain(self._certificate, self._key, password=_no_password)
-        except (ssl.SSLError, ValueError) as error:
-            reason = getattr(error, "reason", None) or str(error)
+        except (OSError, ValueError) as error:  # of ssl, or one of them has gone this very moment
+            reason = getattr(error, "reason", None) or getattr(error, "strerror", None) or str(error)
             raise UserError(
                 f"http.tls: {self._certificate} and {self._key} are no certificate and its key: {reason}"
             ) from error
