@@ -74,13 +74,13 @@ class Budget:
     def _go_on(self, now: int) -> None:
         """Let time pass: what may be spent grows, and what is long ago is forgotten."""
         self._first = now if self._first is None else self._first
+        while self._raised and self._raised[0][0] < now - _ONE_S * self._fps:
+            self._raised.popleft()
         if now == self._last:
             return
         passed = (now - (now if self._last is None else self._last)) / (_MINUTE_S * self._fps)
         self._left = min(self._left + self._per_minute * passed, self._per_minute * _SAVED_MINUTES)
         self._last = now
-        while self._raised and self._raised[0][0] < now - _ONE_S * self._fps:
-            self._raised.popleft()
         for who in [it for it, told in self._told.items() if told.pulse < now - _SAME_S * self._fps]:
             del self._told[who]
         # What lasts is told again and again: who began first need not be the first to be over.
