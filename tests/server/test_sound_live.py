@@ -8,6 +8,7 @@ import threading
 import time
 from collections.abc import Iterator
 from fractions import Fraction
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -143,6 +144,49 @@ def test_a_camera_is_heard_on_when_its_sound_changes_while_it_sends(
                 frames += sound.at(round(packet.pts * packet.time_base * FPS))
                 sound.packet(packet)
     assert len(moments(frames)) == 2 * len(range(EVERY, FRAMES, EVERY))
+
+
+def shifted(packet: av.Packet[Any], seconds: int) -> av.Packet[Any]:
+    assert packet.pts is not None
+    packet.pts += round(seconds / packet.time_base)
+    packet.dts = packet.pts
+    return packet
+
+
+@pytest.mark.parametrize("sends", ["aac", "libopus"], ids=["passed on", "encoded"])
+@pytest.mark.parametrize("lag", [0.0, 0.1, 0.3, -0.1])
+def test_when_a_cameras_time_steps_back_it_is_heard_on_and_so_it_is_when_it_is_connected_anew(
+    tmp_path: Path, sends: str, lag: float
+) -> None:
+    """As that of MPEG-TS does once in 26.5 hours; the sound's steps ``lag`` after the pictures'."""
+    path = write_flashes(tmp_path / "own.mp4", FRAMES, codec=sends)
+    sound, wrap, step = LiveSound(Sound(source="c0"), FPS), 95_443, FRAMES / FPS / 2
+    frames: list[Frame] = []
+    for again in (0, 1):
+        with av.open(str(path)) as container:
+            sound.opened(container.streams.audio[0])
+            for packet in container.demux():
+                if packet.pts is None:
+                    continue
+                time = float(packet.pts * packet.time_base)
+                is_sound = packet.stream.type == "audio"
+                old = not again and time < step + (lag if is_sound else 0.0)
+                if is_sound:
+                    sound.packet(shifted(packet, wrap if old else 0))
+                else:
+                    sound.picture(Fraction(shifted(packet, wrap if old else 0).pts * packet.time_base))
+                    frames += sound.at(round(time * FPS) + again * 2 * FRAMES)
+    numbers = [frame.number for frame in frames]
+    assert numbers == sorted(set(numbers)), "each once, in order"
+    halves = [0.0, step, FRAMES / FPS, 2 * FRAMES / FPS, 3 * FRAMES / FPS]
+    first, second, _, anew = (
+        sum(begin <= it * FRAME / FORM.rate < end for it in numbers) for begin, end in pairwise(halves)
+    )
+    each = step * FORM.rate / FRAME
+    assert first > 0.9 * each - 3
+    assert second > 0.9 * each - (abs(lag) + 0.1) * FORM.rate / FRAME
+    assert anew > 0.9 * 2 * each - 3
+    assert numbers[-1] < 3 * FRAMES / FPS * FORM.rate / FRAME
 
 
 def test_a_camera_without_sound_is_no_mistake(tmp_path: Path) -> None:

@@ -27,7 +27,7 @@ def open_sound(config: Config, camera_id: str) -> RecordedSound | LiveSound | No
         camera = config.camera(camera_id)
         path, offset, at_end = camera.source, camera.offset, camera.at_end
         if kind_of(path) is SourceKind.STREAM:
-            return LiveSound(settings, fps)
+            return LiveSound(settings, fps, config.encode.gop / fps)
         if kind_of(path) is not SourceKind.FILE:
             raise UserError(f"sound: camera {camera_id} has none: {shown(path)}; name another, or a file")
     try:

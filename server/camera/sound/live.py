@@ -22,20 +22,26 @@ _ANEW_S = 0.5
 """A picture that comes this much sooner or later than those before tells of another time."""
 _WAITING_S = 2.0
 """Sound that may wait to be fetched."""
+_FAR_S = 2.0
+"""Sound that is further away from what is shown is of another time: one of the two clocks has stepped."""
 
 
 class LiveSound:
     """Sounds when the pictures are shown that were taken at the same moment, by the camera's own clock.
 
-    A source tells it what comes, in a thread of its own; ``at`` is called in another.
+    A source tells it what comes, in a thread of its own; ``at`` is called in another. Pictures wait for up to
+    ``waiting_s`` until they are shown, and sound with them.
     """
 
-    def __init__(self, settings: Sound, fps: float) -> None:
+    def __init__(self, settings: Sound, fps: float, waiting_s: float = 0.0) -> None:
         form = settings.format
         if form is None:
             raise ValueError("a site without sound")
         self._form, self._kbps, self._fps = form, settings.kbps, fps
+        self._far_s = _FAR_S + waiting_s
         self._lock = threading.Lock()
+        self._asked = 0.0
+        """When what is shown now is shown, seconds after pulse 0."""
         self._newest: Fraction | None = None
         """When the newest picture was taken, by the camera's clock."""
         self._shifts: deque[float] = deque(maxlen=max(1, round(_MEAN_S * fps)))
@@ -65,10 +71,13 @@ class LiveSound:
     def packet(self, packet: Packet) -> None:
         """Take some sound."""
         with self._lock:
-            shift = self._shift
+            shift, asked = self._shift, self._asked
         if shift is None or self._way is None or packet.pts is None or packet.time_base is None:
             return
-        for frame in self._way.take(packet, packet.pts * packet.time_base + shift):
+        at = packet.pts * packet.time_base + shift
+        if abs(at - asked) > self._far_s:
+            return  # once taken, it would keep out all that comes before it
+        for frame in self._way.take(packet, at):
             if frame.number <= self._last:
                 continue  # of a time that is past: a connection was opened anew, or the mean has moved
             self._last = frame.number
@@ -78,6 +87,7 @@ class LiveSound:
     def at(self, pulse: int) -> list[Frame]:
         """Give what has come since the pulse before, now that the newest picture is shown at this one."""
         with self._lock:
+            self._asked = pulse / self._fps
             if self._newest is not None:
                 self._note(pulse / self._fps - float(self._newest))
                 self._newest = None
