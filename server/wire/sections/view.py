@@ -45,7 +45,7 @@ class Flags(Section):
 
     per_minute: Annotated[int, Field(ge=0, le=600)] = 2
     """Flags raised a minute at most, where identities are likeliest to fail; those of 3 minutes are saved."""
-    risk: Annotated[float, Field(ge=0, le=1)] = 0.3
+    risk: Annotated[float, Field(ge=0, le=1)] = 0.1
     """How likely a failure is at least for which one is raised, as far as the trackers can tell."""
     reasons: list[TroubleReason] = ["alike", "exchange", "fading", "gap"]
     """For which of the troubles that are foreseen one is raised."""
