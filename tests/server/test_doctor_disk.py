@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -112,24 +113,21 @@ for it in disk_findings(config, {}):
 
 
 def test_a_folder_behind_one_that_is_closed_is_one_line_which_names_that(tmp_path: Path) -> None:
-    closed = tmp_path / "closed"
-    closed.mkdir()
-    site(tmp_path, record={"folder": "closed/in/kept"})
-    modes = {it: it.stat().st_mode for it in (tmp_path, *tmp_path.parents[:2])}
-    for it, mode in modes.items():
-        it.chmod(mode | 0o011)
-    closed.chmod(0)
-    try:
-        said = subprocess.run(
-            [sys.executable, "-c", AS_SOMEBODY, str(tmp_path / "site.yaml")],
-            capture_output=True,
-            text=True,
-            check=False,
-            env={**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parents[2])},
-        )
-    finally:
-        closed.chmod(0o755)
-        for it, mode in modes.items():
-            it.chmod(mode)
+    with tempfile.TemporaryDirectory() as outside:  # tests' own folders are closed to others themselves
+        Path(outside).chmod(0o755)
+        closed = Path(outside) / "closed"
+        closed.mkdir()
+        site(tmp_path, record={"folder": str(closed / "in" / "kept")})
+        closed.chmod(0)
+        try:
+            said = subprocess.run(
+                [sys.executable, "-c", AS_SOMEBODY, str(tmp_path / "site.yaml")],
+                capture_output=True,
+                text=True,
+                check=False,
+                env={**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parents[2])},
+            )
+        finally:
+            closed.chmod(0o755)
     assert said.stderr == ""
     assert said.stdout == f"record.folder bad {closed}: cannot write there: Permission denied\n"

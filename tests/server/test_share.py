@@ -95,6 +95,8 @@ def test_an_old_numbers_stream_goes_on_at_its_own_service() -> None:
     service.come(*CAMERAS)
     for epoch in range(6):
         service.feed(epoch, {"c0": {1: SMALL, 2: LARGE}, "c1": {}})
+        if epoch == 2:
+            service.splicer.objects[2].join()
     assert service.board.resolve(2) == 1
     assert list(service.board.standings) == [1]
     assert service.decider.people.elsewhere == []
