@@ -43,8 +43,8 @@ WEIGHTS: Mapping[Reason, tuple[float, float, float, float, float]] = {
     "gap": (-3.00, -1.00, 0.00, 0.00, 0.00),
 }
 """By reason; `python -m benchmarks.assist_risk` learns them, but for `gap`: the default solver proves its
-answers, so that no school ever has such a trouble. What stands there is a guess, no likelier than one in twenty,
-and less the surer the two are told apart."""
+answers, so that no school ever has such a trouble. What stands there is a guess, no likelier than one in
+twenty, and less the surer the two are told apart."""
 
 
 def risk_of(reason: Reason, signs: Signs) -> float:
