@@ -56,9 +56,9 @@ class Reporter:
             last=last,
             final_to=last,
             ended=True,
-            shed=self._taken_shed(),
-            unsearched=self._taken_unsearched(),
-            alone=self._taken_alone(),
+            shed=_taken(self._shed),
+            unsearched=_taken(self._unsearched),
+            alone=_taken(self._alone),
             tracks=[],
             solve=None,
         )
@@ -73,26 +73,21 @@ class Reporter:
             last=result.last,
             final_to=result.final_to,
             ended=ended,
-            shed=self._taken_shed(),
-            unsearched=self._taken_unsearched(),
-            alone=self._taken_alone(),
+            shed=_taken(self._shed),
+            unsearched=_taken(self._unsearched),
+            alone=_taken(self._alone),
             tracks=[_track(track) for track in result.tracks],
             solve=_solve(result.report),
             troubles=[_trouble(it) for it in result.troubles[:TROUBLES_MOST]],
             mended_from=result.mended_from,
         )
 
-    def _taken_shed(self) -> list[int]:
-        shed, self._shed = self._shed, []
-        return shed
 
-    def _taken_unsearched(self) -> list[int]:
-        unsearched, self._unsearched = self._unsearched, []
-        return unsearched
-
-    def _taken_alone(self) -> list[int]:
-        alone, self._alone = self._alone, []
-        return alone
+def _taken(noted: list[int]) -> list[int]:
+    """Take out what was noted since the last message."""
+    taken = noted.copy()
+    noted.clear()
+    return taken
 
 
 def _track(track: WindowTrack) -> Track:

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import yaml
 from command_line import Run
 from free_port import free
+from test_doctor import config, site
 
 from server.run import doctor, doctor_files, doctor_ports
 from server.run.doctor_cameras import camera_findings
@@ -20,24 +20,6 @@ from server.run.doctor_findings import Finding, Level
 from server.run.doctor_ports import port_findings
 from server.run.doctor_probe import Probe
 from server.run.doctor_ways import way_findings
-from server.wire.config import Config
-from server.wire.loading import load_config
-
-
-def site(folder: Path, **changes: Any) -> Path:
-    content = {
-        "cameras": [{"id": "c0", "source": "c0.mp4"}],
-        **{section: {"port": free()} for section in ("sync", "http")},
-        "zenoh": dict.fromkeys(("connect", "listen"), f"tcp/127.0.0.1:{free()}"),
-        **changes,
-    }
-    path = folder / "site.yaml"
-    path.write_text(yaml.safe_dump(content))
-    return path
-
-
-def config(folder: Path, **changes: Any) -> Config:
-    return load_config(site(folder, **changes))
 
 
 def of(findings: list[Finding], check: str) -> list[tuple[Level, str]]:
