@@ -9,7 +9,6 @@ from typing import Any
 import msgspec
 from prometheus_client import generate_latest
 
-from benchmarks.fuzz_mutate import as_json, damaged, otherwise
 from benchmarks.fuzz_site import (
     CAMERAS,
     FPS,
@@ -28,6 +27,8 @@ from benchmarks.fuzz_site import (
     word,
 )
 from benchmarks.fuzz_target import Scripts, Target
+from benchmarks.fuzz_zenoh_remembered import Memories
+from benchmarks.fuzz_zenoh_wrong import wrong
 from server.camera.earshot import Earshot
 from server.camera.exchange import Exchange
 from server.camera.pointed import Pointed as PointedAt
@@ -53,28 +54,6 @@ Script = list[tuple[str, bytes, bytes]]
 """Messages: key, payload, attachment. An empty key is the end of an epoch."""
 _script = msgspec.msgpack.Decoder(Script)
 _packed = msgspec.msgpack.encode
-
-
-def wrong(rng: Random, message: Message) -> Message:
-    """Give a message with something in it wrong: a value, a byte, its key."""
-    key, payload, head = message.key, message.payload, message.attachment
-    way = rng.random()
-    if way < 0.55:
-        json = head or payload
-        changed = as_json(otherwise(rng, msgspec.json.decode(json)))
-        return Message(key, payload, changed) if head else Message(key, changed, b"")
-    if way < 0.75:
-        return Message(key, damaged(rng, payload), head)
-    if way < 0.9:
-        return Message(key, payload, damaged(rng, head))
-    other = rng.choice(
-        (
-            key.replace("c0", "c1"),
-            key.replace("c1", "cellar"),
-            damaged(rng, key.encode()).decode("utf-8", "replace"),
-        )
-    )
-    return Message(other, payload, head)
 
 
 class Messages(Target):
@@ -274,4 +253,4 @@ def _plain(key: str) -> str:
     return key.encode("utf-8", "replace").decode()
 
 
-TARGETS = (Messages, Words, Places, Sessions)
+TARGETS = (Messages, Words, Places, Memories, Sessions)

@@ -42,6 +42,8 @@ class Episodes:
         self._row: dict[EpisodeKey, int] = {}
         self._cut: dict[TrackKey, tuple[int, Episode]] = {}
         """Tracks whose next sighting is said to begin an episode: whose it is, and what was before it."""
+        self._recalled: dict[TrackKey, int] = {}
+        """Tracks that were told to be somebody's before they were first heard of here."""
 
     def take(
         self, seen: Sightings, looks: Mapping[TrackKey, Sequence[Glimpse]]
@@ -69,6 +71,8 @@ class Episodes:
                 episode.goes_on_as(number, before)
             elif episode is None or self._ends(episode, frame, crowded=run.crowded):
                 episode = self._begin(key, _end(seen, run.track, run.start), episode)
+                if key in self._recalled:
+                    episode.become(self._recalled.pop(key))
             episode.sight(range(frame, seen.first + run.stop), crowded=run.crowded)
             episode.end = _end(seen, run.track, run.stop - 1)
             rows[run.track, run.start : run.stop] = self._row.get(episode.key, -1)
@@ -126,6 +130,11 @@ class Episodes:
         """Let a track's next sighting begin an episode of this person, which goes on from another one."""
         self._cut[track] = number, before
 
+    def recall(self, track: TrackKey, number: int) -> None:
+        """Let the first sighting of a track begin an episode that was told to be this person's."""
+        if track not in self._current:
+            self._recalled[track] = number
+
     def told_anew(self, lost: int, kept: int) -> None:
         """Take over that two numbers turned out to be one person's."""
         for episode in chain(self.open, self._current.values()):
@@ -133,6 +142,7 @@ class Episodes:
             episode.firm = kept if episode.firm == lost else episode.firm
         for track, (number, before) in self._cut.items():
             self._cut[track] = kept if number == lost else number, before
+        self._recalled = {it: kept if number == lost else number for it, number in self._recalled.items()}
 
     def old(self, last_frame: int) -> list[int]:
         """Give the rows of episodes that are old enough to be settled by now, in order.

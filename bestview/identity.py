@@ -190,6 +190,23 @@ class IdentityRegistry:
         return tuple(sorted({Split(was, number, key.camera) for key, (was, number) in splits.items()}))
 
     @property
+    def next_number(self) -> int:
+        """The first number that nobody was given yet."""
+        return self._people.next_number
+
+    def begin_at(self, number: int) -> None:
+        """Give no number below this one any more: an earlier run has given them."""
+        self._people.begin_at(number)
+
+    def recall(self, track: TrackKey, number: int, frame: int) -> None:
+        """Take over whose a track is that is not heard of here yet, from a run that ended with a frame.
+
+        It is evidence like anything that was told: what cameras show from now on may speak against it.
+        """
+        self._people.recall(number, frame)
+        self._episodes.recall(track, number)
+
+    @property
     def pairs(self) -> int:
         """How many pairs of parts of tracks and people there is anything to say of: what memory goes with."""
         return self._tables.entries

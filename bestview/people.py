@@ -22,7 +22,8 @@ class People:
         self._settings = settings
         self._newcomers = Newcomers(settings, cameras)
         self._persons: dict[int, Person] = {}
-        self._next_number = 1
+        self.next_number = 1
+        """The first that nobody was given yet."""
 
     def __len__(self) -> int:
         """Count everybody remembered."""
@@ -88,10 +89,10 @@ class People:
             if match >= 0:
                 group.number = lost[match].person.number
                 continue
-            group.number = self._next_number
+            group.number = self.next_number
             self._persons[group.number] = Person(group.number)
             born.append(group.number)
-            self._next_number += 1
+            self.next_number += 1
         return tuple(born)
 
     def _is_sure(self, new: Group, frame: int, silent: Callable[[Group], int]) -> bool:
@@ -119,13 +120,22 @@ class People:
 
     def part(self, people: Iterable[int], cameras: Iterable[str], frame: int) -> int:
         """Give the number of somebody new whom some cameras see, and whom these people were taken for."""
-        new = Person(self._next_number)
-        self._next_number += 1
+        new = Person(self.next_number)
+        self.next_number += 1
         self._persons[new.number] = new
         for camera in cameras:
             new.see(camera, frame)
         self.root([new.number, *people])
         return new.number
+
+    def begin_at(self, number: int) -> None:
+        """Give no number below this one any more."""
+        self.next_number = max(self.next_number, number)
+
+    def recall(self, number: int, frame: int) -> None:
+        """Know somebody of this number, who was here before a frame."""
+        self.begin_at(number + 1)
+        self._persons.setdefault(number, Person(number, frame))
 
     def root(self, numbers: Iterable[int]) -> None:
         """Let people have a row among those who are compared, by which they can be kept apart."""

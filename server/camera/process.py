@@ -16,6 +16,7 @@ import msgspec
 
 from camsync import ClientSettings, Pulse, PulseClient
 from server.camera.exchange import Exchange
+from server.camera.keeping import Keeping
 from server.camera.load import Load
 from server.camera.meter import Meter
 from server.camera.pipeline import CameraPipeline
@@ -99,6 +100,9 @@ class CameraProcess:
         try:
             if self._config.track.assist.enabled:
                 bus.subscribe(self._keys.camera(self._id, "pointing"), self._pointed.put)
+            keeping = Keeping(partial(self._publish, "remembered"))
+            bus.subscribe(self._keys.camera(self._id, "remember"), keeping.put)
+            bus.watch_alive(self._keys.bestview("**"), lambda _, there: keeping.service(there))
             await self._wait_for_bestview(bus)
             bus.declare_alive(self._keys.camera(self._id, "alive"))
             await self._exchange.join()

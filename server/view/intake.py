@@ -190,6 +190,16 @@ class Intake:
         state.ended = tracks.ended
         self._aligner.tracks(tracks)
 
+    def remembered(self, message: Message, heard: Callable[[Message], None]) -> None:
+        """Hand what a camera remembers on."""
+        state, _ = self._state_of(message)
+        if state is None:
+            return
+        try:
+            heard(message)
+        except UNREADABLE as error:
+            state.bad(error)
+
     def status(self, message: Message) -> None:
         """Note how a camera is."""
         state, _ = self._state_of(message)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from itertools import chain
 
 import numpy as np
@@ -73,6 +73,8 @@ class People:
         """Numbers that turned out to be another's; the newest, as many as people are remembered."""
         self._corrections: list[Merge | Split] = []
         self._by_hand = ByHand()
+        self._expected: dict[Followed, tuple[int, int]] = {}
+        """Tracks that are not heard of yet: whose they were in an earlier run, and when that ended."""
         self._now = -1
         """The last frame that was spoken of."""
         self.names: dict[int, str] = {}
@@ -82,6 +84,7 @@ class People:
         """Take over what all cameras said about an epoch; give it as it was read."""
         late = [self._taken(window) for window in self._reader.read_late(epoch)]
         windows = [self._taken(window) for window in self._reader.read(epoch)]
+        self._recall(windows)
         tracks = [track for window in windows for track in window.local_tracks()]
         since = max(self._now + 1, epoch.last + 1 - _LATELY)  # there may be a long time in between
         pictures = self._pictures(windows, since - self._lag, epoch.last - self._lag)
@@ -122,6 +125,23 @@ class People:
         """The other people's numbers, in order: another service decides for them."""
         mine = set(self.known)
         return [number for number in self.everybody if number not in mine]
+
+    @property
+    def next_number(self) -> int:
+        """The first number that nobody was given yet."""
+        return self._registry.next_number
+
+    def begin_at(self, number: int) -> None:
+        """Give no number below this one any more: an earlier run has given them."""
+        self._registry.begin_at(number)
+
+    def expect(self, tracks: Mapping[Followed, int], pulse: int) -> None:
+        """Take over whose tracks are that are not heard of yet, from a run that ended with a pulse."""
+        self._expected = {track: (number, pulse) for track, number in tracks.items()}
+
+    def known_as(self, number: int, also: Iterable[int]) -> None:
+        """Take over from an earlier run that somebody had these numbers, too."""
+        self.merged |= {old: number for old in also if old != number and old not in self.first_seen}
 
     def call(self, number: int, name: str) -> None:
         """Give somebody a name; an empty one takes it back."""
@@ -234,6 +254,13 @@ class People:
             self._corrections += self._by_hand.read_splits(splits)
         history.put(window, window.first, window.message.last)
         return window
+
+    def _recall(self, windows: Iterable[CameraWindow]) -> None:
+        """Know the tracks again that an earlier run knew, when they are first heard of."""
+        for key in chain.from_iterable(it.keys for it in windows) if self._expected else ():
+            number, pulse = self._expected.pop(self._reader.locals.origin(key), (0, 0))
+            if number:
+                self._registry.recall(key, number, pulse)
 
     def _note_seen(self, parts: Sequence[Part], first: int, last: int) -> None:
         for place, part in enumerate(parts):

@@ -7,6 +7,7 @@ import contextlib
 import logging
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import msgspec
@@ -15,7 +16,6 @@ from camsync import Login, PulseClient
 from server.view.align import Aligner, Epoch
 from server.view.assist import Assist
 from server.view.board import Board
-from server.view.by_hand_file import ByHandFile
 from server.view.calibrate.walking import Walking
 from server.view.codec import agreement_for
 from server.view.decide import Decider, GopDecision, homographies
@@ -23,6 +23,7 @@ from server.view.intake import Intake
 from server.view.lacking import Lacking
 from server.view.past.past import Past
 from server.view.record_live import LiveRecorder
+from server.view.remembering import PATIENCE_S, Remembering
 from server.view.shelf import Shelf
 from server.view.sound import SoundShelf
 from server.view.splice import Splicer
@@ -77,10 +78,15 @@ class BestViewService:
             config, homographies(config), lambda camera, pulse: self.shelves[camera].has(pulse)
         )
         self.board = Board(config.site.fps)
-        self.assist = Assist(config, self.decider.people, self._send_pointing)
+        self.assist = Assist(config, self.decider.people, partial(self._tell_camera, "pointing"))
+        self.remembering = Remembering(
+            self.decider.people,
+            cameras,
+            fps,
+            partial(self._tell_camera, "remember"),
+            tells=config.view.share.index == 0,
+        )
         self.walking = Walking(config)
-        kept = None if config.view.share.of > 1 else config.record.folder
-        self.by_hand = ByHandFile(kept, config.site.name, fps)
         self.past = Past(config, self.shelves, self.agreement, frames, self.sound)
         self.pulse = -1
         self.pulse0: float | None = None
@@ -119,6 +125,7 @@ class BestViewService:
             "tracks": self._tracks,
             "status": self.intake.status,
             "thumbs/*": self.intake.thumbnail,
+            "remembered": self._remembered,
         }
         for what, handler in handlers.items():
             self.inboxes.append(bus.subscribe(self._keys.camera("*", what), handler))
@@ -136,7 +143,6 @@ class BestViewService:
         if self._out is not None:  # not before all ports are listened on: a failed start leaves no files
             self._recorder = self.lacking.recorder = self._record(self._out)
         self.past.open()
-        self.by_hand.open()
         patience = asyncio.get_running_loop().call_later(_FIRST_PULSE_S, self._go_without_pulses)
         follow = asyncio.create_task(self._follow_pulses(), name="pulses")
         follow.add_done_callback(lambda _: self._changed.set())
@@ -146,7 +152,7 @@ class BestViewService:
                 self._changed.clear()
                 if follow.done():
                     await follow  # raises what ended it
-                if self.pulse >= 0 or self._without_pulses:
+                if (self.pulse >= 0 or self._without_pulses) and not self.remembering.waits:
                     await self.decide_by_turns()
             last = max(shelf.newest for shelf in self.shelves.values())
             for decision in self.decider.finish(last):
@@ -224,7 +230,6 @@ class BestViewService:
                 closing.callback(self._bus.close)
             if self._recorder is not None:
                 closing.callback(self._recorder.close)
-            closing.callback(self.by_hand.close)
             closing.callback(self.past.close)
             closing.callback(self.walking.stop)
             closing.callback(self.splicer.close)
@@ -251,21 +256,28 @@ class BestViewService:
 
     def _alive(self, key: str, there: bool) -> None:
         self.intake.alive(key, there)
+        self.remembering.alive(key, there)
+        self._changed.set()
+        asyncio.get_running_loop().call_later(PATIENCE_S, self._changed.set)
+
+    def _remembered(self, message: Message) -> None:
+        self.intake.remembered(message, self.remembering.heard)
         self._changed.set()
 
     def _step(self, epoch: Epoch) -> None:
         self.lacking.epoch(epoch)
         self.walking.take(epoch)
+        self.remembering.begin(epoch.last)
         with self.stages.deciding():
             decisions = self.decider.step(epoch)
-        self.by_hand.take(self.decider.people, epoch.last)  # names are there with the first decision
+        self.remembering.take(epoch.last)  # names are there with the first decision
         for decision in decisions:
             self._publish(decision)
         self.assist.step(epoch, self.config)
 
-    def _send_pointing(self, camera: str, payload: bytes) -> None:
+    def _tell_camera(self, what: str, camera: str, payload: bytes) -> None:
         if self._bus is not None:
-            self._bus.publish(self._keys.camera(camera, "pointing"), payload)
+            self._bus.publish(self._keys.camera(camera, what), payload)
 
     def _publish(self, decision: GopDecision) -> None:
         """Say which boxes go with the frames before the frames are sent."""

@@ -40,8 +40,10 @@ def no_camera(service: BestViewService, camera: str) -> web.Response:
     return problem(404, f"there is no camera {camera!r}; there are {', '.join(service.shelves)}")
 
 
-def no_object(number: int) -> web.Response:
-    """Say that nobody has this number, or not any more."""
+def no_object(service: BestViewService, number: int) -> web.Response:
+    """Say that nobody has this number, not any more, or not yet again: then, when to try again."""
+    if service.remembering.awaits(number):
+        return not_now(f"the service has just begun: object {number} is not found again yet")
     return problem(404, f"there is no object {number}")
 
 
@@ -62,7 +64,7 @@ async def get_choice(request: web.Request) -> web.Response:
     service, number = _service(request), int(request.match_info["object"])
     if "at" not in request.query:
         choice = choice_info(service, number)
-        return no_object(number) if choice is None else answer(choice)
+        return no_object(service, number) if choice is None else answer(choice)
     try:
         pulse = pulse_at(
             request.query["at"],

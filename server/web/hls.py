@@ -148,4 +148,4 @@ def _connected(request: web.Request) -> int:
 def _nobody(request: web.Request) -> web.Response:
     if "camera" in request.match_info:
         return no_camera(request.app[SERVICE], request.match_info["camera"])
-    return no_object(int(request.match_info["object"]))
+    return no_object(request.app[SERVICE], int(request.match_info["object"]))

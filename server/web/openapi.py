@@ -61,6 +61,7 @@ _OTHER = {
 _UNAVAILABLE = {"/objects/{object}/best.mp4", "/cameras/{camera}/live.mp4", "/readyz"} | {
     path for path in _OTHER if path.endswith((".webm", ".ts", ".m3u8", ".mjpeg", "best.jpg", "live.jpg"))
 }
+_OF_PEOPLE = {"/api/operator/people", "/api/operator/pointing"}
 _FROM_IS_NEEDED = {"/api/past", *OPERATOR_FILES}
 _SPANS = {"/api/objects/{object}/past", "/api/cameras/{camera}/past"}
 _MOMENT = {"type": "string", "examples": ["-60", "p1250", "2026-11-21T16:13:36Z"]}
@@ -145,7 +146,7 @@ def _operation(path: str, summary: str) -> dict[str, Any]:
         responses["429"] = {"description": "Too many wrong tokens; try again later.", "content": error}
     if path in PAST - {"/api/past"}:
         responses["416"] = {"description": "Nothing is kept of that time.", "content": error}
-    if path in _UNAVAILABLE:
+    if path in _UNAVAILABLE | _OF_PEOPLE or "object" in names:
         responses["503"] = {"description": "Not now; try again later."}
     parameters = [{"name": name, "in": "path", "required": True, "schema": _SCHEMAS[name]} for name in names]
     queries = ["prefer"] * (path in HELD)

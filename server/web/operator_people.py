@@ -12,10 +12,9 @@ from server.web.keys import SERVICE
 from server.web.operator_permission import PREFIX
 from server.web.operator_schema import PeopleByHand
 from server.web.operator_session import asked_for
+from server.wire.remembered import NAME_MOST
 
 routes = web.RouteTableDef()
-
-_NAME_MOST = 40
 
 
 class Said(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -45,7 +44,7 @@ async def post_people(request: web.Request) -> web.Response:
         return problem(409, _cannot(service))
     number = people.merged.get(said.object, said.object)  # also of a merge that nobody was told of yet
     if number not in people.known:
-        return no_object(said.object)
+        return no_object(service, said.object)
     given = [it for it in ("name", "merge", "part") if getattr(said, it) is not None]
     if len(given) != 1:
         return problem(400, "say one thing at a time: name, merge or part")
@@ -58,8 +57,8 @@ async def post_people(request: web.Request) -> web.Response:
 
 def _call(service: BestViewService, number: int, name: str) -> web.Response:
     name = " ".join(name.split())
-    if len(name) > _NAME_MOST or not name.isprintable():
-        return problem(400, f"name: at most {_NAME_MOST} letters that can be read")
+    if len(name) > NAME_MOST or not name.isprintable():
+        return problem(400, f"name: at most {NAME_MOST} letters that can be read")
     service.decider.people.call(number, name)
     return answer(_told(service))
 
@@ -67,7 +66,7 @@ def _call(service: BestViewService, number: int, name: str) -> web.Response:
 def _merge(service: BestViewService, people: People, number: int, other: int) -> web.Response:
     lost = people.merged.get(other, other)
     if lost not in people.known:
-        return no_object(other)
+        return no_object(service, other)
     if lost == number:
         return problem(400, f"object {other} is object {number} already")
     people.merge(number, lost)

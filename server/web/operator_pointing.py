@@ -60,7 +60,7 @@ async def post_pointing(request: web.Request) -> web.Response:
     people = service.decider.people
     number = people.merged.get(said.object, said.object)
     if number not in people.known:
-        return no_object(said.object)
+        return no_object(service, said.object)
     wrong = next(filter(None, (_wrong(service, it) for it in said.points)), "")
     if wrong:
         return problem(400, wrong)

@@ -44,7 +44,7 @@ async def best_of_the_past(request: web.Request, form: Form) -> web.StreamRespon
         return service.splicer.objects.get(service.board.resolve(number))
 
     if live() is None and kept_from(source, 0) is None:
-        return no_object(number)
+        return no_object(service, number)
     return await _stream(request, form, source, f"object {number}", live)
 
 

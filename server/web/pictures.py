@@ -134,7 +134,7 @@ def _person(request: web.Request) -> Subject:
     service, number = request.app[SERVICE], int(request.match_info["object"])
     known = service.board.resolve(number)
     if known not in service.splicer.objects:
-        raise _RefusedError(no_object(number))
+        raise _RefusedError(no_object(service, number))
     return PersonView(known)
 
 

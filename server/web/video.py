@@ -63,7 +63,7 @@ async def _best(request: web.Request, form: Form) -> web.StreamResponse:
     person = service.board.resolve(number)
     channel = service.splicer.objects.get(person)
     if channel is None:
-        return no_object(number)
+        return no_object(service, number)
     held, preferred = request.query.get("camera"), request.query.get("prefer")
     for camera in (held, preferred):
         if camera is not None and camera not in service.shelves:

@@ -14,6 +14,8 @@ _SENDS = ["put", "delete", "liveliness_token"]
 _ASKS = ["declare_subscriber", "declare_liveliness_subscriber", "liveliness_query"]
 _PASSES = [*_SENDS, "declare_subscriber"]
 """What the router tells others: messages, who is there, and what somebody wants to hear."""
+_TOLD = ("pointing", "remember")
+"""What best-view services say to a camera, under its key."""
 _SERVICES = 64
 """Best-view services that a site may have, beside the first."""
 
@@ -35,8 +37,8 @@ def access_rules(
 ) -> dict[str, Any]:
     """Give what each user may, as zenoh's ``access_control``: what is not said is denied.
 
-    A camera sends under its own key, and the site's sound if it is the one, and hears what the others found
-    and where the operator points in its own picture: that, the best-view services alone say.
+    A camera sends under its own key, and the site's sound if it is the one. It hears what the others found,
+    and what the best-view services alone say to it: where the operator points, and what to remember.
     Further best-view services may everything. Any other user may hear everything, and send nothing.
     """
     keys = Keys(site)
@@ -49,7 +51,7 @@ def access_rules(
         _rule("others are asked for", "ingress", _ASKS, [found, hears, services]),
         _rule("others are told", "egress", _SENDS, [found, hears, services]),
         _rule("is asked for", "egress", ["declare_subscriber"], [everything]),
-        _rule("points", "ingress", ["put", "delete"], [keys.camera("*", "pointing")])
+        _rule("tells cameras", "ingress", ["put", "delete"], [keys.camera("*", it) for it in _TOLD])
         | {"permission": "deny"},
     ]
     further = [pulse_client(index) for index in range(1, _SERVICES)]
@@ -62,12 +64,12 @@ def access_rules(
     for camera in cameras:
         own = [keys.camera(camera, "**"), *([keys.sound] if camera == sounding else [])]
         rules.append(_rule(f"camera {camera}", "ingress", _SENDS, own))
-        pointing = [keys.camera(camera, "pointing")]
-        rules.append(_rule(f"camera {camera} asks", "ingress", ["declare_subscriber"], pointing))
-        rules.append(_rule(f"camera {camera} is told", "egress", ["put"], pointing))
+        told = [keys.camera(camera, it) for it in _TOLD]
+        rules.append(_rule(f"camera {camera} asks", "ingress", ["declare_subscriber"], told))
+        rules.append(_rule(f"camera {camera} is told", "egress", ["put"], told))
         subjects.append({"id": f"camera {camera}", "usernames": [camera]})
         theirs = [f"camera {camera}{what}" for what in ("", " asks", " is told")]
-        theirs += ["points", "others are asked for", "others are told", "is asked for"]
+        theirs += ["tells cameras", "others are asked for", "others are told", "is asked for"]
         policies.append({"rules": theirs, "subjects": [f"camera {camera}"]})
     return {
         "enabled": True,

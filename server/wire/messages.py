@@ -13,6 +13,8 @@ key                                       payload                               
 ``myview/SITE/camera/ID/thumbs/LOCAL``    JPEG of one person                       :class:`ThumbHead`
 ``myview/SITE/camera/ID/found``           :class:`Found`
 ``myview/SITE/camera/ID/pointing``        :class:`server.wire.help.Pointings`
+``myview/SITE/camera/ID/remember``        :class:`server.wire.remembered.Remembered`
+``myview/SITE/camera/ID/remembered``      the same, to a service that has come; empty: nothing
 ``myview/SITE/camera/ID/hears``           liveliness token: it hears what the other cameras find
 ``myview/SITE/camera/ID/alive``           liveliness token
 ``myview/SITE/sound``                     frames of sound, one after the other     :class:`SoundHead`

@@ -150,7 +150,8 @@ class FedService(BestViewService):
     def come(self, *cameras: str) -> None:
         """Let cameras be there."""
         for camera in cameras:
-            self.intake.alive(Keys("hall").camera(camera, "alive"), there=True)
+            for part in (self.intake, self.remembering):
+                part.alive(Keys("hall").camera(camera, "alive"), there=True)
 
     def feed(self, epoch: int, seen: Mapping[str, Mapping[int, Box | None]]) -> None:
         """Send an epoch's frames and words of the cameras in ``seen``, and decide."""

@@ -166,8 +166,9 @@ def _all(buses: Sequence[Bus], number: int) -> None:
     c1.publish(SITE.camera("c1", "video"), str(number).encode())
 
 
-async def test_where_the_operator_points_is_said_by_the_best_view_and_heard_by_the_camera(
-    settings: Zenoh,
+@pytest.mark.parametrize("what", ["pointing", "remember"])
+async def test_what_a_camera_is_told_is_said_by_the_best_view_and_heard_by_that_camera(
+    settings: Zenoh, what: str
 ) -> None:
     heard, overheard = Heard(), Heard()
     with opened(
@@ -176,27 +177,27 @@ async def test_where_the_operator_points_is_said_by_the_best_view_and_heard_by_t
         lambda: Bus.client(settings, "c1"),
         lambda: Bus.hearing(settings, "auditor"),
     ) as (bestview, c0, c1, auditor):
-        c0.subscribe(SITE.camera("c0", "pointing"), heard)
-        c1.subscribe(SITE.camera("c0", "pointing"), overheard)
-        c1.subscribe(SITE.camera("c1", "pointing"), overheard)
+        c0.subscribe(SITE.camera("c0", what), heard)
+        c1.subscribe(SITE.camera("c0", what), overheard)
+        c1.subscribe(SITE.camera("c1", what), overheard)
 
         def all_of_it() -> None:
-            c1.publish(SITE.camera("c0", "pointing"), b"false")
-            auditor.publish(SITE.camera("c0", "pointing"), b"false")
-            bestview.publish(SITE.camera("c0", "pointing"), b"there")
-            bestview.publish(SITE.camera("c1", "pointing"), b"here")
+            c1.publish(SITE.camera("c0", what), b"false")
+            auditor.publish(SITE.camera("c0", what), b"false")
+            bestview.publish(SITE.camera("c0", what), b"there")
+            bestview.publish(SITE.camera("c1", what), b"here")
 
-        await heard.until("c0/pointing there", all_of_it)
-        await overheard.until("c1/pointing here", all_of_it)
+        await heard.until(f"c0/{what} there", all_of_it)
+        await overheard.until(f"c1/{what} here", all_of_it)
         for number in range(5):  # time enough for what would have come
-            await heard.until(f"c0/pointing {number}", partial(_point, bestview, c1, number))
-        assert "c0/pointing false" not in heard.texts
-        assert set(overheard.texts) - {"c0/pointing false"} == {"c1/pointing here"}, "but what it says itself"
+            await heard.until(f"c0/{what} {number}", partial(_tell, bestview, c1, what, number))
+        assert f"c0/{what} false" not in heard.texts
+        assert set(overheard.texts) - {f"c0/{what} false"} == {f"c1/{what} here"}, "but what it says itself"
 
 
-def _point(bestview: Bus, other: Bus, number: int) -> None:
-    other.publish(SITE.camera("c0", "pointing"), b"false")
-    bestview.publish(SITE.camera("c0", "pointing"), str(number).encode())
+def _tell(bestview: Bus, other: Bus, what: str, number: int) -> None:
+    other.publish(SITE.camera("c0", what), b"false")
+    bestview.publish(SITE.camera("c0", what), str(number).encode())
 
 
 async def test_cameras_hear_what_others_found_and_not_what_they_see(settings: Zenoh) -> None:

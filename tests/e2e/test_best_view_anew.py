@@ -1,0 +1,100 @@
+"""The best view is killed and begins anew: whoever a camera goes on following is who they were."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+from collections import defaultdict
+from collections.abc import Sequence
+from pathlib import Path
+
+import aiohttp
+import msgspec
+import pytest
+from running_site import PATIENCE_S, RunningSite, bounded, configuration, running
+
+from client import Gop
+from server.view.locals import Followed
+from server.wire.bus import Bus
+from server.wire.inbox import Message
+from server.wire.messages import CameraTracks, Keys
+from server.wire.sections import Zenoh
+
+pytestmark = [pytest.mark.live, pytest.mark.asyncio, pytest.mark.timeout(300)]
+
+
+def whose(gops: Sequence[Gop], words: Sequence[CameraTracks]) -> dict[Followed, set[int]]:
+    """Give the numbers under which each track's boxes were shown."""
+    numbers = {
+        (camera, gop.first + at, (box.left, box.top, box.right, box.bottom)): box.object
+        for gop in gops
+        for camera, frames in gop.boxes.items()
+        for at, row in enumerate(frames)
+        for box in row
+    }
+    found: dict[Followed, set[int]] = defaultdict(set)
+    for word in words:
+        for track in word.tracks:
+            for at, place in enumerate(track.boxes):
+                number = None if place is None else numbers.get((word.camera, word.first + at, tuple(place)))
+                if number is not None:
+                    found[Followed(word.camera, word.boot, track.id)].add(number)
+    return found
+
+
+async def test_a_best_view_that_is_killed_shows_the_same_people_under_the_same_addresses(
+    recording: Path, tmp_path: Path
+) -> None:
+    config = configuration(tmp_path, recording, camera={"at_end": "loop"})
+    async with running(config) as site:
+        await site.until(lambda: bool(site.gops and site.gops[-1].choices), "somebody is shown")
+        words: list[CameraTracks] = []
+        bus = await asyncio.to_thread(Bus.hearing, Zenoh(connect=site.config["zenoh"]["connect"]))
+        try:
+            bus.subscribe(Keys("e2e").camera("*", "tracks"), lambda it: words.append(read(it)))
+            for _ in range(2):
+                await killed(site, words)
+        finally:
+            bus.close()
+
+
+def read(message: Message) -> CameraTracks:
+    return msgspec.json.decode(message.payload, type=CameraTracks)
+
+
+async def killed(site: RunningSite, words: list[CameraTracks]) -> None:
+    since = site.pulse
+    await site.until(lambda: site.pulse > since + 75 and bool(site.gops[-1].choices), "people are followed")
+    number = next(iter(site.gops[-1].choices))
+    count, before = len(site.gops), site.children()["bestview"]
+    os.kill(before, signal.SIGKILL)
+    died = site.pulse
+    async with asyncio.timeout(PATIENCE_S), aiohttp.ClientSession() as session:
+        while (status := await asked(session, f"{site.url}objects/{number}/best.mp4")) != 200:
+            assert status in {None, 503}, "who is found again in a moment is not said to be nobody"
+            await asyncio.sleep(0.05)
+    await bounded(site.until(lambda: site.pulse > died + 75 and len(site.gops) > count + 5, "it goes on"))
+    assert site.children()["bestview"] != before
+    told, now = whose(site.gops[:count], words), whose(site.gops[count:], words)
+    again = {track: (told[track], now[track]) for track in told.keys() & now.keys()}
+    last = [it for it in again if any(it in tracks_of(word) for word in words if word.last > died)]
+    assert len(last) >= 2, "tracks that went on over the time without a service"
+    for track in last:
+        assert now[track] & told[track], f"{track}: {again[track]}"
+    used = {it for numbers in told.values() for it in numbers}
+    new = {it for track, numbers in now.items() if track not in told for it in numbers} - used
+    assert all(it > max(used) for it in new), "numbers are not used twice"
+
+
+def tracks_of(word: CameraTracks) -> list[Followed]:
+    return [Followed(word.camera, word.boot, track.id) for track in word.tracks]
+
+
+async def asked(session: aiohttp.ClientSession, url: str) -> int | None:
+    """Give the status of an answer; None: there was none."""
+    try:
+        async with session.get(url) as answer:
+            return answer.status
+    except aiohttp.ClientError:
+        return None

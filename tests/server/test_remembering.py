@@ -1,0 +1,305 @@
+"""A service that begins anew knows who is who, as far as cameras' tracks go on: the cameras remember it."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterable, Mapping
+
+import msgspec
+import pytest
+from aiohttp.test_utils import TestClient, TestServer
+from cameras_by_hand import CAMERAS, FPS, LARGE, SMALL, STRIDE, FedService, small_config, tracks, word
+from hypothesis import given
+from hypothesis import strategies as st
+
+from server.camera.keeping import Keeping
+from server.view.remembering import PATIENCE_S, Remembering
+from server.view.returning import LONGEST_S
+from server.web.app import make_app
+from server.wire.epochs import end_of_epoch
+from server.wire.inbox import Message
+from server.wire.messages import Box, Keys
+from server.wire.remembered import REMEMBERED_MOST, Known, Remembered
+
+A, B = CAMERAS
+KEYS = Keys("hall")
+Seen = Mapping[str, Mapping[int, Box]]
+ALL: Seen = {A: {1: SMALL, 2: LARGE}, B: {3: LARGE}}
+"""By camera the tracks that are there."""
+
+
+class Site:
+    """Cameras that outlast the service, and run after run of it."""
+
+    def __init__(self, **changes: object) -> None:
+        self._changes = changes
+        self.cameras = {camera: Keeping(lambda said, it=camera: self._hear(it, said)) for camera in CAMERAS}
+        self.service = FedService(small_config())
+
+    def start(self, *, deaf: str | None = None) -> FedService:
+        """Start the service anew: the cameras hear of it, but for one."""
+        self.service = it = FedService(small_config(**self._changes))
+        it.remembering._send = self._tell
+        it.come(*CAMERAS)
+        for camera in CAMERAS:
+            if camera != deaf:
+                self.cameras[camera].service(there=True)
+        return it
+
+    def tell(self, epochs: Iterable[int], seen: Seen = ALL, boot: int = 1) -> None:
+        """Tell of who is seen; pictures are of no matter here."""
+        for epoch in epochs:
+            for camera in CAMERAS:
+                self.service.intake.tracks(tracks(word(camera, epoch, seen[camera], boot=boot)))
+            self.service.pulse = end_of_epoch(epoch, STRIDE)
+            self.service.decide()
+
+    def whose(self, camera: str, track: int, epoch: int, boot: int = 1) -> int:
+        """Give who is behind a track."""
+        number = self.service.decider.people.whose(camera, boot, track, end_of_epoch(epoch, STRIDE))
+        assert number is not None
+        return number
+
+    def _tell(self, camera: str, payload: bytes) -> None:
+        self.cameras[camera].put(Message(KEYS.camera(camera, "remember"), payload, b""))
+
+    def _hear(self, camera: str, payload: bytes) -> None:
+        self.service._remembered(Message(KEYS.camera(camera, "remembered"), payload, b""))
+
+
+def told(*, merge: bool = False, **changes: object) -> Site:
+    """Run a service in which camera A's track 2 is Ann, and who is followed by its track 1, too, maybe."""
+    site = Site(**changes)
+    site.start()
+    site.tell(range(4))
+    people = site.service.decider.people
+    people.call(site.whose(A, 2, 3), "Ann")
+    if merge:
+        people.merge(site.whose(A, 2, 3), site.whose(A, 1, 3))
+    site.tell(range(4, 6))
+    return site
+
+
+ONLY_LATE: Seen = {A: {9: SMALL, 2: LARGE}, B: {3: LARGE}}
+"""Of who was there A's track 1 is gone; somebody new has come, who is heard of first."""
+
+
+def test_who_is_followed_all_along_keeps_their_number_and_name_and_nobody_else_gets_it() -> None:
+    site = told()
+    before = [site.whose(A, 1, 5), site.whose(A, 2, 5), site.whose(B, 3, 5)]
+    site.start()
+    site.tell(range(7, 9), ONLY_LATE)
+    assert [site.whose(A, 2, 8), site.whose(B, 3, 8)] == before[1:]
+    assert site.whose(A, 9, 8) > max(before), "numbers are not used twice, not of those who have left either"
+    assert site.service.decider.people.names == {before[1]: "Ann"}
+    assert site.service.decider.people.merged_by_hand == {}
+
+
+def test_the_same_goes_for_any_number_of_runs() -> None:
+    site = told()
+    before = [site.whose(A, 1, 5), site.whose(A, 2, 5), site.whose(B, 3, 5)]
+    for run in range(1, 4):
+        site.start()
+        site.tell(range(6 * run, 6 * run + 5))
+        last = 6 * run + 4
+        assert [site.whose(A, 1, last), site.whose(A, 2, last), site.whose(B, 3, last)] == before
+
+
+def test_who_was_said_to_be_one_is_one_again_under_the_same_number() -> None:
+    site = told(merge=True)
+    kept, (old,) = site.whose(A, 2, 5), site.service.decider.people.merged
+    site.start()
+    site.tell(range(7, 8), {A: {2: LARGE}, B: {}})
+    site.tell(range(8, 12))  # the other track comes later
+    people = site.service.decider.people
+    assert site.whose(A, 1, 11) == site.whose(A, 2, 11) == kept
+    assert people.merged[old] == kept, "an address with the old number goes on"
+    assert people.names == {kept: "Ann"}
+
+
+def test_a_camera_that_remembers_nothing_learns_from_what_the_others_do() -> None:
+    site = told()
+    ann, other = site.whose(A, 2, 5), site.whose(B, 3, 5)
+    site.cameras[B] = Keeping(lambda said: site._hear(B, said))  # it was started anew, too
+    site.start()
+    site.tell(range(7, 9))
+    assert site.whose(A, 2, 8) == ann
+    assert site.whose(B, 3, 8) not in {ann, other}, "nobody knows who that is: it is a new number"
+
+
+LONG_AGO = 6 + int(LONGEST_S * FPS / STRIDE)
+
+
+@pytest.mark.parametrize(
+    ("epochs", "boot"),
+    [
+        (range(7, 9), 2),  # the camera began anew: its tracks are other people's
+        (range(LONG_AGO, LONG_AGO + 2), 1),  # too long ago
+        (range(2), 1),  # pulses began anew
+    ],
+)
+def test_nobody_is_given_a_number_or_name_that_may_be_anothers(epochs: range, boot: int) -> None:
+    site = told()
+    used = max(site.service.decider.people.everybody)
+    site.start()
+    site.tell(epochs, boot=boot)
+    people = site.service.decider.people
+    assert people.known
+    assert min(people.known) > used
+    assert people.names == {}
+
+
+def test_a_camera_that_says_late_what_it_remembers_keeps_numbers_from_being_used_twice() -> None:
+    site = told()
+    used = max(site.service.decider.people.everybody)
+    site.cameras[A] = Keeping(lambda said: site._hear(A, said))
+    site.start(deaf=B)
+    site.tell(range(7, 8), {A: {}, B: {}})
+    site.cameras[B].service(there=True)
+    site.tell(range(8, 10))
+    assert min(site.service.decider.people.known) > used
+
+
+def test_a_name_that_was_given_meanwhile_stays_and_one_that_was_taken_back_is_not_given_again() -> None:
+    site = told()
+    site.start()
+    site.tell(range(7, 9))
+    people = site.service.decider.people
+    people.call(site.whose(A, 2, 8), "")
+    people.call(site.whose(A, 1, 8), "Bob")
+    site.tell(range(9, 10))
+    site.start()
+    site.tell(range(10, 12))
+    assert site.service.decider.people.names == {site.whose(A, 1, 11): "Bob"}
+
+
+def test_of_several_services_the_first_one_tells_and_all_begin_with_it() -> None:
+    site = told(view={"share": {"of": 2, "index": 1}})
+    assert site.service.decider.people.known
+    site.start()
+    site.tell(range(7, 9))
+    assert site.service.decider.people.names == {}, "the second one told nobody"
+    first = told()
+    first._changes = {"view": {"share": {"of": 2, "index": 1}}}
+    ann = first.whose(A, 2, 5)
+    first.start()
+    first.tell(range(7, 9))
+    assert first.whose(A, 2, 8) == ann
+
+
+class Clock:
+    """A clock that a test sets."""
+
+    def __init__(self) -> None:
+        self.now = 100.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+def test_nothing_is_decided_before_every_camera_that_is_there_has_had_time_to_say_what_it_remembers() -> None:
+    clock, service = Clock(), FedService(small_config())
+    it = Remembering(service.decider.people, CAMERAS, FPS, lambda *_: None, clock=clock)
+    it.begin(4)
+    assert not it.waits, "nobody is there"
+    it.alive(KEYS.camera(A, "alive"), there=True)
+    it.alive(KEYS.camera("cellar", "alive"), there=True)
+    it.alive(KEYS.camera(B, "alive"), there=True)
+    assert it.waits
+    it.heard(Message(KEYS.camera(A, "remembered"), b"", b""))
+    assert it.waits
+    it.alive(KEYS.camera(A, "alive"), there=True)
+    it.alive(KEYS.camera(B, "alive"), there=False)
+    assert not it.waits, "a camera's token may come after its word"
+    it.alive(KEYS.camera(B, "alive"), there=True)
+    clock.now += PATIENCE_S
+    assert not it.waits, "one that is frozen keeps nobody waiting for longer"
+    it.begin(9)
+    it.alive(KEYS.camera(A, "alive"), there=True)
+    assert not it.waits, "only at the beginning"
+
+
+async def test_who_may_be_found_again_is_not_said_to_be_nobody() -> None:
+    site = told()
+    number = site.whose(A, 1, 5)
+    service = site.start()
+    async with TestClient(TestServer(make_app(service))) as client:
+        path = f"/objects/{number}/best.mp4"
+        for asked in (path, f"/objects/{number}/hls/index.m3u8", f"/api/objects/{number}/choice"):
+            answer = await client.get(asked)
+            assert answer.status == 503, asked
+            assert int(answer.headers["Retry-After"]) > 0
+        site.tell(range(7, 8), {A: {2: LARGE}, B: {}})
+        assert (await client.get(path)).status == 503
+        assert (await client.get("/objects/77/best.mp4")).status == 404
+        site.tell([LONG_AGO], {A: {2: LARGE}, B: {}})
+        assert (await client.get(path)).status == 404, "they are not waited for for ever"
+
+
+NESTED = b'{"more": ' + b"[" * 100_000 + b"]" * 100_000 + b"}"
+
+
+@pytest.mark.parametrize("damage", [b"\xff", b"[]", b'{"pulse": 1}', b"{" * 100_000, NESTED])
+def test_what_a_camera_says_that_is_none_is_counted(damage: bytes, caplog: pytest.LogCaptureFixture) -> None:
+    site = told()
+    site.cameras[B].put(Message("", damage, b""))
+    with caplog.at_level(logging.ERROR):
+        service = site.start()
+    assert service.intake.states[B].bad_messages == 1
+    assert caplog.messages == []
+    site.tell(range(7, 9))
+    assert site.service.decider.people.names == {site.whose(A, 2, 8): "Ann"}
+
+
+def test_a_camera_keeps_no_more_than_it_can() -> None:
+    said: list[bytes] = []
+    it = Keeping(said.append)
+    it.put(Message("", b"one", b""))
+    it.put(Message("", b"2" * (REMEMBERED_MOST + 1), b""))
+    it.service(there=False)
+    it.service(there=True)
+    assert said == [b"one"]
+
+
+numbers = st.integers(1, 8)
+known = st.builds(
+    Known,
+    number=numbers,
+    tracks=st.lists(st.integers(0, 4), max_size=3),
+    also=st.lists(numbers, max_size=3),
+    name=st.sampled_from(["", "Ann", "Bob"]),
+    by_hand=st.booleans(),
+)
+remembered = st.builds(
+    Remembered,
+    pulse=st.integers(0, 60),
+    boot=st.integers(1, 2),
+    next=st.integers(1, 12),
+    people=st.lists(known, max_size=4),
+)
+
+
+@given(remembered, remembered)
+def test_whatever_cameras_remember_two_tracks_seen_at_once_in_a_camera_are_two(
+    one: Remembered, other: Remembered
+) -> None:
+    site = Site()
+    for camera, it in zip(CAMERAS, (one, other), strict=True):
+        people = [msgspec.structs.replace(them, by_hand=False) for them in it.people]
+        said = msgspec.json.encode(msgspec.structs.replace(it, people=people))
+        site.cameras[camera].put(Message("", said, b""))
+    site.start()
+    site.tell(range(7, 12), {A: {1: SMALL, 2: LARGE}, B: {3: LARGE}})
+    assert site.whose(A, 1, 11) != site.whose(A, 2, 11)
+
+
+@given(remembered, remembered)
+def test_whatever_cameras_remember_the_service_goes_on(one: Remembered, other: Remembered) -> None:
+    site = Site()
+    for camera, it in zip(CAMERAS, (one, other), strict=True):
+        site.cameras[camera].put(Message("", msgspec.json.encode(it), b""))
+    site.start()
+    site.tell(range(7, 10))
+    people = site.service.decider.people
+    assert people.known
+    assert set(people.merged).isdisjoint(people.everybody)
