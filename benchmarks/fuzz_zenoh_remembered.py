@@ -39,6 +39,7 @@ class Memories(Scripts):
                 pulse=rng.randrange(40),
                 boot=rng.randrange(1, 3),
                 next=rng.randrange(1, 9),
+                since=rng.random(),
                 people=[self._somebody(rng) for _ in range(rng.randrange(4))],
             )
             message = Message(KEYS.camera(camera, "remembered"), msgspec.json.encode(said), b"")

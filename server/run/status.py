@@ -70,7 +70,7 @@ async def status_live(url: str, token: str | None, *, as_json: bool) -> None:
                 )
             else:
                 if before is not None and _is_another_run(before, look.now):
-                    restarted = "the service was restarted: people have new numbers"
+                    restarted = "the service was restarted"
                 shown = picture(look.now, Rates.between(before, look.now), restarted)
                 before = look.now
             live.update(shown, refresh=True)

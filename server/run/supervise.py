@@ -118,7 +118,7 @@ class Supervisor:
             child.restarts += 1
 
     def _arguments(self, child: Child) -> Sequence[str]:
-        """Give a process's arguments; a restarted best view numbers people anew, in its own files."""
+        """Give a process's arguments; what a restarted best view decides is in files of its own."""
         if self._out is None or child is not self.children[0]:
             return child.arguments
         out = self._out / f"restart-{child.restarts}" if child.restarts else self._out

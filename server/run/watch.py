@@ -10,8 +10,9 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from client import AwayError as ServerAway
 from client import ClientError, HttpSettings, Progress, objects, watch
-from server.wire.errors import UserError
+from server.wire.errors import AwayError, UserError
 
 _TELL_EVERY_S = 1.0
 
@@ -28,7 +29,8 @@ async def run_watch(
     """List who is there, or follow somebody.
 
     Raises:
-        UserError: the server cannot be reached, does not know them, or the file cannot be written.
+        AwayError: the server cannot be reached.
+        UserError: it does not know them, or the file cannot be written.
     """
     settings = HttpSettings(token=token)
     try:
@@ -37,6 +39,8 @@ async def run_watch(
             return
         teller = _Teller()
         watched = await watch(url, number, out, seconds, teller, start=start, end=end, settings=settings)
+    except ServerAway as error:
+        raise AwayError(f"watch: {error}") from error
     except (ClientError, ValueError) as error:
         raise UserError(f"watch: {error}") from error
     except OSError as error:
@@ -44,7 +48,7 @@ async def run_watch(
     where = f" in {out}" if out else ""
     typer.echo(f"object {number}: {watched.seconds:.1f} s, {watched.cuts} cuts{where}")
     if not watched.complete:
-        raise UserError("watch: the server went away before the end")
+        raise AwayError("watch: the server went away before the end")
 
 
 async def _list(url: str, settings: HttpSettings) -> None:

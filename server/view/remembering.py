@@ -54,6 +54,7 @@ class Remembering:
         self._heard: set[str] = set()
         """Cameras that have said what they remember: told sooner, they would have forgotten it."""
         self._sent: dict[str, Remembered] = {}
+        self._since = time.time()
 
     def alive(self, key: str, there: bool) -> None:
         """A camera's liveliness token came or went."""
@@ -98,6 +99,11 @@ class Remembering:
             return True
         return self._returning is not None and number in self._returning.numbers
 
+    @property
+    def numbers_since(self) -> float:
+        """When numbers began, unix seconds: since then none was given twice. 0: nobody has one yet."""
+        return self._since if self._begun else 0.0
+
     def begin(self, pulse: int) -> None:
         """Begin with what is remembered, before an epoch that ends with a pulse is taken in.
 
@@ -109,6 +115,7 @@ class Remembering:
         self._returning = Returning(self._said, pulse, round(LONGEST_S * self._fps))
         self._returning.begin(self._people, pulse)
         if self._said:
+            self._since = min(self._since, max(it.since for it in self._said.values()))
             log.info("the cameras remember %d people", len(self._returning.numbers))
         self._said = {}
 
@@ -122,7 +129,7 @@ class Remembering:
             self._tell(pulse)
 
     def _tell(self, pulse: int) -> None:
-        for camera, now in remembered_by(self._people, self._cameras, pulse).items():
+        for camera, now in remembered_by(self._people, self._cameras, pulse, self._since).items():
             before = self._sent.get(camera)
             if camera not in self._heard:
                 continue

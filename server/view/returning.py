@@ -13,8 +13,8 @@ LONGEST_S = 30.0
 """Seconds that the service may be away: in a longer time a track may have gone over to somebody else."""
 
 
-def remembered_by(people: People, cameras: Iterable[str], pulse: int) -> dict[str, Remembered]:
-    """Put down for each camera whom it follows now."""
+def remembered_by(people: People, cameras: Iterable[str], pulse: int, since: float) -> dict[str, Remembered]:
+    """Put down for each camera whom it follows now, and since when numbers are not given twice."""
     followed = people.followed(people.everybody)
     by_hand = set(people.merged_by_hand.values())
     boots: dict[str, int] = {}
@@ -31,7 +31,7 @@ def remembered_by(people: People, cameras: Iterable[str], pulse: int) -> dict[st
             )
     following = min(people.next_number, NUMBER_MOST + 1)
     return {
-        camera: Remembered(pulse=pulse, boot=boots.get(camera, 0), next=following, people=them)
+        camera: Remembered(pulse=pulse, boot=boots.get(camera, 0), next=following, since=since, people=them)
         for camera, them in known.items()
     }
 

@@ -62,7 +62,7 @@ class Access:
     """Says who may what.
 
     ``resolve`` gives the number that a merged one goes by now; ``what`` names the service among those of its
-    machine.
+    machine; ``since`` is when people's numbers began, unix seconds.
     """
 
     def __init__(
@@ -71,6 +71,7 @@ class Access:
         resolve: Callable[[int], int],
         what: str = "site",
         now: Callable[[], float] = time.monotonic,
+        since: Callable[[], float] = lambda: 0.0,
     ) -> None:
         """Read the file of tokens.
 
@@ -82,7 +83,7 @@ class Access:
         self.sessions = Sessions(now)
         self._file = None if tokens is None else TokenFile(tokens)
         self._resolve = resolve
-        self._since = time.time()
+        self._since = since
         self._failures = Failures(now)
         self._right: OrderedDict[tuple[str, str], None] = OrderedDict()
         self._asking: dict[int, _Asking] = {}
@@ -186,11 +187,11 @@ class Access:
         return self._void(token) or Grant.of(token)
 
     def _void(self, token: Token) -> str | None:
-        if token.object is None or token.made is None or token.made.timestamp() >= self._since:
+        if token.object is None or token.made is None or token.made.timestamp() >= self._since():
             return None
         return (
-            f"the token {token.name!r} was made before the service started, and object {token.object} "
-            "may be somebody else now: make a new one"
+            f"people have been numbered anew since the token {token.name!r} was made, and object "
+            f"{token.object} may be somebody else now: make a new one"
         )
 
 

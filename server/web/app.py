@@ -86,7 +86,12 @@ def make_app(
     app[openapi.DESCRIBED] = openapi.Described(app)
     app[READERS] = Readers(service.splicer.plan.target_s)
     what = f"{service.config.site.name}_{service.config.view.share.index}"
-    app[ACCESS] = Access(service.config.access.tokens, service.board.resolve, what)
+    app[ACCESS] = Access(
+        service.config.access.tokens,
+        service.board.resolve,
+        what,
+        since=lambda: service.remembering.numbers_since,
+    )
     app[METRICS] = registry(service, app[PICTURES], app[READERS], app[ACCESS], on_disk)
     measure(app)
     for module in (api, session, site, video, past, hls, pictures, openapi, page, operator_routes):

@@ -23,6 +23,8 @@ ALSO_MOST = 64
 NAME_MOST = 40
 """Letters of a name."""
 
+UnixTime = Annotated[float, msgspec.Meta(ge=0, le=1e12)]
+"""Seconds."""
 PersonNumber = Annotated[int, msgspec.Meta(ge=1, le=NUMBER_MOST)]
 
 
@@ -47,4 +49,6 @@ class Remembered(msgspec.Struct, frozen=True, kw_only=True):
     """The run of the camera whose tracks are named."""
     next: Annotated[int, msgspec.Meta(ge=1, le=NUMBER_MOST + 1)]
     """The first number that nobody was given yet in the whole site."""
+    since: UnixTime
+    """When numbers began: since then none was given twice."""
     people: list[Known]

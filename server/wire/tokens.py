@@ -33,7 +33,7 @@ class Token(Section):
     camera: Name | None = None
     """Nothing but this camera."""
     made: AwareDatetime | None = None
-    """When it was made. People are numbered anew when the service restarts: an older one's object is void."""
+    """When it was made. Where people have been numbered anew since, its object is void."""
 
     @model_validator(mode="after")
     def _makes_sense(self) -> Self:

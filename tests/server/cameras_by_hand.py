@@ -136,6 +136,11 @@ def status(camera: str, **changes: Any) -> Message:
 class TrackNumbers:
     """An identity registry for which a track's number is the person's, in every camera."""
 
+    next_number = 1
+
+    def begin_at(self, number: int) -> None:
+        """Give the tracks' numbers all the same."""
+
     def update(
         self, tracks: Sequence[LocalTrack], last_frame: int, pictures: Mapping[str, tuple[int, int]]
     ) -> IdentityUpdate:

@@ -10,6 +10,7 @@ from collections.abc import AsyncIterator
 from pathlib import Path
 
 import aiohttp
+import msgspec
 import pytest
 from cameras_by_hand import CAMERAS, SMALL
 from halls import A, B, Hall
@@ -17,6 +18,9 @@ from tokens_by_hand import bearer, line_of, locked, token_of, write_tokens
 
 from server.web.access_file import TokenFile
 from server.web.operator_permission import CHANGES
+from server.wire.inbox import Message
+from server.wire.messages import Keys
+from server.wire.remembered import Remembered
 from server.wire.tokens import digest_of
 
 
@@ -99,21 +103,35 @@ async def test_a_new_token_lets_in_without_a_restart(site: Hall, tmp_path: Path)
         assert answer.status == 200
 
 
-async def test_a_person_s_token_is_void_when_the_service_was_started_anew_since(tmp_path: Path) -> None:
-    """People are numbered anew: object 1 may be somebody else."""
+@pytest.mark.parametrize(("remembered", "then"), [(None, 403), (4e9, 403), (1000.0, 404)])
+async def test_a_person_s_token_is_void_when_people_were_numbered_anew_since(
+    tmp_path: Path, remembered: float | None, then: int
+) -> None:
+    """Object 1 may be somebody else; where the cameras remember who it is the token goes on."""
     async with locked(tmp_path) as hall:
         write_tokens(
             tmp_path / "tokens.yaml",
             line_of("family", role="watch", object=1, made="2026-01-01T00:00:00Z"),
+            line_of("guest", role="watch"),
         )
         hall.service.come(*CAMERAS)
-        while True:
-            async with hall.session.get("/objects/1/best.mp4", headers=bearer("family")) as answer:
-                if answer.status == 403:
-                    said = (await answer.json())["error"]
-                    break
+        if remembered is not None:
+            said = Remembered(pulse=0, boot=1, next=9, since=remembered, people=[])
+            key = Keys("hall").camera("c0", "remembered")
+            hall.service.remembering.heard(Message(key, msgspec.json.encode(said), b""))
+        while True:  # the file of tokens is looked at now and then
             await asyncio.sleep(0.1)
-        assert said.startswith("the token 'family' was made before the service started")
+            async with hall.session.get("/api/site", headers=bearer("guest")) as answer:
+                if answer.status == 200:
+                    break
+        async with hall.session.get("/objects/1/best.mp4", headers=bearer("family")) as answer:
+            assert answer.status == 503, "nobody can tell yet"
+        hall.service.feed(0, {camera: {} for camera in CAMERAS})
+        async with hall.session.get("/objects/1/best.mp4", headers=bearer("family")) as answer:
+            assert answer.status == then
+            if then == 403:
+                error = (await answer.json())["error"]
+                assert error.startswith("people have been numbered anew since the token 'family' was made")
 
 
 class Looked:

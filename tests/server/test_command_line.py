@@ -14,6 +14,7 @@ from free_port import free
 from videos_by_hand import write_video
 
 from server.camera.scene import scene_names
+from server.wire.errors import AwayError
 
 
 @pytest.fixture
@@ -201,8 +202,11 @@ def test_seconds_that_are_none_are_refused(run: Run, command: list[str], seconds
     assert "--seconds" in done.err
 
 
-def test_watch_says_in_one_line_that_nobody_is_there(run: Run) -> None:
-    assert "watch: " in refusal(run("watch", f"http://127.0.0.1:{free()}"))
+def test_watch_says_in_one_line_that_nobody_is_there_now(run: Run) -> None:
+    done = run("watch", f"http://127.0.0.1:{free()}")
+    assert (done.code, done.out) == (AwayError.code, "")
+    (line,) = done.err.splitlines()
+    assert line.startswith("myview: watch: ")
 
 
 @pytest.mark.parametrize(

@@ -275,6 +275,7 @@ remembered = st.builds(
     pulse=st.integers(0, 60),
     boot=st.integers(1, 2),
     next=st.integers(1, 12),
+    since=st.floats(0, 1e12),
     people=st.lists(known, max_size=4),
 )
 
