@@ -290,7 +290,7 @@ class BestViewService:
 
     def _send(self, decision: GopDecision) -> None:
         choices = self.board.put(decision)
-        self.past.put(choices, self.pulse0)
+        self.past.put(choices, self.pulse0, self.remembering.numbers_since)
         for tell in self.on_decision:
             tell(choices)
         self.splicer.decision(decision)

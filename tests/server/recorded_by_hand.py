@@ -51,7 +51,7 @@ def own_pictures(camera: str) -> list[Picture]:
     ]
 
 
-def head(began: float = PULSE0) -> RunHead:
+def head(began: float = PULSE0, numbers_since: float | None = None) -> RunHead:
     return RunHead(
         site="hall",
         fps=FPS,
@@ -61,6 +61,7 @@ def head(began: float = PULSE0) -> RunHead:
         cameras=list(CAMERAS),
         began=began,
         pulse0=PULSE0,
+        numbers_since=numbers_since,
     )
 
 

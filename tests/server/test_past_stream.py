@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import av
+import msgspec
 import numpy as np
 import pytest
 from cameras_by_hand import CAMERAS, FPS, GOP, LARGE, SMALL
@@ -24,6 +25,7 @@ from recorded_by_hand import (
     Picture,
     filled,
     fragments,
+    head,
     own_pictures,
     piece,
     written,
@@ -37,13 +39,16 @@ from server.view.past.kept import kept_from, kept_until, known
 from server.view.past.media import pulse_of
 from server.view.past.moment import MomentError, pulse_at
 from server.view.past.play import CameraPast, ObjectPast, Recorded
+from server.view.past.run import Headers
 from server.view.past.store import Store
 from server.view.past.stream import PastStream, Wish
 from server.view.past.stretch import Span
 from server.view.picture import Picture as Shown
 from server.view.timeline import Timeline
 from server.view.ts import Counters
-from server.wire.messages import Box
+from server.wire.inbox import Message
+from server.wire.messages import Box, Keys
+from server.wire.remembered import Remembered
 
 MOMENT = "say seconds back (-60), a pulse (p1250) or a time (2026-11-21T16:13:36Z)"
 IN_A: Mapping[str, Mapping[int, Box | None]] = {A: {1: LARGE}, B: {1: SMALL}}
@@ -409,6 +414,33 @@ async def test_a_cameras_past_goes_back_beyond_a_restart_of_the_service(tmp_path
     other = Store(tmp_path / "kept", AMPLE)
     other.open()
     assert len(other.earlier) == 2
+
+
+async def test_somebodys_past_goes_back_beyond_a_restart_if_their_number_does(tmp_path: Path) -> None:
+    folder, since = tmp_path / "kept", PULSE0 - 9.0
+    store = Store(folder, AMPLE)
+    written(store, [piece(gop, {}) for gop in range(1)])
+    for gop in range(1, 4):  # numbers began when the first camera came
+        store.write(piece(gop, {1: A}), head(numbers_since=since), Headers(filled()[1]))
+    store.close()
+    async for hall in opened(record={"folder": str(folder), "segment_s": 0.4}):
+        hall.service.pulse0 = PULSE0 + 0.01
+        hall.service.past.open()
+        hall.service.come(*CAMERAS)
+        said = Remembered(pulse=19, boot=1, next=9, since=since, people=[])
+        key = Keys("hall").camera(A, "remembered")
+        hall.service.remembering.heard(Message(key, msgspec.json.encode(said), b""))
+        for epoch in range(5, 8):
+            hall.service.feed(epoch, IN_A)
+        await until_written(hall, 1)
+        shown = await read(hall, "/objects/1/best.mp4?from=p7&to=p35")
+        assert [pulse for pulse, _ in shown] == list(range(GOP, 35))
+        assert (await hall.get_json("/api/objects/1/past"))["spans"][0]["first"] == GOP
+        async with hall.session.get("/api/past?from=p7") as answer:
+            lines = [json.loads(line) async for line in answer.content]
+        assert [(line["first"], line.get("run")) for line in lines] == [
+            (first, None) for first in (5, 10, 15, 25, 30)
+        ]
 
 
 @pytest.mark.parametrize(

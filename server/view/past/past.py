@@ -44,6 +44,7 @@ class Past:
         """The newest sound; None: the site has none."""
         self.recent = Recent(shelves, config.encode.gop, frames)
         self.pulse0: float | None = None
+        self.numbers_since: float | None = None
         self._held: deque[GopChoices] = deque()
         """Decided, but not all cameras' pictures have come."""
         self._patience = frames // 2
@@ -81,9 +82,9 @@ class Past:
         self.writer.start()
         log.info("recording to %s", self.store.folder)
 
-    def put(self, choices: GopChoices, pulse0: float | None) -> None:
-        """Take a decision over; never waits."""
-        self.pulse0 = pulse0
+    def put(self, choices: GopChoices, pulse0: float | None, numbers_since: float | None = None) -> None:
+        """Take a decision over, and since when pulses and people's numbers are these; never waits."""
+        self.pulse0, self.numbers_since = pulse0, numbers_since
         self.recent.put(choices)
         if self.writer is None:
             return
@@ -132,10 +133,18 @@ class Past:
         return [*(run for run in tuple(self.store.earlier) if self._fits(run, own)), *current]
 
     @property
+    def numbered(self) -> list[Run]:
+        """Those of them in which people's numbers are the same people's as now."""
+        return [run for run in self.runs if run is self.run or self._same_people(run)]
+
+    @property
     def sounding(self) -> list[Run]:
         """Those of them whose sound is that of this site."""
         own = self._headers
         return [] if own is None else [run for run in self.runs if self._headers_of(run).sound == own.sound]
+
+    def _same_people(self, run: Run) -> bool:
+        return self.numbers_since is not None and run.head.numbers_since == self.numbers_since
 
     def _fits(self, run: Run, own: Headers | None) -> bool:
         pulse0 = self.pulse0
@@ -177,5 +186,6 @@ class Past:
             sound=None if self.sound is None else self.sound.format.codec,
             began=time.time(),
             pulse0=self.pulse0,
+            numbers_since=self.numbers_since,
         )
         self.store.write(piece, head, headers)

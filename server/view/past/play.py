@@ -57,12 +57,13 @@ class ObjectPast:
 
     @property
     def recorded(self) -> Sequence[Recorded]:
-        """What there is of them on the disk: of this run, because another's numbers are other people's."""
-        run = self.past.run
-        if run is None:
-            return []
-        playlists = [run.objects.get(number) for number in self.numbers]
-        return [Recorded(run, it.tape) for it in playlists if it is not None]
+        """What there is of them on the disk: of no run whose numbers are other people's."""
+        return [
+            Recorded(run, run.objects[number].tape)
+            for run in self.past.numbered
+            for number in self.numbers
+            if number in run.objects
+        ]
 
     def recall(self, pulse: int) -> Gop | None:
         """Give their GOP in memory that holds a pulse, or the next one."""

@@ -50,6 +50,8 @@ class RunHead(msgspec.Struct, frozen=True, kw_only=True):
     """When the first GOP was written, unix seconds."""
     pulse0: float | None
     """When pulse 0 was due, unix seconds; null where it is not known."""
+    numbers_since: float | None = None
+    """When people's numbers began, unix seconds: in runs of the same time they are the same people's."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,8 +99,20 @@ class Run:
         if headers.sound:
             (folder / SOUND).mkdir(exist_ok=True)
             (folder / SOUND / _HEADER).write_bytes(headers.sound)
-        (folder / HEAD).write_bytes(msgspec.json.format(msgspec.json.encode(head)) + b"\n")
+        (folder / HEAD).write_bytes(_text(head))
         return cls(folder, head, longest_s)
+
+    def number_since(self, since: float | None) -> None:
+        """Note when people's numbers began: when the first camera came, maybe after the first GOP.
+
+        Raises:
+            OSError: the disk does not take it.
+        """
+        head = msgspec.structs.replace(self.head, numbers_since=since)
+        draft = self.folder / f".{HEAD}"
+        draft.write_bytes(_text(head))
+        draft.replace(self.folder / HEAD)
+        self.head = head
 
     @classmethod
     def found(cls, folder: Path, longest_s: float) -> Run:
@@ -215,3 +229,7 @@ def _read(path: Path) -> bytes:
         return path.read_bytes()
     except OSError:
         return b""
+
+
+def _text(head: RunHead) -> bytes:
+    return msgspec.json.format(msgspec.json.encode(head)) + b"\n"

@@ -91,6 +91,8 @@ class Store:
             self._begin(head, headers)
         run = self.run
         assert run is not None  # noqa: S101 — it has begun
+        if run.head.numbers_since != head.numbers_since:
+            run.number_since(head.numbers_since)
         if self._open is None:
             self._open = OpenSegment(run, Segment(first, 0, self._now()), headers)
             run.segments.append(self._open.segment)

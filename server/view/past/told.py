@@ -15,13 +15,13 @@ from server.wire.messages import UNREADABLE, GopChoices
 async def told(past: Past, start: int, end: int) -> AsyncIterator[bytes]:
     """Give the choices about pulses ``start … end - 1`` in order, each as a line of JSON (event ``gop``).
 
-    What an earlier run of the service has said has that run's name in it: its numbers are other people's.
+    What an earlier run has said has that run's name in it, where its numbers are other people's.
     """
-    at = start
+    at, numbered = start, past.numbered
     for run in past.runs:
         for path in run.index_of(at, end):
             for line, choices in await asyncio.to_thread(_lines, path, at, end):
-                yield line if run is past.run else b'{"run":"%b",' % run.folder.name.encode() + line[1:]
+                yield line if run in numbered else b'{"run":"%b",' % run.folder.name.encode() + line[1:]
                 at = choices.first + choices.frames
     for choices in past.recent.choices(at):
         if choices.first < end:
