@@ -203,11 +203,12 @@ class People:
         """Tell whether a camera has spoken of this track, lately."""
         return self._reader.locals.known(track.camera, track.boot, track.track) is not None
 
-    def followed(self, numbers: Collection[int]) -> dict[int, list[Followed]]:
-        """Give the tracks by which these people are followed now, in order; who is not is left out."""
+    def followed(self, numbers: Collection[int], since: int) -> dict[int, list[Followed]]:
+        """Give the tracks by which these people were followed since a pulse; who was not is left out."""
         found: dict[int, list[Followed]] = {}
+        wanted = set(numbers)
         for key, parts in self._parts.items():
-            if parts[-1].number in numbers and self._heard.get(key) == self._now:
+            if parts[-1].number in wanted and self._heard.get(key, -1) >= since:
                 found.setdefault(parts[-1].number, []).append(self._reader.locals.origin(key))
         return dict(sorted(found.items()))
 

@@ -18,6 +18,8 @@ log = logging.getLogger(__name__)
 
 PATIENCE_S = 1.0
 """How long a camera that has come is waited for until it says what it remembers."""
+_LATELY_S = 1.0
+"""A camera whose word on an epoch is late goes on following all the same."""
 _EVERY_S = 1.0
 """Seconds between two words of the same to a camera: each says when it was true."""
 
@@ -129,7 +131,8 @@ class Remembering:
             self._tell(pulse)
 
     def _tell(self, pulse: int) -> None:
-        for camera, now in remembered_by(self._people, self._cameras, pulse, self._since).items():
+        lately = round(_LATELY_S * self._fps)
+        for camera, now in remembered_by(self._people, self._cameras, pulse, lately, self._since).items():
             before = self._sent.get(camera)
             if camera not in self._heard:
                 continue

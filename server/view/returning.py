@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
+from itertools import chain
 
 from server.view.locals import Followed
 from server.view.people import People
@@ -13,21 +14,35 @@ LONGEST_S = 30.0
 """Seconds that the service may be away: in a longer time a track may have gone over to somebody else."""
 
 
-def remembered_by(people: People, cameras: Iterable[str], pulse: int, since: float) -> dict[str, Remembered]:
-    """Put down for each camera whom it follows now, and since when numbers are not given twice."""
-    followed = people.followed(people.everybody)
-    by_hand = set(people.merged_by_hand.values())
+def remembered_by(
+    people: People, cameras: Iterable[str], pulse: int, lately: int, since: float
+) -> dict[str, Remembered]:
+    """Put down for each camera whom it has followed lately, and since when numbers are not given twice."""
+    followed = people.followed(people.everybody, pulse - lately)
     boots: dict[str, int] = {}
+    for it in chain.from_iterable(followed.values()):
+        boots[it.camera] = max(it.boot, boots.get(it.camera, 0))
+    also: dict[int, list[int]] = {}
+    for old, number in people.merged.items():
+        also.setdefault(number, []).append(old)
+    by_hand = set(people.merged_by_hand.values())
     known: dict[str, list[Known]] = {camera: [] for camera in cameras}
     for number, tracks in followed.items():
         if number > NUMBER_MOST:
             continue
-        also, name = people.also(number)[-ALSO_MOST:], people.names.get(number, "")
-        for camera in sorted({it.camera for it in tracks}):
-            boot = boots[camera] = max(it.boot for it in tracks if it.camera == camera)
-            mine = [it.track for it in tracks if it.camera == camera and it.boot == boot]
+        mine: dict[str, list[int]] = {}
+        for it in tracks:
+            if it.boot == boots[it.camera]:  # of a run of the camera that is over nobody remembers anything
+                mine.setdefault(it.camera, []).append(it.track)
+        for camera, theirs in mine.items():
             known[camera].append(
-                Known(number=number, tracks=mine, also=also, name=name, by_hand=number in by_hand)
+                Known(
+                    number=number,
+                    tracks=theirs,
+                    also=also.get(number, [])[-ALSO_MOST:],
+                    name=people.names.get(number, ""),
+                    by_hand=number in by_hand,
+                )
             )
     following = min(people.next_number, NUMBER_MOST + 1)
     return {
@@ -87,6 +102,7 @@ class Returning:
         """Look for them after an epoch that ends with a pulse was taken in."""
         if pulse > self._until:
             self._awaited = []
+            people.expect({}, pulse)
         self._awaited = [it for it in self._awaited if not self._give_back(it, people, pulse)]
 
     def _give_back(self, awaited: _Awaited, people: People, pulse: int) -> bool:

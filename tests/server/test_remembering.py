@@ -117,6 +117,25 @@ def test_who_was_said_to_be_one_is_one_again_under_the_same_number() -> None:
     assert people.names == {kept: "Ann"}
 
 
+def test_a_camera_whose_last_word_was_late_is_remembered_all_the_same() -> None:
+    site = told()
+    before = site.whose(B, 3, 5)
+    site.tell(range(6, 7), {A: {1: SMALL, 2: LARGE}, B: {}})
+    site.start()
+    site.tell(range(7, 9))
+    assert site.whose(B, 3, 8) == before
+
+
+def test_tracks_of_a_camera_that_was_started_anew_are_not_taken_for_those_of_before() -> None:
+    site = told()
+    site.tell(range(6, 7), {A: {2: SMALL}, B: {}}, boot=2)
+    before, used = site.whose(A, 2, 6, boot=2), site.service.decider.people.next_number
+    site.start()
+    site.tell(range(7, 9), {A: {1: SMALL, 2: LARGE}, B: {}}, boot=2)
+    assert site.whose(A, 2, 8, boot=2) == before
+    assert site.whose(A, 1, 8, boot=2) >= used
+
+
 def test_a_camera_that_remembers_nothing_learns_from_what_the_others_do() -> None:
     site = told()
     ann, other = site.whose(A, 2, 5), site.whose(B, 3, 5)
