@@ -17,13 +17,13 @@ from server.wire.inbox import Message
 from server.wire.messages import UNREADABLE
 from server.wire.remembered import Known, Remembered
 
-_SAID = 3
+_SAID = 12
 _EPOCHS = 2
 _script = msgspec.msgpack.Decoder(tuple[int, list[tuple[str, bytes]]])
 
 
 class Memories(Scripts):
-    """What three cameras say, each a memory that is right, wrong in something, or of somebody else's."""
+    """What cameras say, again and again: memories that are right, wrong in something, or of somebody else."""
 
     name = "zenoh-remembered"
 
