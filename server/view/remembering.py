@@ -96,8 +96,8 @@ class Remembering:
         return any(now < came + PATIENCE_S for came in self._came.values())
 
     def awaits(self, number: int) -> bool:
-        """Tell whether somebody of this number may be found again."""
-        if not self._begun:
+        """Tell whether somebody of this number may be found again, or is and only nothing is decided yet."""
+        if not self._begun or self._people.merged.get(number, number) in self._people.first_seen:
             return True
         return self._returning is not None and number in self._returning.numbers
 

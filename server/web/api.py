@@ -43,7 +43,7 @@ def no_camera(service: BestViewService, camera: str) -> web.Response:
 def no_object(service: BestViewService, number: int) -> web.Response:
     """Say that nobody has this number, not any more, or not yet again: then, when to try again."""
     if service.remembering.awaits(number):
-        return not_now(f"the service has just begun: object {number} is not found again yet")
+        return not_now(f"object {number} cannot be shown yet")
     return problem(404, f"there is no object {number}")
 
 
