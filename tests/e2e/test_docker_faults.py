@@ -12,7 +12,13 @@ from benchmarks.faults_containers import FAULTS
 from benchmarks.faults_run import Outcome
 from benchmarks.report import Report
 
-pytestmark = [pytest.mark.live, pytest.mark.slow, pytest.mark.timeout(1800)]
+pytestmark = [
+    pytest.mark.live,
+    pytest.mark.slow,
+    pytest.mark.timeout(1800),
+    # A viewer whose time is up while it connects leaves the connection to the collector, aiohttp does.
+    pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
+]
 
 BY_NAME = {fault.name: fault for fault in FAULTS}
 

@@ -153,10 +153,11 @@ class FedService(BestViewService):
     """The best-view service without a bus: a test hands it what cameras would send."""
 
     def come(self, *cameras: str) -> None:
-        """Let cameras be there."""
+        """Let cameras be there, which remember nobody."""
         for camera in cameras:
             for part in (self.intake, self.remembering):
                 part.alive(Keys("hall").camera(camera, "alive"), there=True)
+            self.remembering.heard(Message(Keys("hall").camera(camera, "remembered"), b"", b""))
 
     def feed(self, epoch: int, seen: Mapping[str, Mapping[int, Box | None]]) -> None:
         """Send an epoch's frames and words of the cameras in ``seen``, and decide."""

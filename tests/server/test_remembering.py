@@ -40,8 +40,9 @@ class Site:
         """Start the service anew: the cameras hear of it, but for one."""
         self.service = it = FedService(small_config(**self._changes))
         it.remembering._send = self._tell
-        it.come(*CAMERAS)
         for camera in CAMERAS:
+            for part in (it.intake, it.remembering):
+                part.alive(KEYS.camera(camera, "alive"), there=True)
             if camera != deaf:
                 self.cameras[camera].service(there=True)
         return it

@@ -83,6 +83,11 @@ def test_an_old_numbers_stream_goes_on_at_its_own_service() -> None:
     class Merging:
         """First two people, then one."""
 
+        next_number = 3
+
+        def begin_at(self, number: int) -> None:
+            """Nobody remembers more."""
+
         def update(self, given: Sequence[LocalTrack], last_frame: int, _: object) -> IdentityUpdate:
             if last_frame < 15:
                 return IdentityUpdate({EpisodeKey(*it.key, 0): it.local for it in given}, (), (), (), (), ())
