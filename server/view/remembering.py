@@ -18,8 +18,8 @@ log = logging.getLogger(__name__)
 
 PATIENCE_S = 1.0
 """How long a camera that has come is waited for until it says what it remembers."""
-_LATELY_S = 1.0
-"""A camera whose word on an epoch is late goes on following all the same."""
+_LATELY_S = 10.0
+"""A camera whose words come late, on a machine with too much to do, goes on following all the same."""
 _EVERY_S = 1.0
 """Seconds between two words of the same to a camera: each says when it was true."""
 

@@ -51,6 +51,7 @@ async def test_a_best_view_that_is_killed_shows_the_same_people_under_the_same_a
     address = f"tcp/127.0.0.1:{free_port()}"
     content = {
         **DEMO,
+        "cameras": DEMO["cameras"][:2],
         "site": {"name": "e2e", "fps": 10, "width": 320, "height": 180},
         "sync": {"port": free_port(), "start_timeout_s": 60},
         "zenoh": {"connect": address, "listen": address},

@@ -1,0 +1,70 @@
+"""The operator's help helps: two are taken for each other; pointed at by who knows better, all is mended."""
+
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+
+import pytest
+from assist_page import PATIENCE_MS, PLACE, every_gop_once, helped, opened
+from playwright.async_api import Page
+from running_site import RunningSite
+from two_alike import FRAMES, MET, camera
+
+from benchmarks.browser import CHROMIUM
+from client import Gop
+from client.model import Split
+
+pytestmark = [
+    pytest.mark.live,
+    pytest.mark.asyncio,
+    pytest.mark.timeout(200),
+    pytest.mark.skipif(not CHROMIUM.exists(), reason=f"needs a Chromium at {CHROMIUM}"),
+]
+ALIKE = "alike"
+
+
+def left_to_right(gop: Gop) -> list[int]:
+    """Give who is shown by the camera of the two; empty where they change within the GOP."""
+    rows = {tuple(it.object for it in sorted(row, key=lambda it: it.left)) for row in gop.boxes[ALIKE]}
+    return list(rows.pop()) if len(rows) == 1 else []
+
+
+async def test_who_is_pointed_at_has_their_number_again_and_the_stream_goes_on(tmp_path: Path) -> None:
+    """Who came from the left went back there; the tracker has the two pass each other."""
+    # One camera, whose boxes are given: also a machine with much to do sees how they meet.
+    async with helped(tmp_path, [camera(ALIKE, tmp_path)], memory=FRAMES) as site, opened(site) as page:
+        await point(site, page)
+
+
+async def point(site: RunningSite, page: Page) -> None:
+    gops = site.gops
+    await site.until(lambda: gops[-1].first > MET, "they have met")
+    came = [it for it in gops if it.first + it.frames <= MET and len(left_to_right(it)) == len("LR")]
+    who, other = left_to_right(came[-1])
+    await site.until(lambda: left_to_right(gops[-1]) == [other, who], "their tracker exchanges them")
+    await page.goto(f"{site.url}?object={who}")
+    await page.wait_for_function(f"myview.state === 'playing' && myview.camera === '{ALIKE}'")
+    await page.evaluate("document.querySelector('video').dataset.same = 'yes'")
+    await page.wait_for_function(f"!document.querySelector('#point').hidden && ({PLACE})({other})")
+    await page.keyboard.press("h")
+    await page.wait_for_function(f"myview.pointing.object === {who}")
+    # They stand: the hand, too, stays where the one who came from the left is, whatever number is there.
+    await page.mouse.move(*await page.evaluate(PLACE, other))
+    await page.wait_for_function(
+        "myview.pointing.taken >= 1"
+    )  # an answered flag ends it sooner than the hand
+    exchanged = {Split(who, other, ALIKE), Split(other, who, ALIKE)}
+    async with asyncio.timeout(PATIENCE_MS / 1000):
+        await site.until(lambda: any(exchanged <= {*it.split} for it in gops), "the camera solves anew")
+    place = next(n for n, it in enumerate(gops) if exchanged <= {*it.split})
+    assert left_to_right(gops[place - 1]) == [other, who], "what was told before stays"
+    assert left_to_right(gops[place]) == [who, other], "what is told next is as they were before they met"
+    assert gops[place].choices[who] == ALIKE
+    # The page shows it, in the film that it has played all the time.
+    left = f"myview.boxes.some(([it, left]) => it === {who} && left < myview.site.width / 2)"
+    await page.wait_for_function(f"myview.pulse >= {gops[place].first} && {left}")
+    await page.wait_for_function(f"myview.state === 'playing' && myview.pulse > {gops[place].first} + 10")
+    assert await page.evaluate(left)
+    assert await page.evaluate("document.querySelector('video').dataset.same") == "yes"
+    assert every_gop_once(site)
