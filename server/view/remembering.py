@@ -133,9 +133,9 @@ class Remembering:
     def _tell(self, pulse: int) -> None:
         lately = round(_LATELY_S * self._fps)
         for camera, now in remembered_by(self._people, self._cameras, pulse, lately, self._since).items():
-            before = self._sent.get(camera)
             if camera not in self._heard:
                 continue
+            before = self._sent.get(camera)
             if before is not None and pulse - before.pulse < _EVERY_S * self._fps and _same(before, now):
                 continue
             payload = msgspec.json.encode(now)

@@ -258,7 +258,8 @@ class BestViewService:
         self.intake.alive(key, there)
         self.remembering.alive(key, there)
         self._changed.set()
-        asyncio.get_running_loop().call_later(PATIENCE_S, self._changed.set)
+        if self.remembering.waits:
+            asyncio.get_running_loop().call_later(PATIENCE_S, self._changed.set)
 
     def _remembered(self, message: Message) -> None:
         self.intake.remembered(message, self.remembering.heard)
