@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import uniform_filter
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -62,7 +62,9 @@ class Findable:
         flat[1] += np.bincount(cells[found], weights[found], flat.shape[1])
         looked, seen = self._counts.sum(axis=(2, 3))
         self._own = (seen + self._many * self._prior) / (looked + self._many)
-        around = uniform_filter(self._counts, (1, 1, _AROUND, _AROUND), mode="constant") * _AROUND**2
+        around = (
+            scipy.ndimage.uniform_filter(self._counts, (1, 1, _AROUND, _AROUND), mode="constant") * _AROUND**2
+        )
         self._shares = (around[1] + self._few * self._own[:, None, None]) / (around[0] + self._few)
 
     def share(self, camera: Ints, feet: Floats) -> Floats:

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
 
 from bestview.appearance import POINTS, Appearances, distances
 from bestview.looks import Looks
@@ -43,7 +43,7 @@ def find_again(
         return [-1] * len(found)
     apart = np.where(possible, unlike(appearances, found, lost) * in_time, np.nan)
     good = clearly_least(apart, _RATIO) & (apart <= gate)
-    row, column = linear_sum_assignment(np.where(good, apart, _NEVER))
+    row, column = scipy.optimize.linear_sum_assignment(np.where(good, apart, _NEVER))
     answer = [-1] * len(found)
     for i, j in zip(row.tolist(), column.tolist(), strict=True):
         if good[i, j]:

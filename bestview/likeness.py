@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
 
 _APPEARANCE_WEIGHT = 0.5
 """Most that likeness may say in one update."""
@@ -90,7 +90,7 @@ def _clear_pairs(share: NDArray[np.float64]) -> NDArray[np.bool_]:
     square = np.ones((rows + columns, rows + columns))
     square[:rows, :columns] = np.where(np.isnan(share), 1.0, np.minimum(share, 1.0))
     square[rows:, columns:] = 0.0
-    _, partner = linear_sum_assignment(square)
+    _, partner = scipy.optimize.linear_sum_assignment(square)
     mine = square[np.arange(rows + columns), partner]
     swapped = square[:, partner]
     exchange = swapped + swapped.T - mine[:, None] - mine[None, :]

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from bestview.evidence import Evidence
 from bestview.likelihood import CameraLooks, LookWeights
@@ -72,8 +71,10 @@ class Links:
 
     def chained(self) -> Ints:
         """Give which rows chains of links lead to each other: (N,) the number of the chain, -1: no link."""
-        graph = coo_array((np.ones(self.one.size), (self.one, self.two)), shape=(self.rows, self.rows))
-        _, chain = connected_components(graph, directed=False)
+        graph = scipy.sparse.coo_array(
+            (np.ones(self.one.size), (self.one, self.two)), shape=(self.rows, self.rows)
+        )
+        _, chain = scipy.sparse.csgraph.connected_components(graph, directed=False)
         chain = chain.astype(np.int64)
         linked = np.zeros(self.rows, dtype=np.bool_)
         linked[self.one] = linked[self.two] = True

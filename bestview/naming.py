@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
+import scipy
 
 
 def named(told: Sequence[Mapping[int, int]]) -> list[int]:
@@ -25,7 +25,7 @@ def named(told: Sequence[Mapping[int, int]]) -> list[int]:
     for group, frames in enumerate(told):
         for number, count in frames.items():
             kept[group, column[number]] = count
-    rows, columns = linear_sum_assignment(kept, maximize=True)
+    rows, columns = scipy.optimize.linear_sum_assignment(kept, maximize=True)
     for group, at in zip(rows.tolist(), columns.tolist(), strict=True):
         if kept[group, at] > 0:
             answer[group] = numbers[at]

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
 
 NOBODY = -1
 
@@ -26,7 +26,7 @@ def stands_for(matches: NDArray[np.int64]) -> NDArray[np.int64]:
     if matches.ndim != 2:  # noqa: PLR2004 — people, objects
         raise ValueError(f"matches have shape {matches.shape}, not (people, objects)")
     people = np.full(matches.shape[1], NOBODY, dtype=np.int64)
-    rows, columns = linear_sum_assignment(matches, maximize=True)
+    rows, columns = scipy.optimize.linear_sum_assignment(matches, maximize=True)
     met = matches[rows, columns] > 0
     people[columns[met]] = rows[met]
     return people

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
 
 from tracking.boxes import Floats
 
@@ -27,6 +27,6 @@ def best_pairs(
     """
     possible = similarity >= least - _ROUNDING
     worth = np.where(possible, similarity if bonus is None else similarity + bonus, 0.0)
-    rows, columns = linear_sum_assignment(worth, maximize=True)
+    rows, columns = scipy.optimize.linear_sum_assignment(worth, maximize=True)
     paired = possible[rows, columns]
     return rows[paired], columns[paired]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import least_squares
+import scipy
 
 from bestview.calibrate.homography import Floats
 from bestview.calibrate.pinhole import FOCAL, HIGH, PARAMETERS, TILT, VIEW, Pinhole
@@ -37,7 +37,7 @@ def view_of(samples: Samples, size: tuple[int, int], focal: float, settings: Wal
             heights = height_errors(camera, feet, tall, weight, settings)
             return np.concatenate([heights, prior_errors(camera, settings), [given]])
 
-        found = least_squares(errors, start[VIEW], x_scale="jac", ftol=1e-5, max_nfev=60)
+        found = scipy.optimize.least_squares(errors, start[VIEW], x_scale="jac", ftol=1e-5, max_nfev=60)
         if found.cost < least:
             best, least = np.concatenate([found.x, start[VIEW.stop :]]), found.cost
     assert best is not None  # noqa: S101 — priors are finite

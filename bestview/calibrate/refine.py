@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import least_squares
+import scipy
 
 from bestview.calibrate.agreement import Placed, apart, placed
 from bestview.calibrate.homography import Floats
@@ -105,7 +105,7 @@ def refined(
         parts += [_match_errors(cameras, later, samples, it, settings, sharpness) for it in thin]
         return np.concatenate(parts)
 
-    found = least_squares(errors, start[free], x_scale="jac", ftol=1e-5, max_nfev=_EVALUATIONS)
+    found = scipy.optimize.least_squares(errors, start[free], x_scale="jac", ftol=1e-5, max_nfev=_EVALUATIONS)
     values = start.copy()
     values[free] = found.x
     return Rig(tuple(_cameras(rig, values)), rig.offsets + values[count * PARAMETERS :])

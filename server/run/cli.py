@@ -7,6 +7,8 @@ import gc
 import os
 import signal
 import sys
+from importlib.metadata import version as version_of
+from typing import Annotated
 
 import typer
 
@@ -29,6 +31,24 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
+
+
+def _say_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"myview {version_of('myview')}")
+        raise typer.Exit
+
+
+@app.callback()
+def _myview(
+    version: Annotated[
+        bool,
+        typer.Option("--version", help="Say which version this is.", callback=_say_version, is_eager=True),
+    ] = False,
+) -> None:
+    """Take what is said before a command."""
+
+
 for command in (
     site_commands.demo,
     site_commands.up,

@@ -12,7 +12,6 @@ from typing import Annotated
 import typer
 
 from server.wire.errors import UserError
-from server.wire.loading import read_content
 from server.wire.output import whole_folder
 
 SEVERAL = {"render": ("--det",), "evaluate": ("--gt", "--tracks", "--videos")}
@@ -35,6 +34,7 @@ def render(
     from server.run.progress import bar, total_frames
     from server.run.render import render as render_views
     from server.run.setup import config_for_videos
+    from server.wire.loading import read_content
 
     logging.basicConfig(format="%(message)s", level=logging.WARNING)
     base = read_content(config) if config else {}

@@ -7,16 +7,17 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from server.run.ending import run_process
-from server.run.hang_up import mind_hang_ups
 from server.run.logs import log_to_stderr
 from server.wire.errors import UserError
 from server.wire.output import check_new_folder
-from server.wire.running import Running
+
+if TYPE_CHECKING:
+    from server.wire.running import Running
 
 ConfigPath = Annotated[Path, typer.Argument(metavar="CONFIG", help="The site's configuration, a YAML file.")]
 _UP_LETS_GO_S = 1.9
@@ -32,6 +33,9 @@ def _read(config: Path) -> Running:
     Raises:
         UserError: it cannot be read, or something in it is wrong.
     """
+    from server.run.hang_up import mind_hang_ups
+    from server.wire.running import Running
+
     mind_hang_ups()
     return Running(config)
 

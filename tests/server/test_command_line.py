@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import socket
+import subprocess
+import sys
 from collections.abc import Iterator
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -243,3 +246,16 @@ def test_help_names_every_command_of_the_contract(run: Run) -> None:
     assert ended.code == 0
     for command in ("demo", "up", "sync", "camera", "bestview", "render", "track", "scene", "watch"):
         assert command in ended.out
+
+
+def test_it_says_which_version_it_is(run: Run) -> None:
+    ended = run("--version")
+    assert ended.code == 0
+    assert ended.out == f"myview {version('myview')}\n"
+
+
+def test_help_does_not_wait_for_what_only_commands_need() -> None:
+    look = "import sys, server.run.cli; print(*{'numpy', 'scipy', 'cv2', 'pydantic'} & set(sys.modules))"
+    command = [sys.executable, "-c", look]
+    loaded = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
+    assert loaded.stdout.split() == []

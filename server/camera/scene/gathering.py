@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
+import scipy
 
 from server.camera.scene.perspective import Floats
 from server.camera.scene.way import BEFORE, ROUND, Way, bend, crowding, straight_way, towards
@@ -123,7 +123,7 @@ def _lead(
         middle = rng.uniform((west + 0.4, south + 0.4), (east - 0.4, north - 0.4))
         slots, look = _slots(middle, size, float(rng.uniform(0, 2 * np.pi)))
         steps = np.linalg.norm(starts[group][:, None] - slots[None], axis=2)
-        taken = linear_sum_assignment(steps)[1]
+        taken = scipy.optimize.linear_sum_assignment(steps)[1]
         trips = [
             _trip(rng, area, float(rng.uniform(*_PACE)), starts[walker], slots[slot], ends[walker])
             for walker, slot in zip(group, taken.tolist(), strict=True)
