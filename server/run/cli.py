@@ -78,8 +78,9 @@ def main() -> None:
     atexit.register(gc.freeze)
     if os.environ.get(SUPERVISED):
         end_with_parent()
-    # So that what is half-written is tidied away; what runs until it is told to end has its own handler.
-    if signal.getsignal(signal.SIGINT) != signal.SIG_IGN:
+    # So that what is half-written is tidied away; what runs until it is told to end writes nothing before it
+    # has its own handler, and until then ends at once.
+    if signal.getsignal(signal.SIGINT) == signal.SIG_DFL:
         signal.signal(signal.SIGINT, signal.default_int_handler)
     if signal.getsignal(signal.SIGTERM) == signal.SIG_DFL:
         signal.signal(signal.SIGTERM, lambda *_: sys.exit(_TERMINATED))

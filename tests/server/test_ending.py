@@ -113,37 +113,50 @@ import os, signal, sys
 
 class CtrlC:
     def find_spec(self, name, path=None, target=None):
-        if name == "server.wire.loading":
+        if name == os.environ["PRESSED_AT"]:
             os.kill(os.getpid(), signal.SIGINT)
 
 sys.meta_path.insert(0, CtrlC())
 """
 """What presses Ctrl-C while a command still loads."""
+_COMMANDS, _WHAT_IT_NEEDS = "server.run.site_commands", "server.wire.loading"
+"""Modules that are loaded before it is known what to do, and when it is."""
 
 
 @pytest.mark.parametrize(
-    ("command", "code"),
-    [(["token", "nobody"], -signal.SIGINT), (["up", "none.yaml"], 0)],
-    ids=["other", "serves"],
+    ("command", "loads", "code"),
+    [
+        (["token", "nobody"], _COMMANDS, -signal.SIGINT),
+        (["render", "none.mp4", "--out", "out", "--config", "none.yaml"], _WHAT_IT_NEEDS, 130),
+        (["up", "none.yaml"], _COMMANDS, 0),
+        (["up", "none.yaml"], _WHAT_IT_NEEDS, 0),
+    ],
 )
 def test_ctrl_c_while_a_command_still_loads_ends_it_without_a_word(
-    tmp_path: Path, command: list[str], code: int
+    tmp_path: Path, command: list[str], loads: str, code: int
 ) -> None:
-    ended = pressed(tmp_path, command)
+    ended = pressed(tmp_path, command, loads)
     assert (ended.returncode, ended.stdout, ended.stderr) == (code, "", "")
 
 
 def test_a_command_that_is_to_mind_no_ctrl_c_minds_none_while_it_loads(tmp_path: Path) -> None:
-    ended = pressed(tmp_path, ["token", "nobody"], "signal.signal(signal.SIGINT, signal.SIG_IGN)")
+    ignored = "signal.signal(signal.SIGINT, signal.SIG_IGN)"
+    ended = pressed(tmp_path, ["token", "nobody"], _COMMANDS, ignored)
     assert ended.returncode == 0, ended.stderr
     assert "nobody" in ended.stdout
 
 
-def pressed(folder: Path, command: list[str], before: str = "") -> subprocess.CompletedProcess[str]:
+def pressed(
+    folder: Path, command: list[str], loads: str, before: str = ""
+) -> subprocess.CompletedProcess[str]:
     (folder / "sitecustomize.py").write_text(_CTRL_C + before, encoding="ascii")
     return subprocess.run(
         [sys.executable, "-m", "server.run.cli", *command],
-        env=os.environ | {"PYTHONPATH": os.pathsep.join([str(folder), os.environ.get("PYTHONPATH", "")])},
+        env=os.environ
+        | {
+            "PYTHONPATH": os.pathsep.join([str(folder), os.environ.get("PYTHONPATH", "")]),
+            "PRESSED_AT": loads,
+        },
         capture_output=True,
         text=True,
         check=False,
