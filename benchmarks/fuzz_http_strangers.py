@@ -80,7 +80,7 @@ class Strangers(Target):
             {"access": {"tokens": str(tokens)}, "http": {"hls_segment_s": 0.2}}, one_each, before=self._watch
         )
         for number, name in _NAMES.items():
-            self._served.service.decider.people.call(number, name)
+            self._served.service.decider.people.roll.call(number, name)
         self._access = self._served.app[ACCESS]
         ends = time.monotonic() + 1e9
         self._sessions = {digest_of(_COOKIES[who]): _Session(digest_of(SECRETS[who]), ends) for who in _WHO}

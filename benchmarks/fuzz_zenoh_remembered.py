@@ -81,7 +81,9 @@ class Memories(Scripts):
             words = [word(rng, camera, last // STRIDE) for camera in CAMERAS]
             people.update(Epoch(last // STRIDE, last, {said.camera: said for said in words}))
             it.take(last)
-            assert not set(people.merged) & set(people.everybody), "a number that is another's is somebody's"
+            assert not set(people.roll.merged) & set(people.roll.everybody), (
+                "a number that is another's is somebody's"
+            )
         for payload in told:
             msgspec.json.decode(payload, type=Remembered)
         return not wrong

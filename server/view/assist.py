@@ -29,7 +29,7 @@ class Assist:
         """Take in what the cameras said of an epoch."""
         people, assist = self._people, config.track.assist
         people.told.frames = assist.memory if assist.enabled else 0
-        self.flags.step(epoch.last, self._foreseen(epoch), lambda number: people.merged.get(number, number))
+        self.flags.step(epoch.last, self._foreseen(epoch), people.roll.whose)
 
     def point(self, number: int, camera: str, places: Sequence[Place]) -> tuple[int, list[int]]:
         """Tell a camera where somebody is, and that this is who; its tracker goes by that, also in the past.

@@ -185,8 +185,8 @@ class Decider:
 
     def _decide(self, outlook: Outlook, first: int, frames: int, weight: Floats) -> GopDecision:
         people, lookahead = self.people, len(weight)
-        everybody = outlook.numbers
-        known = np.fromiter((people.first_seen[it] for it in everybody.tolist()), np.int64, len(everybody))
+        everybody, seen = outlook.numbers, people.roll.first_seen
+        known = np.fromiter((seen[it] for it in everybody.tolist()), np.int64, len(everybody))
         part = outlook.part(first, lookahead, known < first + frames)
         before = self._shots.of(part.numbers)
         starts = np.arange(lookahead) % self._config.encode.gop == 0
@@ -202,10 +202,12 @@ class Decider:
         names = [*self._cameras, None]  # NO_CAMERA is the last of them
         assert NO_CAMERA == -1  # noqa: S101 — as the line above says
         choices = tuple(
-            ObjectChoice(number, names[view], names[last], number in people.away)
+            ObjectChoice(number, names[view], names[last], number in people.roll.away)
             for number, view, last in zip(
                 part.numbers.tolist(), views.tolist(), before.cameras.tolist(), strict=True
             )
         )
         why = Why(part, before.cameras, weight, self.switch_cost, self._config.view.quality)
-        return GopDecision(first, frames, choices, boxes, dict(people.merged), people.take_corrections(), why)
+        return GopDecision(
+            first, frames, choices, boxes, dict(people.roll.merged), people.take_corrections(), why
+        )

@@ -54,7 +54,7 @@ class Outlook:
         unsearched = np.array([people.unsearched.over(camera, first, len(pulses)) for camera in cameras])
         line = Line([sight.over(camera, first, last) for camera in cameras], first, unsearched)
         shown = np.array([[has(camera, it) for camera in cameras] for it in pulses], dtype=np.bool_)
-        numbers: Ints = np.array(people.everybody, dtype=np.int64)
+        numbers: Ints = np.array(people.roll.everybody, dtype=np.int64)
         anybody, mine = line.persons(people, numbers, len(pulses)), indices_of(numbers, self.numbers)
         self.looked = Unfound.nobody() if elsewhere is None else elsewhere.look(line, anybody, len(pulses))
         """For all people, also those whom another service decides for."""

@@ -17,6 +17,7 @@ from server.view.mended import Mending
 from server.view.numbered import numbered_boxes
 from server.view.parts import NOBODY_YET, UNKNOWN, Part, numbers_over, parts_of, with_settled
 from server.view.reading import CameraWindow, Reader
+from server.view.roll import Roll
 from server.view.share import served
 from server.view.told_tracks import ToldTracks
 from server.view.unsearched import Unsearched
@@ -51,7 +52,9 @@ class People:
         fps: float = 25.0,
     ) -> None:
         self._registry = IdentityRegistry(settings, homographies, overhead, fps)
-        self._remembered, self._most_merged = settings.forget_after, settings.remember
+        self._remembered = settings.forget_after
+        self.roll = Roll(settings.remember)
+        """Everybody, also those whom another service decides for."""
         self._share = share
         self._histories = {camera: History[CameraWindow]() for camera in cameras}
         self._reader = Reader(site_size)
@@ -65,20 +68,12 @@ class People:
         self._heard: dict[TrackKey, int] = {}
         self._asked_from = 0
         """Nobody asks for frames before this one any more."""
-        self.first_seen: dict[int, int] = {}
-        self.last_seen: dict[int, int] = {}
-        self.away: set[int] = set()
-        """Those whom no camera has seen for a while; they are remembered."""
-        self.merged: dict[int, int] = {}
-        """Numbers that turned out to be another's; the newest, as many as people are remembered."""
         self._corrections: list[Merge | Split] = []
         self._by_hand = ByHand()
         self._expected: dict[Followed, tuple[int, int]] = {}
         """Tracks that are not heard of yet: whose they were in an earlier run, and when that ended."""
         self._now = -1
         """The last frame that was spoken of."""
-        self.names: dict[int, str] = {}
-        """What people are called, by number; said by hand, as merges and parts may be."""
 
     def update(self, epoch: Epoch) -> Sequence[CameraWindow]:
         """Take over what all cameras said about an epoch; give it as it was read."""
@@ -97,8 +92,8 @@ class People:
         seen = chain.from_iterable(window.seen() for window in windows)
         for key, (first, last) in zip(keys, seen, strict=True):
             self._heard[key] = epoch.last
-            self._note_seen(self._parts.get(key, ()), first, last)
-        self.away = (self.away | set(update.gone)) - set(update.returned)
+            self.roll.note(self._parts.get(key, ()), first, last)
+        self.roll.left(update.gone, update.returned)
         for merge in update.merged:
             self._merge(merge.kept, merge.lost)
         self._corrections += [*update.merged, *update.split]
@@ -111,20 +106,15 @@ class People:
         return self._reader.fits
 
     @property
-    def everybody(self) -> list[int]:
-        """Everybody's number, in order, whichever service decides for them."""
-        return sorted(self.first_seen)
-
-    @property
     def known(self) -> list[int]:
         """Everybody's number whom this service decides for, in order; those who are away too."""
-        return served(self.everybody, self.merged, self._share)
+        return served(self.roll.everybody, self.roll.merged, self._share)
 
     @property
     def elsewhere(self) -> list[int]:
         """The other people's numbers, in order: another service decides for them."""
         mine = set(self.known)
-        return [number for number in self.everybody if number not in mine]
+        return [number for number in self.roll.everybody if number not in mine]
 
     @property
     def next_number(self) -> int:
@@ -139,16 +129,6 @@ class People:
         """Take over whose tracks are that are not heard of yet, from a run that ended with a pulse."""
         self._expected = {track: (number, pulse) for track, number in tracks.items()}
 
-    def known_as(self, number: int, also: Iterable[int]) -> None:
-        """Take over from an earlier run that somebody had these numbers, too."""
-        self.merged |= {old: number for old in also if old != number and old not in self.first_seen}
-
-    def call(self, number: int, name: str) -> None:
-        """Give somebody a name; an empty one takes it back."""
-        self.names.pop(number, None)
-        if name:
-            self.names[number] = name
-
     @property
     def merged_by_hand(self) -> dict[int, int]:
         """Give by number that was said to be another's whose it is."""
@@ -156,11 +136,11 @@ class People:
 
     def merge(self, kept: int, lost: int) -> None:
         """Take somebody's word that two numbers are one person's, whatever the evidence says from now on."""
-        here = not {kept, lost} <= self.away
-        self._by_hand.merge(kept, lost, self.away)
+        here = not {kept, lost} <= self.roll.away
+        self._by_hand.merge(kept, lost, self.roll.away)
         self._merge(kept, lost)
         if here:
-            self.away.discard(kept)
+            self.roll.away.discard(kept)
         self._corrections.append(Merge(kept, lost))
 
     def part(self, number: int, cameras: Collection[str]) -> int | None:
@@ -180,7 +160,7 @@ class People:
         for key in tracks:  # those that the registry has settled it does not speak of again
             since = max(self._asked_from, self._parts[key][-1].first)
             self._parts[key] = [*self._parts[key], Part(since, new)]
-            self._note_seen([Part(since, new)], since, max(since, self._now))
+            self.roll.note([Part(since, new)], since, max(since, self._now))
         self._corrections += [Split(number, new, camera) for camera in sorted({it.camera for it in tracks})]
         return new
 
@@ -215,10 +195,6 @@ class People:
     def numbers(self, keys: Sequence[TrackKey], first: int, frames: int) -> NDArray[np.int64]:
         """Give the persons' numbers behind T tracks, frame by frame, (T, frames); -1: nobody yet."""
         return numbers_over([self._parts.get(key, UNKNOWN) for key in keys], first, frames)
-
-    def also(self, number: int) -> list[int]:
-        """Give the other numbers that somebody once had, in order."""
-        return sorted(old for old, new in self.merged.items() if new == number)
 
     def take_corrections(self) -> tuple[Merge | Split, ...]:
         """Give what has turned out about numbers since this was last asked, in order."""
@@ -263,30 +239,13 @@ class People:
             if number:
                 self._registry.recall(key, number, pulse)
 
-    def _note_seen(self, parts: Sequence[Part], first: int, last: int) -> None:
-        for place, part in enumerate(parts):
-            ends = last if place + 1 == len(parts) else min(last, parts[place + 1].first - 1)
-            if part.number != NOBODY_YET and max(first, part.first) <= ends:
-                # Who is confirmed now was there before: frames that are not decided yet can still show them.
-                self.first_seen[part.number] = min(part.first, self.first_seen.get(part.number, part.first))
-                self.last_seen[part.number] = max(ends, self.last_seen.get(part.number, ends))
-
     def _merge(self, kept: int, lost: int) -> None:
-        merged = {old: kept if new == lost else new for old, new in self.merged.items()} | {lost: kept}
-        self.merged = dict(list(merged.items())[-self._most_merged :] if self._most_merged else [])
-        name = self.names.pop(lost, "")
-        if name:
-            self.names.setdefault(kept, name)
+        self.roll.merge(kept, lost)
         self._mending.merge({lost: kept})
         self._parts = {
             key: [Part(part.first, kept) if part.number == lost else part for part in parts]
             for key, parts in self._parts.items()
         }
-        first, last = self.first_seen.pop(lost, None), self.last_seen.pop(lost, None)
-        self.away.discard(lost)
-        if first is not None and last is not None:
-            self.first_seen[kept] = min(first, self.first_seen.get(kept, first))
-            self.last_seen[kept] = max(last, self.last_seen.get(kept, last))
 
     def _forget(self, now: int) -> None:
         """Let go of tracks and people that were not heard of for as long as the registry remembers."""
@@ -294,8 +253,4 @@ class People:
             del self._heard[key]
             self._parts.pop(key, None)
             self._reader.locals.forget(key)
-        for number in [number for number, last in self.last_seen.items() if last < now - self._remembered]:
-            del self.first_seen[number], self.last_seen[number]
-            self.away.discard(number)
-            self.names.pop(number, None)
-            self.merged = {old: new for old, new in self.merged.items() if new != number}
+        self.roll.forget_unseen_since(now - self._remembered)

@@ -34,7 +34,7 @@ def pointings(people: People, camera: str, number: int, places: Sequence[Place])
     Returns:
         None: nothing is left, or the camera has not shown this person.
     """
-    told, numbers = people.told, [number, *people.also(number)]
+    told, numbers = people.told, [number, *people.roll.also(number)]
     known = [it for it in places if told.remembers(it.pulse)]
     tracks = [(it, told.of(camera, numbers, it.pulse)) for it in known]
     boots = [track.boot for _, track in tracks if track is not None]

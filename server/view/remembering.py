@@ -97,7 +97,7 @@ class Remembering:
 
     def awaits(self, number: int) -> bool:
         """Tell whether somebody of this number may be found again, or is and only nothing is decided yet."""
-        if not self._begun or self._people.merged.get(number, number) in self._people.first_seen:
+        if not self._begun or self._people.roll.whose(number) in self._people.roll.first_seen:
             return True
         return self._returning is not None and number in self._returning.numbers
 

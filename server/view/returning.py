@@ -18,12 +18,12 @@ def remembered_by(
     people: People, cameras: Iterable[str], pulse: int, lately: int, since: float
 ) -> dict[str, Remembered]:
     """Put down for each camera whom it has followed lately, and since when numbers are not given twice."""
-    followed = people.followed(people.everybody, pulse - lately)
+    followed = people.followed(people.roll.everybody, pulse - lately)
     boots: dict[str, int] = {}
     for it in chain.from_iterable(followed.values()):
         boots[it.camera] = max(it.boot, boots.get(it.camera, 0))
     also: dict[int, list[int]] = {}
-    for old, number in people.merged.items():
+    for old, number in people.roll.merged.items():
         also.setdefault(number, []).append(old)
     by_hand = set(people.merged_by_hand.values())
     known: dict[str, list[Known]] = {camera: [] for camera in cameras}
@@ -40,7 +40,7 @@ def remembered_by(
                     number=number,
                     tracks=theirs,
                     also=also.get(number, [])[-ALSO_MOST:],
-                    name=people.names.get(number, ""),
+                    name=people.roll.names.get(number, ""),
                     by_hand=number in by_hand,
                 )
             )
@@ -112,9 +112,9 @@ class Returning:
         if not numbers:
             return False
         kept = awaited.number if awaited.number in numbers else numbers[0]
-        if awaited.name and kept not in people.names:
-            people.call(kept, awaited.name)
-        people.known_as(kept, awaited.also)
+        if awaited.name and kept not in people.roll.names:
+            people.roll.call(kept, awaited.name)
+        people.roll.known_as(kept, awaited.also)
         for other in numbers if awaited.by_hand else ():
             if other != kept:
                 people.merge(kept, other)

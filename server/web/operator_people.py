@@ -42,7 +42,7 @@ async def post_people(request: web.Request) -> web.Response:
     said = await asked_for(request, Said)
     if _cannot(service):
         return problem(409, _cannot(service))
-    number = people.merged.get(said.object, said.object)  # also of a merge that nobody was told of yet
+    number = people.roll.whose(said.object)  # also of a merge that nobody was told of yet
     if number not in people.known:
         return no_object(service, said.object)
     given = [it for it in ("name", "merge", "part") if getattr(said, it) is not None]
@@ -59,12 +59,12 @@ def _call(service: BestViewService, number: int, name: str) -> web.Response:
     name = " ".join(name.split())
     if len(name) > NAME_MOST or not name.isprintable():
         return problem(400, f"name: at most {NAME_MOST} letters that can be read")
-    service.decider.people.call(number, name)
+    service.decider.people.roll.call(number, name)
     return answer(_told(service))
 
 
 def _merge(service: BestViewService, people: People, number: int, other: int) -> web.Response:
-    lost = people.merged.get(other, other)
+    lost = people.roll.whose(other)
     if lost not in people.known:
         return no_object(service, other)
     if lost == number:
@@ -92,7 +92,7 @@ def _cannot(service: BestViewService) -> str:
 def _told(service: BestViewService, parted: int | None = None) -> PeopleByHand:
     people = service.decider.people
     return PeopleByHand(
-        names=dict(sorted(people.names.items())),
+        names=dict(sorted(people.roll.names.items())),
         merged=people.merged_by_hand,
         parted=parted,
         cannot=_cannot(service),

@@ -58,7 +58,7 @@ async def post_pointing(request: web.Request) -> web.Response:
     if said.camera not in service.shelves:
         return no_camera(service, said.camera)
     people = service.decider.people
-    number = people.merged.get(said.object, said.object)
+    number = people.roll.whose(said.object)
     if number not in people.known:
         return no_object(service, said.object)
     wrong = next(filter(None, (_wrong(service, it) for it in said.points)), "")

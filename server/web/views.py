@@ -39,10 +39,10 @@ def objects_info(service: BestViewService) -> Objects:
         objects.append(
             ObjectInfo(
                 object=number,
-                name=people.names.get(number),
-                also=people.also(number),
-                first_seen=people.first_seen.get(number, standing.first),
-                last_seen=people.last_seen.get(number, standing.first),
+                name=people.roll.names.get(number),
+                also=people.roll.also(number),
+                first_seen=people.roll.first_seen.get(number, standing.first),
+                last_seen=people.roll.last_seen.get(number, standing.first),
                 visible=bool(standing.cameras),
                 camera=standing.choice.camera,
                 cameras=list(standing.cameras),

@@ -57,16 +57,16 @@ TWO = said({("c0", 1): 1, ("c1", 1): 2})
 def test_a_merge_by_hand_holds_while_the_evidence_goes_on_saying_two() -> None:
     it = dictated(TWO, TWO, replace(TWO, split=(Split(1, 2, "c1"),)), replace(TWO, merged=(Merge(2, 1),)))
     seen(it, 0)
-    it.call(2, "Ann")
+    it.roll.call(2, "Ann")
     it.merge(1, 2)
     assert it.known == [1]
-    assert it.names == {1: "Ann"}
-    assert (it.first_seen, it.last_seen) == ({1: 0}, {1: STRIDE - 1})
+    assert it.roll.names == {1: "Ann"}
+    assert (it.roll.first_seen, it.roll.last_seen) == ({1: 0}, {1: STRIDE - 1})
     assert it.take_corrections() == (Merge(1, 2),)
     for epoch in (1, 2, 3):
         seen(it, epoch)
         assert it.known == [1]
-        assert it.merged == {2: 1}
+        assert it.roll.merged == {2: 1}
         assert boxes(it, "c0", epoch * STRIDE) == {1: SMALL}
         assert boxes(it, "c1", epoch * STRIDE) == {1: LARGE}
     assert it.take_corrections() == ()
@@ -78,18 +78,18 @@ def test_who_is_two_to_the_evidence_is_away_when_both_are() -> None:
     it.merge(1, 2)
     for epoch, away in ((1, set()), (2, {1}), (3, set())):
         seen(it, epoch)
-        assert it.away == away
+        assert it.roll.away == away
 
 
 def test_a_name_that_both_have_is_the_one_that_is_kept() -> None:
     it = dictated(TWO)
     seen(it, 0)
-    it.call(1, "Ann")
-    it.call(2, "Bob")
+    it.roll.call(1, "Ann")
+    it.roll.call(2, "Bob")
     it.merge(1, 2)
-    assert it.names == {1: "Ann"}
-    it.call(1, "")
-    assert it.names == {}
+    assert it.roll.names == {1: "Ann"}
+    it.roll.call(1, "")
+    assert it.roll.names == {}
 
 
 def test_whom_a_camera_shows_is_somebody_new_at_once_and_stays_it() -> None:

@@ -149,7 +149,7 @@ def test_first_and_last_seen_are_the_frames_with_a_box() -> None:
     for epoch in range(3):
         it.update(epoch_of(epoch, word("c0", epoch, {1: SMALL if epoch < 2 else None})))
     [number] = it.known
-    assert (it.first_seen[number], it.last_seen[number]) == (0, 2 * STRIDE - 1)
+    assert (it.roll.first_seen[number], it.roll.last_seen[number]) == (0, 2 * STRIDE - 1)
 
 
 def test_who_is_confirmed_late_was_there_from_their_first_box_on() -> None:
@@ -166,8 +166,8 @@ def test_who_is_confirmed_late_was_there_from_their_first_box_on() -> None:
     )
     for epoch in range(5):
         it.update(epoch_of(epoch, word("c0", epoch, {1: None if epoch == 0 else SMALL})))
-    assert it.first_seen == {1: STRIDE, 2: later}
-    assert it.last_seen == {1: later - 1, 2: 5 * STRIDE - 1}
+    assert it.roll.first_seen == {1: STRIDE, 2: later}
+    assert it.roll.last_seen == {1: later - 1, 2: 5 * STRIDE - 1}
     numbers = it.numbers([TrackKey("c0", 1)], 0, 5 * STRIDE)[0].tolist()
     assert numbers == [-1] * STRIDE + [1] * (later - STRIDE) + [2] * (2 * STRIDE)
 
@@ -215,8 +215,8 @@ def test_of_merged_numbers_the_newest_are_remembered() -> None:
     it = people(remember=5)
     for lost in range(2, 40):
         it.merge(1, lost)
-    assert it.merged == dict.fromkeys(range(35, 40), 1)
-    assert it.also(1) == [*range(35, 40)]
+    assert it.roll.merged == dict.fromkeys(range(35, 40), 1)
+    assert it.roll.also(1) == [*range(35, 40)]
 
 
 def test_a_merged_number_lives_on_as_the_others_and_chains_are_followed() -> None:
@@ -228,9 +228,9 @@ def test_a_merged_number_lives_on_as_the_others_and_chains_are_followed() -> Non
     for epoch in range(3):
         it.update(epoch_of(epoch, word("c0", epoch, {1: SMALL, 2: None}), word("c1", epoch, {1: LARGE})))
     assert it.known == [1]
-    assert it.merged == {3: 1, 2: 1}
+    assert it.roll.merged == {3: 1, 2: 1}
     assert boxes(it, "c1", 0) == {1: LARGE}, "in frames past, too"
-    assert it.also(1) == [2, 3]
+    assert it.roll.also(1) == [2, 3]
 
 
 def test_what_turned_out_is_taken_once_and_in_order() -> None:
@@ -264,10 +264,10 @@ def test_people_who_were_gone_for_long_are_forgotten_with_all_that_is_known_of_t
     for epoch in range(1, 4):
         it.update(epoch_of(epoch, word("c0", epoch, {})))
     assert it.known == [number]
-    assert it.away == {number}
+    assert it.roll.away == {number}
     it.update(epoch_of(9, word("c0", 9, {})))
     assert it.known == []
-    assert it.away == set()
+    assert it.roll.away == set()
     assert it.whose("c0", 1, 1, 0) is None
     assert not it._parts
     assert not it._heard

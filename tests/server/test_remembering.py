@@ -74,7 +74,7 @@ def told(*, merge: bool = False, **changes: object) -> Site:
     site.start()
     site.tell(range(4))
     people = site.service.decider.people
-    people.call(site.whose(A, 2, 3), "Ann")
+    people.roll.call(site.whose(A, 2, 3), "Ann")
     if merge:
         people.merge(site.whose(A, 2, 3), site.whose(A, 1, 3))
     site.tell(range(4, 6))
@@ -92,7 +92,7 @@ def test_who_is_followed_all_along_keeps_their_number_and_name_and_nobody_else_g
     site.tell(range(7, 9), ONLY_LATE)
     assert [site.whose(A, 2, 8), site.whose(B, 3, 8)] == before[1:]
     assert site.whose(A, 9, 8) > max(before), "numbers are not used twice, not of those who have left either"
-    assert site.service.decider.people.names == {before[1]: "Ann"}
+    assert site.service.decider.people.roll.names == {before[1]: "Ann"}
     assert site.service.decider.people.merged_by_hand == {}
 
 
@@ -108,14 +108,14 @@ def test_the_same_goes_for_any_number_of_runs() -> None:
 
 def test_who_was_said_to_be_one_is_one_again_under_the_same_number() -> None:
     site = told(merge=True)
-    kept, (old,) = site.whose(A, 2, 5), site.service.decider.people.merged
+    kept, (old,) = site.whose(A, 2, 5), site.service.decider.people.roll.merged
     site.start()
     site.tell(range(7, 8), {A: {2: LARGE}, B: {}})
     site.tell(range(8, 12))  # the other track comes later
     people = site.service.decider.people
     assert site.whose(A, 1, 11) == site.whose(A, 2, 11) == kept
-    assert people.merged[old] == kept, "an address with the old number goes on"
-    assert people.names == {kept: "Ann"}
+    assert people.roll.merged[old] == kept, "an address with the old number goes on"
+    assert people.roll.names == {kept: "Ann"}
 
 
 def test_a_camera_whose_last_word_was_late_is_remembered_all_the_same() -> None:
@@ -160,18 +160,18 @@ LONG_AGO = 6 + int(LONGEST_S * FPS / STRIDE)
 )
 def test_nobody_is_given_a_number_or_name_that_may_be_anothers(epochs: range, boot: int) -> None:
     site = told()
-    used = max(site.service.decider.people.everybody)
+    used = max(site.service.decider.people.roll.everybody)
     site.start()
     site.tell(epochs, boot=boot)
     people = site.service.decider.people
     assert people.known
     assert min(people.known) > used
-    assert people.names == {}
+    assert people.roll.names == {}
 
 
 def test_a_camera_that_says_late_what_it_remembers_keeps_numbers_from_being_used_twice() -> None:
     site = told()
-    used = max(site.service.decider.people.everybody)
+    used = max(site.service.decider.people.roll.everybody)
     site.cameras[A] = Keeping(lambda said: site._hear(A, said))
     site.start(deaf=B)
     site.tell(range(7, 8), {A: {}, B: {}})
@@ -185,12 +185,12 @@ def test_a_name_that_was_given_meanwhile_stays_and_one_that_was_taken_back_is_no
     site.start()
     site.tell(range(7, 9))
     people = site.service.decider.people
-    people.call(site.whose(A, 2, 8), "")
-    people.call(site.whose(A, 1, 8), "Bob")
+    people.roll.call(site.whose(A, 2, 8), "")
+    people.roll.call(site.whose(A, 1, 8), "Bob")
     site.tell(range(9, 10))
     site.start()
     site.tell(range(10, 12))
-    assert site.service.decider.people.names == {site.whose(A, 1, 11): "Bob"}
+    assert site.service.decider.people.roll.names == {site.whose(A, 1, 11): "Bob"}
 
 
 def test_of_several_services_the_first_one_tells_and_all_begin_with_it() -> None:
@@ -198,7 +198,7 @@ def test_of_several_services_the_first_one_tells_and_all_begin_with_it() -> None
     assert site.service.decider.people.known
     site.start()
     site.tell(range(7, 9))
-    assert site.service.decider.people.names == {}, "the second one told nobody"
+    assert site.service.decider.people.roll.names == {}, "the second one told nobody"
     first = told()
     first._changes = {"view": {"share": {"of": 2, "index": 1}}}
     ann = first.whose(A, 2, 5)
@@ -268,7 +268,7 @@ def test_what_a_camera_says_that_is_none_is_counted(damage: bytes, caplog: pytes
     assert service.intake.states[B].bad_messages == 1
     assert caplog.messages == []
     site.tell(range(7, 9))
-    assert site.service.decider.people.names == {site.whose(A, 2, 8): "Ann"}
+    assert site.service.decider.people.roll.names == {site.whose(A, 2, 8): "Ann"}
 
 
 def test_a_camera_keeps_no_more_than_it_can() -> None:
@@ -323,4 +323,4 @@ def test_whatever_cameras_remember_the_service_goes_on(one: Remembered, other: R
     site.tell(range(7, 10))
     people = site.service.decider.people
     assert people.known
-    assert set(people.merged).isdisjoint(people.everybody)
+    assert set(people.roll.merged).isdisjoint(people.roll.everybody)
