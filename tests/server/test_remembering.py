@@ -9,7 +9,7 @@ import msgspec
 import pytest
 from aiohttp.test_utils import TestClient, TestServer
 from cameras_by_hand import CAMERAS, FPS, LARGE, SMALL, STRIDE, FedService, small_config, tracks, word
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from server.camera.keeping import Keeping
@@ -300,6 +300,7 @@ remembered = st.builds(
 )
 
 
+@settings(max_examples=40)
 @given(remembered, remembered)
 def test_whatever_cameras_remember_two_tracks_seen_at_once_in_a_camera_are_two(
     one: Remembered, other: Remembered
@@ -314,6 +315,7 @@ def test_whatever_cameras_remember_two_tracks_seen_at_once_in_a_camera_are_two(
     assert site.whose(A, 1, 11) != site.whose(A, 2, 11)
 
 
+@settings(max_examples=40)
 @given(remembered, remembered)
 def test_whatever_cameras_remember_the_service_goes_on(one: Remembered, other: Remembered) -> None:
     site = Site()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import cv2
 import numpy as np
 import pytest
@@ -25,6 +27,7 @@ def company(people: int, seed: int) -> Mingle:
     return Mingle(Gatherings(FREE, people, seed), [1.65 + 0.05 * walker for walker in range(people)])
 
 
+@cache
 def ways(people: int, seed: int, seconds: int = 120) -> np.ndarray:
     """Sample a company: ``(T, people, 2)`` metres."""
     those = company(people, seed)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import cv2
 import numpy as np
 import pytest
@@ -25,6 +27,12 @@ def ways() -> np.ndarray:
     """Three minutes of four people: ``(T, 4, 2)`` metres."""
     walkers = Walkers(ROOM, 4, 7)
     return np.array([[(pose.x, pose.y) for pose in walkers.poses(t / RATE)] for t in range(180 * RATE)])
+
+
+@cache
+def four(seed: int) -> Walkers:
+    """Give four people, whose ways are worked out once for all who ask."""
+    return Walkers(ROOM, 4, seed)
 
 
 def inside(ways: np.ndarray) -> np.ndarray:
@@ -65,8 +73,7 @@ def test_people_leave_and_come_back(ways: np.ndarray) -> None:
 @pytest.mark.parametrize("seed", range(4))
 def test_a_background_can_be_learnt_at_the_beginning(seed: int) -> None:
     """Everybody is there, apart from each other, and nobody stands still for the first four seconds."""
-    walkers = Walkers(ROOM, 4, seed)
-    start = [walkers.poses(t / 10) for t in range(41)]
+    start = [four(seed).poses(t / 10) for t in range(41)]
     assert all(ROOM.outside(pose.x, pose.y) < -0.5 for poses in start for pose in poses)
     assert min(pose.speed for poses in start for pose in poses) > 0.2
     first = np.array([(pose.x, pose.y) for pose in start[0]])
@@ -77,8 +84,8 @@ def test_a_background_can_be_learnt_at_the_beginning(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_the_room_is_never_left_by_all_at_once_for_long(seed: int) -> None:
-    walkers = Walkers(ROOM, 4, seed)
-    there = [sum(ROOM.outside(pose.x, pose.y) < 0 for pose in walkers.poses(float(t))) for t in range(240)]
+    poses = [four(seed).poses(float(t)) for t in range(240)]
+    there = [sum(ROOM.outside(pose.x, pose.y) < 0 for pose in those) for those in poses]
     assert np.mean(np.array(there) >= 2) > 0.95
 
 
