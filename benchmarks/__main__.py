@@ -61,7 +61,7 @@ BENCHMARKS = (
     Benchmark("stream", "splices, viewers and their delay beside ffmpeg and nginx; 6 minutes"),
     Benchmark("codecs", "H.264, VP8 and a camera's own H.264: what pictures cost and weigh; 1 minute"),
     Benchmark("faults", "processes, sources, messages, disk and clock fail while viewers watch; 12 minutes"),
-    Benchmark("faults_containers", "the like in containers, which takes a Docker Engine; 10 minutes"),
+    Benchmark("faults.containers", "the like in containers, which takes a Docker Engine; 10 minutes"),
     Benchmark("overlay", "boxes burnt in and JPEG: what pictures cost; 1 minute"),
     Benchmark("page", "the page on the demo: switching people, memory over a visit; 4 minutes"),
     Benchmark("choice", "what choosing views costs, and how it grows; 1 minute"),

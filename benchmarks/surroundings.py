@@ -42,8 +42,9 @@ def parser(about: str, name: str) -> argparse.ArgumentParser:
 
 def command_line() -> str:
     """Give the command that runs this process's benchmark as it was run."""
-    name = Path(sys.argv[0]).stem
-    words = ["python", "-m", f"benchmarks.{name}", *sys.argv[1:]]
+    module = Path(sys.argv[0]).resolve().relative_to(ROOT).with_suffix("")
+    name = ".".join(module.parts).removesuffix(".__main__")
+    words = ["python", "-m", name, *sys.argv[1:]]
     return " ".join(words)
 
 

@@ -21,7 +21,7 @@ from pathlib import Path
 import cv2
 import matplotlib as mpl
 
-from benchmarks.peer_plot import plot
+from benchmarks.peers.plot import plot
 from benchmarks.report import Report
 from benchmarks.surroundings import CannotRunError, finish, parser
 from server.run.track import Frame, final_rows, loaded_for, searched

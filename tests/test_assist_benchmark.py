@@ -7,15 +7,15 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from benchmarks.assist_cases import Outcome, count
-from benchmarks.assist_clips import Clip
-from benchmarks.assist_desk import Desk
-from benchmarks.assist_failures import Kind, failures, matches
-from benchmarks.assist_operator import Flag, Operator, Person
-from benchmarks.assist_school import school
-from benchmarks.assist_table import texts
-from benchmarks.assist_watch import FISH, Watched, watch
-from benchmarks.experiments_scene import Truth
+from benchmarks.assist.cases import Outcome, count
+from benchmarks.assist.clips import Clip
+from benchmarks.assist.desk import Desk
+from benchmarks.assist.failures import Kind, failures, matches
+from benchmarks.assist.operator import Flag, Operator, Person
+from benchmarks.assist.school import school
+from benchmarks.assist.table import texts
+from benchmarks.assist.watch import FISH, Watched, watch
+from benchmarks.experiments.scene import Truth
 from server.wire.sections import Flags
 from tracking import Detections
 from tracking.assist import Reason, Trouble

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.assist_colours import FamiliarColours
+from benchmarks.assist.colours import FamiliarColours
 from tracking.detectors import Image
 from tracking.detectors.base import Mask
 

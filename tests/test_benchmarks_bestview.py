@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks import bestview
-from benchmarks.bestview_cases import Case
-from benchmarks.bestview_decide import Rendering, decide_given, largest
-from benchmarks.bestview_join import (
+from benchmarks.bestview import __main__ as bestview
+from benchmarks.bestview.cases import Case
+from benchmarks.bestview.decide import Rendering, decide_given, largest
+from benchmarks.bestview.join import (
     boxes_by_truth,
     bridged,
     by_nearest_feet,
@@ -21,10 +21,10 @@ from benchmarks.bestview_join import (
     own_tracks,
     tracks_by_truth,
 )
-from benchmarks.bestview_sweep import DEFAULT_SWITCH_COST_S, STRIDE, Setting, sweep
-from benchmarks.bestview_watch import Rows
-from benchmarks.bestview_ways import Way, outcome, visible_rows
-from benchmarks.bestview_why import Losses, losses
+from benchmarks.bestview.sweep import DEFAULT_SWITCH_COST_S, STRIDE, Setting, sweep
+from benchmarks.bestview.watch import Rows
+from benchmarks.bestview.ways import Way, outcome, visible_rows
+from benchmarks.bestview.why import Losses, losses
 from server.run.evaluate_choices import Choice
 from server.wire.messages import CameraTracks, Track
 from tracking.motchallenge import MotRow

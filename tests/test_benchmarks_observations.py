@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.observed import View, oracle, scores_of_boxes, scores_of_tracks, views_of
-from benchmarks.observers import BlobDetector, rows_of
+from benchmarks.observations.observed import View, oracle, scores_of_boxes, scores_of_tracks, views_of
+from benchmarks.observations.observers import BlobDetector, rows_of
 from benchmarks.surroundings import CannotRunError
 from tracking.motchallenge import MotRow
 

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from benchmarks import render
-from benchmarks.delay_bus import Marks
-from benchmarks.delay_page import Shown
-from benchmarks.delay_stages import STAGES, split
-from benchmarks.picture import small_png
+from benchmarks.delay.bus import Marks
+from benchmarks.delay.page import Shown
+from benchmarks.delay.stages import STAGES, split
+from benchmarks.picture.__main__ import small_png
 from benchmarks.processes import OTHER, busy_now
+from benchmarks.render import __main__ as render
 from benchmarks.stopwatch import Stopwatch
 from benchmarks.surroundings import SKIPPED, CannotRunError
 from benchmarks.views import find_views

@@ -7,9 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks import ablation, peer_environment, peers
+from benchmarks import ablation
 from benchmarks.ablation import DEFAULT, TERMS, Term, cell
-from benchmarks.peer_environment import PeersAwayError
+from benchmarks.peers import __main__ as peers
+from benchmarks.peers import environment as peer_environment
+from benchmarks.peers.environment import PeersAwayError
 from benchmarks.recordings import Recording, find_recordings, track
 from benchmarks.surroundings import SKIPPED
 from server.run.track import track_one

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.bestview_parts import own_parts
-from benchmarks.bestview_who import Agreement, Met
+from benchmarks.bestview.parts import own_parts
+from benchmarks.bestview.who import Agreement, Met
 from server.wire.loading import build_config
 from server.wire.messages import Box, CameraTracks, Track
 from tracking.motchallenge import MotRow

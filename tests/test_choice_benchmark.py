@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.choice_decisions import Crowd, decision_times
-from benchmarks.choice_program import Size, frame_time
+from benchmarks.choice.decisions import Crowd, decision_times
+from benchmarks.choice.program import Size, frame_time
 from server.wire.loading import build_config
 
 

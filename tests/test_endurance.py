@@ -8,9 +8,9 @@ import tracemalloc
 
 import pytest
 
-from benchmarks.endurance import describe, run_tracker, spans
-from benchmarks.endurance_crowd import crowd
-from benchmarks.endurance_memory import Samples, resident_megabytes
+from benchmarks.endurance.__main__ import describe, run_tracker, spans
+from benchmarks.endurance.crowd import crowd
+from benchmarks.endurance.memory import Samples, resident_megabytes
 from benchmarks.report import Report
 from tracking import CostSettings, OnlineTracker, WindowSettings, solver_named
 

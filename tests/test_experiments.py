@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.experiments import run
-from benchmarks.experiments_labels import judge, named, per_frame
-from benchmarks.experiments_list import PAPER_WINDOW, Experiment, Setting
-from benchmarks.experiments_people import Cast, play
-from benchmarks.experiments_runs import follow
-from benchmarks.experiments_scene import Scene, Truth
-from benchmarks.experiments_toys import TOYS, play_toys
-from benchmarks.experiments_walks import Walking
+from benchmarks.experiments.__main__ import run
+from benchmarks.experiments.labels import judge, named, per_frame
+from benchmarks.experiments.list import PAPER_WINDOW, Experiment, Setting
+from benchmarks.experiments.people import Cast, play
+from benchmarks.experiments.runs import follow
+from benchmarks.experiments.scene import Scene, Truth
+from benchmarks.experiments.toys import TOYS, play_toys
+from benchmarks.experiments.walks import Walking
 from benchmarks.report import Report
 from tracking import PAPER_COSTS, CostSettings, Detections, Template, WindowSettings, solver_named
 from tracking.boxes import iou

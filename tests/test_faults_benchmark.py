@@ -11,17 +11,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.faults import _group
-from benchmarks.faults_film import FRAMES, HEIGHT, WIDTH, Stamp, Views, read_stamp, stamped
-from benchmarks.faults_judge import judge
-from benchmarks.faults_live import MOST_AHEAD, MOST_BEHIND
-from benchmarks.faults_processes import FAULTS
-from benchmarks.faults_reader import write_reader
-from benchmarks.faults_recorded import File, note
-from benchmarks.faults_run import Outcome, _injected
-from benchmarks.faults_site import Stand
-from benchmarks.faults_table import kept
-from benchmarks.faults_viewer import Picture, Told
+from benchmarks.faults.film import FRAMES, HEIGHT, WIDTH, Stamp, Views, read_stamp, stamped
+from benchmarks.faults.judge import judge
+from benchmarks.faults.live import MOST_AHEAD, MOST_BEHIND
+from benchmarks.faults.measure import _group
+from benchmarks.faults.processes import FAULTS
+from benchmarks.faults.reader import write_reader
+from benchmarks.faults.recorded import File, note
+from benchmarks.faults.run import Outcome, _injected
+from benchmarks.faults.site import Stand
+from benchmarks.faults.table import kept
+from benchmarks.faults.viewer import Picture, Told
 from benchmarks.report import Report
 from client import Box, Gop
 from tracking.detectors.onnx import OnnxDetector, OnnxSettings

@@ -6,8 +6,8 @@ from itertools import pairwise
 
 import pytest
 
-from benchmarks.faults_bus import Crossing, Way
-from benchmarks.faults_messages import _pointing
+from benchmarks.faults.bus import Crossing, Way
+from benchmarks.faults.messages import _pointing
 from client import Box, Gop
 from server.wire.inbox import Message
 

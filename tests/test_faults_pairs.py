@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from benchmarks.faults import FAULTS
-from benchmarks.faults_pairs import BESTVIEW, DRAWING, OTHER, SHOWN, names, title, turns
-from benchmarks.faults_site import Stand
-from benchmarks.faults_viewer import Viewer
+from benchmarks.faults.__main__ import FAULTS
+from benchmarks.faults.pairs import BESTVIEW, DRAWING, OTHER, SHOWN, names, title, turns
+from benchmarks.faults.site import Stand
+from benchmarks.faults.viewer import Viewer
 from client import Gop
 
 

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.live_counts import counts_in
-from benchmarks.live_stages import REST, STAGES, StageTimes, ThreadWatch, hooked_environment, read_stages
-from benchmarks.live_views import CROWD, FPS, Live, usual_views
+from benchmarks.live.counts import counts_in
+from benchmarks.live.stages import REST, STAGES, StageTimes, ThreadWatch, hooked_environment, read_stages
+from benchmarks.live.views import CROWD, FPS, Live, usual_views
 from benchmarks.views import ROOM, Views
 
 METRICS = """\
@@ -57,7 +57,7 @@ CLOCK = HandClock()
 
 
 def test_a_stage_inside_a_stage_counts_only_there(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("benchmarks.live_stages.time", CLOCK)
+    monkeypatch.setattr("benchmarks.live.stages.time", CLOCK)
     watch = ThreadWatch()
     calls: list[int] = []
     outer, inner = type("O", (Outer,), {}), type("I", (Inner,), {})

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.load import load, step_of
-from benchmarks.load_found import Loaded, Sample, Step
-from benchmarks.load_report import plot
-from benchmarks.load_site import running
+from benchmarks.load.__main__ import load, step_of
+from benchmarks.load.found import Loaded, Sample, Step
+from benchmarks.load.report import plot
+from benchmarks.load.site import running
 
 CALM = Sample(
     at=0.0, levels=(0, 0), pulses=1000, shed=100, missed=10, late=7, delays=(), holes=0

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from scipy.optimize import linprog
 from scipy.sparse import lil_matrix
 
-from benchmarks.occupancy_map import OccupancyMap, OccupancySettings, Sight
-from benchmarks.occupancy_paths import NOWHERE, Lattice, Path, shortest_paths
+from benchmarks.occupancy.map import OccupancyMap, OccupancySettings, Sight
+from benchmarks.occupancy.paths import NOWHERE, Lattice, Path, shortest_paths
 
 bounded = settings(max_examples=40)
 

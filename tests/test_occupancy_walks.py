@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.occupancy_colours import ColourSettings, Walker, numbers_of
-from benchmarks.occupancy_floor import FloorSettings, View, lay_out
-from benchmarks.occupancy_level import levelled
-from benchmarks.occupancy_paths import Path
-from benchmarks.occupancy_walks import WalkSettings, rows_of_walks, smoothed, walk_of
+from benchmarks.occupancy.colours import ColourSettings, Walker, numbers_of
+from benchmarks.occupancy.floor import FloorSettings, View, lay_out
+from benchmarks.occupancy.level import levelled
+from benchmarks.occupancy.paths import Path
+from benchmarks.occupancy.walks import WalkSettings, rows_of_walks, smoothed, walk_of
 from bestview import to_ground
 from tracking.detectors.heightline import HeightLine
 from tracking.motchallenge import MotRow

@@ -8,10 +8,10 @@ import msgspec
 import numpy as np
 import pytest
 
-from benchmarks.scaling import exponent
-from benchmarks.scaling_hall import STRIDE, WINDOW, Hall, Tracker
-from benchmarks.scaling_service import REST, STAGES, Times
-from benchmarks.scaling_site import carry
+from benchmarks.scaling.__main__ import exponent
+from benchmarks.scaling.hall import STRIDE, WINDOW, Hall, Tracker
+from benchmarks.scaling.service import REST, STAGES, Times
+from benchmarks.scaling.site import carry
 from bestview import feet, to_ground
 from server.view.sense import makes_sense
 from server.wire.messages import CameraTracks

@@ -11,7 +11,7 @@ import pytest
 from aiohttp import web
 from aiohttp.test_utils import TestServer
 
-from benchmarks.soak_samples import (
+from benchmarks.soak.samples import (
     DELAY,
     DESCRIPTORS,
     RESIDENT,
@@ -21,9 +21,9 @@ from benchmarks.soak_samples import (
     resident_of,
     threads_of,
 )
-from benchmarks.soak_site import CAMERAS, HEIGHT, WIDTH, Filmed, Tempo
-from benchmarks.soak_tasks import FOLDER_VARIABLE, hooked_environment, note_tasks, read_held
-from benchmarks.soak_visitors import Seen, Visitors, shown_by
+from benchmarks.soak.site import CAMERAS, HEIGHT, WIDTH, Filmed, Tempo
+from benchmarks.soak.tasks import FOLDER_VARIABLE, hooked_environment, note_tasks, read_held
+from benchmarks.soak.visitors import Seen, Visitors, shown_by
 from server.view import fmp4
 from server.wire.loading import build_config
 
@@ -69,7 +69,7 @@ def test_a_process_is_read_as_it_is() -> None:
 
 
 def test_a_process_counts_its_own_tasks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("benchmarks.soak_tasks._EVERY_S", 0.01)
+    monkeypatch.setattr("benchmarks.soak.tasks._EVERY_S", 0.01)
     monkeypatch.setattr(asyncio.BaseEventLoop, "run_forever", asyncio.BaseEventLoop.run_forever)
     note_tasks(str(tmp_path))
 

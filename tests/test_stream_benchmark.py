@@ -13,19 +13,19 @@ from socket import create_server
 import pytest
 
 from benchmarks.report import Report
-from benchmarks.stream_bare import bare_sends
-from benchmarks.stream_cameras import draw_room, load, save
-from benchmarks.stream_crowd import Crowd, Heard
-from benchmarks.stream_drift import drift, times
-from benchmarks.stream_hls import hls_delays
-from benchmarks.stream_load import Step, end_of_first_fragment, first_pictures, send_delays, watch_objects
-from benchmarks.stream_peers import ffmpeg_switching
-from benchmarks.stream_right import Right
-from benchmarks.stream_service import Given, read
-from benchmarks.stream_site import running, viewers
-from benchmarks.stream_splice import encode_again, splice
-from benchmarks.stream_stalled import Beside, Turn, beside_stalled, stalling
-from benchmarks.stream_tables import Found, describe, per_core, plot
+from benchmarks.stream.bare import bare_sends
+from benchmarks.stream.cameras import draw_room, load, save
+from benchmarks.stream.crowd import Crowd, Heard
+from benchmarks.stream.drift import drift, times
+from benchmarks.stream.hls import hls_delays
+from benchmarks.stream.load import Step, end_of_first_fragment, first_pictures, send_delays, watch_objects
+from benchmarks.stream.peers import ffmpeg_switching
+from benchmarks.stream.right import Right
+from benchmarks.stream.service import Given, read
+from benchmarks.stream.site import running, viewers
+from benchmarks.stream.splice import encode_again, splice
+from benchmarks.stream.stalled import Beside, Turn, beside_stalled, stalling
+from benchmarks.stream.tables import Found, describe, per_core, plot
 from server.camera.encode import AccessUnit
 from server.view.fmp4 import Sample, fragment, ticks
 from server.view.footage import Footage

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.temporal import follow, main
-from benchmarks.temporal_merges import NOBODY, events, merged, mistaken
-from benchmarks.temporal_room import Clip, played
+from benchmarks.temporal.__main__ import follow, main
+from benchmarks.temporal.merges import NOBODY, events, merged, mistaken
+from benchmarks.temporal.room import Clip, played
 from tracking.temporal import TemporalSettings
 
 # Two people meet at the third stage and part at the fifth; the third person is by themselves.

@@ -6,10 +6,10 @@ import asyncio
 
 import pytest
 
-from benchmarks.faults import measure
-from benchmarks.faults_compose import missing
-from benchmarks.faults_containers import FAULTS
-from benchmarks.faults_run import Outcome
+from benchmarks.faults.compose import missing
+from benchmarks.faults.containers import FAULTS
+from benchmarks.faults.measure import measure
+from benchmarks.faults.run import Outcome
 from benchmarks.report import Report
 
 pytestmark = [

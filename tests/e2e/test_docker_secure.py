@@ -18,7 +18,7 @@ import aiohttp
 import av
 import pytest
 
-from benchmarks.faults_compose import PLAIN, ComposeSite, composed, missing
+from benchmarks.faults.compose import PLAIN, ComposeSite, composed, missing
 from benchmarks.surroundings import ROOT
 
 pytestmark = [pytest.mark.live, pytest.mark.slow, pytest.mark.timeout(1200)]

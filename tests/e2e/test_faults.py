@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks import faults_processes
-from benchmarks.faults import measure
+from benchmarks.faults import processes as faults_processes
+from benchmarks.faults.measure import measure
 from benchmarks.report import Report
 
 pytestmark = [pytest.mark.live, pytest.mark.slow, pytest.mark.timeout(400)]

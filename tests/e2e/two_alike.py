@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.faults_film import write_film
+from benchmarks.faults.film import write_film
 
 MET = 80
 """The pulse in which they meet."""

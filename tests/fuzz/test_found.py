@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from benchmarks.fuzz_site import KEYS, STRIDE, Fed, pictures, site, video
+from benchmarks.fuzz.site import KEYS, STRIDE, Fed, pictures, site, video
 from bestview import checked_homography
 from client.fmp4 import Mp4Error
 from client.plain import write_plain

@@ -10,10 +10,10 @@ from random import Random
 
 import pytest
 
-from benchmarks.fuzz import PARTS, side_by_side, targets_of
-from benchmarks.fuzz_http_strangers import SECRETS, Strangers
-from benchmarks.fuzz_run import Attempt, Crash, Plan, Runner, numbered
-from benchmarks.fuzz_target import Scripts, Target, UnclearError, refused
+from benchmarks.fuzz.__main__ import PARTS, side_by_side, targets_of
+from benchmarks.fuzz.http_strangers import SECRETS, Strangers
+from benchmarks.fuzz.run import Attempt, Crash, Plan, Runner, numbered
+from benchmarks.fuzz.target import Scripts, Target, UnclearError, refused
 from camsync import door, proof
 from server.web import access
 from server.web.access_grant import Need

@@ -23,7 +23,7 @@ from schemathesis.checks import (
     status_code_conformance,
 )
 
-from benchmarks.fuzz_http_site import Served
+from benchmarks.fuzz.http_site import Served
 
 CASES = 4
 """Of each operation and mode; endless streams are only begun."""

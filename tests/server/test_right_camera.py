@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import pytest
 
-from benchmarks.stream_right import Right, judge, schedule
+from benchmarks.stream.right import Right, judge, schedule
 from server.view.footage import Footage
 from server.view.streams import Gop
 from server.wire.sections import Encode

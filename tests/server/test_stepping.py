@@ -7,7 +7,7 @@ from itertools import islice
 import numpy as np
 import pytest
 
-from benchmarks.endurance_crowd import crowd
+from benchmarks.endurance.crowd import crowd
 from server.camera.ladder import Rung, rungs
 from server.camera.stepping import Stepping
 from tracking import CostSettings, Detections, OnlineTracker, WindowResult, WindowSettings, solver_named

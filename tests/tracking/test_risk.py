@@ -8,7 +8,7 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from benchmarks.assist_risk import fitted
+from benchmarks.assist.risk import fitted
 from tracking.assist import Reason, Signs
 from tracking.assist.risk import WEIGHTS, risk_of
 

@@ -42,7 +42,7 @@ WEIGHTS: Mapping[Reason, tuple[float, float, float, float, float]] = {
     "fading": (-4.71, -0.02, -0.05, -0.12, 1.23),
     "gap": (-3.00, -1.00, 0.00, 0.00, 0.00),
 }
-"""By reason; `python -m benchmarks.assist_risk` learns them, but for `gap`: the default solver proves its
+"""By reason; `python -m benchmarks.assist.risk` learns them, but for `gap`: the default solver proves its
 answers, so that no school ever has such a trouble. What stands there is a guess, no likelier than one in
 twenty, and less the surer the two are told apart."""
 

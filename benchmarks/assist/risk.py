@@ -1,0 +1,85 @@
+"""Learn how likely what is foreseen goes wrong: the weights of `tracking/assist/risk.py`.
+
+    OPENBLAS_NUM_THREADS=1 python -m benchmarks.assist.risk --out out/bench
+
+Schools without pictures of even seeds are tracked with nobody at the screen. Their failures are about as
+rare as the thesis's; drawn fish and players fail so often that nearly every trouble goes wrong, and tell
+nothing apart. A trouble went wrong where an identity failure of one of its tracks followed that an operator
+who had been asked could have seen happen. Of each reason, the log odds of that are a weighted sum of the
+trouble's signs, by the likelihood with a small ridge.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import get_args
+
+import numpy as np
+
+from benchmarks.assist.cases import tells
+from benchmarks.assist.kinds import kinds
+from benchmarks.assist.operator import Person
+from benchmarks.assist.watch import Watched, watch
+from benchmarks.report import Report
+from benchmarks.surroundings import parser
+from tracking.assist import Reason, Signs
+from tracking.boxes import Floats
+
+_MARGIN, _GONE = 4.0, 5
+"""What is foreseen here: more than anybody would be asked about, so that the risk of that is known, too."""
+_RIDGE = 1.0
+_STEPS = 50
+
+
+def fitted(terms: Floats, wrong: Floats) -> Floats:
+    """Give the weights of a logistic regression of `wrong` (N,) on `terms` (N, D), by Newton's method."""
+    weights = np.zeros(terms.shape[1])
+    for _ in range(_STEPS):
+        chance = 1.0 / (1.0 + np.exp(-(terms @ weights)))
+        slope = terms.T @ (wrong - chance) - _RIDGE * weights
+        curve = (terms.T * (chance * (1.0 - chance))) @ terms + _RIDGE * np.eye(len(weights))
+        weights += np.linalg.solve(curve, slope)
+    return weights
+
+
+def examples(watched: Sequence[Watched], reason: Reason) -> tuple[Floats, Floats]:
+    """Give the terms `(N, D)` of the troubles of a reason, and 1 where they went wrong `(N,)`."""
+    rows, wrong, person = [], [], Person()
+    for it in watched:
+        for newest, trouble in it.troubles:
+            if trouble.reason == reason:
+                rows.append(Signs(trouble.margin, trouble.frame - newest, trouble.length).terms)
+                told = [tells(trouble, newest, failure, it.clip.fps, person) for failure in it.failures]
+                wrong.append(float(any(told)))
+    return np.array(rows).reshape(-1, len(Signs(0.0, 0.0, 0.0).terms)), np.array(wrong)
+
+
+def main() -> None:
+    """Learn, and print."""
+    options = parser(__doc__, "assist.risk")
+    options.add_argument("--clips", type=int, default=50, help="how many")
+    chosen = options.parse_args()
+    kind = kinds()["school"]
+    assist = replace(kind.setup.assist, margin=_MARGIN, alike=_MARGIN, gone=_GONE)
+    setup = replace(kind.setup, assist=assist)
+    watched = [watch(clip, setup) for clip in kind.clips(chosen.clips, first=0)]
+    table = []
+    for reason in get_args(Reason):
+        terms, wrong = examples(watched, reason)
+        if not len(wrong):
+            continue
+        weights = [f"{it:.2f}" for it in fitted(terms, wrong)]
+        table.append([reason, str(len(wrong)), f"{100.0 * wrong.mean():.0f} %", *weights])
+    report = Report()
+    report.say(f"{len(watched)} clips, {sum(it.clip.minutes for it in watched):.1f} minutes")
+    report.table(
+        "What risks are told from",
+        ["reason", "troubles", "went wrong", "constant", "margin", "ahead", "lead / 10", "log(1 + length)"],
+        table,
+    )
+    report.save(chosen.out / "assist-risk.txt")
+
+
+if __name__ == "__main__":
+    main()

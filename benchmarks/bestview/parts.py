@@ -1,0 +1,44 @@
+"""The parts of tracks that identity joins: cut where a camera's tracker may have confused people."""
+
+from __future__ import annotations
+
+from itertools import chain, zip_longest
+
+import numpy as np
+
+from benchmarks.bestview.watch import Messages
+from bestview.episodes import Episodes
+from bestview.sightings import FootError, line_up
+from server.view.align import Aligner
+from server.view.decide import homographies
+from server.view.reading import Reader
+from server.wire.config import Config
+from tracking.motchallenge import MotRow
+
+
+def own_parts(config: Config, messages: Messages) -> dict[str, list[MotRow]]:
+    """Give each camera's final boxes, with a number for each part of each track, as the service cuts them."""
+    settings = config.view.identity
+    episodes, reader = Episodes(settings), Reader((config.site.width, config.site.height))
+    ground, error = homographies(config), FootError(settings.foot_sideways, settings.foot_upwards)
+    aligner = Aligner(config.camera_ids, config.track.window.stride, grace=0)
+    for camera in config.camera_ids:
+        aligner.come(camera)
+        aligner.frame(camera, messages[camera][0].boot, 0)
+    parts: dict[str, list[MotRow]] = {camera: [] for camera in config.camera_ids}
+    for message in chain.from_iterable(zip_longest(*messages.values())):
+        if message is not None:
+            aligner.tracks(message)
+        for epoch in aligner.ready(now=-1):
+            tracks = [it for window in reader.read(epoch) for it in window.local_tracks()]
+            seen = line_up(tracks, ground, error, config.overhead)
+            # None is ever settled here, so that a row is one part for good.
+            rows, _ = episodes.take(seen, {it.key: it.looks for it in tracks})
+            for track, column in zip(*np.nonzero(rows >= 0), strict=True):
+                camera = seen.keys[track].camera
+                left, top, right, bottom = (
+                    reader.fits[camera].boxes_to_site(seen.boxes[track, column]).tolist()
+                )
+                frame, number = seen.first + int(column) + 1, int(rows[track, column]) + 1
+                parts[camera].append(MotRow(frame, number, left, top, right - left, bottom - top))
+    return parts

@@ -1,0 +1,1 @@
+"""Cameras placed from people who walk."""

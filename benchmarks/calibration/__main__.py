@@ -1,0 +1,199 @@
+"""Calibration from walks: how exactly cameras are placed from nothing but tracks, and what it is worth.
+
+    OPENBLAS_NUM_THREADS=1 python -m benchmarks.calibration --data ../shared/data --out out/bench
+
+The room is drawn, and its cameras are known. In the recordings, feet of people who have one number in the
+ground truth are compared.
+"""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import yaml
+
+from benchmarks.calibration.errors import Agreement, agreement, error_of_known, in_common
+from benchmarks.recordings import Recording, track
+from benchmarks.report import Report
+from benchmarks.surroundings import CannotRunError, parser
+from benchmarks.views import Views, find_views
+from bestview.calibrate import CalibrationError, Track, Walk, WalkCalibration, calibrate_walks
+from server.camera.scene import Scene, write_recording
+from server.run.calibrate_tracks import Picture, walks_from_tracks
+from server.run.evaluate import evaluate_recordings, read_recordings
+from server.run.render import render
+from server.run.setup import config_for_videos
+from server.run.track import track_one
+from server.view.calibrate.file import ground_file
+from server.view.calibrate.plan import plan_of, plot_plan
+from server.view.calibrate.walked import walk_settings
+from tracking.motchallenge import write_rows
+
+_PERSON = 1.75
+_SHIFT_S = 3.0
+_ROOM_S, _ROOM_SIZE, _ROOM_FPS = 60.0, (640, 360), 25.0
+_MOVED = {"c1": 7, "c2": -4}
+"""Frames by which the room's cameras are put out of step."""
+_AUDITORIUM = ("HC3", "HC4", "IP2", "IP5")
+
+
+@dataclass(frozen=True, slots=True)
+class Room:
+    """A walk of some people in the drawn room, and where its cameras really are."""
+
+    people: int
+    truth: dict[str, np.ndarray]
+    from_boxes: tuple[Walk, ...]
+    from_tracks: tuple[Walk, ...]
+
+
+def draw(folder: Path, people: int) -> Room:
+    """Draw a minute, and track it."""
+    scene = Scene("room", 3, people, 1, *_ROOM_SIZE, _ROOM_FPS)
+    write_recording(scene, folder, _ROOM_S, lambda _done, _total: None)
+    tracks = _tracked(find_views(folder.parent, folder.name), folder / "tracked", None)
+    picture = Picture(_ROOM_SIZE, _ROOM_FPS)
+    matrices = json.loads((folder / "ground.json").read_text(encoding="ascii"))["homography"]
+    return Room(
+        people,
+        {name: np.array(matrix) for name, matrix in matrices.items()},
+        walks_from_tracks([folder / "gt"], picture).walks,
+        walks_from_tracks([tracks], picture).walks,
+    )
+
+
+def _tracked(views: Views, out: Path, config: Path | None) -> Path:
+    out.mkdir()
+    for video in views.videos:
+        track_one(video, None, out / f"{video.stem}.txt", config, None, lambda _: None)
+    return out
+
+
+def out_of_step(walk: Walk) -> Walk:
+    """Let a camera's recording begin later."""
+    late = _MOVED.get(walk.camera, 0)
+    return replace(walk, tracks=tuple(Track(it.first - late, it.boxes) for it in walk.tracks))
+
+
+def room_rows(report: Report, folder: Path, out: Path) -> None:
+    """Compare with what is known of the drawn room."""
+    rows = []
+    for people in (1, 4):
+        room = draw(folder / f"room{people}", people)
+        for name, walks in (("true boxes", room.from_boxes), ("own tracks", room.from_tracks)):
+            found = calibrate_walks(
+                [out_of_step(it) for it in walks], walk_settings(_ROOM_FPS, _SHIFT_S), _PERSON
+            )
+            off = error_of_known(found, room.truth, [out_of_step(it) for it in walks])
+            rows.append(
+                [
+                    f"{people} walking, {name}",
+                    f"{found.heights.median:.2f}",
+                    f"{np.median(off):.2f}",
+                    f"{np.quantile(off, 0.9):.2f}",
+                    *(f"{it.offset:+.1f} ± {2 * it.offset_error:.1f}" for it in found.cameras[1:]),
+                ]
+            )
+            _plot(found, out / f"calibration_room{people}_{name.split()[0]}.png")
+    heading = ["room, 60 s", "feet apart, heights", "error, m, median", "90 %", "offset c1 (+7)", "c2 (-4)"]
+    report.table("Against the drawn room's own cameras (up to a turn and a shift)", heading, rows)
+
+
+def terrace_rows(report: Report, data: Path, folder: Path, out: Path) -> None:
+    """Compare with the published calibration, by the people's own numbers."""
+    views = find_views(data, "terrace")
+    truth, settings = data / "terrace" / "gt", folder / "terrace.yaml"
+    settings.write_text(yaml.safe_dump({"site": views.site, "cameras": views.cameras}), encoding="utf-8")
+    size = (views.site["width"], views.site["height"])
+    tracks = _tracked(views, folder / "terrace", settings)
+    walked = walks_from_tracks([tracks], Picture(size, views.site["fps"]))
+    found = calibrate_walks(walked.walks, walk_settings(walked.fps, _SHIFT_S), _PERSON)
+    _plot(found, out / "calibration_terrace.png")
+    ours = folder / "terrace.json"
+    ours.write_text(ground_file("m", {it.camera: it.homography for it in found.cameras}))
+    assert views.ground is not None  # noqa: S101 — the recording has one
+    rows: list[list[str]] = []
+    for name, ground in (("published", views.ground), ("from its own tracks", ours)):
+        seen = agreement(ground, truth, size)["c0", "c1"]
+        config = config_for_videos(
+            views.videos, base=yaml.safe_load(settings.read_text()), folder=folder, ground=ground
+        )
+        done = folder / f"render-{ground.stem}-{len(rows)}"
+        done.mkdir()
+        render(config, done, lambda _: None)
+        joint = evaluate_recordings(read_recordings([done], [truth]), 0.5).joint
+        rows.append([name, *_cells(seen), f"{100 * joint.idf1:.1f}"])
+    heading = ["terrace, two views", "feet apart, heights", "90 %", "nearest is right, %", "joint IDF1"]
+    report.table("Beside the published calibration, at the true boxes", heading, rows)
+    moved = ", ".join(f"{it.camera} {it.offset:+.1f} ± {2 * it.offset_error:.1f}" for it in found.cameras)
+    report.say(f"terrace: offsets in frames: {moved}")
+
+
+def auditorium_rows(report: Report, data: Path, folder: Path, out: Path) -> None:
+    """Calibrate from public detections, many people at once."""
+    tracks, source = folder / "auditorium", data / "auditorium"
+    if not source.is_dir():
+        raise CannotRunError(f"needs {source}")
+    size = (1920, 1080)
+    common = in_common(source / "gt", _AUDITORIUM, size)
+    report.table(
+        "auditorium, true boxes that two cameras have at once: without any there is no link to be found",
+        ["cameras", "people", "boxes", "off a fitted plane, box heights"],
+        [
+            [f"{one}, {other}", str(it.people), str(it.boxes), f"{it.off:.2f}" if it.boxes else "-"]
+            for (one, other), it in common.items()
+        ],
+    )
+    tracks.mkdir()
+    for camera in _AUDITORIUM:
+        given = Recording(camera, source / "det" / f"{camera}.txt.gz", source / "gt" / f"{camera}.txt.gz")
+        write_rows(tracks / f"{camera}.txt", track(given))
+    walked = walks_from_tracks([tracks], Picture(size, 30.0))
+    found = calibrate_walks(walked.walks, walk_settings(walked.fps, 0.0), _PERSON)
+    _plot(found, out / "calibration_auditorium.png")
+    ground = folder / "auditorium.json"
+    ground.write_text(ground_file("m", {it.camera: it.homography for it in found.cameras}))
+    rows = [
+        [f"{one}, {other}", *_cells(seen)]
+        for (one, other), seen in agreement(ground, source / "gt", size).items()
+    ]
+    report.table(
+        "auditorium, at the true boxes",
+        ["cameras", "feet apart, heights", "90 %", "nearest is right, %"],
+        rows,
+    )
+    for it in found.left_out:
+        report.say(f"auditorium: {it.camera} is left out: {it.why}")
+
+
+def _cells(seen: Agreement) -> Sequence[str]:
+    return [f"{seen.median:.2f}", f"{seen.most:.2f}", f"{100 * seen.right:.0f}"]
+
+
+def _plot(found: WalkCalibration, path: Path) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    plot_plan(plan_of(found), "m", path)
+
+
+def main() -> None:
+    """Run it with the command line's options."""
+    chosen = parser(__doc__, "calibration").parse_args()
+    report = Report()
+    with tempfile.TemporaryDirectory() as work:
+        folder = Path(work)
+        room_rows(report, folder, chosen.out)
+        for name, rows in (("terrace", terrace_rows), ("auditorium", auditorium_rows)):
+            try:
+                rows(report, chosen.data, folder, chosen.out)
+            except (CannotRunError, CalibrationError) as problem:
+                report.say(f"{name}: left out: {problem}")
+    report.save(chosen.out / "calibration.txt")
+
+
+if __name__ == "__main__":
+    main()

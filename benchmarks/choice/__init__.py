@@ -1,0 +1,1 @@
+"""What choosing views costs, and how it grows."""

@@ -1,0 +1,1 @@
+"""From the pulse to the browser, stage by stage."""

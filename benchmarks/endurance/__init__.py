@@ -1,0 +1,1 @@
+"""Memory and time over many frames of one tracker."""

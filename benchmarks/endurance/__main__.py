@@ -1,0 +1,156 @@
+"""Memory and time over tens of thousands of frames: the tracker alone, and a whole camera pipeline.
+
+    OPENBLAS_NUM_THREADS=1 python -m benchmarks.endurance --out out/bench
+
+The tracker follows an endless synthetic crowd (nobody who left comes back; objects are born and forgotten all
+the time). The pipeline draws, encodes, searches and tracks the embedded scene. Neither may grow.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from benchmarks.endurance.crowd import crowd
+from benchmarks.endurance.memory import SPAN, Samples
+from benchmarks.experiments.scene import HEIGHT, WIDTH
+from benchmarks.report import Report
+from benchmarks.surroundings import parser
+from tracking import CostSettings, OnlineTracker, WindowSettings, solver_named
+from tracking.solvers.base import DEFAULT_SOLVER
+
+_EVERY = 250
+"""Frames between two samples."""
+_NUMBERS = 4
+"""Python objects that a sample is: how many frames, megabytes, seconds, blocks."""
+_LEAST = 6 * _EVERY
+"""Frames of which spans and growth can be told: two samples in each third."""
+_PEOPLE = 5
+_SITE = {
+    "site": {"name": "endurance", "fps": 25, "width": WIDTH, "height": HEIGHT},
+    "cameras": [{"id": "c0", "source": "scene:room?camera=0&cameras=4&objects=4&seed=1"}],
+}
+
+
+@dataclass(slots=True)
+class Run:
+    """One long run."""
+
+    name: str
+    samples: Samples
+    objects: int = 0
+    """Numbers given to objects."""
+
+
+def run_tracker(frames: int) -> Run:
+    """Push so many frames of a crowd into a tracker."""
+    tracker = OnlineTracker(WindowSettings(), CostSettings(), solver_named(DEFAULT_SOLVER))
+    scene = crowd(_PEOPLE, seed=1)
+    run = Run("tracker", Samples())
+
+    def step(number: int) -> None:
+        result = tracker.push(number, next(scene))
+        if result is not None:
+            run.objects = max([run.objects, *(track.id for track in result.tracks)])
+
+    _endure(run, frames, step)
+    return run
+
+
+def run_pipeline(frames: int) -> Run:
+    """Put so many frames through a camera's source, encoder, detector and tracker."""
+    # Loaded only now: the tracker's memory is measured without the server's libraries.
+    from server.camera.pipeline import CameraPipeline  # noqa: PLC0415
+    from server.wire.loading import build_config  # noqa: PLC0415
+
+    pipeline = CameraPipeline(build_config(_SITE, where="endurance", folder=Path()), "c0")
+    run = Run("camera pipeline", Samples())
+
+    def step(number: int) -> None:
+        image = pipeline.take(number)
+        if image is not None:
+            pipeline.encode(number, image)
+        tracks = pipeline.track(number, image)
+        if tracks is not None:
+            run.objects = max([run.objects, *(track.id for track in tracks.tracks)])
+
+    _endure(run, frames, step)
+    pipeline.close()
+    return run
+
+
+def _endure(run: Run, frames: int, step: Callable[[int], None]) -> None:
+    for number in range(frames):
+        step(number)
+        if (number + 1) % _EVERY == 0:
+            run.samples.take(number + 1)
+
+
+def describe(report: Report, run: Run) -> None:
+    """Print a row for each span of frames, and the growth after the first."""
+    rows = []
+    for start, stop in spans(run.samples.frames[-1]):
+        part = run.samples.between(start, stop)
+        middle = len(part.frames) // 2
+        rows.append(
+            [
+                f"{start} to {part.frames[-1]}",
+                f"{sorted(part.megabytes)[middle]:.1f}",
+                f"{max(part.megabytes):.1f}",
+                f"{sorted(part.blocks)[middle]}",
+                f"{part.milliseconds_per_frame():.2f}",
+            ]
+        )
+    columns = ["frames", "resident, median MB", "most, MB", "Python blocks, median", "processor ms per frame"]
+    report.table(f"{run.name}: {run.samples.frames[-1]} frames, {run.objects} objects", columns, rows)
+    settled = run.samples.between(min(SPAN, run.samples.frames[-1] // 3), run.samples.frames[-1])
+    start = settled.frames[0] - _EVERY
+    report.say(
+        f"growth after the first {start} frames, in {SPAN}: {settled.growth():+.2f} MB,"
+        f" {settled.block_growth():+.0f} blocks,"
+        f" of which {_NUMBERS * SPAN // _EVERY} are these samples themselves"
+    )
+
+
+def spans(frames: int) -> Iterator[tuple[int, int]]:
+    """Give the spans of the table: of :data:`SPAN` frames, of a third of all where that is fewer."""
+    span = min(SPAN, frames // 3)
+    return itertools.pairwise(range(0, frames + 1, span))
+
+
+def plot(runs: list[Run], path: Path) -> None:
+    """Draw the resident memory of each run."""
+    figure = Figure(figsize=(9, 3.2 * len(runs)))
+    axes = figure.subplots(len(runs), 1, squeeze=False)[:, 0]
+    for axis, run in zip(axes, runs, strict=True):
+        axis.plot(run.samples.frames, run.samples.megabytes, linewidth=1)
+        axis.set(title=run.name, xlabel="frames", ylabel="resident memory, MB", ylim=(0, None))
+        axis.grid(alpha=0.3)
+    figure.tight_layout()
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path, dpi=110)
+
+
+def main() -> None:
+    """Run the benchmark."""
+    options = parser(__doc__, "endurance")
+    options.add_argument("--frames", type=int, default=50_000, help="the tracker's; 0: without")
+    options.add_argument("--pipeline-frames", type=int, default=15_000, help="the pipeline's; 0: without")
+    chosen = options.parse_args()
+    report = Report()
+    given = ((run_tracker, chosen.frames), (run_pipeline, chosen.pipeline_frames))
+    runs = []
+    for start, frames in given:
+        if frames >= _LEAST:
+            runs.append(start(frames))
+            describe(report, runs[-1])
+    plot(runs, chosen.out / "endurance.png")
+    report.save(chosen.out / "endurance.txt")
+
+
+if __name__ == "__main__":
+    main()

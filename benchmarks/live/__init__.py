@@ -1,0 +1,1 @@
+"""Live cameras: whether tracking keeps up, and what each stage costs."""

@@ -1,0 +1,1 @@
+"""More cameras than the machine carries: what is left out, and the way back."""

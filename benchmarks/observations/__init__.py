@@ -1,0 +1,1 @@
+"""What detectors find, and what the tracker makes of it."""

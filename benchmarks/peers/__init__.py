@@ -1,0 +1,1 @@
+"""MyView beside other trackers, on public detections."""

@@ -1,0 +1,134 @@
+"""The other trackers, installed by pip in an environment of their own."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+from tracking.motchallenge import MotRow, format_rows, read_rows
+
+PACKAGES = ("trackers==2.6.1", "supervision==0.31.2", "motile==1.0.1", "ilpy==0.6.0")
+"""Pinned, since their numbers are quoted."""
+
+_RUNNER = Path(__file__).with_name("runner.py")
+_INSTALL_S = 900.0
+_RUN_S = 600.0
+
+
+@dataclass(frozen=True, slots=True)
+class Peer:
+    """Another tracker."""
+
+    name: str
+    runs: str
+    """What the runner calls it."""
+
+
+PEERS = (
+    Peer("C-BIoU", "CBIoUTracker"),
+    Peer("OC-SORT", "OCSORTTracker"),
+    Peer("ByteTrack", "ByteTrackTracker"),
+    Peer("SORT", "SORTTracker"),
+    Peer("motile", "motile"),
+)
+
+
+class PeersAwayError(Exception):
+    """The other trackers cannot be installed, or do not run; the text says why in one line."""
+
+
+@dataclass(frozen=True, slots=True)
+class PeerEnvironment:
+    """An environment in which the other trackers are installed."""
+
+    python: Path
+
+    def track(self, peer: Peer, detections: Path) -> list[MotRow]:
+        """Give a peer's tracks.
+
+        Raises:
+            PeersAwayError: it failed.
+        """
+        with tempfile.TemporaryDirectory() as folder:
+            out = Path(folder) / "tracks.txt"
+            self._run("track", peer.runs, str(detections), str(out))
+            return read_rows(out)
+
+    def score(self, truth: list[MotRow], tracks: list[MotRow]) -> dict[str, float]:
+        """Give HOTA, MOTA, IDF1 and switches by the peers' own evaluation.
+
+        Raises:
+            PeersAwayError: it failed.
+        """
+        with tempfile.TemporaryDirectory() as folder:
+            there, found = Path(folder) / "truth.txt", Path(folder) / "tracks.txt"
+            # It counts only pedestrians, class 1, which not every file says that people are.
+            there.write_text(format_rows(truth).replace("-1,-1,-1\n", "1,1\n"), encoding="ascii")
+            found.write_text(format_rows(tracks), encoding="ascii")
+            scores: dict[str, float] = json.loads(self._run("score", str(there), str(found)))
+            return scores
+
+    def _run(self, *words: str) -> str:
+        try:
+            done = subprocess.run(
+                # -P: a file beside the runner that is called as one of their packages is not that package.
+                [str(self.python), "-P", str(_RUNNER), *words],
+                capture_output=True,
+                text=True,
+                timeout=_RUN_S,
+                check=True,
+            )
+        except subprocess.SubprocessError as error:
+            raise PeersAwayError(f"{words[1]}: {_last_line(error)}") from error
+        return done.stdout
+
+
+def default_folder() -> Path:
+    """Give where the environment is kept: the user's cache, by what is installed in it."""
+    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    wanted = hashlib.sha256(" ".join([sys.version, *PACKAGES]).encode()).hexdigest()[:12]
+    return cache / "myview" / f"peers-{wanted}"
+
+
+def peer_environment(folder: Path) -> PeerEnvironment:
+    """Give the environment in the folder; it is made, which takes a network and a minute, if it is not there.
+
+    Raises:
+        PeersAwayError: it cannot be made.
+    """
+    python = folder / "bin" / "python"
+    done = folder / ".done"  # written last: without it the folder is half an environment
+    if not done.exists():
+        shutil.rmtree(folder, ignore_errors=True)
+        pip = [
+            str(python),
+            "-m",
+            "pip",
+            "--disable-pip-version-check",
+            "install",
+            "--quiet",
+            "--retries",
+            "1",
+        ]
+        try:
+            folder.parent.mkdir(parents=True, exist_ok=True)
+            for command in ([sys.executable, "-m", "venv", str(folder)], [*pip, *PACKAGES]):
+                subprocess.run(command, capture_output=True, text=True, timeout=_INSTALL_S, check=True)
+            done.touch()
+        except (OSError, subprocess.SubprocessError) as error:
+            raise PeersAwayError(_last_line(error)) from error
+    return PeerEnvironment(python)
+
+
+def _last_line(error: Exception) -> str:
+    """Give what a command said last, or what became of it."""
+    said = error.stderr if isinstance(error, subprocess.CalledProcessError) else ""
+    lines = [text for text in (said or str(error)).splitlines() if text.strip()]
+    return lines[-1].strip() if lines else type(error).__name__

@@ -1,0 +1,1 @@
+"""A picture of the page, for the documents."""

@@ -1,0 +1,1 @@
+"""How fast recordings are rendered, and where the processor time goes."""

@@ -1,0 +1,1 @@
+"""Many simulated cameras on one best-view process."""

@@ -1,0 +1,152 @@
+"""Many cameras: what the best-view process uses for a frame, where it goes, and how it grows; a plot.
+
+    OPENBLAS_NUM_THREADS=1 python -m benchmarks.scaling --out out/bench
+
+People are simulated, and so are the cameras' trackers and pictures (one small GOP, sent again and again). The
+bus, the pulses and the best-view process are real; the process is timed from inside. Large sites get pulses
+more slowly, so that the cost of a frame is told and not that of a queue: "cores at 25" is what the frames of
+a second take at 25 a second. Above one the process does not keep up, since it decides in one thread.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.report import Report
+from benchmarks.scaling.hall import Hall
+from benchmarks.scaling.service import REST, STAGES
+from benchmarks.scaling.site import Load, carry
+from benchmarks.surroundings import parser
+
+_FPS = 25.0
+_CAMERAS = (4, 16, 36, 64, 100)
+_QUICK_CAMERAS = (4, 16)
+_EASY = 16
+"""Cameras that get pulses at the full rate; more get them more slowly."""
+_GROWTH = 1.5
+"""Power of the number of cameras with which pulses become slower: that of what a frame costs, and some."""
+_SETTLE, _EPOCHS = 16, 20
+_QUICK_SETTLE, _QUICK_EPOCHS = 12, 8
+_ABOUT_REST = "zenoh's threads and router, copies off the bus, the event loop"
+
+
+def exponent(cameras: Sequence[int], values: Sequence[float]) -> float:
+    """Fit ``values ~ cameras^k`` by least squares of the logarithms; give k, NaN for fewer than two sizes."""
+    if len(cameras) < 2:
+        return float("nan")
+    return float(np.polyfit(np.log(cameras), np.log(values), 1)[0])
+
+
+def describe(report: Report, loads: Sequence[Load]) -> None:
+    """Print the tables."""
+    report.table(
+        f"{_services(loads)}; processor time and memory",
+        [
+            "cameras",
+            "people",
+            "pulses/s",
+            "ms a frame",
+            "cores at 25",
+            "msgs/s",
+            "MB/s",
+            "MB held",
+            "late",
+            "",
+        ],
+        [
+            [
+                f"{it.cameras}",
+                f"{it.people}",
+                f"{it.fps:g}",
+                f"{it.milliseconds:.1f}",
+                f"{it.milliseconds * _FPS / 1e3:.2f}",
+                f"{it.messages:.0f}",
+                f"{it.megabytes:.1f}",
+                f"{it.memory:.0f}",
+                f"{it.late}",
+                f"of {it.epochs * it.cameras * it.services} windows",
+            ]
+            for it in loads
+        ],
+    )
+    names = {**STAGES, REST: _ABOUT_REST}
+    cameras = [it.cameras for it in loads]
+    rows = [
+        [
+            stage,
+            *(f"{it.stages[stage]:.2f}" for it in loads),
+            f"{exponent(cameras, [max(it.stages[stage], 1e-6) for it in loads]):.2f}",
+            about,
+        ]
+        for stage, about in names.items()
+    ]
+    total = [it.milliseconds for it in loads]
+    rows.append(["together", *(f"{it:.1f}" for it in total), f"{exponent(cameras, total):.2f}", ""])
+    report.table(
+        "processor ms a frame, by cameras, and the exponent of growth",
+        ["stage", *(f"{it}" for it in cameras), "grows", "what"],
+        rows,
+    )
+    report.say("messages and bytes are for 25 pulses a second; late: windows decided without their camera")
+
+
+def _services(loads: Sequence[Load]) -> str:
+    count = loads[0].services
+    return "One best-view process" if count == 1 else f"Each of {count} best-view processes of the site"
+
+
+def plot(loads: Sequence[Load], path: Path) -> None:
+    """Draw what a frame costs over the number of cameras, by stage."""
+    from matplotlib.figure import Figure  # noqa: PLC0415 — only after what is measured
+
+    figure = Figure(figsize=(9, 5), layout="constrained")
+    axis = figure.subplots()
+    cameras = [it.cameras for it in loads]
+    for stage in (*STAGES, REST):
+        axis.plot(cameras, [it.stages[stage] for it in loads], marker=".", label=stage)
+    axis.plot(cameras, [it.milliseconds for it in loads], marker="o", color="black", label="together")
+    axis.axhline(1e3 / _FPS, color="black", linestyle="--", linewidth=1, label="one core at 25 a second")
+    axis.set(xscale="log", yscale="log", xlabel="cameras", ylabel="processor ms a frame")
+    axis.set_title(f"{_services(loads)}, about {loads[0].per_camera} people in each camera's view")
+    axis.set_xticks(cameras, [f"{it}" for it in cameras])
+    axis.legend(ncols=2, fontsize="small")
+    figure.savefig(path, dpi=110)
+
+
+def measure(options: argparse.Namespace) -> None:
+    """Run every size, print and save."""
+    options.out.mkdir(parents=True, exist_ok=True)
+    report = Report()
+    quick = options.quick
+    sizes = options.cameras or (_QUICK_CAMERAS if quick else _CAMERAS)
+    loads = []
+    with tempfile.TemporaryDirectory(prefix="myview-scaling-") as temporary:
+        for cameras in sizes:
+            fps = options.fps or max(1.0, round(_FPS * min(1.0, (_EASY / cameras) ** _GROWTH)))
+            hall = Hall(cameras, options.people)
+            settle, epochs = (_QUICK_SETTLE, _QUICK_EPOCHS) if quick else (_SETTLE, _EPOCHS)
+            loads.append(carry(hall, fps, Path(temporary) / f"{cameras}", settle, epochs, options.share))
+            report.say(f"{cameras} cameras: {loads[-1].milliseconds:.1f} ms a frame")
+    describe(report, loads)
+    plot(loads, options.out / "scaling.png")
+    report.save(options.out / "scaling.txt")
+
+
+def main() -> None:
+    """Read the command line and run."""
+    options = parser(__doc__, "scaling")
+    options.add_argument("--quick", action="store_true", help="two small sites, for a short while")
+    options.add_argument("--cameras", type=int, action="append", help="only so many; may be repeated")
+    options.add_argument("--people", type=int, default=30, help="in each camera's view, on average")
+    options.add_argument("--share", type=int, default=1, help="best-view services that share the site")
+    options.add_argument("--fps", type=float, help="pulses a second; without it, fewer for large sites")
+    measure(options.parse_args())
+
+
+if __name__ == "__main__":
+    main()

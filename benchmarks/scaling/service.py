@@ -1,0 +1,127 @@
+"""The real best-view process, timed stage by stage from inside.
+
+    python -m benchmarks.scaling.service TIMES.json bestview SITE.yaml
+
+is `myview bestview SITE.yaml` with its classes' public methods wrapped; nothing else is changed.
+"""
+
+from __future__ import annotations
+
+import functools
+import json
+import sys
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from benchmarks.live.stages import ThreadWatch
+from bestview import IdentityRegistry
+from server.run.cli import main as command_line
+from server.view.align import Aligner
+from server.view.board import Board
+from server.view.decide import Decider
+from server.view.intake import Intake
+from server.view.outlook import Outlook
+from server.view.people import People
+from server.view.service import BestViewService
+from server.view.sight import Sight
+from server.view.splice import Splicer
+from server.web.events import Events
+from server.wire.bus import Bus
+
+LISTS = "lists"
+STAGES = {
+    "tracks in": "the cameras' windows out of JSON, checked, laid in line",
+    "frames in": "access units made into fragments, on the shelves; small pictures",
+    "align": "epochs taken out",
+    "who is who": "identity over all cameras",
+    "people": "messages to tracks, boxes by person",
+    "quality": "of every view",
+    "costs": "laid out by frame, camera and person",
+    "choose": "the program, and the decision put together",
+    "board": "what the page, programs and the bus are told",
+    "publish": "that to JSON and onto the bus",
+    "splice": "everybody's chosen GOP",
+    LISTS: "of people and cameras for the page, every second",
+}
+REST = "rest"
+"""Of the process: zenoh's threads and router, copies off the bus, the event loop, pulses."""
+
+
+@dataclass(frozen=True, slots=True)
+class Times:
+    """What the service has done and used since it started.
+
+    Attributes:
+        epochs: decided.
+        seconds: processor time of each stage, without the stages inside it.
+        process: processor time of the whole process.
+        messages: that came, of all kinds.
+        size: their bytes.
+        at: when this was, seconds by a clock that never steps.
+    """
+
+    epochs: int
+    seconds: Mapping[str, float]
+    process: float
+    messages: int
+    size: int
+    at: float
+
+    @classmethod
+    def read(cls, path: Path) -> Times | None:
+        """Read what was written last; None: nothing yet."""
+        return cls(**json.loads(path.read_text(encoding="utf-8"))) if path.exists() else None
+
+
+def watch(path: Path) -> None:
+    """Time this process from now on, and write into the file after every epoch."""
+    watched = ThreadWatch(STAGES)
+    count = {"epochs": 0, "messages": 0, "size": 0}
+
+    def told() -> None:
+        count["epochs"] += 1
+        part = path.with_suffix(".part")
+        used = {"seconds": watched.seconds, "process": time.process_time()}
+        now = {**count, **used, "at": time.monotonic()}
+        part.write_text(json.dumps(now), encoding="utf-8")
+        part.replace(path)
+
+    for name in ("tracks", "video", "thumbnail"):
+        _count(name, count)
+    for owner, method, stage in (
+        (Intake, "tracks", "tracks in"),
+        (Intake, "video", "frames in"),
+        (Intake, "thumbnail", "frames in"),
+        (Aligner, "ready", "align"),
+        (IdentityRegistry, "update", "who is who"),
+        (People, "update", "people"),
+        (Sight, "put", "quality"),
+        (Outlook, "__init__", "costs"),
+        (Board, "put", "board"),
+        (BestViewService, "_publish", "publish"),
+        (Bus, "publish", "publish"),
+        (Splicer, "decision", "splice"),
+        (Events, "_lists", LISTS),
+    ):
+        watched.wrap(owner, method, stage)
+    watched.wrap(Decider, "step", "choose", told)
+
+
+def _count(name: str, count: dict[str, int]) -> None:
+    original = getattr(Intake, name)
+
+    @functools.wraps(original)
+    def run(self: Intake, message: Any) -> None:
+        count["messages"] += 1
+        count["size"] += len(message.payload) + len(message.attachment)
+        original(self, message)
+
+    setattr(Intake, name, run)
+
+
+if __name__ == "__main__":
+    watch(Path(sys.argv.pop(1)))
+    command_line()

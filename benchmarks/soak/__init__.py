@@ -1,0 +1,1 @@
+"""A day of a whole site: memory, descriptors, threads, delay."""

@@ -1,0 +1,1 @@
+"""The solvers of the tracking program against each other."""

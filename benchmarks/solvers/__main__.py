@@ -1,0 +1,139 @@
+"""How fast the solvers of the tracking program are: tables, and the paper's Fig. 21 and Table I as plots.
+
+    OPENBLAS_NUM_THREADS=1 python -m benchmarks.solvers --out out/bench
+
+Times are processor time of one thread, so that other work on the machine does not count; every ratio is
+of times from the same run.
+"""
+
+from __future__ import annotations
+
+import argparse
+
+import numpy as np
+
+from benchmarks.report import Report
+from benchmarks.solvers.growth import (
+    SOLVERS,
+    SWEEPS,
+    exponent_of_all,
+    grown,
+    plot_growth,
+    plot_table1,
+    table1,
+)
+from benchmarks.solvers.times import (
+    CASES,
+    EXACT_CASES,
+    GATE,
+    Case,
+    against_arcs,
+    live,
+    timed,
+    warm_up,
+)
+from benchmarks.solvers.windows import Size
+from benchmarks.surroundings import parser
+
+LIVE = (Size(8, 16, 15), Size(10, 40, 15), Size(20, 40, 15))
+
+
+def named(case: Case) -> list[str]:
+    """Give the cells that say which case it is."""
+    return [case.name, f"{case.size.objects}", f"{case.size.places}", f"{case.layout:g}"]
+
+
+def ratios(case: Case, seeds: int) -> list[str]:
+    """Give a row: full and gated programs of all arcs against `columns`."""
+    cells = named(case)
+    for gate in (None, GATE):
+        found = against_arcs(case, seeds, gate)
+        cells += [f"{1e3 * found.arcs:.0f}", f"{1e3 * found.columns:.1f}", f"{found.ratio:.0f}x"]
+    return cells
+
+
+def exact(case: Case, seeds: int) -> list[str]:
+    """Give a row: what the integer optimum takes, and how far the rounded answer is from it."""
+    found = [
+        (timed("exact", network), timed("columns", network).solution.report)
+        for network in map(case.network, range(seeds))
+    ]
+    optima = [optimum.solution.report.objective for optimum, _ in found]
+    off = [rounded.objective / best - 1.0 for best, (_, rounded) in zip(optima, found, strict=True)]
+    below = [1.0 - rounded.bound / best for best, (_, rounded) in zip(optima, found, strict=True)]
+    times = [1e3 * optimum.seconds for optimum, _ in found]
+    shares = [
+        f"{np.median(times):.0f}",
+        f"{max(times):.0f}",
+        f"{100 * max(off):.2f}",
+        f"{100 * max(below):.2f}",
+    ]
+    return [*named(case), *shares]
+
+
+def live_row(size: Size, steps: int, *, told: bool) -> list[str]:
+    """Give a row: windows at stride 1, the building of the network from boxes and histograms included."""
+    found = live(size, steps, told=told)
+    middle, late = np.percentile(1e3 * found.seconds, [50, 95])
+    return [
+        "told" if told else "alone",
+        f"{size.objects}",
+        f"{size.places}",
+        f"{size.frames}",
+        f"{middle:.1f}",
+        f"{late:.1f}",
+        f"{1e3 * found.seconds.max():.1f}",
+        f"{100 * (found.rounds == 0).mean():.0f}",
+        f"{found.rounds.mean():.1f}",
+    ]
+
+
+def run(options: argparse.Namespace) -> None:
+    """Print the tables and draw the plots."""
+    report = Report()
+    warm_up()
+    report.table(
+        "All arcs (HiGHS dual simplex, no presolve), full and gated, against columns; M = 20; ms",
+        ["window", "n", "K", "μ", "arcs", "columns", "ratio", "gated arcs", "columns", "ratio"],
+        [ratios(case, options.seeds) for case in CASES],
+    )
+    report.table(
+        "Live: building the network and solving it at every frame, gated; alone, or told by the last one; ms",
+        ["solver", "n", "K", "M", "median", "p95", "max", "no program, %", "rounds"],
+        [live_row(size, options.steps, told=told) for size in LIVE for told in (False, True)],
+    )
+    report.table(
+        "The integer optimum, and what columns' answer and bound are off it at worst, %; M = 20; ms",
+        ["window", "n", "K", "μ", "median", "max", "answer", "bound"],
+        [exact(case, options.seeds) for case in EXACT_CASES],
+    )
+    growths = [grown(sweep, solver, options.seeds) for sweep in SWEEPS for solver in SOLVERS]
+    rows = [[growth.sweep.label, growth.solver, f"{growth.exponent:.2f}"] for growth in growths]
+    rows += [["all of these", solver, f"{exponent_of_all(growths, solver):.2f}"] for solver in SOLVERS]
+    report.table(
+        "Growth: time ~ (n² k m (2 log k + 2 log n + log m))^e; up to 1 is no worse than the paper's",
+        ["along", "solver", "e"],
+        rows,
+    )
+    times = table1()
+    report.table(
+        "Table I: 3 objects, 50 observations, 20 frames; ms",
+        ["solver", "time"],
+        [[solver, f"{1e3 * value:.1f}"] for solver, value in times.items()],
+    )
+    options.out.mkdir(parents=True, exist_ok=True)
+    plot_growth(growths, options.out / "fig21.png")
+    plot_table1(times, options.out / "table1.png")
+    report.save(options.out / "solvers.txt")
+
+
+def main() -> None:
+    """Read the command line and run."""
+    options = parser(__doc__, "solvers")
+    options.add_argument("--seeds", type=int, default=3, help="windows for each number")
+    options.add_argument("--steps", type=int, default=60, help="windows of each live row")
+    run(options.parse_args())
+
+
+if __name__ == "__main__":
+    main()

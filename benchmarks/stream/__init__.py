@@ -1,0 +1,1 @@
+"""Splices, viewers and their delay, beside other servers."""

@@ -1,0 +1,1 @@
+"""The survey's comparison of trackers with measurements for its words."""
