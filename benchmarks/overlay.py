@@ -19,11 +19,11 @@ from benchmarks.report import Report
 from benchmarks.surroundings import parser
 from server.camera.encode import Encoder
 from server.camera.scene import Scene
-from server.view.channel import Channel, Chunk, Viewer
-from server.view.fmp4 import Sample, fragment
+from server.view.media.fmp4 import Sample, fragment
 from server.view.pictures.decided import Told, first_pulse
 from server.view.pictures.series import Series
 from server.view.pictures.source import Source
+from server.view.streams.channel import Channel, Chunk, Viewer
 from server.wire.drawing import Canvas
 from server.wire.h264 import nal_units, sample
 from server.wire.sections import Encode, Site

@@ -27,10 +27,10 @@ from benchmarks.stream.splice import encode_again, splice
 from benchmarks.stream.stalled import Beside, Turn, beside_stalled, stalling
 from benchmarks.stream.tables import Found, describe, per_core, plot
 from server.camera.encode import AccessUnit
-from server.view.fmp4 import Sample, fragment, ticks
-from server.view.footage import Footage
-from server.view.picture import Picture
-from server.view.ts import Counters
+from server.view.media.fmp4 import Sample, fragment, ticks
+from server.view.media.ts import Counters
+from server.view.streams.footage import Footage
+from server.view.streams.picture import Picture
 
 GOP = 10
 Films = Sequence[Sequence[AccessUnit]]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from server.view.flag_budget import Budget
+from server.view.helping.flag_budget import Budget
 from server.wire.sections import Flags
 from tracking.assist import Trouble
 

@@ -15,7 +15,7 @@ from benchmarks.bestview.watch import Messages, Rows
 from bestview import NO_CAMERA, EpisodeKey, IdentityUpdate, LocalTrack, size_quality
 from server.run.evaluate_choices import Choice, read_choices
 from server.view.align import Aligner
-from server.view.decide import Decider, homographies
+from server.view.choice.decide import Decider, homographies
 from server.view.record import Recorder
 from server.wire.config import Config
 from server.wire.epochs import closing_epoch

@@ -10,8 +10,8 @@ from benchmarks.bestview.watch import Messages
 from bestview.episodes import Episodes
 from bestview.sightings import FootError, line_up
 from server.view.align import Aligner
-from server.view.decide import homographies
-from server.view.reading import Reader
+from server.view.choice.decide import homographies
+from server.view.who.reading import Reader
 from server.wire.config import Config
 from tracking.motchallenge import MotRow
 

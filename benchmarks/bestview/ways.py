@@ -27,7 +27,7 @@ from server.run.evaluate_choices import Choice
 from server.run.evaluate_truth import Truth, people_of_objects
 from server.run.evaluate_views import judge
 from server.run.site_file import SiteFacts
-from server.view.decide import homographies
+from server.view.choice.decide import homographies
 from tracking.evaluation import CameraScores, Recording, evaluate_cameras
 from tracking.motchallenge import MotRow, format_rows
 

@@ -10,14 +10,14 @@ import numpy as np
 
 from benchmarks.stopwatch import Stopwatch, Watched
 from bestview import EpisodeKey, IdentityUpdate, LocalTrack, QualitySettings
-from server.view import decide
 from server.view.align import Epoch
 from server.view.board import Board
-from server.view.decide import Decider
-from server.view.outlook import Outlook, Part
-from server.view.people import People
-from server.view.reading import Reader
-from server.view.sight import Sight
+from server.view.choice import decide
+from server.view.choice.decide import Decider
+from server.view.choice.outlook import Outlook, Part
+from server.view.choice.sight import Sight
+from server.view.who.people import People
+from server.view.who.reading import Reader
 from server.wire.config import Config
 from server.wire.epochs import end_of_epoch
 from server.wire.loading import build_config

@@ -16,7 +16,7 @@ from benchmarks.fuzz.mutate import as_json, damaged, odd, otherwise
 from benchmarks.fuzz.site import site
 from benchmarks.fuzz.target import Target, folder, refused
 from server.view.service import BestViewService
-from server.web.operator_settings import settings_of
+from server.web.operator.settings import settings_of
 from server.wire.config import Config
 from server.wire.errors import UserError
 from server.wire.loading import build_config, changed_view, load_config

@@ -21,8 +21,8 @@ from benchmarks.fuzz.http_site import EPOCHS, Served, judged
 from benchmarks.fuzz.mutate import as_json, damaged
 from benchmarks.fuzz.site import STRIDE, one_each, pictures
 from benchmarks.fuzz.target import Target, folder
-from server.web.access import ACCESS
-from server.web.access_sessions import _Session
+from server.web.access.access import ACCESS
+from server.web.access.sessions import _Session
 from server.web.keys import SERVICE
 from server.wire.tokens import digest_of
 

@@ -7,9 +7,9 @@ from typing import Literal
 
 from benchmarks.fuzz.mutate import damaged
 from benchmarks.fuzz.site import FPS, HEIGHT, WIDTH, pictures
-from server.view.agreement import Agreement
-from server.view.mp4_sound import sound_fragment
-from server.view.vp8 import Vp8Agreement
+from server.view.media.agreement import Agreement
+from server.view.media.mp4_sound import sound_fragment
+from server.view.media.vp8 import Vp8Agreement
 from server.wire.sections import Site
 from server.wire.sound import SoundFormat
 

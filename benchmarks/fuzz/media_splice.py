@@ -14,7 +14,7 @@ from benchmarks.fuzz.site import CAMERAS, STRIDE, Fed, pictures, site, tracks, v
 from benchmarks.fuzz.target import Scripts
 from benchmarks.fuzz.zenoh import ask, drink
 from server.camera.encode import AccessUnit
-from server.view.decide import GopDecision, ObjectChoice
+from server.view.choice.decide import GopDecision, ObjectChoice
 from server.wire.config import Config
 from server.wire.epochs import end_of_epoch
 

@@ -32,12 +32,12 @@ from benchmarks.fuzz.zenoh_wrong import wrong
 from server.camera.earshot import Earshot
 from server.camera.exchange import Exchange
 from server.camera.pointed import Pointed as PointedAt
-from server.view.agreement import Agreement
 from server.view.align import Aligner
-from server.view.footage import Footage
 from server.view.intake import Intake
-from server.view.shelf import Shelf
-from server.view.sound import SoundShelf
+from server.view.media.agreement import Agreement
+from server.view.streams.footage import Footage
+from server.view.streams.shelf import Shelf
+from server.view.streams.sound import SoundShelf
 from server.web.app import make_app
 from server.web.keys import METRICS
 from server.web.views import cameras_info, choice_info, objects_info, site_info

@@ -10,8 +10,8 @@ from benchmarks.fuzz.site import CAMERAS, FPS, HEIGHT, KEYS, STRIDE, WIDTH, site
 from benchmarks.fuzz.target import Scripts
 from benchmarks.fuzz.zenoh_wrong import wrong
 from server.view.align import Epoch
-from server.view.people import People
-from server.view.remembering import Remembering
+from server.view.who.people import People
+from server.view.who.remembering import Remembering
 from server.wire.epochs import end_of_epoch
 from server.wire.inbox import Message
 from server.wire.messages import UNREADABLE

@@ -22,7 +22,7 @@ from benchmarks.occupancy.map import OccupancyMap, OccupancySettings, Sight
 from benchmarks.occupancy.masks import Masks, masks_of
 from benchmarks.occupancy.paths import Lattice, shortest_paths
 from benchmarks.occupancy.walks import Walk, WalkSettings, rows_of_walks, walk_of
-from server.view.decide import homographies
+from server.view.choice.decide import homographies
 from server.wire.config import Config
 from tracking.boxes import Floats
 from tracking.motchallenge import MotRow

@@ -15,9 +15,9 @@ from aiohttp import web
 
 from benchmarks.surroundings import ROOT
 from server.camera.encode import Encoder
-from server.view.agreement import Agreement
-from server.view.fmp4 import init_segment, rebased, ticks
-from server.view.shelf import Shelf
+from server.view.media.agreement import Agreement
+from server.view.media.fmp4 import init_segment, rebased, ticks
+from server.view.streams.shelf import Shelf
 from server.wire.sections import Encode, Site
 
 _PAGE = ROOT / "client" / "page"

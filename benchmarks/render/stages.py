@@ -13,7 +13,7 @@ from server.run.offline import run_cameras
 from server.run.render import Renderer
 from server.run.setup import config_for_videos
 from server.view.align import Aligner
-from server.view.decide import Decider
+from server.view.choice.decide import Decider
 from server.wire.config import Config
 from server.wire.loading import read_content
 from tracking import OnlineTracker, solver_named

@@ -21,13 +21,13 @@ from bestview import IdentityRegistry
 from server.run.cli import main as command_line
 from server.view.align import Aligner
 from server.view.board import Board
-from server.view.decide import Decider
+from server.view.choice.decide import Decider
+from server.view.choice.outlook import Outlook
+from server.view.choice.sight import Sight
 from server.view.intake import Intake
-from server.view.outlook import Outlook
-from server.view.people import People
 from server.view.service import BestViewService
-from server.view.sight import Sight
-from server.view.splice import Splicer
+from server.view.streams.splice import Splicer
+from server.view.who.people import People
 from server.web.events import Events
 from server.wire.bus import Bus
 

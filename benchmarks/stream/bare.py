@@ -17,7 +17,7 @@ from benchmarks.stream.crowd import Heard
 from benchmarks.stream.load import send_delays
 from benchmarks.stream.site import viewers
 from server.camera.encode import AccessUnit
-from server.view.fmp4 import Sample, fragment
+from server.view.media.fmp4 import Sample, fragment
 
 _BACKLOG = 1000
 

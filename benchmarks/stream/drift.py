@@ -11,10 +11,10 @@ import msgspec
 from benchmarks.scaling.hall import STRIDE, WINDOW, Hall, Tracker
 from benchmarks.stream.cameras import CAMERAS, ENCODE, SITE
 from server.camera.encode import AccessUnit
-from server.view.channel import Piece
-from server.view.fmp4 import ticks
-from server.view.footage import Footage
+from server.view.media.fmp4 import ticks
 from server.view.service import BestViewService
+from server.view.streams.channel import Piece
+from server.view.streams.footage import Footage
 from server.wire.config import Config
 from server.wire.inbox import Message
 from server.wire.messages import FrameHead, GopChoices, Keys

@@ -13,8 +13,8 @@ import numpy as np
 
 from benchmarks.stream.splice import Cut
 from server.camera.encode import AccessUnit, Encoder
-from server.view.channel import Piece
-from server.view.footage import Footage
+from server.view.streams.channel import Piece
+from server.view.streams.footage import Footage
 from server.wire.config import Config
 from server.wire.sections import Camera, Encode, Site
 

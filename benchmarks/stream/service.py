@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from server.run.cli import main as command_line
-from server.view.decide import GopDecision
-from server.view.splice import Splicer
+from server.view.choice.decide import GopDecision
+from server.view.streams.splice import Splicer
 
 
 def note(path: Path) -> None:

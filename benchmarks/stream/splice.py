@@ -14,12 +14,12 @@ from av.codec.context import Flags
 
 from benchmarks.stream.cameras import CAMERAS, ENCODE, SITE
 from server.camera.encode import AccessUnit, Encoder
-from server.view.channel import Piece
-from server.view.codec import agreement_for
-from server.view.decide import GopDecision, ObjectChoice
-from server.view.shelf import Shelf
-from server.view.splice import Splicer
-from server.view.why import Why
+from server.view.choice.decide import GopDecision, ObjectChoice
+from server.view.choice.why import Why
+from server.view.media.codec import agreement_for
+from server.view.streams.channel import Piece
+from server.view.streams.shelf import Shelf
+from server.view.streams.splice import Splicer
 from server.wire.config import Config
 from server.wire.sections import Camera
 

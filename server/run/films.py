@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
-from server.view.agreement import Agreement
-from server.view.decide import GopDecision
-from server.view.footage import Footage
-from server.view.mp4_sound import sound_fragment
-from server.view.shelf import Shelf
-from server.view.sound import Heard, SoundShelf
-from server.view.streams import Gop, Showing
-from server.view.timeline import Timeline
+from server.view.choice.decide import GopDecision
+from server.view.media.agreement import Agreement
+from server.view.media.mp4_sound import sound_fragment
+from server.view.streams.footage import Footage
+from server.view.streams.kinds import Gop, Showing
+from server.view.streams.shelf import Shelf
+from server.view.streams.sound import Heard, SoundShelf
+from server.view.streams.timeline import Timeline
 from server.wire.sections import Site
 
 

@@ -13,10 +13,10 @@ from server.run.recorded import Size
 from server.run.site_file import write_site
 from server.run.soundtrack import Soundtrack
 from server.view.align import Aligner
-from server.view.codec import agreement_for
-from server.view.decide import Decider, GopDecision, homographies
+from server.view.choice.decide import Decider, GopDecision, homographies
+from server.view.media.codec import agreement_for
 from server.view.record import Recorder
-from server.view.shelf import Shelf
+from server.view.streams.shelf import Shelf
 from server.wire.config import Config
 
 log = logging.getLogger(__name__)

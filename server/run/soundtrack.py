@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from server.camera.sound import RecordedSound, open_sound, runs
-from server.view.sound import SoundShelf
+from server.view.streams.sound import SoundShelf
 from server.wire.config import Config
 from server.wire.messages import SoundHead
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from bestview import Merge, Split
-from server.view.decide import GopDecision, ObjectChoice
-from server.view.reasons import Reason, Reasons, Standing
-from server.view.why import Explanation
+from server.view.choice.decide import GopDecision, ObjectChoice
+from server.view.choice.reasons import Reason, Reasons, Standing
+from server.view.choice.why import Explanation
 from server.wire.messages import Cut, GopChoices, Merged, Parted
 
 

@@ -9,12 +9,12 @@ from dataclasses import dataclass, field
 import msgspec
 
 from camsync import Spell
-from server.view.agreement import ParameterMismatchError
 from server.view.align import Aligner
 from server.view.gauge import Gauge
+from server.view.media.agreement import ParameterMismatchError
 from server.view.sense import makes_sense
-from server.view.shelf import NoPictureError, Shelf, Shelved
-from server.view.sound import SoundShelf
+from server.view.streams.shelf import NoPictureError, Shelf, Shelved
+from server.view.streams.sound import SoundShelf
 from server.wire.epochs import end_of_epoch
 from server.wire.inbox import Message
 from server.wire.messages import (

@@ -9,10 +9,10 @@ from collections.abc import Mapping
 from camsync import Spell
 from camsync.clock import Clock
 from server.view.align import Epoch
-from server.view.decide import GopDecision
+from server.view.choice.decide import GopDecision
 from server.view.intake import CameraState
 from server.view.record_live import LiveRecorder
-from server.view.shelf import Shelf
+from server.view.streams.shelf import Shelf
 
 log = logging.getLogger(__name__)
 

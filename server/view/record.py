@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from bestview import Merge, Split
-from server.view.decide import GopDecision
+from server.view.choice.decide import GopDecision
 from server.view.whole_files import WholeFiles
 from server.wire.fit import Fit
 from server.wire.messages import NumberedBox

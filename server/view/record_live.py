@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from server.view.decide import GopDecision
+from server.view.choice.decide import GopDecision
 from server.view.record import Recorder
 from server.wire.fit import Fit
 

@@ -14,20 +14,20 @@ import msgspec
 
 from camsync import Login, PulseClient
 from server.view.align import Aligner, Epoch
-from server.view.assist import Assist
 from server.view.board import Board
 from server.view.calibrate.walking import Walking
-from server.view.codec import agreement_for
-from server.view.decide import Decider, GopDecision, homographies
+from server.view.choice.decide import Decider, GopDecision, homographies
+from server.view.helping.assist import Assist
 from server.view.intake import Intake
 from server.view.lacking import Lacking
+from server.view.media.codec import agreement_for
 from server.view.past.past import Past
 from server.view.record_live import LiveRecorder
-from server.view.remembering import PATIENCE_S, Remembering
-from server.view.shelf import Shelf
-from server.view.sound import SoundShelf
-from server.view.splice import Splicer
 from server.view.stages import Stages
+from server.view.streams.shelf import Shelf
+from server.view.streams.sound import SoundShelf
+from server.view.streams.splice import Splicer
+from server.view.who.remembering import PATIENCE_S, Remembering
 from server.wire.bus import Bus
 from server.wire.bus_users import access_of
 from server.wire.config import Config

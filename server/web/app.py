@@ -12,16 +12,18 @@ from aiohttp import web
 from camsync import Spell
 from server.view.pictures import Pictures
 from server.view.service import BestViewService
-from server.web import api, hls, openapi, operator_routes, page, past, pictures, session, site, video
-from server.web.access import ACCESS, Access, keep_no_copies, only_who_may
+from server.web import api, openapi, page, past, pictures, session, site, video
+from server.web.access.access import ACCESS, Access, keep_no_copies, only_who_may
 from server.web.api import problem
 from server.web.containers import refuse_other_containers
 from server.web.cors import preflight
 from server.web.events import Events
+from server.web.hls import routes as hls
 from server.web.keys import EVENTS, METRICS, ON_DISK, PICTURES, READERS, SERVICE
-from server.web.metrics import registry
-from server.web.metrics_stages import measure
-from server.web.operator_permission import tell_no_other_origin
+from server.web.metrics.service import registry
+from server.web.metrics.stages import measure
+from server.web.operator import routes as operator
+from server.web.operator.permission import tell_no_other_origin
 from server.web.queries import refuse_what_is_not_there
 from server.web.readers import Readers
 from server.web.share import to_the_right_service
@@ -94,7 +96,7 @@ def make_app(
     )
     app[METRICS] = registry(service, app[PICTURES], app[READERS], app[ACCESS], on_disk)
     measure(app)
-    for module in (api, session, site, video, past, hls, pictures, openapi, page, operator_routes):
+    for module in (api, session, site, video, past, hls, pictures, openapi, page, operator):
         app.add_routes(module.routes)
     app.on_response_prepare.extend((tell_no_other_origin, keep_no_copies))
     app.cleanup_ctx.append(_telling)

@@ -10,10 +10,10 @@ from typing import Any
 
 import msgspec
 
-from server.view.channel import Channel, Chunk, Viewer
-from server.view.flags import Flag
+from server.view.helping.flags import Flag
 from server.view.service import BestViewService
-from server.web.access_grant import Scope
+from server.view.streams.channel import Channel, Chunk, Viewer
+from server.web.access.grant import Scope
 from server.web.narrow import cameras_for, choices_for, flag_for, objects_for, site_for
 from server.web.turns import again_and_again
 from server.web.views import cameras_info, objects_info, site_info

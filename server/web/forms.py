@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from server.view.channel import Piece
-from server.view.fmp4 import init_segment
-from server.view.footage import Footage
+from server.view.media.fmp4 import init_segment
 from server.view.service import BestViewService
+from server.view.streams.channel import Piece
+from server.view.streams.footage import Footage
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,8 +6,8 @@ from collections.abc import AsyncIterator, Callable
 
 import msgspec
 
-from server.view.flags import Flag
-from server.web.access_grant import Scope
+from server.view.helping.flags import Flag
+from server.web.access.grant import Scope
 from server.web.schema import Cameras, Objects, SiteInfo
 from server.wire.messages import GopChoices
 

@@ -12,8 +12,8 @@ from typing import Any
 import msgspec
 from aiohttp import web
 
-from server.web.access_grant import Need, need_of
-from server.web.operator_schema import OPERATOR, OPERATOR_FILES, OPERATOR_RESULTS
+from server.web.access.grant import Need, need_of
+from server.web.operator.schema import OPERATOR, OPERATOR_FILES, OPERATOR_RESULTS
 from server.web.queries import HELD, OVERLAY, PAST
 from server.web.schema import Cameras, Choice, FlagList, Objects, Past, Problem, SessionInfo, SiteInfo
 

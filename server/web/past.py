@@ -8,7 +8,6 @@ from contextlib import aclosing
 
 from aiohttp import web
 
-from server.view.channel import Channel
 from server.view.past.hearing import Hearing
 from server.view.past.kept import kept_from, known, shown
 from server.view.past.moment import MomentError, moment_of, pulse_at
@@ -16,8 +15,9 @@ from server.view.past.play import CameraPast, ObjectPast, Source, sounds
 from server.view.past.stream import PastStream, Wish
 from server.view.past.told import told
 from server.view.service import BestViewService
-from server.view.timeline import Timeline
-from server.web.access import ACCESS
+from server.view.streams.channel import Channel
+from server.view.streams.timeline import Timeline
+from server.web.access.access import ACCESS
 from server.web.api import answer, no_camera, no_object, not_now, problem
 from server.web.forms import Form
 from server.web.keys import SERVICE

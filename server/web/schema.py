@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import msgspec
 
-from server.view.flags import Flag
+from server.view.helping.flags import Flag
 
 
 class SiteInfo(msgspec.Struct, frozen=True):

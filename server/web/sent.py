@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from aiohttp import web
 
-from server.view.channel import Viewer
+from server.view.streams.channel import Viewer
 
 
 class Sent:

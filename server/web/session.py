@@ -5,11 +5,11 @@ from __future__ import annotations
 import msgspec
 from aiohttp import web
 
-from server.web.access import ACCESS, Access
-from server.web.access_grant import SESSION, Grant
-from server.web.access_sessions import SESSION_S
+from server.web.access.access import ACCESS, Access
+from server.web.access.grant import SESSION, Grant
+from server.web.access.sessions import SESSION_S
 from server.web.api import answer, problem
-from server.web.operator_session import asked_for
+from server.web.operator.session import asked_for
 from server.web.schema import SessionInfo
 
 routes = web.RouteTableDef()

@@ -7,7 +7,7 @@ from collections.abc import Awaitable, Callable
 
 from aiohttp import web
 
-from server.view.share import index_of, server_of
+from server.view.who.share import index_of, server_of
 from server.web.api import problem
 from server.web.keys import SERVICE
 

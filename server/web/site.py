@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from aiohttp import web
 
-from server.web.access import ACCESS
+from server.web.access.access import ACCESS
 from server.web.api import answer
 from server.web.events import Events
 from server.web.keys import EVENTS, SERVICE

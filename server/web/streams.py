@@ -10,7 +10,7 @@ from functools import lru_cache
 
 from aiohttp import web
 
-from server.view.channel import Channel, Piece, Viewer
+from server.view.streams.channel import Channel, Piece, Viewer
 from server.web.sent import SENT, Sent
 
 log = logging.getLogger(__name__)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from aiohttp import web
 
-from server.view.channel import Channel
+from server.view.streams.channel import Channel
 from server.web.api import no_camera, no_object, not_now
 from server.web.forms import MP4, TS, WEBM, Form
 from server.web.keys import READERS, SERVICE

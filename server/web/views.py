@@ -7,7 +7,7 @@ import time
 from server.view.board import reason
 from server.view.intake import Thumbnail
 from server.view.service import BestViewService
-from server.view.share import server_of
+from server.view.who.share import server_of
 from server.web.schema import CameraInfo, Cameras, Choice, Elsewhere, ObjectInfo, Objects, SiteInfo
 
 

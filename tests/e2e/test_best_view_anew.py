@@ -17,7 +17,7 @@ from running_site import PATIENCE_S, RunningSite, bounded, running
 
 from client import Gop
 from server.run.setup import DEMO, free_port
-from server.view.locals import Followed
+from server.view.who.locals import Followed
 from server.wire.bus import Bus
 from server.wire.inbox import Message
 from server.wire.messages import CameraTracks, Keys

@@ -18,13 +18,13 @@ from client.plain import write_plain
 from client.webm import ElementReader, WebmError, cluster_time
 from server.camera.exchange import Exchange
 from server.run.calibrate_points import read_points
-from server.view.agreement import Agreement
-from server.view.mp4_sound import sound_fragment
+from server.view.media.agreement import Agreement
+from server.view.media.mp4_sound import sound_fragment
+from server.view.media.skip import UnfitError, continuing
 from server.view.past.playlist import Playlist
 from server.view.past.run import Headers, Run, RunHead
 from server.view.past.sounds import frames_in
 from server.view.past.store import Bounds, Store
-from server.view.skip import UnfitError, continuing
 from server.web.app import make_app, serving
 from server.wire.errors import UserError
 from server.wire.h264 import ParameterSets, nal_units, parameter_sets

@@ -15,8 +15,8 @@ from benchmarks.fuzz.http_strangers import SECRETS, Strangers
 from benchmarks.fuzz.run import Attempt, Crash, Plan, Runner, numbered
 from benchmarks.fuzz.target import Scripts, Target, UnclearError, refused
 from camsync import door, proof
-from server.web import access
-from server.web.access_grant import Need
+from server.web.access import access
+from server.web.access.grant import Need
 
 SECONDS = 0.25
 INPUTS = 1000

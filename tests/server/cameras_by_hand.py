@@ -13,8 +13,8 @@ import numpy as np
 from bestview import EpisodeKey, IdentityUpdate, LocalTrack
 from server.camera.encode import AccessUnit, Encoder
 from server.view.align import Epoch
+from server.view.choice.why import Why
 from server.view.service import BestViewService
-from server.view.why import Why
 from server.wire.config import Config
 from server.wire.epochs import end_of_epoch
 from server.wire.inbox import Message

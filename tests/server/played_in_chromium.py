@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from benchmarks.browser import CHROMIUM, chromium
-from server.view.splice import Splicer
+from server.view.streams.splice import Splicer
 
 PATIENCE_S = 60.0
 

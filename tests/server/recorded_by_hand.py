@@ -12,12 +12,12 @@ import numpy as np
 from cameras_by_hand import CAMERAS, FPS, GOP, HEIGHT, WIDTH, encoded
 from numpy.typing import NDArray
 
-from server.view.agreement import Agreement
-from server.view.fmp4 import init_segment
+from server.view.media.agreement import Agreement
+from server.view.media.fmp4 import init_segment
 from server.view.past.media import Gop, _fragments
 from server.view.past.run import Headers, RunHead
 from server.view.past.store import Bounds, Piece, Store
-from server.view.shelf import Shelf
+from server.view.streams.shelf import Shelf
 from server.wire.messages import GopChoices
 
 A, B = CAMERAS

@@ -100,7 +100,9 @@ async def test_events_are_of_one_camera_alone(site: Hall) -> None:
 
 
 async def test_flags_are_of_who_may_be_seen_alone(site: Hall, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("server.view.flag_budget._ONE_S", -1.0)  # both have a flag, though they are of one
+    monkeypatch.setattr(
+        "server.view.helping.flag_budget._ONE_S", -1.0
+    )  # both have a flag, though they are of one
     troubles = [
         Trouble(reason="alike", tracks=[1, 2], pulse=19, margin=0.5, risk=0.5),
         Trouble(reason="fading", tracks=[2], pulse=19, margin=0.5, risk=0.5),

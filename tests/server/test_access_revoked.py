@@ -16,8 +16,8 @@ from cameras_by_hand import CAMERAS, SMALL
 from halls import A, B, Hall
 from tokens_by_hand import bearer, line_of, locked, token_of, write_tokens
 
-from server.web.access_file import TokenFile
-from server.web.operator_permission import CHANGES
+from server.web.access.file import TokenFile
+from server.web.operator.permission import CHANGES
 from server.wire.inbox import Message
 from server.wire.messages import Keys
 from server.wire.remembered import Remembered
@@ -26,7 +26,7 @@ from server.wire.tokens import digest_of
 
 @pytest.fixture(autouse=True)
 def _looks_often(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("server.web.access._LOOK_EVERY_S", 0.02)
+    monkeypatch.setattr("server.web.access.access._LOOK_EVERY_S", 0.02)
 
 
 @pytest.fixture

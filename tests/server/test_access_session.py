@@ -15,11 +15,11 @@ from aiohttp.test_utils import make_mocked_request
 from halls import Hall, opened
 from tokens_by_hand import bearer, line_of, locked, token_of, write_tokens
 
-from server.web.access import COOKIE, Access, Holder
-from server.web.access_failures import Failures
-from server.web.access_here import is_from_here
-from server.web.access_sessions import Sessions
-from server.web.operator_permission import CHANGES
+from server.web.access.access import COOKIE, Access, Holder
+from server.web.access.failures import Failures
+from server.web.access.here import is_from_here
+from server.web.access.sessions import Sessions
+from server.web.operator.permission import CHANGES
 from server.wire.tokens import digest_of
 
 SESSION = "/api/session"

@@ -6,8 +6,8 @@ from typing import cast
 
 from bestview import Merge, Split
 from server.view.board import Board
-from server.view.decide import GopDecision, ObjectChoice
-from server.view.why import Explanation, Why
+from server.view.choice.decide import GopDecision, ObjectChoice
+from server.view.choice.why import Explanation, Why
 from server.wire.messages import Cut, Merged, Parted
 
 _UNTOLD = cast("Why", None)

@@ -7,7 +7,7 @@ from itertools import product
 
 import pytest
 
-from server.view.channel import Channel, Chunk, Piece
+from server.view.streams.channel import Channel, Chunk, Piece
 
 
 def gop(number: int) -> Chunk:

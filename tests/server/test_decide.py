@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from server.view.board import Board, reason
-from server.view.decide import Decider, GopDecision
+from server.view.choice.decide import Decider, GopDecision
 from server.wire.messages import Box
 
 Seen = Mapping[str, Mapping[int, Box | None]]

@@ -19,7 +19,7 @@ from server.draw.__main__ import serve
 from server.draw.boxes import CHOSEN, OTHER, Image, draw_boxes
 from server.draw.studio import Studio
 from server.draw.unpack import frames
-from server.view.fmp4 import Sample, fragment
+from server.view.media.fmp4 import Sample, fragment
 from server.view.pictures.decided import first_pulse
 from server.wire.drawing import Canvas, Draw, Drawn, belongs, framed
 from server.wire.h264 import nal_units, sample

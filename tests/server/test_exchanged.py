@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from bestview import TrackKey
-from server.view.exchanged import Exchange, exchanged
 from server.view.history import Stretch
-from server.view.reading import CameraWindow
+from server.view.who.exchanged import Exchange, exchanged
+from server.view.who.reading import CameraWindow
 from server.wire.fit import Fit
 
 FRAMES, FIRST = 20, 100

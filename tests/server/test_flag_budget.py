@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from server.view.flag_budget import Budget
+from server.view.helping.flag_budget import Budget
 from server.wire.sections import Flags
 
 FPS = 25.0

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from server.view.flags import Flag, Flags, Foreseen
+from server.view.helping.flags import Flag, Flags, Foreseen
 from server.wire.sections import Flags as FlagSettings
 
 FPS = 25.0

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from server.camera.encode import AccessUnit, Encoder
-from server.view.fmp4 import Sample, fragment, init_segment, rebased, ticks
+from server.view.media.fmp4 import Sample, fragment, init_segment, rebased, ticks
 from server.wire.h264 import NAL_AUD, nal_type, nal_units, parameter_sets, sample, units_of
 from server.wire.sections import Encode, Site
 

@@ -9,7 +9,7 @@ from cameras_by_hand import CAMERAS, FPS, GOP, NO_REASON, SMALL, encoded
 from halls import A, Hall, opened
 from played_in_chromium import PLAY, needs_chromium, seen_in_chromium
 
-from server.view.decide import GopDecision, ObjectChoice
+from server.view.choice.decide import GopDecision, ObjectChoice
 
 GOPS = 12
 SILENT = (4, 5, 6, 9)

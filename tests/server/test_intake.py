@@ -27,11 +27,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bestview import IdentitySettings
-from server.view.agreement import Agreement
 from server.view.align import Aligner
 from server.view.intake import Intake
-from server.view.people import People
-from server.view.shelf import Shelf, Shelved
+from server.view.media.agreement import Agreement
+from server.view.streams.shelf import Shelf, Shelved
+from server.view.who.people import People
 from server.wire.inbox import Message
 from server.wire.messages import Keys
 

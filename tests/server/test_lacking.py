@@ -5,11 +5,11 @@ from __future__ import annotations
 import pytest
 from cameras_by_hand import CAMERAS, FPS, STRIDE, epoch_of, word
 
-from server.view.agreement import Agreement
 from server.view.align import Epoch
 from server.view.intake import CameraState
 from server.view.lacking import Lacking
-from server.view.shelf import Shelf
+from server.view.media.agreement import Agreement
+from server.view.streams.shelf import Shelf
 
 A, B = CAMERAS
 

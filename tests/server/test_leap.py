@@ -24,8 +24,8 @@ from cameras_by_hand import (
 from test_past_store import everything_that_plays, plays_without_a_word
 from test_service_turns import noted
 
-from server.view.footage import Footage
-from server.view.sound import Following, SoundShelf
+from server.view.streams.footage import Footage
+from server.view.streams.sound import Following, SoundShelf
 from server.wire.aac import SAMPLES
 from server.wire.epochs import end_of_epoch
 from server.wire.sound import SoundFormat

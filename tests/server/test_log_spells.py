@@ -25,10 +25,10 @@ from server.camera.sources.pictures import pictures
 from server.camera.sources.recording import Recording
 from server.draw import studio
 from server.run.up import _keep
-from server.view.channel import Channel
 from server.view.pictures import source
 from server.view.pictures.decided import NOTHING
 from server.view.pictures.process import ProcessDiedError
+from server.view.streams.channel import Channel
 from server.wire.drawing import Draw
 from server.wire.inbox import Message
 from server.wire.messages import CameraStatus, Found, Keys

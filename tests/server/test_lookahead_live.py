@@ -22,9 +22,9 @@ from halls import A, B, Hall
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from server.view.channel import Piece
-from server.view.decide import Decider, GopDecision
-from server.web.operator_permission import CHANGES
+from server.view.choice.decide import Decider, GopDecision
+from server.view.streams.channel import Piece
+from server.web.operator.permission import CHANGES
 from server.wire.errors import UserError
 from server.wire.sections import View
 

@@ -8,7 +8,7 @@ from cameras_by_hand import HEIGHT, STRIDE, WIDTH, epoch_of, word
 
 from bestview import IdentitySettings
 from server.view.align import Epoch
-from server.view.people import People
+from server.view.who.people import People
 from server.wire.epochs import end_of_epoch
 from server.wire.messages import Box, CameraTracks
 

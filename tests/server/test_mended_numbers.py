@@ -11,8 +11,8 @@ from bestview import IdentitySettings, Split
 from server.camera.mending import mended
 from server.camera.report import Reporter
 from server.view.align import Epoch
-from server.view.people import People
-from server.view.pointing import Place, pointings
+from server.view.helping.pointing import Place, pointings
+from server.view.who.people import People
 from server.wire.messages import CameraTracks
 from tracking import CostSettings, Detections, WindowSettings, solver_named
 from tracking.assist import AssistedTracker, AssistSettings, Pointing

@@ -15,9 +15,9 @@ from monitoring_files import ALERTS
 from prometheus_client.parser import text_string_to_metric_families
 from promql_series import selectors
 
-from server.view.channel import Chunk, Viewer
 from server.view.histogram import Histogram
 from server.view.ready import most_behind
+from server.view.streams.channel import Chunk, Viewer
 from server.web.lag import Lag
 from server.web.sent import Sent
 from server.wire.inbox import Message

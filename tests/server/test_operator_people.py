@@ -12,8 +12,8 @@ from halls import A, B, Hall, opened
 
 from bestview import IdentityRegistry
 from server.run.watch import run_watch
-from server.view.decide import homographies
-from server.web.operator_permission import CHANGES
+from server.view.choice.decide import homographies
+from server.web.operator.permission import CHANGES
 
 PEOPLE = "/api/operator/people"
 

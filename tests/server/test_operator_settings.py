@@ -13,9 +13,9 @@ from cameras_by_hand import CAMERAS, LARGE, SMALL, TrackNumbers, epoch_of, small
 from halls import A, B, Hall, opened
 
 from bestview.quality import QualitySettings
-from server.view.decide import Decider
-from server.web.operator_permission import CHANGES
-from server.web.operator_settings import settings_of
+from server.view.choice.decide import Decider
+from server.web.operator.permission import CHANGES
+from server.web.operator.settings import settings_of
 from server.wire.config import Config
 from server.wire.sections import View
 

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from bestview import TrackKey
 from server.view.align import Epoch
-from server.view.outlook import Outlook
-from server.view.people import People
-from server.view.sight import Sight
+from server.view.choice.outlook import Outlook
+from server.view.choice.sight import Sight
+from server.view.who.people import People
 from server.wire.messages import Box, CameraTracks
 
 WINDOW, EPOCHS = 3 * STRIDE, 5

@@ -33,9 +33,9 @@ from server.camera.pipeline import CameraPipeline
 from server.camera.process import CameraProcess
 from server.camera.sound import LiveSound
 from server.camera.sources import SourceEnded
-from server.view.agreement import Agreement
-from server.view.shelf import Shelf
-from server.view.ts import Counters, pack
+from server.view.media.agreement import Agreement
+from server.view.media.ts import Counters, pack
+from server.view.streams.shelf import Shelf
 from server.wire.config import Config
 from server.wire.errors import UserError
 from server.wire.h264 import NAL_AUD, nal_type, nal_units

@@ -19,13 +19,13 @@ from numpy.typing import NDArray
 from played_in_chromium import READ, needs_chromium, seen_in_chromium
 
 from server.camera.encode import AccessUnit, Encoder
-from server.view.agreement import ParameterMismatchError
-from server.view.channel import Piece
-from server.view.codec import agreement_for
-from server.view.decide import GopDecision, ObjectChoice
-from server.view.footage import Footage
-from server.view.shelf import Shelf
-from server.view.splice import Splicer
+from server.view.choice.decide import GopDecision, ObjectChoice
+from server.view.media.agreement import ParameterMismatchError
+from server.view.media.codec import agreement_for
+from server.view.streams.channel import Piece
+from server.view.streams.footage import Footage
+from server.view.streams.shelf import Shelf
+from server.view.streams.splice import Splicer
 from server.wire.config import Config
 from server.wire.h264 import nal_units, parameter_sets
 from server.wire.sections import Encode, Site

@@ -21,7 +21,7 @@ from sounds_by_hand import heard, sends, write_flashes
 from test_players import HLS_BY_ITSELF
 
 from benchmarks.browser import CHROMIUM, chromium
-from server.view.decide import GopDecision, ObjectChoice
+from server.view.choice.decide import GopDecision, ObjectChoice
 from server.wire.messages import GopChoices
 
 NOTHING = "of camera c0 nothing is kept from p999 on; there is p0 to p104"

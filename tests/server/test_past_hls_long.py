@@ -14,9 +14,9 @@ from recorded_by_hand import PULSE0
 from test_past_hls import GOPS, HTTP, LENGTH, forget, numbers, shows, text, until_written
 
 from server.view.past.rewound import Listing
-from server.view.reel import plan
-from server.web import hls_long, hls_past
-from server.web.hls_long import MOST_GROWING, long_playlist, newest
+from server.view.streams.reel import plan
+from server.web.hls import long, past
+from server.web.hls.long import MOST_GROWING, long_playlist, newest
 
 PLAN = plan(FPS, LENGTH, LENGTH / FPS, 1.0)
 
@@ -24,10 +24,10 @@ PLAN = plan(FPS, LENGTH, LENGTH / FPS, 1.0)
 @pytest.fixture
 async def hall(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Hall]:
     """A site whose lists are short: eight segments that grow, twelve that do not, a time of day in four."""
-    for module in (hls_long, hls_past):
+    for module in (long, past):
         monkeypatch.setattr(module, "MOST_GROWING", 8)
         monkeypatch.setattr(module, "MOST", 12)
-    monkeypatch.setattr(hls_long, "_STEP", 4)
+    monkeypatch.setattr(long, "_STEP", 4)
     async for hall in opened(record={"folder": str(tmp_path / "kept"), "segment_s": 1.0}, http=HTTP):
         hall.service.past.open()
         hall.service.come(*CAMERAS)

@@ -31,9 +31,8 @@ from recorded_by_hand import (
     written,
 )
 
-from server.view.agreement import Agreement
-from server.view.channel import Channel
-from server.view.footage import Footage
+from server.view.media.agreement import Agreement
+from server.view.media.ts import Counters
 from server.view.past import stream as past_stream
 from server.view.past.kept import kept_from, kept_until, known
 from server.view.past.media import pulse_of
@@ -43,9 +42,10 @@ from server.view.past.run import Headers
 from server.view.past.store import Store
 from server.view.past.stream import PastStream, Wish
 from server.view.past.stretch import Span
-from server.view.picture import Picture as Shown
-from server.view.timeline import Timeline
-from server.view.ts import Counters
+from server.view.streams.channel import Channel
+from server.view.streams.footage import Footage
+from server.view.streams.picture import Picture as Shown
+from server.view.streams.timeline import Timeline
 from server.wire.inbox import Message
 from server.wire.messages import Box, Keys
 from server.wire.remembered import Remembered

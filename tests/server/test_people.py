@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 from bestview import EpisodeKey, IdentitySettings, IdentityUpdate, LocalTrack, Merge, Split, TrackKey
 from server.view.history import History
-from server.view.locals import LocalNumbers
-from server.view.people import People
+from server.view.who.locals import LocalNumbers
+from server.view.who.people import People
 from server.wire.messages import Box
 
 

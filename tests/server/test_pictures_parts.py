@@ -14,11 +14,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from test_draw import CANVAS, fragments, shown
 
-from server.view.channel import Viewer
 from server.view.pictures.decided import NOTHING, Decided
 from server.view.pictures.film import Film
 from server.view.pictures.pace import Pace
 from server.view.pictures.series import AllSeries, Series
+from server.view.streams.channel import Viewer
 from server.wire.drawing import Drawn, Jpeg, Unit
 from server.wire.messages import GopChoices
 

@@ -9,11 +9,11 @@ import pytest
 from cameras_by_hand import CAMERAS, FPS, GOP, NO_REASON, encoded, small_config
 from halls import PATIENCE
 
-from server.view.agreement import Agreement
-from server.view.channel import Viewer
-from server.view.decide import GopDecision, ObjectChoice
-from server.view.shelf import Shelf
-from server.view.splice import Splicer
+from server.view.choice.decide import GopDecision, ObjectChoice
+from server.view.media.agreement import Agreement
+from server.view.streams.channel import Viewer
+from server.view.streams.shelf import Shelf
+from server.view.streams.splice import Splicer
 from server.wire.messages import NumberedBox
 
 A, B = CAMERAS

@@ -27,10 +27,10 @@ from test_splice import choice
 from bestview import Merge, Split
 from server.run.films import Films
 from server.run.soundtrack import Soundtrack
-from server.view.codec import agreement_for
-from server.view.decide import GopDecision, ObjectChoice
+from server.view.choice.decide import GopDecision, ObjectChoice
+from server.view.media.codec import agreement_for
 from server.view.record import Recorder
-from server.view.shelf import Shelf
+from server.view.streams.shelf import Shelf
 from server.wire.fit import Fit
 from server.wire.messages import NumberedBox
 from server.wire.sections import Site

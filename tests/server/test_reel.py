@@ -13,12 +13,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from server.view.agreement import Agreement
-from server.view.decide import GopDecision, ObjectChoice
-from server.view.fmp4 import init_segment
-from server.view.reel import Reel, Segment, plan
-from server.view.shelf import Shelf
-from server.view.splice import Splicer
+from server.view.choice.decide import GopDecision, ObjectChoice
+from server.view.media.agreement import Agreement
+from server.view.media.fmp4 import init_segment
+from server.view.streams.reel import Reel, Segment, plan
+from server.view.streams.shelf import Shelf
+from server.view.streams.splice import Splicer
 
 GOPS = 40
 

@@ -13,8 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from server.camera.keeping import Keeping
-from server.view.remembering import PATIENCE_S, Remembering
-from server.view.returning import LONGEST_S
+from server.view.who.remembering import PATIENCE_S, Remembering
+from server.view.who.returning import LONGEST_S
 from server.web.app import make_app
 from server.wire.epochs import end_of_epoch
 from server.wire.inbox import Message

@@ -7,8 +7,8 @@ from itertools import pairwise
 import pytest
 
 from benchmarks.stream.right import Right, judge, schedule
-from server.view.footage import Footage
-from server.view.streams import Gop
+from server.view.streams.footage import Footage
+from server.view.streams.kinds import Gop
 from server.wire.sections import Encode
 
 

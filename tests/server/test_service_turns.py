@@ -17,7 +17,7 @@ from cameras_by_hand import (
     word,
 )
 
-from server.view.decide import GopDecision
+from server.view.choice.decide import GopDecision
 from server.wire.epochs import end_of_epoch
 
 EPOCHS = 8

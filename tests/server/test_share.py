@@ -27,9 +27,9 @@ from hypothesis import strategies as st
 
 from bestview import EpisodeKey, IdentityUpdate, LocalTrack, Merge
 from server.run.setup import free_port
-from server.view.decide import Decider
+from server.view.choice.decide import Decider
 from server.view.service import BestViewService
-from server.view.share import index_of, served, server_of
+from server.view.who.share import index_of, served, server_of
 from server.web.app import make_app, serving
 from server.wire.bus import Bus
 from server.wire.errors import UserError

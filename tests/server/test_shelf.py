@@ -6,8 +6,8 @@ import pytest
 from cameras_by_hand import FPS, encoded
 
 from server.camera.encode import AccessUnit
-from server.view.agreement import Agreement, ParameterMismatchError
-from server.view.shelf import Shelf
+from server.view.media.agreement import Agreement, ParameterMismatchError
+from server.view.streams.shelf import Shelf
 
 
 def put(shelf: Shelf, unit: AccessUnit) -> None:

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from server.camera.encode import AccessUnit, Encoder
-from server.view.bits import BitReader, BitWriter, payload_of, unit_of
-from server.view.skip import Continuing, UnfitError, continuing
+from server.view.media.bits import BitReader, BitWriter, payload_of, unit_of
+from server.view.media.skip import Continuing, UnfitError, continuing
 from server.wire.h264 import ParameterSets, nal_units, parameter_sets, sample
 from server.wire.sections import Encode, Site
 

@@ -18,7 +18,7 @@ from sounds_by_hand import EVERY, FPS, beeps, write_flashes
 
 from server.camera.sound import Frame, LiveSound
 from server.camera.sources.stream import Stream
-from server.view.mp4_sound import sound_fragment, sound_init_segment
+from server.view.media.mp4_sound import sound_fragment, sound_init_segment
 from server.wire.aac import SAMPLES as FRAME
 from server.wire.sections import Sound
 from server.wire.sound import Coding, SoundFormat

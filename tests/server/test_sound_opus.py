@@ -37,8 +37,8 @@ from server.camera.sound import Frame, RecordedSound
 from server.camera.sound.encoding import Encoding
 from server.camera.sound.opus import samples_in
 from server.camera.sound.passing import Passing
-from server.view.decide import GopDecision, ObjectChoice
-from server.view.mp4_sound import sound_fragment, sound_init_segment
+from server.view.choice.decide import GopDecision, ObjectChoice
+from server.view.media.mp4_sound import sound_fragment, sound_init_segment
 from server.wire.errors import UserError
 from server.wire.loading import build_config
 from server.wire.sections import Sound

@@ -30,8 +30,8 @@ from test_ts import check_counters, taken_apart
 
 import client
 from server.camera.sound import RecordedSound
-from server.view.decide import GopDecision, ObjectChoice
-from server.view.fmp4 import init_segment
+from server.view.choice.decide import GopDecision, ObjectChoice
+from server.view.media.fmp4 import init_segment
 from server.wire.aac import SAMPLES as FRAME
 from server.wire.sections import Sound
 

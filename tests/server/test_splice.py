@@ -7,11 +7,11 @@ from collections.abc import Iterable
 
 from cameras_by_hand import CAMERAS, FPS, GOP, NO_REASON, encoded, small_config
 
-from server.view.agreement import Agreement
-from server.view.channel import Viewer
-from server.view.decide import GopDecision, ObjectChoice
-from server.view.shelf import Shelf
-from server.view.splice import Splicer
+from server.view.choice.decide import GopDecision, ObjectChoice
+from server.view.media.agreement import Agreement
+from server.view.streams.channel import Viewer
+from server.view.streams.shelf import Shelf
+from server.view.streams.splice import Splicer
 
 A, B = CAMERAS
 

@@ -15,12 +15,12 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from server.camera.encode import AccessUnit, Encoder
-from server.view.agreement import Agreement
-from server.view.channel import Viewer
-from server.view.decide import GopDecision, ObjectChoice
-from server.view.fmp4 import init_segment
-from server.view.shelf import Shelf
-from server.view.splice import Splicer
+from server.view.choice.decide import GopDecision, ObjectChoice
+from server.view.media.agreement import Agreement
+from server.view.media.fmp4 import init_segment
+from server.view.streams.channel import Viewer
+from server.view.streams.shelf import Shelf
+from server.view.streams.splice import Splicer
 from server.wire.sections import Encode, Site
 
 FRAMES = 6 * GOP

@@ -14,11 +14,11 @@ from ffprobe_by_hand import needs_ffprobe, probed
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from server.view.agreement import Agreement
-from server.view.fmp4 import Sample, fragment, ticks
-from server.view.picture import Picture
-from server.view.shelf import Shelf
-from server.view.ts import COUNTERS, PACKET_BYTES, Counters, pack, packets
+from server.view.media.agreement import Agreement
+from server.view.media.fmp4 import Sample, fragment, ticks
+from server.view.media.ts import COUNTERS, PACKET_BYTES, Counters, pack, packets
+from server.view.streams.picture import Picture
+from server.view.streams.shelf import Shelf
 
 CLOCK = 1 << 33
 

@@ -13,11 +13,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from server.view.board import reason
-from server.view.decide import Decider, GopDecision
-from server.view.elsewhere import Elsewhere
-from server.view.sight import Sight
-from server.view.unfound import Tested as Looked
-from server.view.unfound import Unfound
+from server.view.choice.decide import Decider, GopDecision
+from server.view.choice.elsewhere import Elsewhere
+from server.view.choice.sight import Sight
+from server.view.choice.unfound import Tested as Looked
+from server.view.choice.unfound import Unfound
 from server.wire.messages import Box
 
 A, B = CAMERAS

@@ -17,14 +17,14 @@ from numpy.typing import NDArray
 
 from server.camera.encode import AccessUnit, Encoder
 from server.draw.unpack_webm import webm_frames
-from server.view.agreement import ParameterMismatchError
-from server.view.picture import Picture
+from server.view.media.agreement import ParameterMismatchError
+from server.view.media.vp8 import Vp8Agreement, size_of
+from server.view.media.vp8_skip import repeat
+from server.view.media.webm import cluster, header, rebased
 from server.view.pictures.decided import first_pulse
-from server.view.shelf import Shelf
-from server.view.timeline import Timeline
-from server.view.vp8 import Vp8Agreement, size_of
-from server.view.vp8_skip import repeat
-from server.view.webm import cluster, header, rebased
+from server.view.streams.picture import Picture
+from server.view.streams.shelf import Shelf
+from server.view.streams.timeline import Timeline
 from server.wire.sections import Encode, Site
 
 FPS, GOP, FRAMES = 25.0, 5, 20

@@ -10,7 +10,7 @@ import aiohttp
 from cameras_by_hand import CAMERAS, GOP, LARGE, SMALL
 from halls import A, B, Hall
 
-from server.web.access_grant import ALL
+from server.web.access.grant import ALL
 from server.web.events import Events
 
 

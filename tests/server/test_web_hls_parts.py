@@ -18,9 +18,9 @@ from cameras_by_hand import CAMERAS, FPS, GOP, NO_REASON, encoded, video
 from halls import A, Hall, opened
 from numpy.typing import NDArray
 
-from server.view.decide import GopDecision, ObjectChoice
-from server.view.reel import Reel
-from server.web.hls_live import _newest
+from server.view.choice.decide import GopDecision, ObjectChoice
+from server.view.streams.reel import Reel
+from server.web.hls.live import _newest
 
 HTTP = {"hls_segment_s": 0.6, "hls_window_s": 6.0}
 PARTS = 3
@@ -204,7 +204,7 @@ async def test_what_never_comes_is_not_waited_for_for_ever(
     hall: Hall, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     shows(hall, range(PARTS + 1))
-    monkeypatch.setattr("server.web.hls_live._WAIT", 0.05)
+    monkeypatch.setattr("server.web.hls.live._WAIT", 0.05)
     async with hall.session.get(f"{STREAM}index.m3u8?_HLS_msn=2") as answer:
         assert (answer.status, bool(answer.headers["Retry-After"])) == (503, True)
 

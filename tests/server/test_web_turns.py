@@ -10,7 +10,7 @@ import pytest
 from cameras_by_hand import FedService, small_config
 from tokens_by_hand import line_of, write_tokens
 
-from server.web.access import Access
+from server.web.access.access import Access
 from server.web.events import Events
 from server.web.tls import Certificate
 from server.web.turns import again_and_again
@@ -66,7 +66,7 @@ async def test_what_people_and_cameras_are_is_told_on(monkeypatch: pytest.Monkey
 async def test_tokens_are_looked_at_on_and_what_is_over_ends_meanwhile(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("server.web.access._LOOK_EVERY_S", 0.001)
+    monkeypatch.setattr("server.web.access.access._LOOK_EVERY_S", 0.001)
     failing, over = Failing(RuntimeError("nobody has thought of this")), Failing()
     access = Access(write_tokens(tmp_path / "tokens.yaml", line_of("desk")), lambda number: number, "hall")
     monkeypatch.setattr(access._file, "look", failing)

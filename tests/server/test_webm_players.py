@@ -29,7 +29,7 @@ from played_in_chromium import PLAY, needs_chromium, seen_in_chromium
 from vp8_by_hand import EPOCHS, feed, own
 
 from benchmarks.browser import chromium
-from server.view.decide import GopDecision, ObjectChoice
+from server.view.choice.decide import GopDecision, ObjectChoice
 from server.wire.epochs import end_of_epoch
 
 PATHS = ("/objects/1/best.webm", "/cameras/c1/live.webm")

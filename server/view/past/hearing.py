@@ -8,8 +8,8 @@ from collections.abc import Callable, Sequence
 from server.view.past.play import Recorded
 from server.view.past.sounds import frames_in
 from server.view.past.stretch import Stretch
-from server.view.sound import Following, Heard, SoundShelf
-from server.view.timeline import LONGEST_S
+from server.view.streams.sound import Following, Heard, SoundShelf
+from server.view.streams.timeline import LONGEST_S
 from server.wire.sound import SoundFormat
 
 

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
-from server.view.agreement import Agreement
-from server.view.fmp4 import TIMESCALE
-from server.view.picture import Picture
+from server.view.media.agreement import Agreement
+from server.view.media.fmp4 import TIMESCALE
+from server.view.streams.picture import Picture
 
 _HEAD = 8
 """Bytes of a box's size and kind."""

@@ -8,15 +8,15 @@ from collections import deque
 from collections.abc import Mapping
 from weakref import WeakKeyDictionary
 
-from server.view.agreement import Agreement
-from server.view.fmp4 import init_segment
-from server.view.mp4_sound import sound_init_segment
+from server.view.media.agreement import Agreement
+from server.view.media.fmp4 import init_segment
+from server.view.media.mp4_sound import sound_init_segment
 from server.view.past.recent import Recent
 from server.view.past.run import Headers, Run, RunHead
 from server.view.past.store import Bounds, Piece, Store
 from server.view.past.writer import Writer
-from server.view.shelf import Shelf
-from server.view.sound import SoundShelf
+from server.view.streams.shelf import Shelf
+from server.view.streams.sound import SoundShelf
 from server.wire.config import Config
 from server.wire.errors import UserError
 from server.wire.h264 import ParameterSets

@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Mapping
 
 from server.view.past.media import Gop
-from server.view.shelf import Shelf
+from server.view.streams.shelf import Shelf
 from server.wire.messages import GopChoices
 
 

@@ -1,4 +1,4 @@
-"""The past in segments (HLS), cut and numbered by pulses as the live ones are (:mod:`server.view.reel`).
+"""The past in segments (HLS), cut and numbered by pulses as the live ones are (`streams/reel.py`).
 
 So a segment has one address, whether it is new or long past, and who plays the past comes to the present.
 """
@@ -9,16 +9,16 @@ from collections.abc import Callable
 from contextlib import aclosing
 from dataclasses import dataclass, replace
 
-from server.view.agreement import Agreement
-from server.view.footage import Footage
+from server.view.media.agreement import Agreement
+from server.view.media.ts import Counters
 from server.view.past.hearing import Hearing
 from server.view.past.kept import kept_from, kept_until
 from server.view.past.media import pictures_of
 from server.view.past.play import Source, last_before, play
-from server.view.picture import Picture
-from server.view.reel import Plan, Segment
-from server.view.timeline import Timeline
-from server.view.ts import Counters
+from server.view.streams.footage import Footage
+from server.view.streams.picture import Picture
+from server.view.streams.reel import Plan, Segment
+from server.view.streams.timeline import Timeline
 
 
 @dataclass(frozen=True, slots=True)

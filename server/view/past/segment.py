@@ -13,7 +13,7 @@ from server.view.past.playlist import Playlist
 from server.view.past.run import Headers, Run, Segment
 from server.view.past.sounds import NAME as SOUND
 from server.view.past.stretch import Stretch
-from server.view.sound import Heard
+from server.view.streams.sound import Heard
 from server.wire.messages import GopChoices
 
 

@@ -63,7 +63,7 @@ def _fragments(file: BufferedReader, at: int, end: int) -> Iterator[tuple[int, t
 
 
 def _told(moof: bytes) -> tuple[int, tuple[int, ...]] | None:
-    """Give what a fragment of :func:`server.view.mp4_sound.sound_fragment` says: first sample, sizes."""
+    """Give what a fragment of `mp4_sound.sound_fragment` says: first sample, sizes."""
     try:
         (sample,) = struct.unpack_from(">Q", moof, moof.index(b"tfdt") + 8)
         at = moof.index(b"trun") + 8

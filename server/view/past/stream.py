@@ -7,14 +7,14 @@ from collections.abc import AsyncGenerator, Callable, Iterator
 from contextlib import aclosing
 from dataclasses import dataclass
 
-from server.view.channel import Channel
-from server.view.footage import Footage
 from server.view.past.hearing import Hearing
 from server.view.past.media import pictures_of
 from server.view.past.play import Source, play
-from server.view.picture import Picture
-from server.view.tally import Tally
-from server.view.timeline import LONGEST_S, Timeline
+from server.view.streams.channel import Channel
+from server.view.streams.footage import Footage
+from server.view.streams.picture import Picture
+from server.view.streams.tally import Tally
+from server.view.streams.timeline import LONGEST_S, Timeline
 
 _LEAD_S = 4.0
 """Seconds of the past that are sent at once: what a player likes to have before it begins."""

@@ -6,13 +6,13 @@ import asyncio
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
-from server.view.agreement import Agreement
-from server.view.channel import Channel
-from server.view.fmp4 import Sample, fragment, init_segment
-from server.view.picture import Picture
-from server.view.sound import Following, SoundShelf
-from server.view.tally import Tally
-from server.view.timeline import Timeline
+from server.view.media.agreement import Agreement
+from server.view.media.fmp4 import Sample, fragment, init_segment
+from server.view.streams.channel import Channel
+from server.view.streams.picture import Picture
+from server.view.streams.sound import Following, SoundShelf
+from server.view.streams.tally import Tally
+from server.view.streams.timeline import Timeline
 from server.wire.drawing import Canvas, Unit
 from server.wire.h264 import nal_units, parameter_sets, sample
 

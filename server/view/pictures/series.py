@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 
-from server.view.channel import Channel, Chunk, Viewer
 from server.view.pictures.multipart import part
 from server.view.pictures.pace import Pace
+from server.view.streams.channel import Channel, Chunk, Viewer
 from server.wire.drawing import Canvas, Drawn, Jpeg, belongs
 
 _NEWEST = 1

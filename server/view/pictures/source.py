@@ -8,13 +8,13 @@ import logging
 from collections.abc import Callable
 
 from camsync import Spell
-from server.view.channel import Channel, Viewer
 from server.view.pictures.decided import Told
 from server.view.pictures.film import Film
 from server.view.pictures.process import DrawProcess, ProcessDiedError
 from server.view.pictures.series import AllSeries
 from server.view.pictures.stills import Stills
-from server.view.sound import SoundShelf
+from server.view.streams.channel import Channel, Viewer
+from server.view.streams.sound import SoundShelf
 from server.wire.drawing import Canvas, Draw, Jpeg, Still
 
 log = logging.getLogger(__name__)

@@ -1,0 +1,1 @@
+"""Which camera shows whom, and why."""

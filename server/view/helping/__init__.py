@@ -1,0 +1,1 @@
+"""The operator who helps: flags, and where somebody points."""

@@ -1,0 +1,1 @@
+"""Containers and codecs, as far as streams are written by hand."""

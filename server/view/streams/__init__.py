@@ -1,0 +1,1 @@
+"""The streams: the cameras' own frames, spliced, to any number of viewers."""

@@ -1,0 +1,148 @@
+"""The cameras remember who is who: what they are told, and what they say to a service that begins anew."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable, Sequence
+
+import msgspec
+
+from server.view.who.people import People
+from server.view.who.returning import LONGEST_S, Returning, remembered_by
+from server.wire.inbox import Message
+from server.wire.messages import camera_of
+from server.wire.remembered import REMEMBERED_MOST, Remembered
+
+log = logging.getLogger(__name__)
+
+PATIENCE_S = 1.0
+"""How long a camera that has come is waited for until it says what it remembers."""
+_LATELY_S = 10.0
+"""A camera whose words come late, on a machine with too much to do, goes on following all the same."""
+_EVERY_S = 1.0
+"""Seconds between two words of the same to a camera: each says when it was true."""
+
+
+class Remembering:
+    """Begins with what the cameras remember, and tells them what there is to remember.
+
+    Args:
+        people: who is who.
+        cameras: all of them.
+        fps: frames a second.
+        send: sends a camera its word.
+        tells: whether this service does so; of several one is enough, since they agree.
+        clock: seconds that only go forward.
+    """
+
+    def __init__(
+        self,
+        people: People,
+        cameras: Sequence[str],
+        fps: float,
+        send: Callable[[str, bytes], None],
+        *,
+        tells: bool = True,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._people, self._cameras, self._fps = people, cameras, fps
+        self._send, self._tells, self._clock = send, tells, clock
+        self._came: dict[str, float] = {}
+        """When each camera came that has not said yet what it remembers."""
+        self._said: dict[str, Remembered] = {}
+        self._returning: Returning | None = None
+        self._begun = self._anybody = False
+        self._heard: set[str] = set()
+        """Cameras that have said what they remember: told sooner, they would have forgotten it."""
+        self._sent: dict[str, Remembered] = {}
+        self._since = time.time()
+
+    def alive(self, key: str, there: bool) -> None:
+        """A camera's liveliness token came or went."""
+        camera = camera_of(key)
+        if camera in self._cameras and there:
+            self._anybody = True
+            if camera not in self._heard:  # its token may come after its word
+                self._came[camera] = self._clock()
+        else:
+            self._came.pop(camera, None)
+
+    def heard(self, message: Message) -> None:
+        """A camera says what it remembers; after the beginning only which numbers are taken is of use.
+
+        Raises:
+            DecodeError or another of `UNREADABLE`: it is none.
+        """
+        camera = camera_of(message.key)
+        if camera not in self._cameras:
+            return
+        self._came.pop(camera, None)
+        self._heard.add(camera)
+        if not message.payload:
+            return
+        said = msgspec.json.decode(message.payload, type=Remembered)
+        if self._begun:
+            self._people.begin_at(said.next)
+        else:
+            self._said[camera] = said
+
+    @property
+    def waits(self) -> bool:
+        """Whether a camera may still say what it remembers, so that nothing should be decided yet."""
+        if self._begun:
+            return False
+        now = self._clock()
+        return any(now < came + PATIENCE_S for came in self._came.values())
+
+    def awaits(self, number: int) -> bool:
+        """Tell whether somebody of this number may be found again, or is and only nothing is decided yet."""
+        if not self._begun or self._people.roll.whose(number) in self._people.roll.first_seen:
+            return True
+        return self._returning is not None and number in self._returning.numbers
+
+    @property
+    def numbers_since(self) -> float:
+        """When numbers began, unix seconds: since then none was given twice. 0: nobody has one yet."""
+        return self._since if self._begun else 0.0
+
+    def begin(self, pulse: int) -> None:
+        """Begin with what is remembered, before an epoch that ends with a pulse is taken in.
+
+        As long as no camera has come there is nothing to begin with.
+        """
+        if self._begun or not self._anybody:
+            return
+        self._begun = True
+        self._returning = Returning(self._said, pulse, round(LONGEST_S * self._fps))
+        self._returning.begin(self._people, pulse)
+        if self._said:
+            self._since = min(self._since, max(it.since for it in self._said.values()))
+            log.info("the cameras remember %d people", len(self._returning.numbers))
+        self._said = {}
+
+    def take(self, pulse: int) -> None:
+        """Look at people after an epoch that ends with a pulse was taken in."""
+        if self._returning is not None:
+            self._returning.look(self._people, pulse)
+            if self._returning.over:
+                self._returning = None
+        if self._begun and self._tells:
+            self._tell(pulse)
+
+    def _tell(self, pulse: int) -> None:
+        lately = round(_LATELY_S * self._fps)
+        for camera, now in remembered_by(self._people, self._cameras, pulse, lately, self._since).items():
+            if camera not in self._heard:
+                continue
+            before = self._sent.get(camera)
+            if before is not None and pulse - before.pulse < _EVERY_S * self._fps and _same(before, now):
+                continue
+            payload = msgspec.json.encode(now)
+            if len(payload) <= REMEMBERED_MOST:
+                self._sent[camera] = now
+                self._send(camera, payload)
+
+
+def _same(one: Remembered, other: Remembered) -> bool:
+    return msgspec.structs.replace(one, pulse=other.pulse) == other
