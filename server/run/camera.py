@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
 
-from camsync import SyncError
+from camsync import Spell, SyncError
 from server.camera.process import CameraProcess
 from server.run.checks import check_recording
 from server.run.hang_up import reloads
@@ -17,9 +18,13 @@ from server.wire.running import Running
 
 log = logging.getLogger(__name__)
 
+_RETRY_FIRST_S, _RETRY_MAX_S = 0.5, 10.0
+
 
 async def camera_process(running: Running, camera_id: str) -> None:
     """Run one camera; when a configuration that is read again changes what it goes by, it begins anew.
+
+    A network camera or device that does not answer yet is waited for.
 
     Raises:
         UserError: its source cannot be opened.
@@ -28,12 +33,10 @@ async def camera_process(running: Running, camera_id: str) -> None:
     anew = asyncio.Event()
     following = asyncio.create_task(_follow(running, camera_id, anew), name="reload")
     try:
-        camera = await asyncio.to_thread(_made, running.now, camera_id)
+        camera = await _made(running, camera_id, anew)
         while not await _run(camera, anew):
             try:
-                camera = await asyncio.to_thread(
-                    CameraProcess, with_password(running.now, camera_id), camera_id
-                )
+                camera = await _made(running, camera_id, anew)
             except UserError as error:  # whoever looks after this process starts it again
                 raise AwayError(str(error)) from error
     except SyncError as error:
@@ -43,7 +46,29 @@ async def camera_process(running: Running, camera_id: str) -> None:
         await asyncio.gather(following, return_exceptions=True)
 
 
-def _made(config: Config, camera_id: str) -> CameraProcess:
+async def _made(running: Running, camera_id: str, anew: asyncio.Event) -> CameraProcess:
+    """Make it as soon as its source can be opened, by what is in force then; ``anew`` says that this changed.
+
+    To end instead, and be started again, would load all libraries each time.
+    """
+    away, pause = Spell(calm=0.0), _RETRY_FIRST_S
+    while True:
+        anew.clear()
+        try:
+            camera = await asyncio.to_thread(_opened, running.now, camera_id)
+        except AwayError as error:
+            if (more := away.happened(str(error))) is not None:
+                log.warning("%s%s; it is tried again", error, more)
+        else:
+            if ended := away.over():
+                log.info("camera %s: it answers, after %.0f s", camera_id, ended.seconds)
+            return camera
+        with contextlib.suppress(TimeoutError):
+            await asyncio.wait_for(anew.wait(), pause)
+        pause = min(2 * pause, _RETRY_MAX_S)
+
+
+def _opened(config: Config, camera_id: str) -> CameraProcess:
     return CameraProcess(with_password(config, camera_id), camera_id)
 
 
