@@ -86,7 +86,8 @@ def test_a_second_flag_waits_until_the_first_is_over_and_is_let_be_if_all_is_ove
     truth = _truth()
     shown = _tracks(truth, [[1] * FRAMES, [2] * FRAMES])
     for due, seen_to in ((150, True), (61, False)):
-        operator = Operator(Person(delay_s=0.0), Desk(ALL, FPS), truth, FPS, seed=1)
+        person = Person(delay_s=0.0, back_s=0.0)
+        operator = Operator(person, Desk(ALL, FPS), truth, FPS, seed=1)
         operator.hear(60, [_trouble((1, 8), 60, 0.9), _trouble((2, 7), due, 0.5)])
         pointings = [operator.look(newest, shown) for newest in range(60, 200)]
         assert [flag.trouble.objects for flag in operator.flags] == [(1, 8), (2, 7)]
@@ -94,6 +95,20 @@ def test_a_second_flag_waits_until_the_first_is_over_and_is_let_be_if_all_is_ove
         assert first.fish == 0
         assert (second.fish == 1) == seen_to
         assert {it.object for it in pointings if it} == ({1, 2} if seen_to else {1})
+
+
+def test_what_is_over_when_the_first_is_over_is_seen_again_from_a_moment_before() -> None:
+    truth = _truth()
+    shown = _tracks(truth, [[1] * FRAMES, [2] * FRAMES])
+    operator = Operator(Person(delay_s=0.0, back_s=8.0), Desk(ALL, FPS), truth, FPS, seed=1)
+    operator.hear(60, [_trouble((1, 8), 60, 0.9), _trouble((2, 7), 61, 0.5)])
+    pointings = [operator.look(newest, shown) for newest in range(60, 200)]
+    second = operator.flags[1]
+    assert second.fish == 1
+    assert second.begun is not None
+    assert second.begun > 61
+    assert second.looks[0] in range(40, 61)
+    assert {it.object for it in pointings if it} == {1, 2}
 
 
 def test_flags_go_to_the_riskiest_and_once_to_the_same_two() -> None:

@@ -39,6 +39,7 @@ _SWEEP = (
     ("quick: 0.2 s", Person(reaction_s=0.2)),
     ("slow: 1 s", Person(reaction_s=1.0)),
     ("picture not late", Person(delay_s=0.0)),
+    ("sees nothing again", Person(back_s=0.0)),
 )
 
 

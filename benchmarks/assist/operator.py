@@ -1,4 +1,7 @@
-"""A simulated operator: sees to one flag at a time, looks after a while, and points as a hand can."""
+"""A simulated operator: sees to one flag at a time, looks after a while, and points as a hand can.
+
+What was over before they could turn to it they see again, from a moment before, as the page offers.
+"""
 
 from __future__ import annotations
 
@@ -22,6 +25,8 @@ _CLEAR_S = 0.3
 """Seconds for which it must."""
 _LONGEST_S = 5.0
 """Seconds after which the operator lets go."""
+_BACK_S = 0.5
+"""Seconds before what is seen again, beside those until the hand is there."""
 _FOUND = 0.2
 """Overlap (IoU) of a track's box with a body from which the operator knows who is meant."""
 
@@ -34,11 +39,13 @@ class Person:
         reaction_s: seconds from the flag to the first pointing.
         error: how far off the pointing is, a body's size (the root of its box's area), root mean square.
         delay_s: seconds by which the picture that is shown lags behind the newest frame that is tracked.
+        back_s: seconds back that they may see again, of what was over before they turned to it.
     """
 
     reaction_s: float = 0.5
     error: float = 1.0 / 3.0
     delay_s: float = 1.0
+    back_s: float = 8.0
 
 
 @dataclass(slots=True)
@@ -51,6 +58,7 @@ class Flag:
         raised: the newest frame when it was raised.
         until: the frame on the screen up to which it lasts at least.
         begun: the newest frame when the operator turned to it; `None`: not yet, or never.
+        lag: frames that the picture lags behind in which they see to it.
         fish: who was followed in truth; `None`: nobody, yet.
         looks: the frames in which the operator pointed.
         ended: the frame on the screen when it was over; `None`: not yet.
@@ -61,6 +69,7 @@ class Flag:
     raised: int
     until: int
     begun: int | None = None
+    lag: int = 0
     fish: int | None = None
     looks: list[int] = field(default_factory=list)
     ended: int | None = None
@@ -77,14 +86,16 @@ class Operator:
         self._rng = np.random.default_rng(seed)
         self._delay = round(person.delay_s * fps)
         self._reaction = round(person.reaction_s * fps)
+        self._back = round(person.back_s * fps)
+        self._before = round(_BACK_S * fps) + self._reaction
         self.flags: list[Flag] = []
         self._now: Flag | None = None
         """Which the operator sees to."""
 
     @property
-    def delay(self) -> int:
-        """Frames that the picture lags behind."""
-        return self._delay
+    def after(self) -> int:
+        """Frames after the last one for which there is something to look at."""
+        return max(self._delay, self._back)
 
     def hear(self, newest: int, troubles: Sequence[Trouble]) -> None:
         """Be told the troubles of a window, some of which raise flags."""
@@ -100,11 +111,8 @@ class Operator:
 
     def look(self, newest: int, shown: Mapping[int, Mapping[int, Floats]]) -> Pointing | None:
         """Look at the screen and point at whom the flag names, if anybody can be seen there."""
-        screen = newest - self._delay
-        if not 0 <= screen < self._truth.frames:
-            return None
-        flag = self._now = self._now or self._next(newest, screen)
-        if flag is None or flag.begun is None:
+        flag = self._now = self._now or self._next(newest, newest - self._delay)
+        if flag is None or flag.begun is None or not 0 <= newest - flag.lag < self._truth.frames:
             return None
         pointing = self._see_to(flag, flag.begun, newest, shown)
         if flag.ended is not None:
@@ -112,20 +120,24 @@ class Operator:
         return pointing
 
     def _next(self, newest: int, screen: int) -> Flag | None:
-        """Turn to the flag that is due first; what is over on the screen after a wait is let be."""
+        """Turn to the flag that is due first; where none is ahead, back to what is over on the screen."""
         waiting = [it for it in self.flags if it.begun is None and it.ended is None]
+        over = {id(it) for it in waiting if it.until < screen and it.raised < newest}
         for it in waiting:
-            if it.until < screen and it.raised < newest:
+            if id(it) in over and newest - it.trouble.frame + self._before > self._back:
                 it.ended = screen
-        flag = min((it for it in waiting if it.ended is None), key=lambda it: it.until, default=None)
+        left = (it for it in waiting if it.ended is None)
+        flag = min(left, key=lambda it: (id(it) in over, it.until), default=None)
         if flag is not None:
             flag.begun = newest
+            again = newest - flag.trouble.frame + self._before if id(flag) in over else 0
+            flag.lag = max(self._delay, again)
         return flag
 
     def _see_to(
         self, flag: Flag, begun: int, newest: int, shown: Mapping[int, Mapping[int, Floats]]
     ) -> Pointing | None:
-        screen = newest - self._delay
+        screen = newest - flag.lag
         if flag.fish is None:
             self._recognise(flag, shown.get(screen, {}), screen)
             if newest < begun + self._reaction:
@@ -158,7 +170,7 @@ class Operator:
 
     def _follow(self, flag: Flag, newest: int, box: Floats | None) -> None:
         """Let go once all is over: who is followed has been alone for a while, with the right box around."""
-        screen = newest - self._delay
+        screen = newest - flag.lag
         if flag.fish is not None:
             boxes = self._truth.boxes[:, screen]
             touching = np.nan_to_num(iou(boxes, boxes[flag.fish])) > _TOUCH
@@ -166,7 +178,7 @@ class Operator:
             right = box is not None and iou(boxes[flag.fish], box) >= _FOUND
             flag.clear = flag.clear + 1 if alone and right else 0
         over = screen > flag.until and flag.clear >= _CLEAR_S * self._fps
-        if over or newest - (flag.begun or 0) > (_LONGEST_S + self._person.delay_s) * self._fps:
+        if over or newest - (flag.begun or 0) > _LONGEST_S * self._fps + flag.lag:
             flag.ended = screen
 
     def _pointing(self, flag: Flag, screen: int) -> Pointing:

@@ -84,7 +84,7 @@ def watch(clip: Clip, setup: Setup, person: Person | None = None, desk: Desk | N
     troubles: list[tuple[int, Trouble]] = []
     waiting: list[Pointing] = []
     count = len(clip.seen)
-    for newest in range(count + (operator.delay if operator else 0)):
+    for newest in range(count + (operator.after if operator else 0)):
         if newest < count:
             result = tracker.push(newest, clip.seen[newest])
             _show(shown, result)

@@ -8,6 +8,8 @@ import { label } from './names.js';
 /** @import {Pointing} from './pointing.js' */
 /** @import {Viewer} from './viewer.js' */
 
+const BEFORE_S = 1; // what is over in the picture is seen again from so long before it
+
 export class Banner {
   flags = new Flags();
   #banner = element('flags');
@@ -17,6 +19,7 @@ export class Banner {
   #toggle = element('point');
   /** @type {string | null} the camera that is held to point in its picture */
   #held = null;
+  #back = false; // what is shown is past, to point at somebody there
 
   /**
    * @param {Viewer} viewer
@@ -71,7 +74,7 @@ export class Banner {
     this.#toggle.setAttribute('aria-pressed', String(on));
     probe.flags = urgent;
     probe.pointing = { object: pointing.object, taken: pointing.taken };
-    if (!on && this.#held !== null) this.#leave();
+    if (!on && (this.#held !== null || this.#back)) this.#leave();
   }
 
   /** The first frame of which what is expected there is not past for who looks at the picture. */
@@ -80,23 +83,30 @@ export class Banner {
     return site && probe.pulse !== null ? probe.pulse - NOW_S * site.fps : 0;
   }
 
-  /** @param {Flag} flag to be answered in the picture of the camera that has raised it */
-  #answer({ objects: [object], cameras: [camera] }) {
+  /** @param {Flag} flag to be answered in the picture of the camera that has raised it, as it happens or again */
+  #answer({ objects: [object], cameras: [camera], pulse }) {
     const { viewer, pointing } = this;
+    const over = pulse < this.#now;
     pointing.begin(object);
     if (pointing.object === null) return;
     viewer.choose(object);
-    if (viewer.override.camera === camera) return; // as the operator wished
-    viewer.hold(camera);
-    this.#held = camera;
+    if (viewer.override.camera !== camera) {
+      viewer.hold(camera);
+      this.#held = camera;
+    } // else as the operator wished
+    if (!over || !viewer.site || viewer.travel.moment) return;
+    this.#back = true;
+    viewer.travel.watchFrom(pulse - Math.round(BEFORE_S * viewer.site.fps));
   }
 
-  /** What was held to point is let go, unless somebody has held another meanwhile. */
+  /** What was held to point is let go, unless somebody has held another meanwhile; and what was past is live. */
   #leave() {
-    const held = this.#held;
+    const [held, back] = [this.#held, this.#back];
     this.#held = null;
+    this.#back = false;
     if (this.pointing.object !== null) this.pointing.end();
     if (held !== null && this.viewer.override.camera === held) this.viewer.hold(null);
+    if (back && this.viewer.travel.moment) this.viewer.travel.live();
     this.show();
   }
 }

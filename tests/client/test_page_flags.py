@@ -10,6 +10,7 @@ from page_pattern import CAMERAS, HEIGHT, WIDTH
 from page_site import FakeSite
 from playwright.async_api import Browser, expect
 from test_page_accessible import AXE, faults
+from test_page_past import seconds_of_playing
 
 pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="session")]
 
@@ -72,6 +73,28 @@ async def test_the_pointer_is_followed_in_the_picture_of_the_camera_in_doubt(bro
         await visit.until("myview.pointing.object === null")
         await expect(visit.page.locator("#automatic")).to_be_hidden()
         await expect(visit.page.locator("#cross")).to_be_hidden()
+
+
+async def test_what_is_over_is_seen_again_to_point_at_it_and_then_what_happens_now(browser: Browser) -> None:
+    site = FakeSite(operates=True)
+    async with visiting(browser, site) as visit:
+        await visit.playing(1)
+        await seconds_of_playing(visit, 6)
+        over = flag(site, -5.0)
+        site.flags.append(over)
+        await visit.until("/ [0-9] s ago/.test(document.querySelector('#flag-when').textContent)")
+        await visit.page.locator("#flag-point").click()
+        await visit.playing(2)
+        await visit.until(f"myview.camera === '{CAMERAS[2]}' && myview.pulse < {over['pulse']}")
+        await expect(visit.page.locator("#live")).to_be_visible()
+        there, down, *_ = await middle(visit, 2)
+        await visit.page.mouse.move(there, down)
+        await visit.until("myview.pointing.taken >= 5")
+        assert over["pulse"] - 2 * 25 < points(site)[0]["pulse"] < over["pulse"] + 25
+        await visit.page.keyboard.press("Escape")
+        await expect(visit.page.locator("#live")).to_be_hidden()
+        await visit.until("myview.delays.at(-1).delayMs < 3000")
+        await expect(visit.page.locator("#automatic")).to_be_hidden()
 
 
 async def test_who_follows_somebody_reads_what_for_though_another_flag_is_more_urgent(
