@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import time
 from collections.abc import Iterable, Mapping
 
 import msgspec
@@ -135,6 +136,16 @@ def test_tracks_of_a_camera_that_was_started_anew_are_not_taken_for_those_of_bef
     site.tell(range(7, 9), {A: {1: SMALL, 2: LARGE}, B: {}}, boot=2)
     assert site.whose(A, 2, 8, boot=2) == before
     assert site.whose(A, 1, 8, boot=2) >= used
+
+
+def test_numbers_have_begun_with_the_first_that_is_given_however_late_cameras_say_that_they_are_there() -> None:
+    site = Site()
+    service = site.service = FedService(small_config())  # no camera's token has come
+    assert service.remembering.numbers_since == 0, "nobody has a number"
+    before = time.time() - 60
+    site.tell(range(4))
+    assert site.whose(A, 1, 3)
+    assert service.remembering.numbers_since > before, "a token of before is for somebody else, maybe"
 
 
 def test_a_camera_that_remembers_nothing_learns_from_what_the_others_do() -> None:

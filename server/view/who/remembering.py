@@ -104,7 +104,7 @@ class Remembering:
     @property
     def numbers_since(self) -> float:
         """When numbers began, unix seconds: since then none was given twice. 0: nobody has one yet."""
-        return self._since if self._begun else 0.0
+        return self._since if self._begun or self._people.roll.first_seen else 0.0
 
     def begin(self, pulse: int) -> None:
         """Begin with what is remembered, before an epoch that ends with a pulse is taken in.
