@@ -84,8 +84,7 @@ class Weighing:
                 by_camera[name].append((row, look))
         found = []
         for camera, seen in by_camera.items():
-            # Looks of other bins than the newest cannot be compared with anybody's.
-            alike = [(row, look) for row, look in seen if look.total.size == seen[-1][1].total.size]
+            alike = comparable(seen, len(episodes))
             if len(alike) > 1:
                 rows = np.array([row for row, _ in alike], dtype=np.int64)
                 total = np.array([look.total for _, look in alike])
@@ -97,3 +96,9 @@ class Weighing:
     def remember(self, old: Collection[int], episodes: Sequence[Episode], tables: PairTables) -> None:
         """Keep what episodes that are about to be settled teach about looks, by their rows."""
         self._scales.remember(old, episodes, tables)
+
+
+def comparable(looks: Sequence[tuple[int, Look]], there: int) -> list[tuple[int, Look]]:
+    """Give those of rows' looks with as many bins as the newest: the last of the rows below `there`, if any."""
+    newest = [look for row, look in looks if row < there] or [look for _, look in looks]
+    return [(row, look) for row, look in looks if look.total.size == newest[-1].total.size]

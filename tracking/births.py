@@ -58,7 +58,7 @@ def find_births(
     test = _Test(window, costs, solver)
     left = [_left_over(seen, boxes, window) for seen, boxes in zip(frames, taken, strict=True)]
     births: list[Birth] = []
-    latest = len(frames) - _needed(window)
+    latest = max(len(frames) - _needed(window), 1)  # who must be seen in all of them is in the last
     tries = 0
     for last in range(len(frames) - 1, max(len(frames) - 1 - latest, -1), -1):
         tried = np.zeros(len(left[last]), dtype=np.bool_)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -178,11 +178,12 @@ class OnlineTracker:
             for m, seen in enumerate(test)
         ]
         added = False
+        hidden = {it.id for it, row in zip(self._objects, states, strict=True) if (row == OCCLUDED).all()}
         for birth in find_births(test, taken, self._window, self._costs, self._single):
             frame = first + start + birth.offset
             if self._come_back(first, frame, birth):
                 added = True
-            elif self._make_room(first, states):
+            elif self._make_room(first, hidden):
                 self._objects.append(
                     RememberedObject(self._number(birth, frame), birth.histogram, birth.box, frame)
                 )
@@ -202,16 +203,18 @@ class OnlineTracker:
         away[best].return_at(birth.box, frame)
         return True
 
-    def _make_room(self, frame: int, states: npt.NDArray[np.int64]) -> bool:
-        """Forget the longest hidden object where the list is full; say whether there is room."""
+    def _make_room(self, frame: int, hidden: Collection[int]) -> bool:
+        """Forget the longest hidden object where the list is full; say whether there is room.
+
+        `hidden` has the ids of all who are in this window; who has come back in it is not any more.
+        """
         if len(self._objects) < self._window.most_objects:
             return True
-        shown = {item.id for item, row in zip(self._objects, states, strict=False) if (row != OCCLUDED).any()}
-        hidden = [item for item in self._objects[: len(states)] if item.id not in shown]
-        if hidden:
+        away = [item for item in self._objects if item.id in hidden and item.hidden_for(frame) > 0]
+        if away:
             # `max` takes the first of equals: the lowest id.
-            self._objects.remove(max(hidden, key=lambda item: item.hidden_for(frame)))
-        return bool(hidden)
+            self._objects.remove(max(away, key=lambda item: item.hidden_for(frame)))
+        return bool(away)
 
     def _track(
         self,

@@ -122,7 +122,7 @@ class Operator:
     def _next(self, newest: int, screen: int) -> Flag | None:
         """Turn to the flag that is due first; where none is ahead, back to what is over on the screen."""
         waiting = [it for it in self.flags if it.begun is None and it.ended is None]
-        over = {id(it) for it in waiting if it.until < screen and it.raised < newest}
+        over = {id(it) for it in waiting if it.until < screen}
         for it in waiting:
             if id(it) in over and newest - it.trouble.frame + self._before > self._back:
                 it.ended = screen

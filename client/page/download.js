@@ -7,16 +7,19 @@ import { ClusterSplitter } from './webm.js';
 /** @import {Segment} from './mp4.js' */
 
 const SILENCE_MS = 6000; // a live stream that says nothing for this long is dead, whatever TCP thinks
+const GOPS = 2; // nor sooner than so many of them should have come, each at once
 
 /**
  * @param {string} address of an MP4, or of a WebM by its ending
  * @param {AbortSignal} signal
+ * @param {number} gopS seconds of a GOP
  * @returns {AsyncGenerator<Segment[], void>}
  * @throws {Error} when there is no such stream, or it fails or falls silent; returns when it ends
  */
-export async function* download(address, signal) {
+export async function* download(address, signal, gopS) {
   const silence = new AbortController();
-  let timer = setTimeout(() => silence.abort(), SILENCE_MS);
+  const longest = Math.max(SILENCE_MS, GOPS * 1000 * gopS);
+  let timer = setTimeout(() => silence.abort(), longest);
   const leave = () => silence.abort(); // AbortSignal.any is younger than the oldest iPhones that can play this
   signal.addEventListener('abort', leave);
   if (signal.aborted) leave();
@@ -29,7 +32,7 @@ export async function* download(address, signal) {
       const { done, value } = await reader.read();
       if (done) return;
       clearTimeout(timer);
-      timer = setTimeout(() => silence.abort(), SILENCE_MS);
+      timer = setTimeout(() => silence.abort(), longest);
       const segments = splitter.push(value);
       if (segments.length) yield segments;
     }

@@ -22,6 +22,7 @@ const SLOWER_AT = 0.35; // of the aim
 const SLOWER_UNTIL = 0.8; // of the aim
 const SLOWER = 0.94;
 const FAR_S = 3; // beyond this a jump is kinder than minutes of hurry
+const GOPS = 2; // that may lie ahead, or pass between two gaps, whatever the seconds say
 const EDGE_S = 0.06; // closer to the end of a range than this, the picture stands
 
 /**
@@ -37,6 +38,8 @@ export class Pace {
   #aim = SLACK_S;
   #rate = 1;
   #last = 0;
+  /** Seconds of a GOP, which may come all at once. */
+  gopS = 0;
 
   /** After a jump or a switch what was before says nothing. */
   reset() {
@@ -61,7 +64,7 @@ export class Pace {
     if (hole !== null) return this.#jump(hole);
     const end = ranges.at(-1)?.[1] ?? time;
     const lead = end - time;
-    if (lead > FAR_S) return this.#jump(Math.max(end - this.#aim, /** @type {any} */ (ranges.at(-1))[0]));
+    if (lead > Math.max(FAR_S, GOPS * this.gopS)) return this.#jump(Math.max(end - this.#aim, /** @type {any} */ (ranges.at(-1))[0]));
     this.#aim = Math.max(SLACK_S, this.#aim - CALM_PER_S * Math.max(0, now - this.#last));
     this.#last = now;
     this.#edges.push({ now, edge: end - now });
@@ -75,14 +78,15 @@ export class Pace {
    */
   #choose(now, time) {
     if (Number.isNaN(this.#begun)) this.#begun = now;
-    const recent = Math.min(Math.max(HALF * (now - this.#begun), CALM_S), RECENT_S);
+    const calmS = Math.max(CALM_S, GOPS * this.gopS);
+    const recent = Math.min(Math.max(HALF * (now - this.#begun), calmS), Math.max(RECENT_S, calmS));
     const old = this.#edges.findIndex((sample) => sample.now >= now - recent);
     this.#edges.splice(0, old);
     const slack = Math.min(...this.#edges.map((sample) => sample.edge)) + now - time;
     const over = slack - this.#aim;
     if (slack < SLOWER_AT * this.#aim) return SLOWER;
     if (this.#rate < 1 && slack < SLOWER_UNTIL * this.#aim) return SLOWER;
-    const calm = now - this.#begun >= CALM_S; // before, the lowest point may be to come
+    const calm = now - this.#begun >= calmS; // before, the lowest point may be to come
     if (!calm || over < (this.#rate > 1 ? FASTER_UNTIL_S : FASTER_AT_S)) return 1;
     return Math.min(1 + FASTER_PER_S * over, FASTER);
   }

@@ -5,7 +5,9 @@
  * stream's init segment in the same SourceBuffer, over the same moments.
  */
 
+import { Backoff } from './backoff.js';
 import { Going } from './going.js';
+import { pause } from './http.js';
 import { begunAnew, landingOf } from './landing.js';
 import { join } from './mp4.js';
 import { opened, plays } from './opening.js';
@@ -20,6 +22,7 @@ import { same } from './subject.js';
 
 const TICK_MS = 100;
 const PAUSED_S = 30; // of video that waits behind a paused picture; then the download stops
+const WELL_MS = 10_000; // without an error: the next one is a new one
 
 /**
  * @typedef {object} Listener
@@ -43,6 +46,10 @@ export class Player {
   #codec = '';
   #container = 'mp4';
   #going;
+  #backoff = new Backoff();
+  #failed = -Infinity; // performance.now() of the last error
+  #turn = 0; // how often the element has been opened
+  #waits = false; // before it is opened again
   /** @type {Subject | null} whose picture the element shows */
   shown = null;
   /** @type {Subject | null} whose stream was left because the picture was paused for long */
@@ -58,7 +65,7 @@ export class Player {
     video.addEventListener('waiting', () => {
       if (!video.seeking && this.#run?.landed) this.#pace.stalled();
     });
-    video.addEventListener('error', () => this.#reopen());
+    video.addEventListener('error', () => this.#fail());
     this.#going = new Going(video, () => this.shown && (!this.#run || this.#run.landed) && listener.resumed());
     this.#ticking = setInterval(() => this.#tick(), TICK_MS);
   }
@@ -67,8 +74,9 @@ export class Player {
    * @param {Form} form
    * @returns {boolean} whether this browser can play such streams at all
    */
-  configure({ container, codec }) {
+  configure({ container, codec, gopS }) {
     if (!plays(container, codec)) return false;
+    this.#pace.gopS = gopS;
     if (container !== this.#container || codec !== this.#codec) {
       this.#container = container;
       this.#codec = codec;
@@ -83,7 +91,7 @@ export class Player {
     if (this.#left && same(this.#left, subject) && this.video.paused) return;
     this.#left = null;
     this.#run?.leave();
-    this.#run = new Run(subject);
+    this.#run = new Run(subject, this.#pace.gopS);
     void this.#run.follow(this.#container, {
       take: (run, segments) => this.#take(run, segments),
       ended: (refused) => this.listener.ended(refused),
@@ -96,17 +104,34 @@ export class Player {
     this.#going.on();
   }
 
-  #reopen() {
+  /** What cannot be decoded may be followed by more that cannot: it is asked for again at a bearable rate. */
+  #fail() {
+    if (this.#waits) return;
+    if (performance.now() - this.#failed > WELL_MS) this.#backoff.reset();
+    this.#failed = performance.now();
+    this.#reopen(this.#backoff.next());
+  }
+
+  /** @param {number} wait milliseconds until then */
+  #reopen(wait = 0) {
     const subject = this.#run?.subject;
     this.#run?.leave();
     this.#run = this.#landing = null;
     this.#opened = null;
-    this.#buffer = this.#open();
+    this.#buffer = this.#open(wait);
     if (subject) this.choose(subject);
   }
 
-  /** @returns {Promise<MediaBuffer>} */
-  async #open() {
+  /**
+   * @param {number} wait milliseconds until then
+   * @returns {Promise<MediaBuffer>} of the element as it was opened last
+   */
+  async #open(wait) {
+    const turn = ++this.#turn;
+    this.#waits = wait > 0;
+    if (wait) await pause(wait);
+    if (turn !== this.#turn) return /** @type {Promise<MediaBuffer>} */ (this.#buffer);
+    this.#waits = false;
     const buffer = await opened(this.video, this.#container, this.#codec);
     this.#opened = buffer;
     this.play();
@@ -126,7 +151,7 @@ export class Player {
       return;
     }
     if (first && Number.isNaN(run.start)) {
-      const again = begunAnew(first.start, this.video.currentTime);
+      const again = begunAnew(first.start, this.video.currentTime, run.gopS);
       if (again && run.landed && this.video.paused) return this.#leaveFor(run); // the old picture stays
       run.start = first.start;
       // Nothing of the old stream may be met again behind the edge of the new one.
@@ -212,6 +237,8 @@ export class Player {
   /** Leave the stream and the element, for good. */
   close() {
     this.stop();
+    this.#turn += 1;
+    this.#buffer = null;
     clearInterval(this.#ticking);
     this.video.removeAttribute('src');
     this.video.load();

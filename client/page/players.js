@@ -11,6 +11,7 @@ import { Player } from './player.js';
  * @property {string} container mp4 or webm
  * @property {string} codec of the pictures, and after a comma of the sound if there is any
  * @property {number | null} pulse0 unix seconds of media time 0
+ * @property {number} gopS seconds of a GOP, which may come all at once
  */
 
 /**

@@ -29,9 +29,13 @@ export class Run {
   early = [];
   #leave = new AbortController();
 
-  /** @param {Subject} subject */
-  constructor(subject) {
+  /**
+   * @param {Subject} subject
+   * @param {number} gopS seconds of a GOP, which may come all at once
+   */
+  constructor(subject, gopS) {
     this.subject = subject;
+    this.gopS = gopS;
   }
 
   get left() {
@@ -56,7 +60,7 @@ export class Run {
       let refused = false;
       let broken = false;
       try {
-        for await (const segments of download(streamOf(this.subject, container, from), signal)) {
+        for await (const segments of download(streamOf(this.subject, container, from), signal, this.gopS)) {
           await take(this, segments);
           if (this.left) return;
           backoff.reset();

@@ -44,7 +44,7 @@ export class Viewer {
   connected = false;
   supported = true;
   /** @type {Form} */
-  form = { container: 'mp4', codec: '', pulse0: null };
+  form = { container: 'mp4', codec: '', pulse0: null, gopS: 0 };
   boxesOn = true;
   #asked = this.object !== null; // by the viewer, not by default
   #chosenAt = -Infinity;
@@ -86,7 +86,7 @@ export class Viewer {
     this.site = this.probe.site = site;
     this.palette = new Palette(site.cameras);
     const codec = [site.codec, site.sound].filter(Boolean).join(',');
-    this.form = { container: site.container ?? 'mp4', codec, pulse0: site.pulse0 };
+    this.form = { container: site.container ?? 'mp4', codec, pulse0: site.pulse0, gopS: site.gop / site.fps };
     // Before the first key frame nobody knows yet what there is to be played.
     this.supported = site.codec === null || this.player.configure(this.form);
     this.#play();

@@ -27,6 +27,8 @@ from tracking import Detections, solver_named
 from tracking.assist import Pointing
 
 _BY_ITSELF = Heard()
+_TOLD_MOST = 50_000
+"""Frames of one hole that are told of, the last ones: a machine that slept has missed millions."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -170,8 +172,9 @@ class CameraPipeline:
         """
         pulse, detections = searched.pulse, searched.detections
         if self._last is not None:
-            self._reporter.shed(range(self._last + 1, pulse))
-            self._reporter.unsearched(range(self._last + 1, pulse))
+            missed = range(max(self._last + 1, pulse - _TOLD_MOST), pulse)
+            self._reporter.shed(missed)
+            self._reporter.unsearched(missed)
         self._last = pulse
         if not searched.looked:
             self._reporter.unsearched([pulse])

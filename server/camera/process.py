@@ -215,7 +215,7 @@ class CameraProcess:
 
     async def _track(self) -> None:
         """Follow everybody, frame by frame, behind the video."""
-        thumbs_every = round(self._config.site.fps)
+        thumbs_every = max(1, round(self._config.site.fps))
         took: list[float] = []
         while (item := await self._backlog.get()) is not None:
             pulse, image, left_out = item.pulse, item.image, item.left_out

@@ -28,6 +28,7 @@ from server.web.queries import refuse_what_is_not_there
 from server.web.readers import Readers
 from server.web.share import to_the_right_service
 from server.web.strangers import REQUESTS
+from server.web.streams import break_off
 from server.web.tls import Certificate
 from server.wire.errors import UserError
 from server.wire.running import OnDisk
@@ -36,6 +37,8 @@ from server.wire.sections import Http
 log = logging.getLogger(__name__)
 
 _MISTAKES = web.AppKey("mistakes", Spell)
+_BEGUN = web.RequestKey("begun", web.StreamResponse)
+"""The answer to a request, once its head has been sent."""
 _CLOSE_S = 1.0
 """How long viewers have to take what was sent before the server ends."""
 
@@ -62,7 +65,15 @@ async def one_line_errors(
     except Exception as error:
         if (more := request.app[_MISTAKES].happened(repr(error))) is not None:
             log.exception("answering %s %s failed%s", request.method, request.path, more)
-        return problem(500, "the server made a mistake; its log says more")
+        begun: web.StreamResponse | None = request.get(_BEGUN)
+        if begun is None:
+            return problem(500, "the server made a mistake; its log says more")
+        break_off(request)
+        return begun
+
+
+async def _has_begun(request: web.Request, response: web.StreamResponse) -> None:
+    request[_BEGUN] = response
 
 
 def make_app(
@@ -98,7 +109,7 @@ def make_app(
     measure(app)
     for module in (api, session, site, video, past, hls, pictures, openapi, page, operator):
         app.add_routes(module.routes)
-    app.on_response_prepare.extend((tell_no_other_origin, keep_no_copies))
+    app.on_response_prepare.extend((tell_no_other_origin, keep_no_copies, _has_begun))
     app.cleanup_ctx.append(_telling)
     app.on_shutdown.append(_end_streams)
     return app

@@ -14,7 +14,10 @@ routes = web.RouteTableDef()
 _FOLDER = Path(str(files("client") / "page")).resolve()
 _HEADERS = {
     "Cache-Control": "no-cache",  # ask again each time: an upgraded server must not meet an old page
-    "Content-Security-Policy": "default-src 'self'; media-src 'self' blob:; img-src 'self' data: blob:",
+    "Content-Security-Policy": (
+        "default-src 'self'; media-src 'self' blob:; img-src 'self' data: blob:; "
+        "frame-ancestors 'none'"  # or another site's page could lead a click here, and operate by it
+    ),
     "X-Content-Type-Options": "nosniff",
     "Referrer-Policy": "same-origin",  # an address may say who is watched
 }

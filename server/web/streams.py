@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import socket
+import struct
 from collections.abc import AsyncIterable, Callable, Mapping
 from functools import lru_cache
 
@@ -17,6 +18,8 @@ log = logging.getLogger(__name__)
 
 _WAITING_BYTES = 65_536
 """What of a stream may wait in the system: else it would keep a minute for who reads too slowly, unseen."""
+_RESET = struct.pack("ii", 1, 0)
+"""Of a connection that is not to be closed in good order: (on, seconds)."""
 _STREAM_HEADERS = {
     "Cache-Control": "no-store",
     "Access-Control-Allow-Origin": "*",
@@ -116,6 +119,15 @@ async def send_bytes(
     except (ConnectionError, TimeoutError) as error:
         log.debug("a viewer has gone: %s", error)
     return response
+
+
+def break_off(request: web.Request) -> None:
+    """End an answer in its middle so that its reader knows: by HTTP/1.0 any other end is a right one."""
+    connection = request.get_extra_info("socket")
+    if connection is not None:
+        connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _RESET)
+    if request.transport is not None:
+        request.transport.abort()
 
 
 def _keep_little_waiting(request: web.Request) -> None:

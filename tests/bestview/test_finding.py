@@ -11,6 +11,7 @@ from bestview.appearance import Appearances
 from bestview.finding import clearly_least, find_again, unlike
 from bestview.likelihood import LookScale, LookWeights, look_evidence
 from bestview.looks import Look, Looks
+from bestview.weighing import comparable
 
 BINS, RATIO = 16, 1.5
 
@@ -29,6 +30,14 @@ def people(draw: st.DrawFn) -> list[Looks]:
             looks.add(camera, Look.of(rng.dirichlet(np.full(bins, 0.3)), 30))
         found.append(looks)
     return found
+
+
+def test_once_looks_have_other_bins_those_of_before_are_compared_with_nobodys() -> None:
+    old, new = (Look.of(np.ones(bins), 30) for bins in (BINS, 2 * BINS))
+    assert comparable([(0, new), (1, new), (2, old), (3, old)], 2) == [(0, new), (1, new)]
+    assert comparable([(0, old), (1, new), (2, new)], 2) == [(1, new), (2, new)]
+    assert comparable([(2, old), (3, old)], 2) == [(2, old), (3, old)]
+    assert comparable([], 2) == []
 
 
 @settings(deadline=None, max_examples=200)

@@ -78,3 +78,20 @@ async def test_a_broken_stream_is_opened_again(browser: Browser) -> None:
         await visit.until(f"myview.pulse > {shown + 2 * FPS}")
         assert visit.server.site.opened == [1, 1]
         await visit.until("myview.state === 'playing'")
+
+
+async def test_what_cannot_be_decoded_is_asked_for_again_now_and_then(browser: Browser) -> None:
+    """An element that fails at once whenever it is opened."""
+    async with visiting(browser) as visit:
+        await visit.playing(1)
+        fails = "video.dispatchEvent(new Event('error'))"
+        await visit.get(
+            f"""(() => {{
+                window.failing = setInterval(() => {fails}, 20);
+                setTimeout(() => clearInterval(window.failing), 2000);
+            }})()"""
+        )
+        await visit.playing(1)
+        shown = await visit.get("myview.pulse")
+        await visit.until(f"myview.pulse > {shown + 3 * FPS}")
+        assert len(visit.server.site.opened) < 10

@@ -7,6 +7,7 @@ import { begunAnew, landingOf } from '../../client/page/landing.js';
 import { Run } from '../../client/page/run.js';
 
 const ANYBODY = { object: 1, camera: null, prefer: null, past: null };
+const GOP_S = 0.4;
 const SOON = 0.01; // seconds: so near to the start of a stream is its start
 
 /**
@@ -14,7 +15,7 @@ const SOON = 0.01; // seconds: so near to the start of a stream is its start
  * @returns {Run} a stream whose first frame, at `start`, is in the buffer
  */
 function stream({ start, since = 0, past }) {
-  const run = new Run({ ...ANYBODY, past: past === undefined ? null : { pulse: 0, time: past } });
+  const run = new Run({ ...ANYBODY, past: past === undefined ? null : { pulse: 0, time: past } }, GOP_S);
   return Object.assign(run, { start, since });
 }
 
@@ -35,8 +36,9 @@ test('a stream that is ahead of it, or whose pulses have begun anew, is waited f
     const landed = landingOf(stream({ start }), start + 1, time, 0) ?? NaN;
     assert.ok(landed >= start && landed < start + SOON);
   }
-  assert.ok(begunAnew(0, 60));
-  assert.ok(!begunAnew(55, 60));
+  assert.ok(begunAnew(0, 60, GOP_S));
+  assert.ok(!begunAnew(55, 60, GOP_S));
+  assert.ok(!begunAnew(45, 60, 12), 'a GOP is as long');
 });
 
 test('a past is met at its moment, once that has come', () => {

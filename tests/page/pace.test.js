@@ -8,11 +8,12 @@ import { Pace } from '../../client/page/pace.js';
 /**
  * Play for some seconds against a stream that arrives `burst` seconds at a time.
  *
- * @param {{behind?: number, burst: number, seconds: number, late?: (gop: number) => number}} stream
+ * @param {{behind?: number, burst: number, seconds: number, gopS?: number, late?: (gop: number) => number}} stream
  *   `late`: seconds that a burst comes late; none overtakes another
  */
-function played({ behind = 0, burst, seconds, late = () => 0 }) {
+function played({ behind = 0, burst, seconds, gopS = 0, late = () => 0 }) {
   const pace = new Pace();
+  pace.gopS = gopS;
   const log = [];
   const step = 0.01; // seconds
   let [time, end, rate, arrived, standing] = [0, behind, 1, 0, false];
@@ -48,6 +49,15 @@ for (const burst of [0.04, 0.4, 1]) {
       assert.equal(log.some((it) => it.seek !== null), behind + burst > 3);
     });
   }
+}
+
+for (const gopS of [3.5, 4, 10]) {
+  test(`GOPs of ${gopS} s are played whole, however far ahead one comes`, () => {
+    const log = played({ behind: gopS, burst: gopS, seconds: 12 * gopS, gopS });
+    assert.ok(log.every((it) => it.seek === null));
+    assert.ok(log.filter((it) => it.stood).length < 5, 'for a moment, a few times');
+    assert.ok(Math.max(...log.map((it) => it.lead)) < gopS + 0.2);
+  });
 }
 
 test('far behind it jumps, once', () => {

@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import logging
 import os
+import threading
 from collections.abc import AsyncIterator
 from pathlib import Path
 
@@ -14,7 +15,7 @@ import msgspec
 import pytest
 from cameras_by_hand import CAMERAS, SMALL
 from halls import A, B, Hall
-from tokens_by_hand import bearer, line_of, locked, token_of, write_tokens
+from tokens_by_hand import LATER, bearer, line_of, locked, token_of, write_tokens
 
 from server.web.access.file import TokenFile
 from server.web.operator.permission import CHANGES
@@ -89,10 +90,38 @@ async def test_so_do_those_of_a_sign_in_by_it_and_of_who_signs_out(site: Hall, t
     other.close()
 
 
-async def test_what_a_token_may_no_longer_see_ends_too(site: Hall, tmp_path: Path) -> None:
-    answer = await stream(site, "/cameras/c0/live.mp4", **bearer("desk"))
-    write_tokens(tmp_path / "tokens.yaml", line_of("desk", role="watch", camera="c1"))
+@pytest.mark.parametrize("path", ["/cameras/c0/live.mp4", "/api/events"])
+@pytest.mark.parametrize("less", [{"camera": "c1"}, {"object": 9, "made": LATER}])
+async def test_what_a_token_may_no_longer_see_ends_too(
+    site: Hall, tmp_path: Path, path: str, less: dict[str, object]
+) -> None:
+    answer = await stream(site, path, **bearer("desk"))
+    write_tokens(tmp_path / "tokens.yaml", line_of("desk", role="watch", **less))
     await ended(answer)
+
+
+async def test_what_it_may_see_as_before_goes_on(site: Hall, tmp_path: Path) -> None:
+    camera = await stream(site, "/cameras/c0/live.mp4", **bearer("desk"))
+    events = await stream(site, "/api/events", **bearer("desk"))
+    write_tokens(tmp_path / "tokens.yaml", line_of("desk", role="watch", camera="c0"))
+    await ended(events)
+    site.service.feed(3, {A: {1: SMALL}, B: {}})
+    assert await camera.content.readany()
+    camera.close()
+
+
+async def test_a_disk_that_hangs_keeps_no_token_in_force(site: Hall, tmp_path: Path) -> None:
+    """All threads for recordings wait for it; the file of tokens is on another one."""
+    answer = await stream(site, "/api/events", **bearer("desk"))
+    hangs = threading.Event()
+    waiting = [asyncio.create_task(asyncio.to_thread(hangs.wait, 30.0)) for _ in range(64)]
+    await asyncio.sleep(0)
+    write_tokens(tmp_path / "tokens.yaml", line_of("lead"))
+    try:
+        await asyncio.wait_for(ended(answer), 10.0)
+    finally:
+        hangs.set()
+        await asyncio.gather(*waiting)
 
 
 async def test_a_new_token_lets_in_without_a_restart(site: Hall, tmp_path: Path) -> None:

@@ -110,7 +110,9 @@ async def test_a_token_is_needed_where_there_are_some_and_nobody_is_told_of_them
         async with site.session.get(path) as answer:
             assert answer.status == 401
             assert answer.headers["WWW-Authenticate"] == "Bearer"
-    assert (await asked(site, Authorization="Bearer wrong"))[0] == 401
+    async with site.session.get(CAMERAS, headers={"Authorization": "Bearer wrong"}) as answer:
+        assert answer.status == 401
+        assert answer.headers["WWW-Authenticate"] == "Bearer"
     assert (await asked(site, Authorization="Basic d3Jvbmc="))[0] == 401
     for more in ({}, {"X_Forwarded_For": "10.0.0.7"}):
         assert await asked(site, CAMERAS, **bearer("lead"), **more) == (200, "")
@@ -295,7 +297,8 @@ async def test_there_is_nothing_to_sign_in_to_without_tokens(hall: Hall) -> None
 
 
 async def test_the_page_itself_is_for_everybody_and_tells_nothing(site: Hall) -> None:
-    async with site.session.get("/operator", headers={"X-Forwarded-For": "10.0.0.7"}) as answer:
-        assert answer.status == 200
-        assert "default-src 'self'" in answer.headers["Content-Security-Policy"]
-        assert "frame-ancestors 'none'" in answer.headers["Content-Security-Policy"]
+    for path in ("/", "/operator"):
+        async with site.session.get(path, headers={"X-Forwarded-For": "10.0.0.7"}) as answer:
+            assert answer.status == 200
+            assert "default-src 'self'" in answer.headers["Content-Security-Policy"]
+            assert "frame-ancestors 'none'" in answer.headers["Content-Security-Policy"]

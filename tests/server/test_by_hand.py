@@ -27,7 +27,9 @@ def test_whoever_is_said_to_be_one_stays_one(steps: list[tuple[bool, int, int]])
         if by_hand:
             it.merge(kept, lost)
         else:
-            it.read(said({}, Merge(first, second)))
+            read = it.read(said({}, Merge(first, second)))
+            gone = {merge.lost for merge in read.merged}
+            assert not gone & {it.now(number) for number in range(1, 7) if number not in gone}
             if it.now(first) != it.now(second):
                 continue  # nobody's word was about the lost one: it is never heard of again
         together = next(group for group in one if kept in group) | next(
@@ -70,6 +72,18 @@ def test_a_merge_by_hand_holds_while_the_evidence_goes_on_saying_two() -> None:
         assert boxes(it, "c0", epoch * STRIDE) == {1: SMALL}
         assert boxes(it, "c1", epoch * STRIDE) == {1: LARGE}
     assert it.take_corrections() == ()
+
+
+def test_who_is_said_to_be_somebody_is_whoever_that_turns_out_to_be() -> None:
+    three = said({("c0", 1): 1, ("c1", 1): 2, ("c1", 2): 3})
+    it = dictated(three, replace(three, merged=(Merge(3, 1),)), said({("c0", 2): 2}))
+    seen(it, 0)
+    it.merge(1, 2)
+    seen(it, 1)
+    it.update(epoch_of(2, word("c0", 2, {2: SMALL})))
+    assert it.roll.everybody == [3]
+    assert it.roll.merged == {1: 3, 2: 3}
+    assert boxes(it, "c0", 2 * STRIDE) == {3: SMALL}
 
 
 def test_who_is_two_to_the_evidence_is_away_when_both_are() -> None:

@@ -133,6 +133,16 @@ def test_frames_that_were_missed_are_reported_once_and_begin_a_new_gop_where_the
     assert [unit.pulse for unit in units if unit.key] == [0, 13, 20, 30, 40]
 
 
+def test_of_a_hole_of_days_its_end_is_told(recording: Path) -> None:
+    pipeline = CameraPipeline(config_of(recording), "c0")
+    late = 100_000 * STRIDE
+    words = [pipeline.track(pulse, None) for pulse in (*range(STRIDE), *range(late, late + STRIDE))]
+    pipeline.close()
+    shed = [word.shed for word in words if word]
+    assert max(map(len, shed)) <= 50_000 + 2 * STRIDE
+    assert [pulse for told in shed for pulse in told][-STRIDE - 1 :] == [*range(late - 1, late + STRIDE)]
+
+
 def test_a_frame_of_which_only_the_number_is_left_is_reported(recording: Path) -> None:
     pipeline = CameraPipeline(config_of(recording), "c0")
     for pulse in range(STRIDE):

@@ -138,7 +138,7 @@ def test_tracks_of_a_camera_that_was_started_anew_are_not_taken_for_those_of_bef
     assert site.whose(A, 1, 8, boot=2) >= used
 
 
-def test_numbers_have_begun_with_the_first_that_is_given_however_late_cameras_say_that_they_are_there() -> None:
+def test_numbers_have_begun_with_the_first_that_is_given_however_late_a_camera_says_it_is_there() -> None:
     site = Site()
     service = site.service = FedService(small_config())  # no camera's token has come
     assert service.remembering.numbers_since == 0, "nobody has a number"

@@ -89,6 +89,15 @@ def test_a_recording_that_repeats_stays_in_step(tmp_path: Path, codec: str) -> N
     assert beeps(as_adts(frames, form), "aac") == pytest.approx(expected, abs=0.03)
 
 
+def test_a_recording_with_no_sound_beside_its_pictures_is_silent_and_is_not_read_for_ever(
+    tmp_path: Path,
+) -> None:
+    path = write_flashes(tmp_path / "loop.mkv", FRAMES)
+    sound = RecordedSound(str(path), STEREO, FPS, 0, "loop")
+    sound._start -= 60  # as where the sound begins a minute after the pictures
+    assert all_until(sound, 2 * FRAMES) == []
+
+
 @pytest.mark.parametrize("codec", ["aac", "mp3"])
 def test_whoever_begins_late_hears_the_same_moments(tmp_path: Path, codec: str) -> None:
     path = write_flashes(tmp_path / "late.mkv", FRAMES, codec=codec)

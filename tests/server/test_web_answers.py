@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import re
+from collections.abc import AsyncIterator
+from types import SimpleNamespace
 
 import pytest
 from cameras_by_hand import status, tracks, word
 from halls import A, B, Hall
 
+from server.view.streams.channel import Viewer
 from server.web import openapi
 from server.web.app import make_app
 
@@ -109,6 +112,26 @@ async def test_a_mistake_of_the_servers_own_is_500_without_a_traceback(
 ) -> None:
     monkeypatch.setattr(hall.service, "shelves", {})
     assert await hall.get("/api/cameras") == (500, {"error": "the server made a mistake; its log says more"})
+
+
+@pytest.mark.parametrize("version", ["1.0", "1.1"])
+async def test_a_mistake_in_the_middle_of_an_answer_breaks_it_off(
+    busy: Hall, monkeypatch: pytest.MonkeyPatch, version: str
+) -> None:
+    """By an end that looks like one a part of a film would be taken for all of it."""
+
+    async def some(_: Viewer) -> AsyncIterator[SimpleNamespace]:
+        yield SimpleNamespace(data=b"some of it")
+        raise PermissionError(13, "the disk is gone")
+
+    monkeypatch.setattr(Viewer, "pieces", some)
+    reader, writer = await asyncio.open_connection("127.0.0.1", busy.port)
+    writer.write(f"GET /objects/1/best.mp4 HTTP/{version}\r\nHost: 127.0.0.1\r\n\r\n".encode())
+    head = await reader.readuntil(b"\r\n\r\n")
+    assert b" 200 OK" in head
+    with pytest.raises(ConnectionResetError):
+        await reader.read()
+    writer.close()
 
 
 @pytest.mark.parametrize(

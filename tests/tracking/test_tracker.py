@@ -201,6 +201,24 @@ def test_memory_is_bounded_by_the_window_and_the_list() -> None:
         assert len(tracked._objects) <= window.most_objects
 
 
+def test_where_the_list_is_full_only_who_is_hidden_makes_room() -> None:
+    """One who is hidden, and two who come at once: the second of them finds no room."""
+    there = [Stroll(100.0 * k, 40.0, 0.0, k) for k in range(4)]
+    left = [Stroll(100.0, 40.0, 0.0, 1, seen=range(20))]
+    new = [Stroll(100.0 * k, 240.0, 0.0, k, seen=range(40, 100)) for k in (5, 6)]
+    people = [there[0], *left, *there[2:], *new]
+    results = follow([seen_at(people, n) for n in range(100)], tracker(WindowSettings(most_objects=4)))
+    assert {1, 3, 4} < set(final_boxes(results)[99])
+    assert len(final_boxes(results)[99]) == 4
+
+
+def test_who_must_be_seen_in_every_frame_to_be_somebody_is_found_by_that() -> None:
+    person = Stroll(20, 40, 2.0, 0)
+    window = WindowSettings(birth_visible=1.0)
+    results = follow([seen_at([person], n) for n in range(40)], tracker(window))
+    assert _ids(results) == {1}
+
+
 def test_frame_numbers_must_grow() -> None:
     tracked = tracker()
     tracked.push(4, Detections.empty(8))

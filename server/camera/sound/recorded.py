@@ -85,12 +85,14 @@ class RecordedSound:
         if lasts is not None:
             begin += max(0, (moment - begin) // lasts) * lasts
         while True:
+            heard = False
             for time, packet in self._once():
                 if lasts is not None and time >= lasts:
                     break
+                heard = True
                 if begin + time >= moment:
                     yield begin + time, packet
-            if lasts is None:
+            if lasts is None or not heard:  # what has none beside its pictures would be read for ever
                 return
             begin += lasts
 

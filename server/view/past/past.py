@@ -6,7 +6,6 @@ import logging
 import time
 from collections import deque
 from collections.abc import Mapping
-from weakref import WeakKeyDictionary
 
 from server.view.media.agreement import Agreement
 from server.view.media.fmp4 import init_segment
@@ -48,8 +47,6 @@ class Past:
         self._held: deque[GopChoices] = deque()
         """Decided, but not all cameras' pictures have come."""
         self._patience = frames // 2
-        self._read: WeakKeyDictionary[Run, Headers] = WeakKeyDictionary()
-        """Of earlier runs: what their files begin with."""
         self._begin: tuple[ParameterSets, Headers] | None = None
         """What this service's files begin with, made of these parameters: every GOP that is played asks."""
         self.viewers = 0
@@ -141,7 +138,7 @@ class Past:
     def sounding(self) -> list[Run]:
         """Those of them whose sound is that of this site."""
         own = self._headers
-        return [] if own is None else [run for run in self.runs if self._headers_of(run).sound == own.sound]
+        return [] if own is None else [run for run in self.runs if run.headers.sound == own.sound]
 
     def _same_people(self, run: Run) -> bool:
         return self.numbers_since is not None and run.head.numbers_since == self.numbers_since
@@ -151,12 +148,7 @@ class Past:
         if own is None or pulse0 is None or run.head.pulse0 is None:
             return False
         same = run.head.fps == self._config.site.fps and abs(run.head.pulse0 - pulse0) < _SAME_S
-        return same and self._headers_of(run).pictures == own.pictures
-
-    def _headers_of(self, run: Run) -> Headers:
-        if run not in self._read:
-            self._read[run] = run.headers
-        return self._read[run]
+        return same and run.headers.pictures == own.pictures
 
     @property
     def _headers(self) -> Headers | None:

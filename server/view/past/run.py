@@ -76,8 +76,8 @@ class Segment:
 class Run:
     """The folder of one run, this service's or an earlier one's. ``longest_s``: of a segment."""
 
-    def __init__(self, folder: Path, head: RunHead, longest_s: float) -> None:
-        self.folder, self.head = folder, head
+    def __init__(self, folder: Path, head: RunHead, headers: Headers, longest_s: float) -> None:
+        self.folder, self.head, self.headers = folder, head, headers
         self._longest_s = longest_s
         self.segments: list[Segment] = []
         self.objects: dict[int, Playlist] = {}
@@ -100,7 +100,7 @@ class Run:
             (folder / SOUND).mkdir(exist_ok=True)
             (folder / SOUND / _HEADER).write_bytes(headers.sound)
         (folder / HEAD).write_bytes(_text(head))
-        return cls(folder, head, longest_s)
+        return cls(folder, head, headers, longest_s)
 
     def number_since(self, since: float | None) -> None:
         """Note when people's numbers began: when the first camera came, maybe after the first GOP.
@@ -121,7 +121,9 @@ class Run:
         Raises:
             OSError, msgspec.DecodeError: it is no such folder.
         """
-        run = cls(folder, msgspec.json.decode((folder / HEAD).read_bytes(), type=RunHead), longest_s)
+        head = msgspec.json.decode((folder / HEAD).read_bytes(), type=RunHead)
+        headers = Headers(_read(folder / "cameras" / _HEADER), _read(folder / SOUND / _HEADER))
+        run = cls(folder, head, headers, longest_s)
         for playlist in (*run.cameras.values(), run.sound):
             if playlist.path.exists():
                 playlist.read()
@@ -165,11 +167,6 @@ class Run:
     def index_file(self, first: int) -> Path:
         """Say where the choices from a pulse on are."""
         return (self.folder / "index" / file_name(first)).with_suffix(".jsonl")
-
-    @property
-    def headers(self) -> Headers:
-        """What its files begin with; empty where that cannot be read."""
-        return Headers(_read(self.folder / "cameras" / _HEADER), _read(self.folder / SOUND / _HEADER))
 
     def index_of(self, start: int, end: int) -> list[Path]:
         """List the indexes in which something may stand about pulses ``start … end - 1``, in order."""
@@ -227,7 +224,7 @@ class Run:
 def _read(path: Path) -> bytes:
     try:
         return path.read_bytes()
-    except OSError:
+    except OSError:  # mostly since there was no sound
         return b""
 
 

@@ -71,7 +71,7 @@ class ByHand:
             self._gone.discard(it.lost)
             kept, lost = self.now(it.kept), self.now(it.lost)
             if kept != lost:
-                if lost != it.lost:
+                if lost in self._spoken_of:
                     self.merge(kept, lost)
                 yield Merge(kept, lost)
 

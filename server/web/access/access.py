@@ -12,6 +12,7 @@ import math
 import time
 from collections import OrderedDict
 from collections.abc import Awaitable, Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -87,6 +88,7 @@ class Access:
         self._failures = Failures(now)
         self._right: OrderedDict[tuple[str, str], None] = OrderedDict()
         self._asking: dict[int, _Asking] = {}
+        self._reader = ThreadPoolExecutor(1, "tokens")
         self.wrong_tokens = 0
         """Since the start. They are counted and not logged: strangers could fill a disk with that."""
 
@@ -140,7 +142,7 @@ class Access:
         self._right.pop((address, digest), None)
         self._failures.add(address)
         self.wrong_tokens += 1
-        return problem(401, "there is no such token, or not any more")
+        return _challenged("there is no such token, or not any more")
 
     def session_of(self, request: web.Request) -> str:
         """Give the SHA-256 of the identifier in a request's cookie."""
@@ -148,13 +150,20 @@ class Access:
 
     async def run(self) -> None:
         """Look at the file again and again, and end what nobody may have any more."""
-        if self._file is not None:
+        if self._file is None:
+            return
+        try:
             await again_and_again(_LOOK_EVERY_S, self._look, "looking at the file of tokens")
+        finally:
+            self._reader.shutdown(wait=False)
 
     async def _look(self) -> None:
         assert self._file is not None  # noqa: S101 — nobody looks where there is none
+        self.end_what_is_over()  # sign-ins end by themselves, however long the disk takes
         try:
-            await asyncio.to_thread(self._file.look)  # a long file takes longer to read than a frame
+            # A long file takes longer to read than a frame. The thread is its own: all others may wait for
+            # a disk that recordings are on.
+            await asyncio.get_running_loop().run_in_executor(self._reader, self._file.look)
         finally:
             self.end_what_is_over()
 
@@ -162,7 +171,11 @@ class Access:
         """End all answers whose token or sign-in is not in force any more."""
         for it in list(self._asking.values()):
             held = self.held(it.holder)
-            if isinstance(held, Grant) and held.allows(it.need, it.request, self._resolve):
+            if (
+                isinstance(held, Grant)
+                and held.allows(it.need, it.request, self._resolve)
+                and (it.need is not Need.TOKEN or held == it.grant)  # what is told is what it saw then
+            ):
                 continue
             if it.request.transport is not None:
                 it.request.transport.abort()
@@ -200,9 +213,13 @@ ACCESS = web.AppKey("access", Access)
 
 def _unknown(need: Need) -> web.Response:
     if need is Need.OPERATOR:
-        answer = problem(401, "operating needs an operator's token; sign in at /operator")
-    else:
-        answer = problem(401, "watching needs a token; sign in at /, or send it (docs/security.md)")
+        return _challenged("operating needs an operator's token; sign in at /operator")
+    return _challenged("watching needs a token; sign in at /, or send it (docs/security.md)")
+
+
+def _challenged(why: str) -> web.Response:
+    """Refuse, and say by what it would not be (RFC 9110, 15.5.2)."""
+    answer = problem(401, why)
     answer.headers["WWW-Authenticate"] = "Bearer"
     return answer
 
