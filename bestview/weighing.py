@@ -99,6 +99,6 @@ class Weighing:
 
 
 def comparable(looks: Sequence[tuple[int, Look]], there: int) -> list[tuple[int, Look]]:
-    """Give those of rows' looks with as many bins as the newest: the last of the rows below `there`, if any."""
+    """Give those of rows' looks with as many bins as the newest: of rows below `there`, if any."""
     newest = [look for row, look in looks if row < there] or [look for _, look in looks]
     return [(row, look) for row, look in looks if look.total.size == newest[-1].total.size]
