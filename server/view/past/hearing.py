@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import Callable, Sequence
 
+from server.view.past.disk import from_disk
 from server.view.past.play import Recorded
 from server.view.past.sounds import frames_in
 from server.view.past.stretch import Stretch
@@ -43,7 +43,7 @@ class Hearing:
         frames = {number: shelf.get(number) for number in range(begin, end)}
         missing = [number for number, frame in frames.items() if frame is None]
         if missing and (recorded := self._recorded()):
-            frames |= await asyncio.to_thread(self._read, recorded, missing[0], missing[-1] + 1)
+            frames |= await from_disk(self._read, recorded, missing[0], missing[-1] + 1)
         self._next = next((it for it in missing if it >= late and frames[it] is None), max(begin, end))
         heard = (frames[number] or form.silence for number in range(begin, self._next))
         return Heard(begin, tuple(heard), form)

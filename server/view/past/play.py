@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
 from collections.abc import AsyncGenerator, Generator, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from typing import Protocol
 
+from server.view.past.disk import from_disk
 from server.view.past.media import Gop, gops
 from server.view.past.past import Past
 from server.view.past.run import Run
@@ -186,7 +186,7 @@ async def _read(run: Run, stretch: Stretch, pulse: int) -> AsyncGenerator[Gop, N
     path = run.camera_file(stretch.camera, stretch.file)
     reading = gops(path, stretch.offset, stretch.length, run.head.fps, pulse)
     try:
-        while some := await asyncio.to_thread(_some, reading, pulse):
+        while some := await from_disk(_some, reading, pulse):
             for gop in some:
                 yield gop
     finally:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import AsyncIterator
 from pathlib import Path
 
 import msgspec
 
+from server.view.past.disk import from_disk
 from server.view.past.past import Past
 from server.wire.messages import UNREADABLE, GopChoices
 
@@ -20,7 +20,7 @@ async def told(past: Past, start: int, end: int) -> AsyncIterator[bytes]:
     at, numbered = start, past.numbered
     for run in past.runs:
         for path in run.index_of(at, end):
-            for line, choices in await asyncio.to_thread(_lines, path, at, end):
+            for line, choices in await from_disk(_lines, path, at, end):
                 yield line if run in numbered else b'{"run":"%b",' % run.folder.name.encode() + line[1:]
                 at = choices.first + choices.frames
     for choices in past.recent.choices(at):
