@@ -111,6 +111,16 @@ def test_what_is_over_when_the_first_is_over_is_seen_again_from_a_moment_before(
     assert {it.object for it in pointings if it} == {1, 2}
 
 
+def test_who_was_lost_long_ago_is_seen_again_when_they_were_still_there() -> None:
+    truth = _truth()
+    shown = _tracks(truth, [[1] * 60 + [0] * 140, [2] * FRAMES])
+    operator = Operator(Person(delay_s=1.0), Desk(ALL, FPS), truth, FPS, seed=1)
+    operator.hear(120, [_trouble((1,), 60, 0.9)])
+    first = next(it for newest in range(120, 200) if (it := operator.look(newest, shown)) is not None)
+    assert (first.object, operator.flags[0].fish) == (1, 0)
+    assert first.frame in range(45, 60)
+
+
 def test_flags_go_to_the_riskiest_and_once_to_the_same_two() -> None:
     desk = Desk(Flags(per_minute=2), FPS)
     desk.begin()
