@@ -25,6 +25,14 @@ case $name in
     *) also=IP:$name ;;
 esac
 
+for camera in "$@"; do
+    case $camera in
+        '' | bestview | bestview-* | [!A-Za-z0-9]* | *[!A-Za-z0-9_-]*)
+            echo "$0: '$camera' cannot be a camera's name: letters, digits, _ and - alone, and not bestview" >&2
+            exit 2 ;;
+    esac
+done
+
 # Nobody else of this host may look in; inside, the containers' user may read what is handed to it.
 umask 022
 folder=${MYVIEW_SECRETS:-secrets}

@@ -21,6 +21,7 @@ from server.view.calibrate.outcome import worked_out
 from server.view.calibrate.plan import PlanView, plan_of, plot_plan
 from server.view.calibrate.walked import Walked
 from server.wire.errors import UserError
+from server.wire.ground_unit import checked_unit
 
 _UNNAMED = "unit"
 
@@ -31,8 +32,9 @@ def calibrate_points(points: Path, out: Path, plan: Path, unit: str | None) -> l
     Raises:
         UserError: the file is no such file, or its points contradict each other.
     """
+    asked = None if unit is None else _checked("--unit", unit)
     given = read_points(points)
-    unit = unit or given.unit or _UNNAMED
+    unit = asked or _checked(f"{points}: unit", given.unit or _UNNAMED)
     with refusing(points):
         fits = fit_cameras(given.cameras)
     views = [PlanView(it.camera, fits[it.camera].homography, it.image, it.floor) for it in given.cameras]
@@ -70,6 +72,13 @@ def refusing(source: Path | str) -> Iterator[None]:
         yield
     except CalibrationError as error:
         raise UserError(f"{source}: {error}") from error
+
+
+def _checked(where: str, unit: str) -> str:
+    try:
+        return checked_unit(unit)
+    except ValueError as error:
+        raise UserError(f"{where}: {error}") from error
 
 
 def _rounded(fit: PointFit) -> list[float]:

@@ -50,7 +50,7 @@ def calibrate(
     if plan.resolve() == out.resolve():
         raise UserError(f"--out: {out}: the floor plan would be written there too; name a .json, or --plan")
     picture = Picture(parse_size(size) if size else None, fps)
-    with whole_file(out) as ground, whole_file(plan) as drawn:  # both of them, or none
+    with whole_file(out, *given) as ground, whole_file(plan, *given) as drawn:  # both of them, or none
         if any(path.suffix.lower() in ENDINGS for path in given):
             if len(given) > 1:
                 raise UserError("calibrate: marked points are one file, with all cameras in it")

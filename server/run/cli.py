@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import atexit
+import errno
 import gc
 import os
 import signal
@@ -69,6 +70,7 @@ for command in (
 
 _BAD_INPUT = UserError.code
 _INTERRUPTED = 130
+_NO_WAY = {errno.EACCES, errno.EPERM, errno.ENAMETOOLONG, errno.ELOOP}
 _TERMINATED = 143
 
 
@@ -89,16 +91,16 @@ def main() -> None:
     except UserError as error:
         say_failure(str(error))
         sys.exit(error.code)
-    except PermissionError as error:  # of a folder on the way, wherever it is first looked into
-        if error.filename is None:
+    except OSError as error:  # of a path that leads nowhere, wherever it is first looked into
+        if isinstance(error, BrokenPipeError):  # whoever read our output has gone, as by `… | head`
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            sys.exit(0)
+        if error.filename is None or error.errno not in _NO_WAY:
             raise
         say_failure(f"{error.filename}: {error.strerror}")
         sys.exit(_BAD_INPUT)
     except KeyboardInterrupt:
         sys.exit(_INTERRUPTED)
-    except BrokenPipeError:  # whoever read our output has gone, e.g. `myview watch URL | head`
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        sys.exit(0)
 
 
 if __name__ == "__main__":

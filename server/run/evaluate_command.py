@@ -48,9 +48,10 @@ def evaluate(asked: Asked) -> None:
         UserError: something is missing or malformed; nothing is written then.
     """
     _check(asked)
+    read = (*asked.tracks, *asked.truth, asked.views, *asked.videos)
     content: dict[str, Any] = {"iou": asked.least_iou}
     with ExitStack() as outputs:  # all of them, or none
-        numbers = outputs.enter_context(whole_file(asked.json_file)) if asked.json_file else None
+        numbers = outputs.enter_context(whole_file(asked.json_file, *read)) if asked.json_file else None
         plots = outputs.enter_context(whole_folder(asked.plots)) if asked.plots else None
         if asked.tracks:
             recordings = read_recordings(asked.tracks, asked.truth)

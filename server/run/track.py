@@ -57,7 +57,7 @@ def track_one(
     frames = _from_detections(det) if video is None and det is not None else searched(loaded)
     follower = _follower(loaded, _tracker_for(loaded, tracker, video), lambda: solver_for(loaded, solver))
     rows: list[MotRow] = []
-    with whole_file(out) as draft:
+    with whole_file(out, video, det) as draft:
         for frame in frames:
             rows += final_rows(follower.push(frame.number, frame.detections, frame.image))
             progress(frame.number + 1)

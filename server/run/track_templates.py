@@ -66,7 +66,7 @@ def track_templates(
             MotRow(1, number, left, top, right - left, bottom - top)
             for number, (left, top, right, bottom) in enumerate(boxes.tolist(), 1)
         ]
-        with whole_file(out) as draft:
+        with whole_file(out, video) as draft:
             for number, picture in pictures(source, 1):
                 if picture is not None:
                     rows += final_rows(tracker.push(picture))

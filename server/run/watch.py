@@ -13,6 +13,7 @@ from rich.table import Table
 from client import AwayError as ServerAway
 from client import ClientError, HttpSettings, Progress, objects, watch
 from server.wire.errors import AwayError, UserError
+from server.wire.output import check_new_file
 
 _TELL_EVERY_S = 1.0
 
@@ -32,6 +33,10 @@ async def run_watch(
         AwayError: the server cannot be reached.
         UserError: it does not know them, or the file cannot be written.
     """
+    if number is None and (out or seconds is not None or start or end):
+        raise UserError("watch: --out, --seconds, --from and --to are about somebody: say whom by --object")
+    if out is not None:
+        check_new_file(out)
     settings = HttpSettings(token=token)
     try:
         if number is None:

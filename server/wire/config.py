@@ -7,6 +7,7 @@ Every default is documented in ``configs/demo.yaml``.
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Self
@@ -20,6 +21,8 @@ from server.wire.sections import Access, Camera, Encode, Http, Record, Site, Sou
 from tracking.yardsticks import TEMPORAL
 
 _PREFIX = "MYVIEW_"
+_SERVICE = re.compile(r"bestview(-\d+)?")
+"""What best-view services are called beside the cameras, where pulses and passwords are given out."""
 
 
 class Config(BaseSettings):
@@ -66,6 +69,10 @@ class Config(BaseSettings):
     def _cameras_have_different_names(self) -> Self:
         ids = [camera.id for camera in self.cameras]
         for camera_id in ids:
+            if _SERVICE.fullmatch(camera_id):
+                raise ValueError(
+                    f"cameras: {camera_id!r} is what a best-view service is called; take another id"
+                )
             if ids.count(camera_id) > 1:
                 raise ValueError(f"cameras: two cameras are called {camera_id!r}; every id must be its own")
         return self

@@ -228,7 +228,7 @@ def _known_keys(section: tuple[int | str, ...]) -> list[str]:
 
 def _no_unknown_environment(where: str) -> None:
     """Refuse ``MYVIEW_HTP__PORT``: pydantic-settings would pass over it in silence."""
-    sections = [name.upper() for name in Config.model_fields]
+    sections = [name.upper() for name in Config.model_fields if name != "ground"]
     for name in os.environ:
         section, nested, _ = name.removeprefix("MYVIEW_").partition("__")
         if name.startswith("MYVIEW_") and nested and section not in sections:

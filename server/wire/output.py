@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
 import tempfile
@@ -10,6 +11,9 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from server.wire.errors import UserError
+
+_DISK = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS}
+"""What a disk says that takes no more."""
 
 
 def check_new_folder(out: Path) -> None:
@@ -20,6 +24,22 @@ def check_new_folder(out: Path) -> None:
     """
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise UserError(f"{out}: is there already and is not an empty folder; name another, or remove it")
+
+
+def check_new_file(out: Path, *read: Path | None) -> None:
+    """Make sure that a file can take this place.
+
+    Raises:
+        UserError: a folder, a device or one of the files that are read has it.
+    """
+    if out.is_dir():
+        raise UserError(f"{out}: is a folder; name a file")
+    if not out.exists():
+        return
+    if not out.is_file():
+        raise UserError(f"{out}: is no ordinary file, and would be replaced by one; name another")
+    if any(it is not None and it.exists() and out.samefile(it) for it in read):
+        raise UserError(f"{out}: is read, and would be replaced; name another")
 
 
 @contextmanager
@@ -35,7 +55,8 @@ def whole_folder(out: Path) -> Iterator[Path]:
         target.parent.mkdir(parents=True, exist_ok=True)
         draft = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=target.parent))
     try:
-        yield draft
+        with _no_room(out):
+            yield draft
         with _cannot_write(out):
             draft.chmod(0o777 & ~_umask())  # mkdtemp makes it for this user alone
             draft.replace(target)
@@ -44,14 +65,15 @@ def whole_folder(out: Path) -> Iterator[Path]:
 
 
 @contextmanager
-def whole_file(out: Path) -> Iterator[Path]:
+def whole_file(out: Path, *read: Path | None) -> Iterator[Path]:
     """Give a file to write; it becomes ``out``, in place of an older one, only when all went well.
+
+    ``read`` are the files that are read meanwhile: none of them is replaced.
 
     Raises:
         UserError: there cannot be a file ``out``; this is found out before anything else is done.
     """
-    if out.is_dir():
-        raise UserError(f"{out}: is a folder; name a file")
+    check_new_file(out, *read)
     target = out.resolve()
     with _cannot_write(out):
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -59,7 +81,8 @@ def whole_file(out: Path) -> Iterator[Path]:
         os.close(handle)
     draft = Path(name)
     try:
-        yield draft
+        with _no_room(out):
+            yield draft
         with _cannot_write(out):
             draft.chmod(0o666 & ~_umask())
             draft.replace(target)
@@ -72,6 +95,17 @@ def _cannot_write(out: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
+        raise UserError(f"{out}: cannot write there: {error.strerror}") from error
+
+
+@contextmanager
+def _no_room(out: Path) -> Iterator[None]:
+    """Say in one line that the disk takes no more, whoever writes."""
+    try:
+        yield
+    except OSError as error:
+        if error.errno not in _DISK:
+            raise
         raise UserError(f"{out}: cannot write there: {error.strerror}") from error
 
 

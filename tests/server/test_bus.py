@@ -181,7 +181,7 @@ async def test_two_routers_of_one_address_cannot_be(settings: Zenoh) -> None:
 
 
 async def test_an_address_that_is_none_is_refused() -> None:
-    for address in ("nonsense", "tcp/127.0.0.1", "127.0.0.1:7447", "tcp/a b:1"):
+    for address in ("nonsense", "tcp/127.0.0.1", "127.0.0.1:7447", "tcp/a b:1", "tcp/a:65536", "tcp/a:0"):
         with pytest.raises(ValidationError, match="is not an address such as tcp"):
             Zenoh(connect=address)
     with pytest.raises(UserError, match=r"zenoh\.connect: cannot use smoke/signal:1") as caught:

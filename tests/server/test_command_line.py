@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import resource
+import signal
 import socket
 import subprocess
 import sys
@@ -62,6 +65,7 @@ COMMANDS = ["sync", "bestview", "up"]
         ({"cameras": [{"id": "a", "source": "x"}] * 2}, "two cameras are called 'a'"),
         ({"cameras": [{"id": "a", "source": "x", "ground": [[0] * 3] * 3}]}, "not invertible"),
         ({"cameras": []}, "cameras"),
+        ({"cameras": [{"id": "bestview-1", "source": "x"}]}, "is what a best-view service is called"),
         ({"zenoh": {"listen": "nonsense"}}, "zenoh.listen"),
         ({"sync": {"port": 70000}}, "sync.port"),
         ({"site": {"fps": float("inf")}}, "site.fps"),
@@ -86,6 +90,61 @@ def test_a_configuration_of_odd_keys_or_a_section_from_outside_that_is_none_is_r
     assert "mapping of sections" in refusal(run("sync", "odd.yaml"))
     monkeypatch.setenv("MYVIEW_CAMERAS", "no json")
     assert "environment" in refusal(run("sync", site(tmp_path)))
+
+
+def test_a_key_that_is_no_section_is_none_from_outside_either(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MYVIEW_GROUND__X", "1")
+    assert "there is no section 'ground'" in refusal(run("sync", site(tmp_path)))
+
+
+DETECTIONS = "".join(f"{n},-1,{n},10,20,40,0.9,-1,-1,-1\n" for n in range(1, 200))
+
+
+@pytest.mark.parametrize(
+    ("words", "why"),
+    [
+        (["track", "--det", "det.txt", "--out", "det.txt"], "is read, and would be replaced"),
+        (["track", "--det", "det.txt", "--out", "sub/../det.txt"], "is read, and would be replaced"),
+        (["calibrate", "points.json", "--out", "points.json"], "is read, and would be replaced"),
+        (["calibrate", "points.json", "--out", "g.json", "--plan", "points.json"], "would be replaced"),
+        (["calibrate", "points.json", "--out", "g.json", "--unit", "metres"], "did you mean 'm'?"),
+        (["evaluate", "--gt", "det.txt", "--tracks", "det.txt", "--json", "det.txt"], "would be replaced"),
+        (["track", "--det", "det.txt", "--out", "pipe"], "is no ordinary file"),
+        (["track", "det.txt", "--out", "t.txt"], "this is text, and no video"),
+        (["render", "det.txt", "--out", "r"], "this is text, and no video"),
+        (["track", "--det", "det.txt", "--out", "t" * 300], "File name too long"),
+        (["watch", "http://127.0.0.1:1", "--out", "x.mp4"], "say whom by --object"),
+        (["watch", "http://127.0.0.1:1", "--object", "1", "--out", "sub"], "is a folder"),
+    ],
+    ids=lambda it: " ".join(it)[:40] if isinstance(it, list) else "",
+)
+def test_what_is_read_or_is_no_file_is_not_replaced_and_what_makes_no_sense_is_not_passed_over(
+    run: Run, tmp_path: Path, words: list[str], why: str
+) -> None:
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "det.txt").write_text(DETECTIONS)
+    (tmp_path / "points.json").write_text('{"cameras": {}}')
+    os.mkfifo(tmp_path / "pipe")
+    before = written(tmp_path)
+    assert why in refusal(run(*words))
+    assert written(tmp_path) == before
+    assert (tmp_path / "det.txt").read_text() == DETECTIONS
+
+
+def test_a_disk_that_takes_no_more_is_one_line_and_leaves_nothing(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "det.txt").write_text(DETECTIONS)
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    ignored = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (64, before[1]))
+    try:
+        line = refusal(run("track", "--det", "det.txt", "--out", "t.txt"))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        signal.signal(signal.SIGXFSZ, ignored)
+    assert "t.txt: cannot write there: File too large" in line
+    assert written(tmp_path) == {"det.txt"}
 
 
 def test_a_level_of_the_log_that_is_none_is_refused(

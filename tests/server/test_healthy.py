@@ -184,8 +184,8 @@ def users(path: Path) -> dict[str, str]:
     return read_users(path, "users")
 
 
-def made(folder: Path, name: str, **environment: str) -> subprocess.CompletedProcess[str]:
-    script = ["/bin/sh", str(ROOT / "configs" / "secrets.sh"), name, "c0"]
+def made(folder: Path, name: str, camera: str = "c0", **environment: str) -> subprocess.CompletedProcess[str]:
+    script = ["/bin/sh", str(ROOT / "configs" / "secrets.sh"), name, camera]
     surroundings = {**os.environ, "MYVIEW_SECRETS": str(folder), **environment}
     return subprocess.run(script, env=surroundings, capture_output=True, text=True, check=False)
 
@@ -193,6 +193,17 @@ def made(folder: Path, name: str, **environment: str) -> subprocess.CompletedPro
 def test_without_openssl_nothing_is_made_and_that_is_said(tmp_path: Path) -> None:
     done = made(tmp_path / "secrets", "cameras.example", PATH=str(tmp_path))
     assert (done.returncode, done.stderr) == (1, "secrets.sh: needs openssl, which is not there\n")
+    assert not (tmp_path / "secrets").exists()
+
+
+@NEEDS_OPENSSL
+@pytest.mark.parametrize("camera", ["c 0", "../x", "bestview", "bestview-1", "a: b", ""])
+def test_a_camera_that_cannot_be_called_that_is_refused_before_anything_is_made(
+    tmp_path: Path, camera: str
+) -> None:
+    done = made(tmp_path / "secrets", "cameras.example", camera)
+    assert done.returncode == 2
+    assert "cannot be a camera's name" in done.stderr
     assert not (tmp_path / "secrets").exists()
 
 

@@ -18,6 +18,8 @@ from server.wire.errors import UserError
 from server.wire.sources import is_device
 
 _DEFAULT_FPS = 25.0
+_TEXT = "tty"
+"""The format of which FFmpeg takes any text to be: it would play it as letters."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +49,14 @@ def open_video(
             source, format="v4l2" if is_device(source) else None, options=dict(options or {}), timeout=timeout
         )
     except (av.error.FFmpegError, OSError, ValueError) as error:
-        raise UserError(f"{name}: cannot open this video: {_reason(source, error)}") from error
+        why = no_answer(error, timeout[0]) if timeout else None
+        raise UserError(f"{name}: cannot open this video: {why or _reason(source, error)}") from error
+    if container.format.name == _TEXT:
+        container.close()
+        raise UserError(
+            f"{name}: this is text, and no video; detections are named with --det, or with `detections` "
+            "beside a camera's source"
+        )
     if not container.streams.video:
         container.close()
         raise UserError(f"{name}: there is no video in this file")
@@ -61,6 +70,11 @@ def open_video(
     context.thread_count = 1  # one process per camera already uses the cores
     fps = float(stream.average_rate) if stream.average_rate else _DEFAULT_FPS
     return Opened(container, stream, (context.width, context.height), fps, stream.frames)
+
+
+def no_answer(error: Exception, seconds: float) -> str | None:
+    """Say that a source has kept silent for so long, where it was given up for that."""
+    return f"no answer within {seconds:g} s" if isinstance(error, av.error.ExitError) else None
 
 
 def _reason(source: str, error: Exception) -> str:

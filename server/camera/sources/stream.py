@@ -16,7 +16,7 @@ from av.video.stream import VideoStream
 from camsync import Spell
 from server.camera.sound import LiveSound
 from server.camera.sources.base import Image
-from server.camera.sources.opening import Opened, open_video
+from server.camera.sources.opening import Opened, no_answer, open_video
 from server.wire.addresses import shown
 from server.wire.colours import bgr
 from server.wire.errors import UserError
@@ -98,7 +98,7 @@ class Stream:
                 elif self._listener is not None:
                     self._listener.packet(cast("av.Packet[AudioStream]", packet))
         except (av.error.FFmpegError, OSError) as error:
-            why = f"reading stopped: {shown(str(error))}"
+            why = f"reading stopped: {no_answer(error, READ_S) or shown(str(error))}"
         finally:
             opened.container.close()
         if not self._closing.is_set():

@@ -21,12 +21,14 @@ def _even(value: int) -> int:
 
 
 def _endpoint(value: str) -> str:
-    if not _ENDPOINT.fullmatch(value):
+    found = _ENDPOINT.fullmatch(value)
+    if found is None or not 0 < int(found["port"]) <= _PORT_MOST:
         raise ValueError(f"{value!r} is not an address such as tcp/127.0.0.1:7447")
     return value
 
 
-_ENDPOINT = re.compile(r"[a-z]+/[^\s/]+:[0-9]{1,5}([?#]\S*)?")
+_ENDPOINT = re.compile(r"[a-z]+/[^\s/]+:(?P<port>[0-9]{1,5})([?#]\S*)?")
+_PORT_MOST = 65535
 
 Endpoint = Annotated[str, AfterValidator(_endpoint)]
 """Where zenoh connects to or listens: protocol/host:port."""
@@ -34,7 +36,7 @@ Endpoint = Annotated[str, AfterValidator(_endpoint)]
 Side = Annotated[int, Field(ge=16, le=8192), AfterValidator(_even)]
 """Width or height of a picture in pixels; x264 cannot encode much smaller or larger ones."""
 
-Port = Annotated[int, Field(ge=1, le=65535)]
+Port = Annotated[int, Field(ge=1, le=_PORT_MOST)]
 
 
 class Section(BaseModel):
