@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import threading
 
+import av
 import numpy as np
 from av.video.frame import VideoFrame
-from av.video.reformatter import VideoReformatter
+from av.video.reformatter import Colorspace, VideoReformatter
 from numpy.typing import NDArray
 
 
@@ -23,8 +24,17 @@ _THREADS = 1
 
 
 def bgr(picture: VideoFrame) -> NDArray[np.uint8]:
-    """Give a decoded picture as ``(height, width, 3)`` BGR."""
-    found = _kept.to_bgr.reformat(picture, format="bgr24", threads=_THREADS)
+    """Give a decoded picture as ``(height, width, 3)`` BGR.
+
+    One that names colours which FFmpeg cannot convert (ITU-T H.273, 8.3: half of the numbers there are) is
+    shown by BT.601: whoever names them mostly did not mean to.
+    """
+    try:
+        found = _kept.to_bgr.reformat(picture, format="bgr24", threads=_THREADS)
+    except av.FFmpegError:
+        found = _kept.to_bgr.reformat(
+            picture, format="bgr24", threads=_THREADS, src_colorspace=Colorspace.ITU601
+        )
     return np.asarray(found.to_ndarray(), dtype=np.uint8)
 
 

@@ -6,6 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from av.video.frame import VideoFrame
+from av.video.reformatter import Colorspace
 
 from server.wire.colours import bgr, yuv
 
@@ -38,3 +39,13 @@ def test_threads_do_not_disturb_each_other() -> None:
         found = list(pool.map(bgr, pictures))
     for picture, image in zip(pictures, found, strict=True):
         assert np.array_equal(image, picture.to_ndarray(format="bgr24"))
+
+
+def test_colours_that_cannot_be_converted_are_taken_for_the_usual_ones() -> None:
+    usual, unknown = decoded(2), [3, 8, 10, 13, 14, 200]
+    usual.colorspace = Colorspace.ITU601
+    for number in unknown:
+        picture = decoded(2)
+        picture.colorspace = number
+        assert np.array_equal(bgr(picture), bgr(usual)), number
+    assert np.array_equal(bgr(decoded(2)), decoded(2).to_ndarray(format="bgr24"))  # as if they had not been

@@ -129,6 +129,17 @@ def test_a_damaged_frame_spoils_nothing_after_its_gop(damage: bytes, place: int)
     assert all(far(picture.data, shown(0)[picture.pulse]) < 15 for picture in drawn.plain)
 
 
+@settings(deadline=None, max_examples=10)
+@given(st.integers(2**62, 2**64 - 1))
+def test_a_time_that_never_comes_is_damage(ticks: int) -> None:
+    whole = fragments(0, GOP)
+    start = whole.index(b"tfdt") + len(b"tfdt") + 4
+    studio = Studio(CANVAS)
+    broken = whole[:start] + ticks.to_bytes(8, "big") + whole[start + 8 :]
+    assert studio.draw(Draw(fragments=broken, film=True, still="plain")) == Drawn(newest=-1)
+    assert len(studio.draw(Draw(fragments=fragments(GOP, GOP), film=True)).film) == GOP
+
+
 def test_the_film_has_the_cameras_gops_and_begins_anew_where_time_goes_back() -> None:
     studio = Studio(CANVAS)
     keys = [
