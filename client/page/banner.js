@@ -95,8 +95,8 @@ export class Banner {
       this.#held = camera;
     } // else as the operator wished
     if (!over || !viewer.site || viewer.travel.moment) return;
-    this.#back = true;
     viewer.travel.watchFrom(pulse - Math.round(BEFORE_S * viewer.site.fps));
+    this.#back = viewer.travel.moment !== null; // it stays live where that is as good
   }
 
   /** What was held to point is let go, unless somebody has held another meanwhile; and what was past is live. */

@@ -33,12 +33,9 @@ async def camera_process(running: Running, camera_id: str) -> None:
     anew = asyncio.Event()
     following = asyncio.create_task(_follow(running, camera_id, anew), name="reload")
     try:
-        camera = await _made(running, camera_id, anew)
+        camera = await _made(running, camera_id, anew, begun=False)
         while not await _run(camera, anew):
-            try:
-                camera = await _made(running, camera_id, anew)
-            except UserError as error:  # whoever looks after this process starts it again
-                raise AwayError(str(error)) from error
+            camera = await _made(running, camera_id, anew, begun=True)
     except SyncError as error:
         raise AwayError(f"camera {camera_id}: {error}") from error
     finally:
@@ -46,10 +43,11 @@ async def camera_process(running: Running, camera_id: str) -> None:
         await asyncio.gather(following, return_exceptions=True)
 
 
-async def _made(running: Running, camera_id: str, anew: asyncio.Event) -> CameraProcess:
+async def _made(running: Running, camera_id: str, anew: asyncio.Event, *, begun: bool) -> CameraProcess:
     """Make it as soon as its source can be opened, by what is in force then; ``anew`` says that this changed.
 
-    To end instead, and be started again, would load all libraries each time.
+    To end instead, and be started again, would load all libraries each time. Once the site has begun, as it
+    does while a camera is waited for, what is wrong with one camera ends that one alone.
     """
     away, pause = Spell(calm=0.0), _RETRY_FIRST_S
     while True:
@@ -59,6 +57,11 @@ async def _made(running: Running, camera_id: str, anew: asyncio.Event) -> Camera
         except AwayError as error:
             if (more := away.happened(str(error))) is not None:
                 log.warning("%s%s; it is tried again", error, more)
+            begun = True
+        except UserError as error:
+            if not begun:
+                raise
+            raise AwayError(str(error)) from error  # whoever looks after this process starts it again
         else:
             if ended := away.over():
                 log.info("camera %s: it answers, after %.0f s", camera_id, ended.seconds)

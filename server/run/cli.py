@@ -91,10 +91,10 @@ def main() -> None:
     except UserError as error:
         say_failure(str(error))
         sys.exit(error.code)
+    except BrokenPipeError:  # whoever read our output has gone, as by `… | head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(0)
     except OSError as error:  # of a path that leads nowhere, wherever it is first looked into
-        if isinstance(error, BrokenPipeError):  # whoever read our output has gone, as by `… | head`
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-            sys.exit(0)
         if error.filename is None or error.errno not in _NO_WAY:
             raise
         say_failure(f"{error.filename}: {error.strerror}")

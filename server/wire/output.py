@@ -6,14 +6,14 @@ import errno
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from server.wire.errors import UserError
 
-_DISK = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS}
-"""What a disk says that takes no more."""
+_FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS}
+"""What a disk says that takes no more, whoever writes."""
 
 
 def check_new_folder(out: Path) -> None:
@@ -55,7 +55,7 @@ def whole_folder(out: Path) -> Iterator[Path]:
         target.parent.mkdir(parents=True, exist_ok=True)
         draft = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=target.parent))
     try:
-        with _no_room(out):
+        with _cannot_write(out, _FULL):
             yield draft
         with _cannot_write(out):
             draft.chmod(0o777 & ~_umask())  # mkdtemp makes it for this user alone
@@ -81,7 +81,7 @@ def whole_file(out: Path, *read: Path | None) -> Iterator[Path]:
         os.close(handle)
     draft = Path(name)
     try:
-        with _no_room(out):
+        with _cannot_write(out, _FULL):
             yield draft
         with _cannot_write(out):
             draft.chmod(0o666 & ~_umask())
@@ -91,20 +91,12 @@ def whole_file(out: Path, *read: Path | None) -> Iterator[Path]:
 
 
 @contextmanager
-def _cannot_write(out: Path) -> Iterator[None]:
+def _cannot_write(out: Path, only: Collection[int] | None = None) -> Iterator[None]:
+    """Say in one line that what is written cannot be; ``only`` if it is one of these errors."""
     try:
         yield
     except OSError as error:
-        raise UserError(f"{out}: cannot write there: {error.strerror}") from error
-
-
-@contextmanager
-def _no_room(out: Path) -> Iterator[None]:
-    """Say in one line that the disk takes no more, whoever writes."""
-    try:
-        yield
-    except OSError as error:
-        if error.errno not in _DISK:
+        if only is not None and error.errno not in only:
             raise
         raise UserError(f"{out}: cannot write there: {error.strerror}") from error
 

@@ -124,6 +124,28 @@ async def test_a_disk_that_hangs_keeps_no_token_in_force(site: Hall, tmp_path: P
         await asyncio.gather(*waiting)
 
 
+async def test_a_sign_in_ends_in_time_though_the_disk_with_the_tokens_hangs(
+    site: Hall, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    looked, hangs = threading.Event(), threading.Event()
+
+    def look(_: TokenFile) -> None:
+        looked.set()
+        hangs.wait(30.0)
+
+    sessions = {CHANGES: "1"}
+    async with site.session.post("/api/session", headers=sessions, json={"token": token_of("desk")}) as done:
+        [cookie] = done.cookies.values()
+    answer = await stream(site, "/api/events", Cookie=f"{cookie.key}={cookie.value}")
+    monkeypatch.setattr(TokenFile, "look", look)
+    try:
+        await asyncio.to_thread(looked.wait, 10.0)
+        monkeypatch.setattr("server.web.access.sessions.Sessions.token", lambda *_: None)  # 12 hours are over
+        await asyncio.wait_for(ended(answer), 10.0)
+    finally:
+        hangs.set()
+
+
 async def test_a_new_token_lets_in_without_a_restart(site: Hall, tmp_path: Path) -> None:
     old = await stream(site, "/api/events", **bearer("desk"))
     write_tokens(tmp_path / "tokens.yaml", line_of("guest", role="watch"))

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable
+from collections.abc import AsyncIterator, Awaitable, Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,7 @@ from free_port import free
 from videos_by_hand import write_video
 
 from server.run.camera import camera_process
+from server.wire.errors import AwayError
 from server.wire.running import Running
 
 PATIENCE = 60.0  # seconds
@@ -40,35 +42,74 @@ class Lines(logging.Handler):
                 await self._more.wait()
 
 
-@pytest.mark.timeout(2 * PATIENCE + 10)
-async def test_it_is_said_once_that_a_camera_does_not_answer_and_when_it_does_it_runs(tmp_path: Path) -> None:
+@dataclass
+class Site:
+    """One camera's process, whose network camera does not answer yet."""
+
+    process: asyncio.Task[None]
+    told: Lines
+    answer: Callable[[], Awaitable[None]]
+    """Let the camera answer."""
+
+
+@pytest.fixture
+async def begin(tmp_path: Path) -> AsyncIterator[Callable[..., Site]]:
+    """Begin one by the site's width and how the camera's own H.264 is used."""
     write_video(tmp_path / "c0.mp4", 25)
-    port, bus = free(), f"tcp/127.0.0.1:{free()}"
-    path = tmp_path / "site.yaml"
-    content = {
-        "site": {"name": "hall", "width": 64, "height": 48},
-        "sync": {"port": free(), "start_timeout_s": 0.1},
-        "zenoh": {"connect": bus, "listen": bus},
-        "cameras": [{"id": "c0", "source": f"http://127.0.0.1:{port}/c0.mp4"}],
-    }
-    path.write_text(yaml.safe_dump(content))
     told, log = Lines(), logging.getLogger("server")
     log.addHandler(told)
     log.setLevel(logging.INFO)
-    running = asyncio.create_task(camera_process(Running(path), "c0"))
     app = web.Application()
     app.router.add_static("/", tmp_path)
     runner = web.AppRunner(app)
-    try:
-        await told.until(lambda line: "Connection refused; it is tried again" in line)
-        await runner.setup()
-        await web.TCPSite(runner, "127.0.0.1", port).start()
-        await told.until(lambda line: line.startswith("camera c0: it answers, after"))
-        await told.until(lambda line: "no best-view service" in line)  # it runs
-        assert sum("Connection refused" in line for line in told.lines) == 1
-    finally:
-        running.cancel()
-        await asyncio.gather(running, return_exceptions=True)
-        await runner.cleanup()
-        log.removeHandler(told)
-        log.setLevel(logging.NOTSET)
+    begun: list[asyncio.Task[None]] = []
+
+    def begin(width: int = 64, h264: str = "encode") -> Site:
+        port, bus = free(), f"tcp/127.0.0.1:{free()}"
+        path = tmp_path / "site.yaml"
+        content = {
+            "site": {"name": "hall", "width": width, "height": 48},
+            "sync": {"port": free(), "start_timeout_s": 0.1},
+            "zenoh": {"connect": bus, "listen": bus},
+            "cameras": [{"id": "c0", "source": f"http://127.0.0.1:{port}/c0.mp4", "h264": h264}],
+        }
+        path.write_text(yaml.safe_dump(content))
+        begun.append(asyncio.create_task(camera_process(Running(path), "c0")))
+
+        async def answer() -> None:
+            await runner.setup()
+            await web.TCPSite(runner, "127.0.0.1", port).start()
+
+        return Site(begun[-1], told, answer)
+
+    yield begin
+    for process in begun:
+        process.cancel()
+    await asyncio.gather(*begun, return_exceptions=True)
+    await runner.cleanup()
+    log.removeHandler(told)
+    log.setLevel(logging.NOTSET)
+
+
+@pytest.mark.timeout(2 * PATIENCE + 10)
+async def test_it_is_said_once_that_a_camera_does_not_answer_and_when_it_does_it_runs(
+    begin: Callable[..., Site],
+) -> None:
+    site = begin()
+    await site.told.until(lambda line: "Connection refused; it is tried again" in line)
+    await site.answer()
+    await site.told.until(lambda line: line.startswith("camera c0: it answers, after"))
+    await site.told.until(lambda line: "no best-view service" in line)  # it runs
+    assert sum("Connection refused" in line for line in site.told.lines) == 1
+
+
+@pytest.mark.timeout(2 * PATIENCE + 10)
+async def test_what_is_wrong_with_a_camera_that_was_waited_for_ends_no_others(
+    begin: Callable[..., Site],
+) -> None:
+    """A mistake at the start ends the site, but the others have begun long ago."""
+    site = begin(128, "pass")
+    await site.told.until(lambda line: "Connection refused; it is tried again" in line)
+    await site.answer()
+    with pytest.raises(AwayError, match=r"^camera c0: h264: pass: its pictures are 64x48"):
+        await asyncio.wait_for(site.process, PATIENCE)

@@ -37,7 +37,7 @@ from server.view.media.agreement import Agreement
 from server.view.media.ts import Counters, pack
 from server.view.streams.shelf import Shelf
 from server.wire.config import Config
-from server.wire.errors import UserError
+from server.wire.errors import AwayError, UserError
 from server.wire.h264 import NAL_AUD, nal_type, nal_units
 
 FRAMES = 20
@@ -376,6 +376,18 @@ def test_a_network_camera_passes_too_in_whole_gops_at_the_sites_pulses(
             assert unit.pulse % GOP == 0
         else:
             assert unit.pulse % GOP == number % GOP
+
+
+@pytest.mark.parametrize("h264", ["pass", "auto"])
+def test_a_network_camera_that_falls_silent_while_it_is_looked_at_is_away(
+    network: NetworkCamera, monkeypatch: pytest.MonkeyPatch, h264: str
+) -> None:
+    """That says nothing of what it sends: it is neither refused for good nor encoded for good."""
+    monkeypatch.setattr("server.camera.own.stream.READ_S", 0.5)
+    network.let = 2
+    camera = {"options": {"probesize": "2000", "analyzeduration": "1000"}}
+    with pytest.raises(AwayError, match=r"stopped while it was looked at: no answer within 0\.5 s$"):
+        CameraPipeline(site(network.url, h264, camera=camera), "c0")
 
 
 def test_sound_beside_it_waits_as_long_as_the_pictures(network: NetworkCamera) -> None:

@@ -16,9 +16,10 @@ from server.camera.own.recording import at_once, decoded, packets
 from server.camera.own.waiting import Waiting
 from server.camera.sound import LiveSound
 from server.camera.sources.base import Image
-from server.camera.sources.opening import Opened, open_video
+from server.camera.sources.opening import Opened, no_answer, open_video
 from server.camera.sources.stream import OPEN_S, READ_S, Stream
 from server.wire.addresses import shown
+from server.wire.errors import UserError
 
 _LOOKED_AT_GOPS = 2
 """GOPs that a camera sends before it is known to fit."""
@@ -89,7 +90,12 @@ class OwnStream(Stream):
 
 
 def _check(url: str, options: Mapping[str, str], wanted: Wanted) -> None:
-    """Look at what a camera sends, from its first key unit on."""
+    """Look at what a camera sends, from its first key unit on.
+
+    Raises:
+        UserError: it cannot be opened, or stops meanwhile.
+        MisfitError: what it sends cannot stand in the site's streams.
+    """
     opened, fitting = open_video(url, options, (OPEN_S, READ_S)), Fitting(wanted)
     try:
         fitting.opened(opened)
@@ -104,7 +110,10 @@ def _check(url: str, options: Mapping[str, str], wanted: Wanted) -> None:
                 break
         if begun < 0:
             raise MisfitError(f"no GOP begins within {_LOOKED_AT_GOPS * wanted.gop} frames (encode.gop)")
-    except (av.error.FFmpegError, ValueError) as error:
+    except (av.error.InvalidDataError, ValueError) as error:
         raise MisfitError(f"it cannot be read: {shown(str(error))}") from error
+    except av.error.FFmpegError as error:  # it has gone, which says nothing of what it sends
+        why = no_answer(error, READ_S) or error.strerror
+        raise UserError(f"{shown(url)}: it stopped while it was looked at: {why}") from error
     finally:
         opened.container.close()

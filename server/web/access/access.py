@@ -153,16 +153,20 @@ class Access:
         if self._file is None:
             return
         try:
-            await again_and_again(_LOOK_EVERY_S, self._look, "looking at the file of tokens")
+            async with asyncio.TaskGroup() as both:  # sign-ins end by themselves, however long the disk takes
+                both.create_task(again_and_again(_LOOK_EVERY_S, self._look, "looking at the file of tokens"))
+                both.create_task(again_and_again(_LOOK_EVERY_S, self._end, "ending what is over"))
         finally:
             self._reader.shutdown(wait=False)
 
+    async def _end(self) -> None:
+        self.end_what_is_over()
+
     async def _look(self) -> None:
         assert self._file is not None  # noqa: S101 — nobody looks where there is none
-        self.end_what_is_over()  # sign-ins end by themselves, however long the disk takes
         try:
             # A long file takes longer to read than a frame. The thread is its own: all others may wait for
-            # a disk that recordings are on.
+            # some other disk.
             await asyncio.get_running_loop().run_in_executor(self._reader, self._file.look)
         finally:
             self.end_what_is_over()
