@@ -2,6 +2,7 @@
 
 from camsync.asking import clients_of
 from camsync.client import PulseClient
+from camsync.clock import steady_unix_clock
 from camsync.limits import ServerLimits
 from camsync.messages import Listener
 from camsync.peer import ClientInfo
@@ -37,4 +38,5 @@ __all__ = [
     "SyncStatus",
     "VersionError",
     "clients_of",
+    "steady_unix_clock",
 ]

@@ -14,7 +14,7 @@ from typing import TypeVar
 
 import msgspec
 
-from camsync import ClientSettings, Pulse, PulseClient
+from camsync import ClientSettings, Pulse, PulseClient, steady_unix_clock
 from server.camera.exchange import Exchange
 from server.camera.keeping import Keeping
 from server.camera.load import Load
@@ -68,6 +68,7 @@ class CameraProcess:
         self._config, self._id = config, camera_id
         self._login = pulse_login(config, camera_id)
         self._boot = time.time_ns() // 1_000_000
+        self._clock = steady_unix_clock()  # of pulses and all that is measured from them
         self._keys = Keys(config.site.name)
         self._sound = open_sound(config, camera_id)
         listener = self._sound if isinstance(self._sound, LiveSound) else None
@@ -119,8 +120,10 @@ class CameraProcess:
                     task.cancel()
                 await asyncio.gather(*tasks, return_exceptions=True)
         finally:
-            await self._exchange.leave()
-            bus.close()
+            try:
+                await self._exchange.leave()
+            finally:
+                bus.close()  # or the process would never end
             self._video.shutdown(wait=True)
             self._tracking.shutdown(wait=True)
             self._pipeline.close()
@@ -148,7 +151,13 @@ class CameraProcess:
         queue = self._backlog_pictures if self._pipeline.source.recorded else 2
         settings = ClientSettings(queue=queue, free_run_after=sync.start_timeout_s)
         client = PulseClient(
-            sync.host, sync.port, self._id, fps_hint=fps, settings=settings, login=self._login
+            sync.host,
+            sync.port,
+            self._id,
+            fps_hint=fps,
+            settings=settings,
+            clock=self._clock,
+            login=self._login,
         )
         async with client as pulses:
             self._meter.watch(pulses)
@@ -176,7 +185,7 @@ class CameraProcess:
             self._queue_for_tracking(pulse.number, None, due)
             return
         self._state = "live"
-        taken = time.time()
+        taken = self._clock()
         unit = await self._in(self._video, lambda: self._pipeline.encode(pulse.number, image))
         head = FrameHead(
             pulse=pulse.number,
@@ -185,7 +194,7 @@ class CameraProcess:
             after=unit.after,
             due=pulse.due,
             taken=taken,
-            encoded=time.time(),
+            encoded=self._clock(),
         )
         self._publish("video", unit.data, msgspec.json.encode(head))
         self._meter.frame(pulse.number, pulse.missed)
@@ -246,7 +255,7 @@ class CameraProcess:
         self._send_tracks(await self._in(self._tracking, lambda: self._pipeline.finish(self._end)))
 
     def _send_tracks(self, tracks: CameraTracks) -> None:
-        self._publish("tracks", msgspec.json.encode(msgspec.structs.replace(tracks, solved_at=time.time())))
+        self._publish("tracks", msgspec.json.encode(msgspec.structs.replace(tracks, solved_at=self._clock())))
 
     async def _send_thumbnails(self, image: Image, tracks: CameraTracks) -> None:
         pictures = await self._in(self._tracking, lambda: thumbnails(image, tracks))

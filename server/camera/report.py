@@ -11,6 +11,7 @@ import tracking
 from server.wire.epochs import closing_epoch, epoch_of_window
 from server.wire.help import TROUBLES_MOST, Trouble
 from server.wire.messages import Box, CameraTracks, Glimpse, Solve, Track
+from server.wire.numbers import FARTHEST
 from tracking import SolveReport, WindowResult, WindowTrack, troubles
 
 _LOOK_DIGITS = 5
@@ -116,7 +117,7 @@ def _glimpse(look: tracking.Glimpse) -> Glimpse:
 
 
 def _box(row: NDArray[np.float64]) -> Box | None:
-    left, top, right, bottom = (float(side) for side in row)
+    left, top, right, bottom = (float(side) for side in np.clip(row, -FARTHEST, FARTHEST))
     return None if np.isnan(left) else (left, top, right, bottom)
 
 

@@ -12,6 +12,7 @@ from bestview import Findings, Vantage, overlook, witnessed
 from server.wire.config import Config
 from server.wire.fit import Fit
 from server.wire.messages import FOUND_MOST, Found
+from server.wire.numbers import FARTHEST
 from tracking import Detections
 
 Floats = NDArray[np.float64]
@@ -46,7 +47,7 @@ class Witness:
             most = np.sort(np.argsort(-detections.scores, kind="stable")[:FOUND_MOST])
             places = self._fit.boxes_to_own(detections.boxes[most]).round(_PIXEL_DIGITS)
             scores = detections.scores[most].round(_SCORE_DIGITS)
-            rows = np.clip(np.column_stack([places, scores]), -_FAR, _FAR)
+            rows = np.clip(np.column_stack([places, scores]), -FARTHEST, FARTHEST)
             boxes = [(row[0], row[1], row[2], row[3], row[4]) for row in rows.tolist()]
         return Found(
             camera=self._camera, boot=self._boot, size=self._size, pulse=pulse, boxes=boxes, ended=ended
@@ -72,10 +73,6 @@ class Witness:
             vantage = _vantage(self._config, word.camera, word.size)
             known = self._others[word.camera] = (word.size, vantage if overlook(self._own, vantage) else None)
         return known[1]
-
-
-_FAR = 1e6
-"""No box is farther out; messages with one that is would be refused."""
 
 
 def _vantage(config: Config, camera_id: str, size: tuple[int, int]) -> Vantage:

@@ -13,18 +13,15 @@ import numpy as np
 from av.video.codeccontext import VideoCodecContext
 from av.video.frame import VideoFrame
 
-from server.camera.codecs import CLOCK
 from server.camera.encode import Encoder
 from server.draw.boxes import Image, draw_boxes
 from server.draw.unpack import frames
 from server.draw.unpack_webm import webm_frames
 from server.wire.colours import bgr
 from server.wire.drawing import Canvas, Draw, Drawn, Jpeg, Unit, belongs
+from server.wire.numbers import LAST_PULSE
 
 log = logging.getLogger(__name__)
-
-_NEVER = 2**62
-"""A time, by the clock of what is encoded, that only damage can say."""
 
 
 @dataclass
@@ -56,8 +53,6 @@ class Studio:
     def __init__(self, canvas: Canvas) -> None:
         self._canvas = canvas
         self._decoder = _decoder(canvas.codec)
-        self._never = _NEVER * CLOCK * canvas.fps
-        """A pulse that never comes."""
         self._whole = False
         """What comes can be decoded: nothing has been damaged since the last key frame."""
         self._told = False
@@ -92,7 +87,7 @@ class Studio:
     def _paintings(self, request: Draw) -> Iterator[Painting]:
         unpack = webm_frames if self._canvas.codec == "vp8" else frames
         for unit in unpack(request.fragments, self._canvas.fps):
-            good = bool(unit.data) and unit.pulse < self._never  # no data would mean the end
+            good = bool(unit.data) and unit.pulse <= LAST_PULSE  # no data would mean the end
             self._whole = (self._whole or unit.key) and good
             if not self._whole:
                 continue

@@ -65,7 +65,7 @@ def _watched(opened: Opened, until: float) -> Sent:
         for packet in opened.container.demux(opened.stream):
             try:
                 pictures = [it for it in packet.decode() if isinstance(it, VideoFrame)]
-            except av.error.InvalidDataError:
+            except av.error.FFmpegError:
                 damaged, pictures = damaged + 1, []
             times += [time.monotonic() if it.time is None else it.time for it in pictures]
             if time.monotonic() >= until:

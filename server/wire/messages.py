@@ -38,7 +38,7 @@ from server.wire.numbers import Coordinate, Duration, Number, Pixels, Pulse
 UNREADABLE = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
 """What a decoder raises: it is no JSON or other JSON, it is no text, it is nested without end."""
 
-Box = tuple[float, float, float, float]
+Box = tuple[Coordinate, Coordinate, Coordinate, Coordinate]
 """Left, top, right, bottom in pixels of the site's picture."""
 
 NumberedBox = tuple[int, float, float, float, float]

@@ -6,8 +6,11 @@ from typing import Annotated
 
 import msgspec
 
-Pulse = Annotated[int, msgspec.Meta(ge=0, le=2**40)]
-"""A frame number; the bound is a thousand years at 25 frames a second, and keeps times within 64 bits."""
+LAST_PULSE = 2**40
+"""A thousand years at 25 frames a second; the bound keeps times within 64 bits."""
+
+Pulse = Annotated[int, msgspec.Meta(ge=0, le=LAST_PULSE)]
+"""A frame number."""
 
 Pixels = Annotated[int, msgspec.Meta(ge=1, le=2**16)]
 
@@ -16,4 +19,7 @@ Number = Annotated[int, msgspec.Meta(ge=0, le=2**62)]
 Duration = Annotated[float, msgspec.Meta(ge=0, le=1e6)]
 """Seconds."""
 
-Coordinate = Annotated[float, msgspec.Meta(ge=-1e6, le=1e6)]
+FARTHEST = 1e6
+"""Pixels from a picture's corner, either way; what is farther is as far."""
+
+Coordinate = Annotated[float, msgspec.Meta(ge=-FARTHEST, le=FARTHEST)]

@@ -14,7 +14,7 @@ def read_users(path: Path, setting: str) -> dict[str, str]:
         UserError: it cannot be read, or a line is no name and password.
     """
     try:
-        lines = path.read_text(encoding="utf-8").splitlines()
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "it is no text"
         raise UserError(f"{setting}: cannot read {path}: {reason}") from error

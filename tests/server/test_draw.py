@@ -154,7 +154,11 @@ def test_the_chosen_persons_box_lies_over_the_others() -> None:
     draw_boxes(image, [(7, 10, 20, 40, 40), (3, 10, 20, 40, 40), (5, 30, 5, 60, 45)], 3)
     assert tuple(image[30, 10]) == CHOSEN
     assert tuple(image[30, 59]) == OTHER
-    draw_boxes(image, [(1, -500.0, -500.0, 9000.0, 9000.0), (2, 3.0, 3.0, 3.0, 3.0)], None)
+    draw_boxes(
+        image,
+        [(1, -500.0, -500.0, 9000.0, 9000.0), (2, 3.0, 3.0, 3.0, 3.0), (3, -1e300, 4.0, 3e9, 9.0)],
+        None,
+    )
 
 
 def test_the_process_answers_until_its_input_ends() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import io
 from collections.abc import Callable
 from itertools import pairwise
@@ -18,6 +19,7 @@ from server.view.pictures.decided import NOTHING, Decided
 from server.view.pictures.film import Film
 from server.view.pictures.pace import Pace
 from server.view.pictures.series import AllSeries, Series
+from server.view.pictures.stills import Stills
 from server.view.streams.channel import Viewer
 from server.wire.drawing import Drawn, Jpeg, Unit
 from server.wire.messages import GopChoices
@@ -121,6 +123,20 @@ def choices(first: int, camera: str = "c0", number: int = 1) -> GopChoices:
 
 def decided(resolve: Callable[[int], int] = lambda number: number, gops: int = 3) -> Decided:
     return Decided(resolve, FPS, gops)
+
+
+async def test_who_asks_for_a_newer_picture_than_others_is_given_no_older_one() -> None:
+    stills = Stills()
+    early, late = (asyncio.create_task(stills.get("plain", pulse)) for pulse in (100, 125))
+    await asyncio.sleep(0)
+    assert stills.possible(101) == ["plain"]
+    stills.give("plain", Jpeg(101, b""))
+    assert await early == Jpeg(101, b"")
+    await stills.asked.wait()
+    await asyncio.sleep(0)
+    assert stills.possible(124) == []
+    stills.give("plain", Jpeg(125, b""))
+    assert await late == Jpeg(125, b"")
 
 
 def test_boxes_are_found_by_the_pulse_of_the_frames() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import threading
+import time
 from collections.abc import AsyncIterator
 from itertools import pairwise, zip_longest
 from pathlib import Path
@@ -208,6 +209,29 @@ async def test_a_camera_that_goes_is_seen_to_be_gone_and_the_others_go_on(
         decided.clear()
         await decided.wait()
     assert states["c0"].word == "live"
+
+
+async def test_a_clock_that_is_set_changes_nothing_that_is_measured(
+    tmp_path: Path, running: list[Running], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As of a machine that learns the time only when it has been running for a while."""
+    it = Running(site(tmp_path, c0="scene:room?camera=0&objects=1"))
+    running.append(it)
+    decided = asyncio.Event()
+    it.service.on_decision.append(lambda _: decided.set())
+    await it.start()
+    it.camera("c0")
+    clock = time.time
+    async with asyncio.timeout(PATIENCE):
+        await decided.wait()
+        monkeypatch.setattr(time, "time", lambda: clock() + 3600)
+        for _ in range(4):
+            decided.clear()
+            await decided.wait()
+    gauge = it.service.intake.states["c0"].gauge
+    for spread in (gauge.sync_error, gauge.tracking_delay):
+        assert spread is not None
+        assert abs(spread.worst) < PATIENCE
 
 
 async def test_a_camera_and_a_service_prove_who_they_are_to_pulses_that_ask(

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import io
+import wave
+from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
 
 import av
+import cv2
+import numpy as np
 import pytest
+from av.audio.stream import AudioStream
 from hypothesis import given
 from hypothesis import strategies as st
 from sounds_by_hand import EVERY, FPS, beeps, write_flashes
@@ -15,6 +20,7 @@ from sounds_by_hand import EVERY, FPS, beeps, write_flashes
 from server.camera.sound import Frame, LiveSound, RecordedSound, open_sound, runs
 from server.camera.sound.encoding import Encoding
 from server.camera.sound.passing import Passing
+from server.camera.sound.recorded import _in_order
 from server.wire.errors import UserError
 from server.wire.loading import build_config
 from server.wire.sections import Sound
@@ -22,6 +28,7 @@ from server.wire.sound import SoundFormat
 
 FRAMES = 70
 STEREO = Sound(source="here")
+FORM = SoundFormat(48_000, 2)
 
 
 def all_until(sound: RecordedSound, pulse: int, first: int = 0) -> list[Frame]:
@@ -109,6 +116,52 @@ def test_whoever_begins_late_hears_the_same_moments(tmp_path: Path, codec: str) 
     moments = beeps(as_adts(frames, form), "aac")
     expected = [(late + n) / FPS for n in range(EVERY, FRAMES, EVERY)]
     assert [it for it in moments if it > late / FPS] == pytest.approx(expected, abs=0.03)
+
+
+def test_a_records_cover_is_no_picture_that_it_goes_by(tmp_path: Path) -> None:
+    path = write_flashes(tmp_path / "plain.mp3", FRAMES, codec="mp3", pictures=False)
+    cover = cv2.imencode(".jpg", np.full((60, 60, 3), 120, np.uint8))[1].tobytes()
+    content = b"\0image/jpeg\0\x03\0" + cover
+    head = b"APIC" + len(content).to_bytes(4, "big") + b"\0\0"  # ID3v2.3, 4.15
+    size = len(head) + len(content)
+    tag = b"ID3\x03\0\0" + bytes(size >> shift & 0x7F for shift in (21, 14, 7, 0))
+    covered = tmp_path / "covered.mp3"
+    covered.write_bytes(tag + head + content + path.read_bytes())
+    with av.open(str(covered)) as container:
+        assert container.streams.video
+    ways = [RecordedSound(str(it), STEREO, FPS, 0, "loop") for it in (path, covered)]
+    plain, other = (beeps(as_adts(all_until(it, 2 * FRAMES), FORM), "aac") for it in ways)
+    assert len(plain) > 2
+    assert other == pytest.approx(plain, abs=0.03)
+
+
+def test_one_packet_with_a_time_far_ahead_silences_nothing_behind_it() -> None:
+    def packet(seconds: float) -> av.Packet[AudioStream]:
+        found: av.Packet[AudioStream] = av.Packet(b"sound")
+        found.pts, found.time_base = round(seconds * 1000), Fraction(1, 1000)
+        return found
+
+    def times(*seconds: float) -> list[float]:
+        return [float(time) for time, _ in _in_order(packet(it) for it in seconds)]
+
+    assert times(0, 1, 3600, 2, 3) == [0, 1, 2, 3]
+    assert times(0, 1, 60, 61) == [0, 1, 60, 61], "nothing sounded for a minute"
+    assert times(0, 3600, 7200, 1, 2) == [0, 3600, 1, 2]
+
+
+def test_sound_that_cannot_be_converted_is_silence_and_said_once(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    path = tmp_path / "nine.wav"
+    with wave.open(str(path), "wb") as file:
+        file.setnchannels(9)
+        file.setsampwidth(2)
+        file.setframerate(48_000)
+        file.writeframes(bytes(2 * 9 * 48_000))
+    frames = all_until(RecordedSound(str(path), STEREO, FPS, 0, "stop"), FPS)
+    assert beeps(as_adts(frames, FORM), "aac") == []
+    (line,) = caplog.messages
+    assert line.startswith("sound of 9 channels at 48000 Hz cannot be converted: ")
 
 
 def test_what_cannot_be_in_step_or_has_no_sound_is_refused(tmp_path: Path) -> None:

@@ -10,19 +10,22 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import cast
 
 import av
 import cv2
 import numpy as np
 import pytest
 from av.audio.stream import AudioStream
+from av.video.frame import VideoFrame
+from av.video.stream import VideoStream
 from videos_by_hand import HEIGHT, STEP, WIDTH, frame_in, write_video
 
 from server.camera.sound import LiveSound
 from server.camera.sources import open_source, stream
-from server.camera.sources.opening import open_video
+from server.camera.sources.opening import Opened, open_video
 from server.camera.sources.stream import Stream
-from server.wire.errors import UserError
+from server.wire.errors import AwayError, UserError
 from server.wire.sections import Camera, Site, Sound
 
 PATIENCE = 60.0  # seconds until a test that awaits something has failed
@@ -32,7 +35,7 @@ class MotionJpeg:
     """A network camera by hand: shows the picture it is told to, until it is unplugged."""
 
     def __init__(self) -> None:
-        self.frame = 0
+        self.frame, self.width = 0, WIDTH
         self._unplugged = threading.Event()
         self._server: http.server.ThreadingHTTPServer | None = None
         self._thread: threading.Thread | None = None
@@ -46,7 +49,7 @@ class MotionJpeg:
                 self.send_header("Content-Type", "multipart/x-mixed-replace; boundary=frame")
                 self.end_headers()
                 while not unplugged.wait(0.02):
-                    grey = np.full((HEIGHT, WIDTH, 3), STEP * camera.frame, np.uint8)
+                    grey = np.full((HEIGHT, camera.width, 3), STEP * camera.frame, np.uint8)
                     jpeg = cv2.imencode(".jpg", grey)[1].tobytes()
                     part = b"--frame\r\nContent-Type: image/jpeg\r\nContent-Length: %d\r\n\r\n" % len(jpeg)
                     try:
@@ -203,6 +206,71 @@ def test_a_picture_of_before_a_silence_is_not_shown_after_it(
     finally:
         camera.goes_on.set()
         camera.close()
+        source.close()
+
+
+@pytest.mark.timeout(PATIENCE)
+@pytest.mark.parametrize("connected", [True, False])
+def test_pictures_of_another_size_are_no_pictures_of_this_camera(
+    camera: MotionJpeg, monkeypatch: pytest.MonkeyPatch, connected: bool
+) -> None:
+    """Where people stand goes by the size: the camera's process ends, and begins anew with the other one."""
+    monkeypatch.setattr(stream, "_RETRY_FIRST_S", 0.05)
+    port = camera.plug_in()
+    source = Stream(f"http://127.0.0.1:{port}/", {})
+
+    def take_them_all() -> None:
+        while True:
+            picture = source.take(0)
+            assert picture is None or picture.shape == (HEIGHT, WIDTH, 3)
+            time.sleep(0.01)
+
+    try:
+        until(lambda: shown(source) == 0)
+        if not connected:
+            camera.unplug()
+        camera.width = 2 * WIDTH
+        if not connected:
+            camera.plug_in(port)
+        with pytest.raises(AwayError, match=r"its pictures are 128x48 now, they were 64x48$"):
+            take_them_all()
+    finally:
+        source.close()
+
+
+@pytest.mark.parametrize("kind", [av.error.PatchWelcomeError, av.error.ArgumentError])
+def test_a_picture_that_cannot_be_decoded_cuts_no_connection(
+    camera: MotionJpeg, kind: type[av.error.FFmpegError]
+) -> None:
+    """What damage makes FFmpeg say differs from codec to codec."""
+    damaged = threading.Event()
+
+    class Damaging(Stream):
+        connections = 0
+
+        def _decode(self, packet: av.Packet[VideoStream]) -> bool:
+            return super()._decode(cast("av.Packet[VideoStream]", Damaged()) if damaged.is_set() else packet)
+
+        def _read(self, opened: Opened) -> bool:
+            self.connections += 1
+            return super()._read(opened)
+
+    class Damaged:
+        pts = time_base = None
+
+        def decode(self) -> list[VideoFrame]:
+            damaged.clear()
+            raise kind(1, "not yet implemented")
+
+    source = Damaging(f"http://127.0.0.1:{camera.plug_in()}/", {})
+    try:
+        until(lambda: shown(source) == 0)
+        damaged.set()
+        until(lambda: not damaged.is_set())
+        camera.frame = 5
+        until(lambda: shown(source) == 5)
+        assert source.connections == 1
+    finally:
         source.close()
 
 

@@ -33,6 +33,8 @@ class Encoding:
         self._layout = "mono" if form.channels == 1 else "stereo"
         self._format = "fltp" if form.coding == "aac" else "flt"
         self._resampler = self._new_resampler()
+        self._told = False
+        """That something cannot be converted."""
         self._heard: tuple[str, str, int] | None = None
         """What the resampler is given: format, layout, rate. It takes nothing else."""
         self._encoder = self._new_encoder(form, kbps)
@@ -53,10 +55,17 @@ class Encoding:
         except av.error.FFmpegError as error:
             log.debug("sound that cannot be decoded: %s", error)
             return []
-        for frame in heard:
-            if frame.pts is not None and frame.time_base is not None:
-                self._place(round((frame.pts * frame.time_base + shift) * self._rate) - self._ahead)
-            self._append(frame)
+        try:
+            for frame in heard:
+                if frame.pts is not None and frame.time_base is not None:
+                    self._place(round((frame.pts * frame.time_base + shift) * self._rate) - self._ahead)
+                self._append(frame)
+        except av.error.FFmpegError as error:
+            if not self._told:  # it is the same of all that follows
+                log.warning(
+                    "sound of %s at %d Hz cannot be converted: %s", *(self._heard or ())[1:], error.strerror
+                )
+            self._told = True
         return self._encoded()
 
     def _place(self, at: int) -> None:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from fractions import Fraction
 from typing import Literal
 
 import av
 from av.audio.stream import AudioStream
 from av.container import InputContainer
+from av.stream import Disposition
+from av.video.stream import VideoStream
 
 from server.camera.sound.frames import Frame, Packet, Way
 from server.camera.sound.ways import way_for
@@ -22,6 +24,7 @@ log = logging.getLogger(__name__)
 _WARM_S = 1
 """What is decoded of a recording before the moment at which it is first asked for."""
 _AHEAD_S = Fraction(1, 5)
+_FAR_S = 5
 _SPEED_OFF = 0.002
 """Pictures may be shown this much faster or slower than they were taken: the sound follows in small jumps."""
 
@@ -100,9 +103,8 @@ class RecordedSound:
         """Give the packets of one pass with when they sound after the first picture."""
         container, stream = _open(self._path)
         try:
-            for packet in container.demux(stream):
-                if packet.pts is not None and packet.time_base is not None and packet.size:
-                    yield (packet.pts * packet.time_base - self._start) * self._speed, packet
+            for time, packet in _in_order(container.demux(stream)):
+                yield (time - self._start) * self._speed, packet
         except av.error.FFmpegError as error:
             if not self._told:  # it may be read over and over
                 log.warning("%s: its sound cannot be read any further: %s", self._path, error.strerror)
@@ -112,9 +114,9 @@ class RecordedSound:
 
     def _of_pictures(self, container: InputContainer) -> tuple[Fraction, Fraction]:
         """Give when the first picture is shown, and how much longer one is shown here than it was there."""
-        if not container.streams.video:
+        video = _pictures(container)
+        if video is None:
             return Fraction(0), Fraction(1)
-        video = container.streams.video[0]
         rate = video.average_rate
         start = Fraction(0) if video.start_time is None else video.start_time * (video.time_base or 0)
         speed = Fraction(1) if rate is None else Fraction(rate) / self._fps
@@ -127,14 +129,39 @@ class RecordedSound:
 
     def _length(self, container: InputContainer, sound: AudioStream) -> Fraction:
         """Give the seconds after which it begins again: that of its pictures, or without any of its sound."""
-        if container.streams.video:
-            return sum(bool(it.size) for it in container.demux(container.streams.video[0])) / self._fps
+        if (video := _pictures(container)) is not None:
+            return sum(bool(it.size) for it in container.demux(video)) / self._fps
         ends = [
             (it.pts + (it.duration or 0)) * it.time_base
             for it in container.demux(sound)
             if it.pts is not None and it.time_base is not None
         ]
         return Fraction(max(ends, default=Fraction(1)))
+
+
+def _in_order(packets: Iterable[Packet]) -> Iterator[tuple[Fraction, Packet]]:
+    """Give packets with their times in seconds, without single ones far ahead of what follows: damage."""
+    reached: Fraction | None = None
+    ahead: tuple[Fraction, Packet] | None = None
+    for packet in packets:
+        if packet.pts is None or packet.time_base is None or not packet.size:
+            continue
+        time = packet.pts * packet.time_base
+        if ahead is not None and time >= ahead[0]:  # it was a gap
+            yield ahead
+            reached = ahead[0]
+        ahead = None
+        if reached is not None and time > reached + _FAR_S:
+            ahead = time, packet
+        else:
+            yield time, packet
+            reached = time
+
+
+def _pictures(container: InputContainer) -> VideoStream | None:
+    """Give the stream of its pictures, if it has one: that of a record's cover is none."""
+    streams = container.streams.video
+    return next((it for it in streams if not it.disposition & Disposition.attached_pic), None)
 
 
 def _open(path: str) -> tuple[InputContainer, AudioStream]:

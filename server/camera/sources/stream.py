@@ -19,7 +19,7 @@ from server.camera.sources.base import Image
 from server.camera.sources.opening import Opened, no_answer, open_video
 from server.wire.addresses import shown
 from server.wire.colours import bgr
-from server.wire.errors import UserError
+from server.wire.errors import AwayError, UserError
 
 log = logging.getLogger(__name__)
 
@@ -44,6 +44,8 @@ class Stream:
         self._url, self._options, self._listener = url, options, listener
         opened = open_video(url, options, (OPEN_S, READ_S))
         self.size = opened.size
+        self._resized: tuple[int, int] | None = None
+        """The size of its pictures, where it is another one since."""
         self._lock = threading.Lock()
         self._newest: VideoFrame | None = None
         self._newest_at = 0.0
@@ -54,8 +56,15 @@ class Stream:
         self._thread.start()
 
     def take(self, pulse: int) -> Image | None:
-        """Give the newest picture; None while the camera is away."""
+        """Give the newest picture; None while the camera is away.
+
+        Raises:
+            AwayError: its pictures have another size by now, and whoever takes them has to begin anew: the
+                floor, the boxes and the people's looks go by the one that it began with.
+        """
         del pulse
+        if self._resized is not None:
+            raise AwayError(f"{shown(self._url)}: {self._other_size(self._resized)}")
         with self._lock:
             picture = self._newest if time.monotonic() - self._newest_at < _STALE_S else None
         return None if picture is None else bgr(picture)
@@ -85,6 +94,10 @@ class Stream:
 
     def _read(self, opened: Opened) -> bool:
         """Read until the connection ends; tell whether any picture came."""
+        if opened.size != self.size:
+            self._resized = opened.size
+            opened.container.close()
+            return False
         any_picture, why = False, "the connection has ended"
         self._silence = _Silence()
         try:
@@ -97,6 +110,8 @@ class Stream:
                         self._back()
                 elif self._listener is not None:
                     self._listener.packet(cast("av.Packet[AudioStream]", packet))
+        except _OddSizeError as error:
+            why = str(error)  # by damage or for good: a new connection will tell
         except (av.error.FFmpegError, OSError) as error:
             why = f"reading stopped: {no_answer(error, READ_S) or shown(str(error))}"
         finally:
@@ -104,6 +119,9 @@ class Stream:
         if not self._closing.is_set():
             self._lost(f"{shown(self._url)}: {why}")
         return any_picture
+
+    def _other_size(self, size: tuple[int, int]) -> str:
+        return "its pictures are {}x{} now, they were {}x{}".format(*size, *self.size)
 
     def _lost(self, why: str, *, mistake: bool = False) -> None:
         """Say that the camera is away; one that comes and goes, or stays away, is not told of each time."""
@@ -135,8 +153,10 @@ class Stream:
         old = self._silence.was_before(packet, time.monotonic())
         try:
             pictures = [picture for picture in packet.decode() if isinstance(picture, VideoFrame)]
-        except av.error.InvalidDataError:
+        except av.error.FFmpegError:  # damage; that nothing can be read any more is no matter of decoding
             return False
+        if any((it.width, it.height) != self.size for it in pictures):
+            raise _OddSizeError(self._other_size((pictures[-1].width, pictures[-1].height)))
         if pictures and not old:
             with self._lock:
                 self._newest, self._newest_at = pictures[-1], time.monotonic()
@@ -144,6 +164,10 @@ class Stream:
             if self._listener is not None and newest.pts is not None and newest.time_base is not None:
                 self._listener.picture(newest.pts * newest.time_base)
         return bool(pictures)
+
+
+class _OddSizeError(Exception):
+    """A picture has not the size that the camera's had at the beginning."""
 
 
 class _Silence:

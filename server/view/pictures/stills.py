@@ -25,12 +25,14 @@ class Stills:
 
     async def get(self, kind: Still, pulse: int) -> Jpeg | None:
         """Wait for a picture of this frame or a newer one; None: there will be none."""
-        wish = self._wishes.get(kind)
-        if wish is None:
-            wish = self._wishes[kind] = _Wish(pulse, asyncio.Event())
-        self.asked.set()
-        await wish.given.wait()
-        return wish.picture
+        while True:
+            wish = self._wishes.get(kind)
+            if wish is None:
+                wish = self._wishes[kind] = _Wish(pulse, asyncio.Event())
+            self.asked.set()
+            await wish.given.wait()
+            if wish.picture is None or wish.picture.pulse >= pulse:
+                return wish.picture  # else it was good enough for who has asked before
 
     def possible(self, newest: int) -> list[Still]:
         """List what can be given when ``newest`` is the newest frame."""
