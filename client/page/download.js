@@ -1,13 +1,13 @@
 /** A live stream as whole segments, in bunches as they arrive. */
 
+import { atLeast } from './gops.js';
 import { Refused } from './http.js';
 import { SegmentSplitter } from './mp4.js';
 import { ClusterSplitter } from './webm.js';
 
 /** @import {Segment} from './mp4.js' */
 
-const SILENCE_MS = 6000; // a live stream that says nothing for this long is dead, whatever TCP thinks
-const GOPS = 2; // nor sooner than so many of them should have come, each at once
+const SILENCE_S = 6; // a live stream that says nothing for this long is dead, whatever TCP thinks
 
 /**
  * @param {string} address of an MP4, or of a WebM by its ending
@@ -18,7 +18,7 @@ const GOPS = 2; // nor sooner than so many of them should have come, each at onc
  */
 export async function* download(address, signal, gopS) {
   const silence = new AbortController();
-  const longest = Math.max(SILENCE_MS, GOPS * 1000 * gopS);
+  const longest = 1000 * atLeast(SILENCE_S, gopS);
   let timer = setTimeout(() => silence.abort(), longest);
   const leave = () => silence.abort(); // AbortSignal.any is younger than the oldest iPhones that can play this
   signal.addEventListener('abort', leave);

@@ -1,9 +1,10 @@
 /** When the picture goes over to a stream that has just begun, and at which moment. */
 
+import { atLeast } from './gops.js';
+
 /** @import {Run} from './run.js' */
 
 const RESTARTED_S = 10; // a stream that begins this far back is of a site whose pulses began anew
-const GOPS = 2; // and so far: the newest that there is may have begun long ago
 const LANDING_MS = 300; // how long a new stream may take to reach the moment now shown
 const INSIDE_S = 0.001; // a seek to the very start of a range may round to just before it
 
@@ -14,7 +15,7 @@ const INSIDE_S = 0.001; // a seek to the very start of a range may round to just
  * @returns {boolean} whether its pulses have begun anew
  */
 export function begunAnew(start, time, gopS) {
-  return start < time - Math.max(RESTARTED_S, GOPS * gopS);
+  return start < time - atLeast(RESTARTED_S, gopS);
 }
 
 /**

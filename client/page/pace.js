@@ -7,6 +7,8 @@
  * does not depend on what is shown, so all of the last while tells the slack of the moment now shown.
  */
 
+import { atLeast } from './gops.js';
+
 const RECENT_S = 15; // in which the edge was furthest behind at some time: a network's rough moments recur
 const CALM_S = 4; // before hurrying, so long at least: the next gap may be seconds away
 const HALF = 0.5; // of the time since the beginning counts at most: beginnings are rough, and soon over
@@ -22,7 +24,6 @@ const SLOWER_AT = 0.35; // of the aim
 const SLOWER_UNTIL = 0.8; // of the aim
 const SLOWER = 0.94;
 const FAR_S = 3; // beyond this a jump is kinder than minutes of hurry
-const GOPS = 2; // that may lie ahead, or pass between two gaps, whatever the seconds say
 const EDGE_S = 0.06; // closer to the end of a range than this, the picture stands
 
 /**
@@ -64,7 +65,7 @@ export class Pace {
     if (hole !== null) return this.#jump(hole);
     const end = ranges.at(-1)?.[1] ?? time;
     const lead = end - time;
-    if (lead > Math.max(FAR_S, GOPS * this.gopS)) return this.#jump(Math.max(end - this.#aim, /** @type {any} */ (ranges.at(-1))[0]));
+    if (lead > atLeast(FAR_S, this.gopS)) return this.#jump(Math.max(end - this.#aim, /** @type {any} */ (ranges.at(-1))[0]));
     this.#aim = Math.max(SLACK_S, this.#aim - CALM_PER_S * Math.max(0, now - this.#last));
     this.#last = now;
     this.#edges.push({ now, edge: end - now });
@@ -78,7 +79,7 @@ export class Pace {
    */
   #choose(now, time) {
     if (Number.isNaN(this.#begun)) this.#begun = now;
-    const calmS = Math.max(CALM_S, GOPS * this.gopS);
+    const calmS = atLeast(CALM_S, this.gopS);
     const recent = Math.min(Math.max(HALF * (now - this.#begun), calmS), Math.max(RECENT_S, calmS));
     const old = this.#edges.findIndex((sample) => sample.now >= now - recent);
     this.#edges.splice(0, old);

@@ -44,6 +44,7 @@ export class Player {
   /** @type {number} */
   #ticking;
   #codec = '';
+  #gopS = 0;
   #container = 'mp4';
   #going;
   #backoff = new Backoff();
@@ -76,7 +77,7 @@ export class Player {
    */
   configure({ container, codec, gopS }) {
     if (!plays(container, codec)) return false;
-    this.#pace.gopS = gopS;
+    this.#gopS = this.#pace.gopS = gopS;
     if (container !== this.#container || codec !== this.#codec) {
       this.#container = container;
       this.#codec = codec;
@@ -91,7 +92,7 @@ export class Player {
     if (this.#left && same(this.#left, subject) && this.video.paused) return;
     this.#left = null;
     this.#run?.leave();
-    this.#run = new Run(subject, this.#pace.gopS);
+    this.#run = new Run(subject, this.#gopS);
     void this.#run.follow(this.#container, {
       take: (run, segments) => this.#take(run, segments),
       ended: (refused) => this.listener.ended(refused),
