@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import accumulate
 
-from server.view.media.mp4_boxes import MATRIX, box, full, movie_head, track_defaults
+from server.view.media.mp4_boxes import box, full, moof_mdat, movie_head, track, track_defaults
 from server.view.media.mp4_sound import SOUND_TRACK, sound_track
 from server.wire.h264 import ParameterSets
 from server.wire.sound import SoundFormat
@@ -49,38 +49,20 @@ def init_segment(
 ) -> bytes:
     """Give ``ftyp`` and ``moov``: what a player needs before the first fragment, the same for all streams."""
     last = _TRACK if sound is None else SOUND_TRACK
-    return (
-        box("ftyp", b"iso5" + struct.pack(">I", 512) + b"iso5iso6avc1mp41")
-        + box(
-            "moov",
-            movie_head(last),
-            box(
-                "trak",
-                full("tkhd", 0, 3, struct.pack(">5I", 0, 0, _TRACK, 0, 0) + bytes(16) + MATRIX
-                      + struct.pack(">2I", width << 16, height << 16)),
-                box(
-                    "mdia",
-                    full("mdhd", 0, 0, struct.pack(">4I2H", 0, 0, TIMESCALE, 0, 0x55C4, 0)),
-                    full("hdlr", 0, 0, bytes(4) + b"vide" + bytes(12) + b"MyView\x00"),
-                    box(
-                        "minf",
-                        full("vmhd", 0, 1, bytes(8)),
-                        box("dinf", full("dref", 0, 0, struct.pack(">I", 1) + full("url ", 0, 1, b""))),
-                        box(
-                            "stbl",
-                            full("stsd", 0, 0, struct.pack(">I", 1) + _entry(parameters, width, height)),
-                            full("stts", 0, 0, bytes(4)),
-                            full("stsc", 0, 0, bytes(4)),
-                            full("stsz", 0, 0, bytes(8)),
-                            full("stco", 0, 0, bytes(4)),
-                        ),
-                    ),
-                ),
-            ),
-            b"" if sound is None else sound_track(sound),
-            box("mvex", *(track_defaults(track + 1) for track in range(last))),
-        )
-    )  # fmt: skip
+    return box("ftyp", b"iso5" + struct.pack(">I", 512) + b"iso5iso6avc1mp41") + box(
+        "moov",
+        movie_head(last),
+        track(
+            _TRACK,
+            TIMESCALE,
+            b"vide",
+            full("vmhd", 0, 1, bytes(8)),
+            _entry(parameters, width, height),
+            size=(width, height),
+        ),
+        b"" if sound is None else sound_track(sound),
+        box("mvex", *(track_defaults(number + 1) for number in range(last))),
+    )
 
 
 def fragment(samples: Sequence[Sample], first: int, fps: float) -> bytes:
@@ -106,15 +88,8 @@ def _fragment(samples: Sequence[Sample], first: int, edges: Sequence[int]) -> by
         )
         for number, sample in enumerate(samples)
     )
-    # The sequence number only has to grow; taken from the pulse, a fragment fits into any stream.
-    header = full("mfhd", 0, 0, struct.pack(">I", (first + 1) & 0xFFFFFFFF))
-    track = full("tfhd", 0, 0x020000, struct.pack(">I", _TRACK)) + full(
-        "tfdt", 1, 0, struct.pack(">Q", edges[0])
-    )
-    run_bytes = 8 + 4 + 4 + 4 + len(entries)
-    moof_bytes = 8 + len(header) + 8 + len(track) + run_bytes
-    run = full("trun", 0, 0x000701, struct.pack(">Ii", len(samples), moof_bytes + 8) + entries)
-    return box("moof", header, box("traf", track, run)) + box("mdat", *(s.data for s in samples))
+    track_head = full("tfhd", 0, 0x020000, struct.pack(">I", _TRACK))
+    return moof_mdat(first, track_head, edges[0], 0x000701, entries, [it.data for it in samples])
 
 
 def _entry(parameters: ParameterSets, width: int, height: int) -> bytes:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import struct
+from collections.abc import Sequence
 
-MATRIX = struct.pack(">9I", 0x10000, 0, 0, 0, 0x10000, 0, 0, 0, 0x40000000)
+_MATRIX = struct.pack(">9I", 0x10000, 0, 0, 0, 0x10000, 0, 0, 0, 0x40000000)
 """Neither turned nor scaled."""
 
 
@@ -22,9 +23,66 @@ def full(kind: str, version: int, flags: int, body: bytes) -> bytes:
 def movie_head(last: int) -> bytes:
     """Give ``mvhd`` of a film whose tracks are numbered up to ``last``."""
     head = struct.pack(">5I", 0, 0, 1000, 0, 0x10000) + struct.pack(">H", 0x100) + bytes(10)
-    return full("mvhd", 0, 0, head + MATRIX + bytes(24) + struct.pack(">I", last + 1))
+    return full("mvhd", 0, 0, head + _MATRIX + bytes(24) + struct.pack(">I", last + 1))
 
 
 def track_defaults(track: int) -> bytes:
     """Give ``trex`` of a track whose fragments say everything themselves."""
     return full("trex", 0, 0, struct.pack(">5I", track, 1, 0, 0, 0))
+
+
+def track(
+    number: int,
+    timescale: int,
+    handler: bytes,
+    head: bytes,
+    entry: bytes,
+    *,
+    volume: int = 0,
+    size: tuple[int, int] = (0, 0),
+) -> bytes:
+    """Give ``trak`` of a track whose samples are all in fragments.
+
+    ``head`` is the box of its kind (``vmhd``, ``smhd``), ``entry`` its sample entry; ``size`` is in pixels.
+    """
+    width, height = size
+    return box(
+        "trak",
+        full("tkhd", 0, 3, struct.pack(">5I", 0, 0, number, 0, 0) + bytes(8)
+              + struct.pack(">4H", 0, 0, volume, 0) + _MATRIX
+              + struct.pack(">2I", width << 16, height << 16)),
+        box(
+            "mdia",
+            full("mdhd", 0, 0, struct.pack(">4I2H", 0, 0, timescale, 0, 0x55C4, 0)),
+            full("hdlr", 0, 0, bytes(4) + handler + bytes(12) + b"MyView\x00"),
+            box(
+                "minf",
+                head,
+                box("dinf", full("dref", 0, 0, struct.pack(">I", 1) + full("url ", 0, 1, b""))),
+                box(
+                    "stbl",
+                    full("stsd", 0, 0, struct.pack(">I", 1) + entry),
+                    full("stts", 0, 0, bytes(4)),
+                    full("stsc", 0, 0, bytes(4)),
+                    full("stsz", 0, 0, bytes(8)),
+                    full("stco", 0, 0, bytes(4)),
+                ),
+            ),
+        ),
+    )  # fmt: skip
+
+
+def moof_mdat(
+    first: int, track_head: bytes, time: int, flags: int, entries: bytes, samples: Sequence[bytes]
+) -> bytes:
+    """Give a fragment: ``moof``, and its samples in ``mdat``.
+
+    ``first`` is the first sample's number, ``time`` its time, and ``track_head`` is ``tfhd``. ``flags`` and
+    ``entries`` are those of ``trun``: what is told of each sample, and that.
+    """
+    # The sequence number only has to grow; taken from the sample's, a fragment fits into any stream.
+    header = full("mfhd", 0, 0, struct.pack(">I", (first + 1) & 0xFFFFFFFF))
+    of_track = track_head + full("tfdt", 1, 0, struct.pack(">Q", time))
+    moof_bytes = 8 + len(header) + 8 + len(of_track) + 8 + 4 + 4 + 4 + len(entries)
+    run = full("trun", 0, flags, struct.pack(">Ii", len(samples), moof_bytes + 8) + entries)
+    return box("moof", header, box("traf", of_track, run)) + box("mdat", *samples)

@@ -5,11 +5,12 @@ from __future__ import annotations
 import struct
 from collections.abc import Sequence
 
-from server.view.media.mp4_boxes import MATRIX, box, full, movie_head, track_defaults
+from server.view.media.mp4_boxes import box, full, moof_mdat, movie_head, track, track_defaults
 from server.wire.sound import SoundFormat
 
 SOUND_TRACK = 2
 """Pictures are track 1."""
+_FULL_VOLUME = 0x100
 
 
 def sound_init_segment(sound: SoundFormat) -> bytes:
@@ -21,29 +22,8 @@ def sound_init_segment(sound: SoundFormat) -> bytes:
 
 def sound_track(sound: SoundFormat) -> bytes:
     """Give the ``trak`` of sound; its clock ticks once a sample, so that no frame is rounded."""
-    return box(
-        "trak",
-        full("tkhd", 0, 3, struct.pack(">5I", 0, 0, SOUND_TRACK, 0, 0) + bytes(8)
-              + struct.pack(">4H", 0, 0, 0x100, 0) + MATRIX + bytes(8)),
-        box(
-            "mdia",
-            full("mdhd", 0, 0, struct.pack(">4I2H", 0, 0, sound.rate, 0, 0x55C4, 0)),
-            full("hdlr", 0, 0, bytes(4) + b"soun" + bytes(12) + b"MyView\x00"),
-            box(
-                "minf",
-                full("smhd", 0, 0, bytes(4)),
-                box("dinf", full("dref", 0, 0, struct.pack(">I", 1) + full("url ", 0, 1, b""))),
-                box(
-                    "stbl",
-                    full("stsd", 0, 0, struct.pack(">I", 1) + _entry(sound)),
-                    full("stts", 0, 0, bytes(4)),
-                    full("stsc", 0, 0, bytes(4)),
-                    full("stsz", 0, 0, bytes(8)),
-                    full("stco", 0, 0, bytes(4)),
-                ),
-            ),
-        ),
-    )  # fmt: skip
+    head = full("smhd", 0, 0, bytes(4))
+    return track(SOUND_TRACK, sound.rate, b"soun", head, _entry(sound), volume=_FULL_VOLUME)
 
 
 def _entry(sound: SoundFormat) -> bytes:
@@ -79,10 +59,5 @@ def sound_fragment(sound: SoundFormat, frames: Sequence[bytes], first: int, orig
     ``origin`` is the sample that is at time 0.
     """
     sizes = struct.pack(f">{len(frames)}I", *map(len, frames))
-    header = full("mfhd", 0, 0, struct.pack(">I", (first + 1) & 0xFFFFFFFF))
-    track = full("tfhd", 0, 0x020008, struct.pack(">2I", SOUND_TRACK, sound.samples)) + full(
-        "tfdt", 1, 0, struct.pack(">Q", first * sound.samples - origin)
-    )
-    moof_bytes = 8 + len(header) + 8 + len(track) + 8 + 4 + 4 + 4 + len(sizes)
-    run = full("trun", 0, 0x000201, struct.pack(">Ii", len(frames), moof_bytes + 8) + sizes)
-    return box("moof", header, box("traf", track, run)) + box("mdat", *frames)
+    track_head = full("tfhd", 0, 0x020008, struct.pack(">2I", SOUND_TRACK, sound.samples))
+    return moof_mdat(first, track_head, first * sound.samples - origin, 0x000201, sizes, frames)
