@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 
 from server.view.board import reason
-from server.view.intake import Thumbnail
+from server.view.intake import CameraState, Thumbnail
 from server.view.service import BestViewService
 from server.view.who.share import server_of
 from server.web.schema import CameraInfo, Cameras, Choice, Elsewhere, ObjectInfo, Objects, SiteInfo
@@ -55,24 +55,24 @@ def objects_info(service: BestViewService) -> Objects:
 
 def cameras_info(service: BestViewService) -> Cameras:
     """List all cameras."""
-    cameras = []
-    for camera, state in service.intake.states.items():
-        status = state.status
-        cameras.append(
-            CameraInfo(
-                camera=camera,
-                state=state.word,
-                pulse=service.shelves[camera].newest,
-                late=service.aligner.late_messages[camera],
-                fps=status.fps if status else 0.0,
-                missed=status.missed if status else 0,
-                shed=status.shed if status else 0,
-                load_level=status.load_level if status else 0,
-                in_step=status.in_step if status else False,
-                message=state.message,
-            )
-        )
-    return Cameras(cameras)
+    return Cameras([camera_info(service, *it) for it in service.intake.states.items()])
+
+
+def camera_info(service: BestViewService, camera: str, state: CameraState) -> CameraInfo:
+    """Say how a camera is."""
+    status = state.status
+    return CameraInfo(
+        camera=camera,
+        state=state.word,
+        pulse=service.shelves[camera].newest,
+        late=service.aligner.late_messages[camera],
+        fps=status.fps if status else 0.0,
+        missed=status.missed if status else 0,
+        shed=status.shed if status else 0,
+        load_level=status.load_level if status else 0,
+        in_step=status.in_step if status else False,
+        message=state.message,
+    )
 
 
 def choice_info(service: BestViewService, number: int, pulse: int | None = None) -> Choice | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import msgspec
 import numpy as np
 from aiohttp import web
 
@@ -21,6 +22,7 @@ from server.web.operator.schema import (
     PulseListener,
     Pulses,
 )
+from server.web.views import camera_info
 from server.wire.fit import Fit
 from server.wire.pulse_users import pulse_clients
 
@@ -66,16 +68,7 @@ async def get_floor(request: web.Request) -> web.Response:
 def _camera(service: BestViewService, camera: str, state: CameraState) -> OperatorCamera:
     status, gauge = state.status, state.gauge
     return OperatorCamera(
-        camera=camera,
-        state=state.word,
-        message=state.message,
-        pulse=service.shelves[camera].newest,
-        fps=status.fps if status else 0.0,
-        missed=status.missed if status else 0,
-        shed=status.shed if status else 0,
-        load_level=status.load_level if status else 0,
-        late=service.aligner.late_messages[camera],
-        in_step=status.in_step if status else False,
+        **msgspec.structs.asdict(camera_info(service, camera, state)),
         bad_messages=state.bad_messages,
         clock_offset=status.clock_offset if status else None,
         sync_error=gauge.sync_error,

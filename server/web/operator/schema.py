@@ -5,6 +5,7 @@ from __future__ import annotations
 import msgspec
 
 from server.view.gauge import Spread, Trouble
+from server.web.schema import CameraInfo
 
 
 class OwnPicture(msgspec.Struct, frozen=True):
@@ -17,20 +18,9 @@ class OwnPicture(msgspec.Struct, frozen=True):
     top: float
 
 
-class OperatorCamera(msgspec.Struct, frozen=True):
-    """How one camera is, in all that is measured of it."""
+class OperatorCamera(CameraInfo, frozen=True):
+    """How one camera is, in all that is measured of it: what /api/cameras says, and more."""
 
-    camera: str
-    state: str
-    """As in /api/cameras, as message, pulse, fps, missed, shed, load_level, late and in_step."""
-    message: str
-    pulse: int
-    fps: float
-    missed: int
-    shed: int
-    load_level: int
-    late: int
-    in_step: bool
     bad_messages: int
     clock_offset: float | None
     """Seconds, pulse server's clock minus the camera's; null: not known."""
