@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from server.view.media.fmp4 import init_segment
 from server.view.service import BestViewService
 from server.view.streams.channel import Piece
 from server.view.streams.footage import Footage
@@ -24,10 +23,7 @@ class Form:
 
 def mp4_head(service: BestViewService) -> bytes | None:
     """Give what every MP4 of a site begins with, the same for all; None before the first key frame."""
-    parameters, site = service.agreement.parameters, service.config.site
-    if parameters is None:
-        return None
-    return init_segment(parameters, site.width, site.height, service.config.sound.format)
+    return service.agreement.head(service.config.site, service.config.sound.format)
 
 
 def _mp4(piece: Piece) -> bytes:
