@@ -20,7 +20,7 @@ from benchmarks.stream.service import Given
 from benchmarks.stream.site import StreamSite, Viewers
 from benchmarks.stream.splice import encode_again
 from server.camera.encode import AccessUnit
-from server.view.media.fmp4 import TIMESCALE
+from server.wire.drawing import TIMESCALE
 
 _SETTLE_S = 2.0
 _PAUSE_S = 0.037

@@ -6,7 +6,9 @@ import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-_TIMESCALE = 90_000
+from server.wire.drawing import TIMESCALE
+from server.wire.h264 import NAL_IDR, nal_type
+
 _HEAD = 8
 """Bytes of a box's size and kind."""
 _INSIDE = frozenset({b"moof", b"traf"})
@@ -15,7 +17,6 @@ _TFDT_TIME = 4
 """Bytes of version and flags before the time."""
 _TRUN_DURATION = 12
 """Bytes of version and flags, the number of samples and where they are, before the first one's duration."""
-_NAL_IDR = 5
 _START_CODE = b"\x00\x00\x00\x01"
 
 
@@ -36,13 +37,13 @@ def frames(fragments: bytes, fps: float) -> Iterator[Frame]:
     for kind, start, end in _boxes(fragments, 0, len(fragments)):
         if kind == b"tfdt" and end - start >= _TFDT_TIME + 8:
             (ticks,) = struct.unpack_from(">Q", fragments, start + _TFDT_TIME)
-            pulse = round(ticks * fps / _TIMESCALE)
+            pulse = round(ticks * fps / TIMESCALE)
         elif kind == b"trun" and end - start >= _TRUN_DURATION + 4:
             (ticks,) = struct.unpack_from(">I", fragments, start + _TRUN_DURATION)
-            lasts = max(1, round(ticks * fps / _TIMESCALE))
+            lasts = max(1, round(ticks * fps / TIMESCALE))
         elif kind == b"mdat":
             units = list(_units(fragments, start, end))
-            key = any(unit[0] & 0x1F == _NAL_IDR for unit in units)
+            key = any(nal_type(unit) == NAL_IDR for unit in units)
             yield Frame(pulse, key, b"".join(_START_CODE + unit for unit in units), lasts)
 
 

@@ -17,6 +17,8 @@ Still = Literal["plain", "boxed"]
 
 LENGTH_BYTES = 4
 """The length before every message, big-endian."""
+TIMESCALE = 90_000
+"""Ticks a second in fragments of MP4: divisible by 24, 25, 30 and 50 frames a second."""
 
 
 class Canvas(msgspec.Struct, frozen=True, kw_only=True):

@@ -13,11 +13,9 @@ from itertools import accumulate
 
 from server.view.media.mp4_boxes import box, full, moof_mdat, movie_head, track, track_defaults
 from server.view.media.mp4_sound import SOUND_TRACK, sound_track
+from server.wire.drawing import TIMESCALE
 from server.wire.h264 import ParameterSets
 from server.wire.sound import SoundFormat
-
-TIMESCALE = 90_000
-"""Ticks a second: divisible by 24, 25, 30 and 50 frames a second."""
 
 _TRACK = 1
 _SYNC_SAMPLE = 0x02000000

@@ -12,9 +12,10 @@ import struct
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from server.view.media.fmp4 import TIMESCALE, ticks
+from server.view.media.fmp4 import ticks
 from server.view.streams.picture import Picture
 from server.view.streams.sound import Heard
+from server.wire.drawing import TIMESCALE
 from server.wire.h264 import units_of
 
 PACKET_BYTES = 188

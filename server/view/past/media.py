@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import BinaryIO
 
 from server.view.media.agreement import Agreement
-from server.view.media.fmp4 import TIMESCALE
 from server.view.streams.picture import Picture
+from server.wire.drawing import TIMESCALE
 
 _HEAD = 8
 """Bytes of a box's size and kind."""

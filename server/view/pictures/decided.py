@@ -7,9 +7,8 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from server.view.media.fmp4 import TIMESCALE
 from server.view.media.webm import CLUSTER, pulse_of
-from server.wire.drawing import Boxes
+from server.wire.drawing import TIMESCALE, Boxes
 from server.wire.messages import GopChoices
 
 _TFDT = b"tfdt"
