@@ -28,9 +28,9 @@ from benchmarks.stream.stalled import Beside, Turn, beside_stalled, stalling
 from benchmarks.stream.tables import Found, describe, per_core, plot
 from server.camera.encode import AccessUnit
 from server.view.media.fmp4 import Sample, fragment, ticks
+from server.view.media.picture import Picture
 from server.view.media.ts import Counters
 from server.view.streams.footage import Footage
-from server.view.streams.picture import Picture
 
 GOP = 10
 Films = Sequence[Sequence[AccessUnit]]

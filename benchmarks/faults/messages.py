@@ -23,7 +23,7 @@ from benchmarks.faults.site import Fault, Inject, Stand
 from benchmarks.surroundings import one_thread_environment
 from client import Gop
 from server.run.setup import free_port
-from server.web.operator.permission import CHANGES
+from server.web.access.other_sites import CHANGES
 
 _GONE_S = 30.0
 _FAULTY_S = 8.0

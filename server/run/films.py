@@ -9,11 +9,12 @@ from typing import BinaryIO
 
 from server.view.choice.decide import GopDecision
 from server.view.media.agreement import Agreement
+from server.view.media.heard import Heard
 from server.view.media.mp4_sound import sound_fragment
 from server.view.streams.footage import Footage
 from server.view.streams.kinds import Gop, Showing
 from server.view.streams.shelf import Shelf
-from server.view.streams.sound import Heard, SoundShelf
+from server.view.streams.sound import SoundShelf
 from server.view.streams.timeline import Timeline
 from server.wire.sections import Site
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TypeVar
 
 import msgspec
 from aiohttp import web
@@ -14,10 +14,13 @@ from server.view.service import BestViewService
 from server.web.keys import METRICS, SERVICE
 from server.web.schema import Problem
 from server.web.views import choice_info, thumbnail_of
+from server.wire.messages import UNREADABLE
 
 routes = web.RouteTableDef()
 
 _RETRY_S = "5"
+
+Asked = TypeVar("Asked")
 
 
 def answer(content: Any, status: int = 200) -> web.Response:
@@ -52,6 +55,18 @@ def not_now(error: str) -> web.Response:
     response = problem(503, error)
     response.headers["Retry-After"] = _RETRY_S
     return response
+
+
+async def asked_for(request: web.Request, kind: type[Asked]) -> Asked:
+    """Read what a request asks for.
+
+    Raises:
+        HTTPBadRequest: it is not JSON of that kind.
+    """
+    try:
+        return msgspec.json.decode(await request.read(), type=kind)
+    except UNREADABLE as error:
+        raise web.HTTPBadRequest(reason=f"the request's JSON: {' '.join(str(error).split())}") from error
 
 
 def _service(request: web.Request) -> BestViewService:

@@ -14,6 +14,7 @@ from server.view.pictures import Pictures
 from server.view.service import BestViewService
 from server.web import api, openapi, page, past, pictures, session, site, video
 from server.web.access.access import ACCESS, Access, keep_no_copies, only_who_may
+from server.web.access.other_sites import tell_no_other_origin
 from server.web.api import problem
 from server.web.containers import refuse_other_containers
 from server.web.cors import preflight
@@ -23,7 +24,6 @@ from server.web.keys import EVENTS, METRICS, ON_DISK, PICTURES, READERS, SERVICE
 from server.web.metrics.service import registry
 from server.web.metrics.stages import measure
 from server.web.operator import routes as operator
-from server.web.operator.permission import tell_no_other_origin
 from server.web.queries import refuse_what_is_not_there
 from server.web.readers import Readers
 from server.web.share import to_the_right_service

@@ -8,8 +8,7 @@ from aiohttp import web
 from server.web.access.access import ACCESS, Access
 from server.web.access.grant import SESSION, Grant
 from server.web.access.sessions import SESSION_S
-from server.web.api import answer, problem
-from server.web.operator.session import asked_for
+from server.web.api import answer, asked_for, problem
 from server.web.schema import SessionInfo
 
 routes = web.RouteTableDef()

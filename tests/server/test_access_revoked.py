@@ -18,7 +18,7 @@ from halls import A, B, Hall
 from tokens_by_hand import LATER, bearer, line_of, locked, token_of, write_tokens
 
 from server.web.access.file import TokenFile
-from server.web.operator.permission import CHANGES
+from server.web.access.other_sites import CHANGES
 from server.wire.inbox import Message
 from server.wire.messages import Keys
 from server.wire.remembered import Remembered

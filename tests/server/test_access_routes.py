@@ -13,8 +13,8 @@ from halls import A, B, Hall, see
 from tokens_by_hand import EVERYBODY, bearer, locked
 
 from server.web.access.access import ACCESS, Access, only_who_may
+from server.web.access.other_sites import CHANGES
 from server.web.app import make_app
-from server.web.operator.permission import CHANGES
 
 ALL = frozenset(EVERYBODY)
 NOBODY = "nobody"

@@ -18,8 +18,8 @@ from tokens_by_hand import bearer, line_of, locked, token_of, write_tokens
 from server.web.access.access import COOKIE, Access, Holder
 from server.web.access.failures import Failures
 from server.web.access.here import is_from_here
+from server.web.access.other_sites import CHANGES
 from server.web.access.sessions import Sessions
-from server.web.operator.permission import CHANGES
 from server.wire.tokens import digest_of
 
 SESSION = "/api/session"

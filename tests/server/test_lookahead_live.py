@@ -24,7 +24,7 @@ from hypothesis import strategies as st
 
 from server.view.choice.decide import Decider, GopDecision
 from server.view.streams.channel import Piece
-from server.web.operator.permission import CHANGES
+from server.web.access.other_sites import CHANGES
 from server.wire.errors import UserError
 from server.wire.sections import View
 

@@ -13,7 +13,7 @@ from halls import A, B, Hall, opened
 from bestview import IdentityRegistry
 from server.run.watch import run_watch
 from server.view.choice.decide import homographies
-from server.web.operator.permission import CHANGES
+from server.web.access.other_sites import CHANGES
 
 PEOPLE = "/api/operator/people"
 

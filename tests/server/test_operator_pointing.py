@@ -12,7 +12,7 @@ from cameras_by_hand import FPS, HEIGHT, LARGE, SMALL, STRIDE, WIDTH, tracks, wo
 from halls import A, B, Hall, opened, see
 
 from server.camera.pointed import Pointed
-from server.web.operator.permission import CHANGES
+from server.web.access.other_sites import CHANGES
 from server.wire.help import Pointings, Trouble
 from server.wire.inbox import Message
 

@@ -14,7 +14,7 @@ from halls import A, B, Hall, opened
 
 from bestview.quality import QualitySettings
 from server.view.choice.decide import Decider
-from server.web.operator.permission import CHANGES
+from server.web.access.other_sites import CHANGES
 from server.web.operator.settings import settings_of
 from server.wire.config import Config
 from server.wire.sections import View

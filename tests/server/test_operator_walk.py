@@ -19,7 +19,7 @@ from server.view.calibrate import walking as walking_module
 from server.view.calibrate.process import calibrated
 from server.view.calibrate.task import Done, Seen, Task
 from server.view.calibrate.walking import State, Walking
-from server.web.operator.permission import CHANGES
+from server.web.access.other_sites import CHANGES
 from server.wire.loading import build_config
 
 WALK = "/api/operator/walk"

@@ -30,11 +30,11 @@ from sounds_by_hand import (
 from test_ts import check_counters, taken_apart
 
 from server.view.choice.decide import GopDecision, ObjectChoice
+from server.view.media.heard import Heard
 from server.view.media.mp4_sound import sound_fragment
 from server.view.past.run import Headers
 from server.view.past.sounds import frames_in
 from server.view.past.store import Bounds, Piece, Store
-from server.view.streams.sound import Heard
 from server.wire.aac import SAMPLES as FRAME
 from server.wire.messages import GopChoices
 from server.wire.sound import SoundFormat

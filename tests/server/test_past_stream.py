@@ -32,6 +32,7 @@ from recorded_by_hand import (
 )
 
 from server.view.media.agreement import Agreement
+from server.view.media.picture import Picture as Shown
 from server.view.media.ts import Counters
 from server.view.past import stream as past_stream
 from server.view.past.kept import kept_from, kept_until, known
@@ -44,7 +45,6 @@ from server.view.past.stream import PastStream, Wish
 from server.view.past.stretch import Span
 from server.view.streams.channel import Channel
 from server.view.streams.footage import Footage
-from server.view.streams.picture import Picture as Shown
 from server.view.streams.timeline import Timeline
 from server.wire.inbox import Message
 from server.wire.messages import Box, Keys

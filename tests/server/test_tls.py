@@ -19,7 +19,7 @@ from halls import A, B, opened
 from pydantic import ValidationError
 from tokens_by_hand import line_of, token_of, write_tokens
 
-from server.web.operator.permission import CHANGES
+from server.web.access.other_sites import CHANGES
 from server.web.tls import Certificate
 from server.wire.errors import UserError
 from server.wire.loading import build_config

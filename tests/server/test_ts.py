@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 
 from server.view.media.agreement import Agreement
 from server.view.media.fmp4 import Sample, fragment, ticks
+from server.view.media.picture import Picture
 from server.view.media.ts import COUNTERS, PACKET_BYTES, Counters, pack, packets
-from server.view.streams.picture import Picture
 from server.view.streams.shelf import Shelf
 
 CLOCK = 1 << 33

@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 from server.camera.encode import AccessUnit, Encoder
 from server.draw.unpack_webm import webm_frames
 from server.view.media.agreement import ParameterMismatchError
+from server.view.media.picture import Picture
 from server.view.media.vp8 import Vp8Agreement, size_of
 from server.view.media.vp8_skip import repeat
 from server.view.media.webm import cluster, header, rebased
 from server.view.pictures.decided import first_pulse
-from server.view.streams.picture import Picture
 from server.view.streams.shelf import Shelf
 from server.view.streams.timeline import Timeline
 from server.wire.sections import Encode, Site

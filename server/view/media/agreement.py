@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Literal
 
+from server.view.media.bridge import Bridge, H264Bridge
 from server.view.media.fmp4 import Sample, fragment, init_segment, rebased, sample_of, ticks
+from server.view.media.picture import Picture
 from server.view.media.skip import UnfitError, continuing
-from server.view.streams.bridge import Bridge, H264Bridge
-from server.view.streams.picture import Picture
 from server.wire.h264 import ParameterSets, nal_units, parameter_sets, sample, units_of
 from server.wire.sections import Site
 from server.wire.sound import SoundFormat

@@ -13,8 +13,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from server.view.media.fmp4 import ticks
-from server.view.streams.picture import Picture
-from server.view.streams.sound import Heard
+from server.view.media.heard import Heard
+from server.view.media.picture import Picture
 from server.wire.drawing import TIMESCALE
 from server.wire.h264 import units_of
 

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from server.view.media.agreement import Agreement, Container, ParameterMismatchError
+from server.view.media.bridge import NO_CAMERAS, Bridge, Span
+from server.view.media.picture import Picture
 from server.view.media.vp8_skip import repeat
 from server.view.media.webm import cluster, header, rebased, ticks
-from server.view.streams.bridge import NO_CAMERAS, Bridge, Span
-from server.view.streams.picture import Picture
 from server.wire.sections import Site
 from server.wire.sound import SoundFormat
 

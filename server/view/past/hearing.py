@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+from server.view.media.heard import Heard
 from server.view.past.disk import from_disk
 from server.view.past.play import Recorded
 from server.view.past.sounds import frames_in
 from server.view.past.stretch import Stretch
-from server.view.streams.sound import Following, Heard, SoundShelf
+from server.view.streams.sound import Following, SoundShelf
 from server.view.streams.timeline import LONGEST_S
 from server.wire.sound import SoundFormat
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from server.view.media.agreement import Agreement
-from server.view.streams.picture import Picture
+from server.view.media.picture import Picture
 from server.wire.drawing import TIMESCALE
 
 _HEAD = 8

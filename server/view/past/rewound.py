@@ -10,13 +10,13 @@ from contextlib import aclosing
 from dataclasses import dataclass, replace
 
 from server.view.media.agreement import Agreement
+from server.view.media.picture import Picture
 from server.view.media.ts import Counters
 from server.view.past.hearing import Hearing
 from server.view.past.kept import kept_from, kept_until
 from server.view.past.media import pictures_of
 from server.view.past.play import Source, last_before, play
 from server.view.streams.footage import Footage
-from server.view.streams.picture import Picture
 from server.view.streams.reel import Plan, Segment
 from server.view.streams.timeline import Timeline
 

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import msgspec
 
+from server.view.media.heard import Heard
 from server.view.past.media import CameraFile, Gop, write_at
 from server.view.past.playlist import Playlist
 from server.view.past.run import Headers, Run, Segment
 from server.view.past.sounds import NAME as SOUND
 from server.view.past.stretch import Stretch
-from server.view.streams.sound import Heard
 from server.wire.messages import GopChoices
 
 

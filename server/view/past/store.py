@@ -15,10 +15,10 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
+from server.view.media.heard import Heard
 from server.view.past.media import Gop
 from server.view.past.run import HEAD, Headers, Run, RunHead, Segment
 from server.view.past.segment import OpenSegment
-from server.view.streams.sound import Heard
 from server.wire.messages import UNREADABLE, GopChoices
 
 _SHARE = 8

@@ -7,12 +7,12 @@ from collections.abc import AsyncGenerator, Callable, Iterator
 from contextlib import aclosing
 from dataclasses import dataclass
 
+from server.view.media.picture import Picture
 from server.view.past.hearing import Hearing
 from server.view.past.media import pictures_of
 from server.view.past.play import Source, play
 from server.view.streams.channel import Channel
 from server.view.streams.footage import Footage
-from server.view.streams.picture import Picture
 from server.view.streams.tally import Tally
 from server.view.streams.timeline import LONGEST_S, Timeline
 

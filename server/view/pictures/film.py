@@ -8,8 +8,8 @@ from itertools import pairwise
 
 from server.view.media.agreement import Agreement
 from server.view.media.fmp4 import Sample, fragment, init_segment
+from server.view.media.picture import Picture
 from server.view.streams.channel import Channel
-from server.view.streams.picture import Picture
 from server.view.streams.sound import Following, SoundShelf
 from server.view.streams.tally import Tally
 from server.view.streams.timeline import Timeline

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import cached_property
 
+from server.view.media.heard import Heard
+from server.view.media.picture import Picture
 from server.view.media.ts import Counters, pack
-from server.view.streams.picture import Picture
-from server.view.streams.sound import Heard
 
 
 class Footage:

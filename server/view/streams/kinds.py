@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from server.view.media.picture import Picture
 from server.view.media.ts import Counters
 from server.view.streams.channel import Channel
 from server.view.streams.footage import Footage
-from server.view.streams.picture import Picture
 from server.view.streams.reel import Reel
 from server.view.streams.shelf import Shelf
 from server.view.streams.sound import Following, SoundShelf

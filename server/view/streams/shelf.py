@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TypeAlias
 
 from server.view.media.agreement import Agreement
-from server.view.streams.picture import Picture
+from server.view.media.picture import Picture
 from server.wire.h264 import ParameterSets
 
 Shelved: TypeAlias = Picture

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
-
-from server.view.media.mp4_sound import sound_fragment
+from server.view.media.heard import Heard
 from server.view.streams.timeline import LONGEST_S
 from server.wire.messages import SoundHead
 from server.wire.sound import SoundFormat
@@ -14,20 +11,6 @@ _PATIENCE_S = 0.5
 """How long a camera's own stream, which is behind nobody, waits for sound before it has silence instead."""
 _ANEW_S = 10
 """Pulses that go back by more have begun anew."""
-
-
-@dataclass(frozen=True)
-class Heard:
-    """Consecutive frames of sound from number ``first`` on; those that did not come are silent."""
-
-    first: int
-    frames: tuple[bytes, ...]
-    format: SoundFormat
-
-    @cached_property
-    def fragment(self) -> bytes:
-        """The frames as a fragment of MP4; nothing where there are none."""
-        return sound_fragment(self.format, self.frames, self.first) if self.frames else b""
 
 
 class SoundShelf:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 
 from server.view.choice.decide import GopDecision
-from server.view.choice.prefer import Preferring
 from server.view.media.agreement import Agreement
+from server.view.media.picture import Picture
 from server.view.streams.channel import Channel
 from server.view.streams.kinds import DecidedStream, Gop, LiveStream
-from server.view.streams.picture import Picture
+from server.view.streams.prefer import Preferring
 from server.view.streams.reel import Reel, plan
 from server.view.streams.shelf import Shelf
 from server.view.streams.sound import SoundShelf

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from server.view.media.heard import Heard
+from server.view.media.picture import Picture
 from server.view.media.ts import Counters, packets, sound_packets
 from server.view.streams.footage import Footage
-from server.view.streams.picture import Picture
-from server.view.streams.sound import Heard
 
 
 class Tally:

@@ -1,15 +1,15 @@
 """One stream's time: no hole in it, whatever does not come.
 
 A player that has nothing for a moment stops there, some for good. So where a picture is missing, the one
-before it is shown again, by a picture that says just that (`streams/bridge.py`): a decoder sees an ordinary
+before it is shown again, by a picture that says just that (`media/bridge.py`): a decoder sees an ordinary
 stream.
 """
 
 from __future__ import annotations
 
 from server.view.media.agreement import Agreement
-from server.view.streams.bridge import Bridge
-from server.view.streams.picture import Picture
+from server.view.media.bridge import Bridge
+from server.view.media.picture import Picture
 
 _LONG_S = 2
 """Holes up to so long get a picture for every pulse, longer ones a single picture that lasts."""

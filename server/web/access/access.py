@@ -22,9 +22,9 @@ from server.web.access.failures import Failures
 from server.web.access.file import TokenFile
 from server.web.access.grant import Grant, Need, need_of
 from server.web.access.here import is_from_here
+from server.web.access.other_sites import path_of, refused_to_other_sites
 from server.web.access.sessions import Sessions
 from server.web.api import problem
-from server.web.operator.permission import path_of, refused_to_other_sites
 from server.web.turns import again_and_again
 from server.wire.tokens import Token, digest_of
 

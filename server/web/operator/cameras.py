@@ -10,9 +10,9 @@ from camsync import SyncError, clients_of
 from server.view.floor import covered
 from server.view.intake import CameraState
 from server.view.service import BestViewService
+from server.web.access.grant import OPERATING
 from server.web.api import answer
 from server.web.keys import SERVICE
-from server.web.operator.permission import PREFIX
 from server.web.operator.schema import (
     Floor,
     FloorCamera,
@@ -29,14 +29,14 @@ from server.wire.pulse_users import pulse_clients
 routes = web.RouteTableDef()
 
 
-@routes.get(f"{PREFIX}/cameras")
+@routes.get(f"{OPERATING}/cameras")
 async def get_cameras(request: web.Request) -> web.Response:
     """Say how every camera is: state, rate, how far from the pulse, how late its tracks, what went wrong."""
     service = request.app[SERVICE]
     return answer(OperatorCameras([_camera(service, *it) for it in service.intake.states.items()]))
 
 
-@routes.get(f"{PREFIX}/pulses")
+@routes.get(f"{OPERATING}/pulses")
 async def get_pulses(request: web.Request) -> web.Response:
     """Ask the pulse server who its clients are."""
     service = request.app[SERVICE]
@@ -51,7 +51,7 @@ async def get_pulses(request: web.Request) -> web.Response:
     return answer(Pulses(where, "", listeners, [it for it in expected if it not in there]))
 
 
-@routes.get(f"{PREFIX}/floor")
+@routes.get(f"{OPERATING}/floor")
 async def get_floor(request: web.Request) -> web.Response:
     """Say what the cameras cover of the floor that they share."""
     service = request.app[SERVICE]

@@ -10,9 +10,9 @@ from aiohttp import web
 from server.view.past.moment import MomentError, moment_of
 from server.view.past.told import told
 from server.view.service import BestViewService
+from server.web.access.grant import OPERATING
 from server.web.api import problem
 from server.web.keys import SERVICE
-from server.web.operator.permission import PREFIX
 from server.web.past import wish_of
 from server.web.streams import send_bytes
 from server.wire.messages import GopChoices
@@ -33,13 +33,13 @@ class Told(GopChoices, frozen=True, kw_only=True):
 Rows = Callable[[Told, range, Callable[[int], str]], Iterator[str]]
 
 
-@routes.get(f"{PREFIX}/tracks.csv")
+@routes.get(f"{OPERATING}/tracks.csv")
 async def get_tracks(request: web.Request) -> web.StreamResponse:
     """Give who was where from one moment to another, as CSV."""
     return await _send(request, "tracks", _TRACKS, _tracks)
 
 
-@routes.get(f"{PREFIX}/choices.csv")
+@routes.get(f"{OPERATING}/choices.csv")
 async def get_choices(request: web.Request) -> web.StreamResponse:
     """Give which camera showed whom from one moment to another, as CSV."""
     return await _send(request, "choices", _CHOICES, _choices)

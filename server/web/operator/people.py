@@ -7,11 +7,10 @@ from aiohttp import web
 
 from server.view.service import BestViewService
 from server.view.who.people import People
-from server.web.api import answer, no_camera, no_object, problem
+from server.web.access.grant import OPERATING
+from server.web.api import answer, asked_for, no_camera, no_object, problem
 from server.web.keys import SERVICE
-from server.web.operator.permission import PREFIX
 from server.web.operator.schema import PeopleByHand
-from server.web.operator.session import asked_for
 from server.wire.remembered import NAME_MOST
 
 routes = web.RouteTableDef()
@@ -28,13 +27,13 @@ class Said(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Cameras that show somebody else as them; none: all do."""
 
 
-@routes.get(f"{PREFIX}/people")
+@routes.get(f"{OPERATING}/people")
 async def get_people(request: web.Request) -> web.Response:
     """Tell what was said of people by hand."""
     return answer(_told(request.app[SERVICE]))
 
 
-@routes.post(f"{PREFIX}/people")
+@routes.post(f"{OPERATING}/people")
 async def post_people(request: web.Request) -> web.Response:
     """Say something of people: a name, that two are one, that one is somebody new."""
     service = request.app[SERVICE]

@@ -9,11 +9,10 @@ from aiohttp import web
 
 from server.view.helping.pointing import Place
 from server.view.service import BestViewService
-from server.web.api import answer, no_camera, no_object, problem
+from server.web.access.grant import OPERATING
+from server.web.api import answer, asked_for, no_camera, no_object, problem
 from server.web.keys import SERVICE
-from server.web.operator.permission import PREFIX
 from server.web.operator.schema import Pointing
-from server.web.operator.session import asked_for
 from server.wire.help import POINTS_MOST, REACH_LEAST
 from server.wire.numbers import Pulse
 
@@ -42,13 +41,13 @@ class Said(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     points: Annotated[list[Point], msgspec.Meta(min_length=1, max_length=POINTS_MOST)]
 
 
-@routes.get(f"{PREFIX}/pointing")
+@routes.get(f"{OPERATING}/pointing")
 async def get_pointing(request: web.Request) -> web.Response:
     """Say whether anybody can be pointed at, and how far back."""
     return answer(_told(request.app[SERVICE], 0, 0, []))
 
 
-@routes.post(f"{PREFIX}/pointing")
+@routes.post(f"{OPERATING}/pointing")
 async def post_pointing(request: web.Request) -> web.Response:
     """Say where somebody is in a camera's picture: its tracker goes by that, also in the past."""
     service = request.app[SERVICE]

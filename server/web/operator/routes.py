@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from server.web.operator import cameras, past, people, pointing, session, settings, walk
+from server.web.operator import cameras, page, past, people, pointing, settings, walk
 
 routes = [
-    *session.routes,
+    *page.routes,
     *cameras.routes,
     *settings.routes,
     *people.routes,

@@ -12,11 +12,10 @@ from pydantic import BaseModel
 from pydantic_core import PydanticUndefined
 
 from server.view.service import BestViewService
-from server.web.api import answer, problem
+from server.web.access.grant import OPERATING
+from server.web.api import answer, asked_for, problem
 from server.web.keys import ON_DISK, SERVICE
-from server.web.operator.permission import PREFIX
 from server.web.operator.schema import Choosing, Setting, Settings
-from server.web.operator.session import asked_for
 from server.wire.addresses import HIDDEN, SECRET_WORDS, shown
 from server.wire.config import Config
 from server.wire.errors import UserError
@@ -29,7 +28,7 @@ routes = web.RouteTableDef()
 _SECRET = re.compile(f"{SECRET_WORDS}|header|cookie", re.IGNORECASE)
 
 
-@routes.get(f"{PREFIX}/config")
+@routes.get(f"{OPERATING}/config")
 async def get_config(request: web.Request) -> web.Response:
     """Give the configuration in force, with what differs from the defaults; passwords are not shown."""
     found = request.app[ON_DISK]()
@@ -37,13 +36,13 @@ async def get_config(request: web.Request) -> web.Response:
     return answer(Settings(settings, found.error, list(found.waiting)))
 
 
-@routes.get(f"{PREFIX}/choosing")
+@routes.get(f"{OPERATING}/choosing")
 async def get_choosing(request: web.Request) -> web.Response:
     """Say what views are chosen by now, and what the configuration says."""
     return answer(_choosing(request.app[SERVICE]))
 
 
-@routes.put(f"{PREFIX}/choosing")
+@routes.put(f"{OPERATING}/choosing")
 async def put_choosing(request: web.Request) -> web.Response:
     """Choose views by other settings, to try them out: until they are changed again or the service ends."""
     service = request.app[SERVICE]
@@ -59,7 +58,7 @@ async def put_choosing(request: web.Request) -> web.Response:
     return answer(_choosing(service))
 
 
-@routes.delete(f"{PREFIX}/choosing")
+@routes.delete(f"{OPERATING}/choosing")
 async def delete_choosing(request: web.Request) -> web.Response:
     """Choose views by what the configuration says again."""
     service = request.app[SERVICE]

@@ -11,11 +11,10 @@ from server.view.calibrate.task import Done
 from server.view.calibrate.walking import MOST_S, State
 from server.view.calibrate.words import missed
 from server.view.service import BestViewService
-from server.web.api import answer, problem
+from server.web.access.grant import OPERATING
+from server.web.api import answer, asked_for, problem
 from server.web.keys import SERVICE
-from server.web.operator.permission import PREFIX
 from server.web.operator.schema import OperatorWalk, WalkCamera, WalkPair
-from server.web.operator.session import asked_for
 
 routes = web.RouteTableDef()
 
@@ -30,13 +29,13 @@ class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """To finish: how tall people are, metres."""
 
 
-@routes.get(f"{PREFIX}/walk")
+@routes.get(f"{OPERATING}/walk")
 async def get_walk(request: web.Request) -> web.Response:
     """Say what was covered of the walk so far, and what has come of it."""
     return answer(_told(request.app[SERVICE]))
 
 
-@routes.post(f"{PREFIX}/walk")
+@routes.post(f"{OPERATING}/walk")
 async def post_walk(request: web.Request) -> web.Response:
     """Start a walk, go on with it, or finish it: then it is calibrated from."""
     service = request.app[SERVICE]
@@ -54,7 +53,7 @@ async def post_walk(request: web.Request) -> web.Response:
     return answer(_told(service))
 
 
-@routes.delete(f"{PREFIX}/walk")
+@routes.delete(f"{OPERATING}/walk")
 async def delete_walk(request: web.Request) -> web.Response:
     """Forget the walk and what came of it."""
     service = request.app[SERVICE]
@@ -62,7 +61,7 @@ async def delete_walk(request: web.Request) -> web.Response:
     return answer(_told(service))
 
 
-@routes.get(f"{PREFIX}/walk/ground.json")
+@routes.get(f"{OPERATING}/walk/ground.json")
 async def get_ground(request: web.Request) -> web.Response:
     """Give the ground file that has come of the walk."""
     done = request.app[SERVICE].walking.done
@@ -71,7 +70,7 @@ async def get_ground(request: web.Request) -> web.Response:
     return _file(done.ground.encode(), "application/octet-stream", "ground.json")
 
 
-@routes.get(f"{PREFIX}/walk/plan.png")
+@routes.get(f"{OPERATING}/walk/plan.png")
 async def get_plan(request: web.Request) -> web.Response:
     """Give the floor plan that has come of the walk."""
     done = request.app[SERVICE].walking.done

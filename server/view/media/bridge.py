@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from server.view.media.fmp4 import Sample, fragment
+from server.view.media.picture import Picture
 from server.view.media.skip import Continuing
-from server.view.streams.picture import Picture
 from server.wire.h264 import ParameterSets
 
 Span = tuple[int, int]

@@ -12,7 +12,6 @@ from aiohttp import web
 from server.web.access.grant import OPERATING, SESSION
 from server.web.api import problem
 
-PREFIX = OPERATING
 CHANGES = "X-MyView-Changes"
 """The head of a request that changes something."""
 
@@ -45,4 +44,4 @@ def path_of(request: web.Request) -> str:
 
 
 def _changes_something(path: str) -> bool:
-    return path in {PREFIX, SESSION} or path.startswith(f"{PREFIX}/")
+    return path in {OPERATING, SESSION} or path.startswith(f"{OPERATING}/")

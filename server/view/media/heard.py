@@ -1,0 +1,23 @@
+"""Some of a site's sound."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from server.view.media.mp4_sound import sound_fragment
+from server.wire.sound import SoundFormat
+
+
+@dataclass(frozen=True)
+class Heard:
+    """Consecutive frames of sound from number ``first`` on; those that did not come are silent."""
+
+    first: int
+    frames: tuple[bytes, ...]
+    format: SoundFormat
+
+    @cached_property
+    def fragment(self) -> bytes:
+        """The frames as a fragment of MP4; nothing where there are none."""
+        return sound_fragment(self.format, self.frames, self.first) if self.frames else b""
