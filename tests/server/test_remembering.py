@@ -20,7 +20,7 @@ from server.web.app import make_app
 from server.wire.epochs import end_of_epoch
 from server.wire.inbox import Message
 from server.wire.messages import Box, Keys
-from server.wire.remembered import REMEMBERED_MOST, Known, Remembered
+from server.wire.remembered import NUMBER_MOST, REMEMBERED_MOST, Known, Remembered
 
 A, B = CAMERAS
 KEYS = Keys("hall")
@@ -136,6 +136,17 @@ def test_tracks_of_a_camera_that_was_started_anew_are_not_taken_for_those_of_bef
     site.tell(range(7, 9), {A: {1: SMALL, 2: LARGE}, B: {}}, boot=2)
     assert site.whose(A, 2, 8, boot=2) == before
     assert site.whose(A, 1, 8, boot=2) >= used
+
+
+def test_a_number_too_large_to_remember_keeps_nobody_else_from_being_remembered() -> None:
+    site = told()
+    ann = site.whose(A, 2, 5)
+    site.service.decider.people.roll.known_as(ann, [NUMBER_MOST + 1])
+    site.tell(range(6, 7))
+    site.start()
+    site.tell(range(7, 9))
+    assert site.whose(A, 2, 8) == ann
+    assert site.service.decider.people.roll.names == {ann: "Ann"}
 
 
 def test_numbers_have_begun_with_the_first_that_is_given_however_late_a_camera_says_it_is_there() -> None:

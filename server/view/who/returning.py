@@ -24,7 +24,8 @@ def remembered_by(
         boots[it.camera] = max(it.boot, boots.get(it.camera, 0))
     also: dict[int, list[int]] = {}
     for old, number in people.roll.merged.items():
-        also.setdefault(number, []).append(old)
+        if old <= NUMBER_MOST:
+            also.setdefault(number, []).append(old)
     by_hand = set(people.merged_by_hand.values())
     known: dict[str, list[Known]] = {camera: [] for camera in cameras}
     for number, tracks in followed.items():
