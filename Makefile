@@ -12,11 +12,12 @@ AGAIN ?= --reruns 2 --reruns-delay 1
 demo: $(STAMP)
 	$(BIN)/myview demo
 
-# First libraries and services, on two cores; then browsers and whole sites, which run in real time.
+# First libraries and services; then browsers and whole sites, which run in real time. Three at once for two cores:
+# a third of it waits for a disk, a browser or the next frame.
 # Machines are shared: what fails is tried again and told of as RERUN. What is wrong fails every time.
 test: $(STAMP) $(NODE_STAMP)
-	$(BIN)/pytest -m "not slow" $(AGAIN) -n 2 --dist loadfile --ignore tests/client --ignore tests/e2e
-	$(BIN)/pytest -m "not slow" $(AGAIN) -n 2 --dist loadfile tests/client tests/e2e
+	$(BIN)/pytest -m "not slow" $(AGAIN) -n 3 --dist loadfile --ignore tests/client --ignore tests/e2e
+	$(BIN)/pytest -m "not slow" $(AGAIN) -n 3 --dist loadfile tests/client tests/e2e
 
 test-slow: $(STAMP) $(NODE_STAMP)
 	$(BIN)/pytest -m slow --timeout 1800
