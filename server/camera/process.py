@@ -107,13 +107,12 @@ class CameraProcess:
             await self._wait_for_bestview(bus)
             bus.declare_alive(self._keys.camera(self._id, "alive"))
             await self._exchange.join()
-            tasks = [
-                asyncio.create_task(self._follow_pulses(), name="pulses"),
-                asyncio.create_task(self._track(), name="track"),
-                asyncio.create_task(self._tell_status(), name="status"),
-            ]
+            video = asyncio.create_task(self._follow_pulses(), name="pulses")
+            tracking = asyncio.create_task(self._track(), name="track")
+            status = asyncio.create_task(self._tell_status(), name="status")
+            tasks = (video, tracking, status)
             try:
-                await self._until_over(*tasks[:2])
+                await self._until_over(video, tracking, status)
                 self._send_status()
             finally:
                 for task in tasks:
@@ -129,11 +128,14 @@ class CameraProcess:
             self._pipeline.close()
 
     @staticmethod
-    async def _until_over(video: asyncio.Task[None], tracking: asyncio.Task[None]) -> None:
-        """Wait for both; what ends one of them by an error ends the process, which is then started anew."""
-        await asyncio.wait({video, tracking}, return_when=asyncio.FIRST_EXCEPTION)
-        for task in (video, tracking):
-            if task.done():
+    async def _until_over(
+        video: asyncio.Task[None], tracking: asyncio.Task[None], status: asyncio.Task[None]
+    ) -> None:
+        """Wait for video and tracking; an error in any ends the process, which is then started anew."""
+        left = {video, tracking, status}
+        while left - {status}:
+            over, left = await asyncio.wait(left, return_when=asyncio.FIRST_COMPLETED)
+            for task in over:
                 task.result()
 
     async def _wait_for_bestview(self, bus: Bus) -> None:

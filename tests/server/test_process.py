@@ -252,8 +252,9 @@ async def test_a_camera_and_a_service_prove_who_they_are_to_pulses_that_ask(
     assert it.pulses.refused == 0
 
 
-async def test_a_camera_whose_tracker_fails_ends_with_that_error(
-    tmp_path: Path, running: list[Running], monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("what", ["pipeline.CameraPipeline.follow", "meter.Meter.status"])
+async def test_a_camera_whose_work_fails_ends_with_that_error(
+    tmp_path: Path, running: list[Running], monkeypatch: pytest.MonkeyPatch, what: str
 ) -> None:
     config = site(tmp_path, c0="scene:room?objects=1")
     it = Running(config)
@@ -261,9 +262,9 @@ async def test_a_camera_whose_tracker_fails_ends_with_that_error(
     await it.start()
 
     def fail(*_: object) -> None:
-        raise ArithmeticError("the tracker's own mistake")
+        raise ArithmeticError("the camera's own mistake")
 
-    monkeypatch.setattr("server.camera.pipeline.CameraPipeline.follow", fail)
+    monkeypatch.setattr(f"server.camera.{what}", fail)
     async with asyncio.timeout(PATIENCE):
         with pytest.raises(ArithmeticError):
             await it.camera("c0")
