@@ -23,7 +23,8 @@ LATE_HEAD = "frame,camera,what\n"
 class Recorder:
     """Writes decisions: ``tracks/<camera>.txt``, ``choices.csv``, ``corrections.csv``, ``late.csv``.
 
-    ``fits`` may grow: a camera is in it from its first word on.
+    ``fits`` may grow: a camera is in it from its first word on. A choice is a line also while nobody sees
+    the person: it says what their stream shows.
 
     Frames count from 1 in all of them, as in MOTChallenge files: frame 1 is pulse 0. Boxes are in pixels of
     the camera's own picture. An empty ``late.csv`` says that the files are exactly what `myview render`
@@ -60,7 +61,7 @@ class Recorder:
             texts[self._choices] += (
                 f"{decision.first + place + 1},{choice.number},{choice.camera}\n"
                 for choice in decision.choices
-                if choice.camera is not None and not choice.away
+                if choice.camera is not None
             )
         texts[self._corrections] += (f"{decision.first + 1},{_line(it)}\n" for it in decision.corrections)
         texts[self._late] += late
