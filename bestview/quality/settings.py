@@ -16,7 +16,7 @@ class QualitySettings:
     """
 
     size: float = 1.0  # how large the person is in the picture
-    whole: float = 0.1  # how much of the person the picture's edges leave
+    whole: float = 1.0  # how much of the person the picture's edges leave
     unhidden: float = 0.25  # how much of the person other people leave to be seen
     central: float = 0.0  # how near the middle of the picture
     sharp: float = 0.0  # how much detail there is

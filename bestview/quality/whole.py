@@ -6,19 +6,22 @@ import numpy as np
 
 from bestview.quality.boxes import Floats, areas, areas_inside, shares
 
-_CUT = 0.5
-"""What a box is worth that ends at the upper or lower edge: nobody can say how much is beyond it."""
-
 _NEAR_EDGE = 0.03
-"""Share of the box's height from the edge at which it counts as clear of it."""
+"""Share of the box's height from an edge at which it counts as clear of it."""
+_CUT = 0.05
+"""What a box loses that ends at the upper or lower edge: nobody can say how much is beyond it."""
+_SLIM = 0.37
+"""Width over height of a box at an upright person: one at a side edge that is slimmer is a part of them."""
 
 
 def whole(boxes: Floats, pictures: Floats) -> Floats:
-    """Share of the box inside the picture, and less where the upper or lower edge cuts it.
+    """Share of the person inside the picture, as far as their box tells.
 
-    ``area(box in picture) / area(box) * (1/2 + 1/2 min(gap / (0.03 height), 1))`` with `gap` the distance to
-    the nearer of the two edges, at least 0. Detectors that keep their boxes inside the picture do not
-    say how much of head or feet is missing; a box that ends at the edge tells that something is.
+    ``area(box in picture) / area(box)``, times ``1 - 0.05 n`` for the nearer of the upper and lower edge,
+    times ``1 - n (1 - min(width / (0.37 height), 1))`` for the nearer side edge, with `n` how near it is:
+    ``1 - min(gap / (0.03 height), 1)``. Detectors keep their boxes inside the picture. One that ends at the
+    upper or lower edge tells that something is missing, though not how much; one that ends at a side edge
+    and is slimmer than people are tells that, too. Of who sticks out at a side the area says it.
 
     Args:
         boxes: (..., 4) pixels, nobody hidden.
@@ -28,6 +31,16 @@ def whole(boxes: Floats, pictures: Floats) -> Floats:
         (...) values in [0, 1].
     """
     inside = shares(areas_inside(boxes, pictures), areas(boxes))
-    gap = np.minimum(boxes[..., 1] - pictures[..., 1], pictures[..., 3] - boxes[..., 3])
-    room = np.maximum(_NEAR_EDGE * (boxes[..., 3] - boxes[..., 1]), np.finfo(np.float64).tiny)
-    return np.asarray(inside * (_CUT + (1.0 - _CUT) * np.clip(gap / room, 0.0, 1.0)))
+    left, top, right, bottom = np.moveaxis((boxes - pictures) * np.array([1.0, 1.0, -1.0, -1.0]), -1, 0)
+    tall = boxes[..., 3] - boxes[..., 1]
+    ends = _nearness(np.minimum(top, bottom), tall)
+    beside = np.minimum(left, right)
+    beside = np.where(beside < 0.0, 0.0, _nearness(beside, tall))
+    slim = np.minimum(shares(boxes[..., 2] - boxes[..., 0], _SLIM * tall), 1.0)
+    return np.asarray(inside * (1.0 - _CUT * ends) * (1.0 - beside * (1.0 - slim)))
+
+
+def _nearness(gap: Floats, tall: Floats) -> Floats:
+    """Say how near (...) boxes are to an edge that is `gap` away: 1 at it or beyond, 0 clear of it."""
+    room = np.maximum(_NEAR_EDGE * tall, np.finfo(np.float64).tiny)
+    return np.asarray(1.0 - np.clip(gap / room, 0.0, 1.0))

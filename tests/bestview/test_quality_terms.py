@@ -49,12 +49,22 @@ def only(**weights: float) -> QualitySettings:
 
 def test_who_is_inside_the_picture_and_clear_of_its_edges_is_whole() -> None:
     boxes = np.array([box(20, 20), box(-5, 20), box(20, 40), box(20, 0), box(20, 60), box(200, 20)])
-    assert whole(boxes, PICTURE) == pytest.approx([1.0, 0.5, 0.5, 0.5, 0.25, 0.0])
+    assert whole(boxes, PICTURE) == pytest.approx([1.0, 0.5, 0.95, 0.95, 0.475, 0.0])
 
 
 def test_the_edge_counts_gradually() -> None:
     values = whole(np.array([box(20, 40 - gap) for gap in (0.0, 0.3, 0.6, 1.2, 5.0)]), PICTURE)
-    assert values == pytest.approx([0.5, 0.625, 0.75, 1.0, 1.0])
+    assert values == pytest.approx([0.95, 0.9625, 0.975, 1.0, 1.0])
+
+
+def test_who_ends_at_a_side_is_as_much_of_a_person_as_the_box_is_wide() -> None:
+    slim, wide = 0.37 * 40.0 / 2.0, 0.37 * 40.0
+    boxes = np.array([box(0, 20, slim), box(WIDTH - slim, 20, slim), box(0, 20, wide), box(0, 20, 2 * wide)])
+    assert whole(boxes, PICTURE) == pytest.approx([0.5, 0.5, 1.0, 1.0])
+    away = np.array([box(gap, 20, slim) for gap in (0.0, 0.6, 1.2, 30.0)])
+    assert whole(away, PICTURE) == pytest.approx([0.5, 0.75, 1.0, 1.0]), "clear of it, people may be slim"
+    beyond = np.array([box(-slim / 2, 20, slim), box(WIDTH - slim / 2, 20, slim)])
+    assert whole(beyond, PICTURE) == pytest.approx([0.5, 0.5]), "the part outside is told once"
 
 
 def test_who_is_in_the_middle_is_central() -> None:
