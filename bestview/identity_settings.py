@@ -35,9 +35,9 @@ class IdentitySettings:
     # The most evidence that the ground gives, for or against.
     ground_cap: float = 20.0
     # Evidence of looking as much alike as the same person usually does in a camera.
-    look: float = 3.0
+    look: float = 8.0
     # The most evidence that looks give in one camera, for or against.
-    look_cap: float = 4.0
+    look_cap: float = 12.0
     # Frames alone after which a look is known well enough to weigh in full.
     look_frames: int = 8
     # Evidence that a camera's track is the same person before and after a crowd...
@@ -89,6 +89,8 @@ class IdentitySettings:
     travel_known: float = 5.0
     # The most evidence that they give, for or against; 0: looks alone.
     travel_cap: float = 4.0
+    # What looks weigh beside them: the evidence of being nearer than the gate by a factor of e.
+    travel_look: float = 3.0
     # Frames for which who is gone is compared like everybody; later only a clear likeness brings them back.
     recent: int = 750
     # Frames after which someone gone is forgotten (15000: ten minutes at 25/s).
@@ -102,7 +104,14 @@ class IdentitySettings:
             raise ValueError(f"identity gate: {self.gate} is not above 0")
         if not 0 < self.memory <= 1:
             raise ValueError(f"identity memory: {self.memory} is not in (0, 1]")
-        for name in ("regroup", "look_frames", "ground_frames", "goes_on_frames", "reach_heights"):
+        for name in (
+            "regroup",
+            "look_frames",
+            "ground_frames",
+            "goes_on_frames",
+            "reach_heights",
+            "travel_look",
+        ):
             if not getattr(self, name) > 0:
                 raise ValueError(f"identity {name}: {getattr(self, name)} is not above 0")
         for field in fields(self):

@@ -74,9 +74,8 @@ class Newcomers:
         first, last = [_first(it) for it in new], [it.person.sight for it in lost]
         time = self._travel.evidence(first, last)
         by_looks = find_again(between.appearances, *looks, possible, between.gate)
-        found = find_again(
-            between.appearances, *looks, possible, between.gate, np.exp(-time / self._settings.look)
-        )
+        nearer = np.exp(-time / self._settings.travel_look)
+        found = find_again(between.appearances, *looks, possible, between.gate, nearer)
         for i, match in enumerate(by_looks):
             if match < 0:
                 continue
