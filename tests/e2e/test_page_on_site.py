@@ -26,6 +26,16 @@ pytestmark = [
     pytest.mark.skipif(not CHROMIUM.exists(), reason=f"needs a Chromium at {CHROMIUM}"),
 ]
 
+PLAYED_ACROSS_A_CUT = f"""(() => {{
+  const shown = myview.delays.map((it) => it.pulse);
+  return myview.cuts.some(({{ pulse: cut }}) => {{
+    const [from, to] = [cut - {FPS}, cut + {FPS}];
+    const around = [from, ...shown.filter((it) => from < it && it < to), to];
+    const steps = around.slice(1).map((it, k) => it - around[k]);
+    return shown.at(-1) >= to && steps.every((step) => 0 <= step && step < {FPS // 2});
+  }});
+}})()"""
+
 
 @pytest_asyncio.fixture(scope="module", loop_scope="module")
 async def site(recording: Path, tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[RunningSite]:
@@ -62,13 +72,8 @@ async def test_the_best_view_plays_across_a_cut_and_the_frames_go_on(page: Page)
     await page.wait_for_function("myview.state === 'playing'")
     # Whoever has left for good is never cut to again: then somebody in view is chosen.
     somebody = "document.querySelector('#people button.person:not(.away)')?.click()"
-    await page.wait_for_function(f"myview.cuts.length > 0 || (myview.state === 'away' && {somebody}, false)")
-    cut = await page.evaluate("myview.cuts[0].pulse")
-    await page.wait_for_function(f"myview.pulse > {cut} + 25")
-    shown = await page.evaluate("myview.delays.map((it) => it.pulse)")
-    around = [pulse for pulse in shown if cut - 25 <= pulse <= cut + 25]
-    assert len(around) > 20, "a slow core may leave frames out, but not the seconds around a cut"
-    assert around == sorted(around)
+    # A slow core leaves frames out, and now and then the page jumps to live; it never stops at each cut.
+    await page.wait_for_function(f"{PLAYED_ACROSS_A_CUT} || (myview.state === 'away' && {somebody}, false)")
 
 
 @pytest.mark.slow
