@@ -86,7 +86,7 @@ async def killed(site: RunningSite, words: list[CameraTracks]) -> None:
     died = site.pulse
     async with asyncio.timeout(PATIENCE_S), aiohttp.ClientSession() as session:
         while (status := await asked(session, f"{site.url}objects/{number}/best.mp4")) != 200:
-            assert status in {None, 503}, "who is found again in a moment is not said to be nobody"
+            assert status in {None, 503}, f"{number} is not said to be nobody: " + "\n".join(site.lines)
             await asyncio.sleep(0.05)
     await bounded(site.until(lambda: site.pulse > died + 50 and len(site.gops) > count + 3, "it goes on"))
     assert site.children()["bestview"] != before

@@ -202,6 +202,45 @@ def test_a_camera_that_says_late_what_it_remembers_keeps_numbers_from_being_used
     assert min(site.service.decider.people.known) > used
 
 
+def test_a_camera_that_says_late_what_it_remembers_is_heard_all_the_same() -> None:
+    site = told()
+    ann, b = site.whose(A, 2, 5), site.whose(B, 3, 5)
+    site.start(deaf=B)
+    site.tell(range(7, 8), {A: {2: LARGE}, B: {}})
+    assert site.service.remembering.awaits(b), "camera B may still come"
+    site.cameras[B].service(there=True)
+    site.tell(range(8, 12), {A: {2: LARGE, 9: SMALL}, B: {3: LARGE}})
+    assert [site.whose(A, 2, 11), site.whose(B, 3, 11)] == [ann, b]
+
+
+def test_of_what_is_said_late_nothing_counts_that_may_be_anothers_by_now() -> None:
+    site = told()
+    before = [site.whose(A, 1, 5), site.whose(A, 2, 5), site.whose(B, 3, 5)]
+    site.cameras[A] = Keeping(lambda said: site._hear(A, said))
+    site.start(deaf=B)
+    site.tell(range(7, 8), {A: {1: SMALL, 2: LARGE}, B: {}})
+    assert site.whose(A, 1, 7) in before, "nobody had said that it was taken"
+    site.cameras[B].service(there=True)
+    site.tell(range(8, 12))
+    assert site.whose(B, 3, 11) > max(before)
+    assert site.service.decider.people.roll.names == {}
+
+
+def test_a_track_that_comes_late_is_whose_number_its_own_has_become_meanwhile() -> None:
+    site = Site()
+    site.start()
+    site.tell(range(4))
+    site.service.decider.people.merge(site.whose(A, 1, 3), site.whose(B, 3, 3))
+    site.tell(range(4, 6))
+    one, ann = site.whose(A, 1, 5), site.whose(A, 2, 5)
+    site.start()
+    site.tell(range(7, 9), {A: {1: SMALL, 2: LARGE}, B: {}})
+    site.tell(range(9, 11), {A: {2: LARGE}, B: {}})
+    site.service.decider.people.merge(ann, one)
+    site.tell(range(11, 14), {A: {2: LARGE}, B: {3: LARGE}})
+    assert site.whose(B, 3, 13) == ann
+
+
 def test_a_name_that_was_given_meanwhile_stays_and_one_that_was_taken_back_is_not_given_again() -> None:
     site = told()
     site.start()

@@ -127,7 +127,14 @@ class People:
 
     def expect(self, tracks: Mapping[Followed, int], pulse: int) -> None:
         """Take over whose tracks are that are not heard of yet, from a run that ended with a pulse."""
-        self._expected = {track: (number, pulse) for track, number in tracks.items()}
+        self._expected |= {
+            track: (number, pulse) for track, number in tracks.items() if not self.heard_of(track)
+        }
+
+    def expect_no_more(self, tracks: Iterable[Followed]) -> None:
+        """Take these tracks, should they be heard of, for somebody's of whom nothing is known."""
+        for track in tracks:
+            self._expected.pop(track, None)
 
     @property
     def merged_by_hand(self) -> dict[int, int]:
@@ -237,7 +244,7 @@ class People:
         for key in chain.from_iterable(it.keys for it in windows) if self._expected else ():
             number, pulse = self._expected.pop(self._reader.locals.origin(key), (0, 0))
             if number:
-                self._registry.recall(key, number, pulse)
+                self._registry.recall(key, self.roll.whose(number), pulse)
 
     def _merge(self, kept: int, lost: int) -> None:
         self.roll.merge(kept, lost)

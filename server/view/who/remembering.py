@@ -20,6 +20,8 @@ PATIENCE_S = 1.0
 """How long a camera that has come is waited for until it says what it remembers."""
 _LATELY_S = 10.0
 """A camera whose words come late, on a machine with too much to do, goes on following all the same."""
+_COMES_S = 10.0
+"""How long after the beginning a camera may still come that remembers more people: its way may be slow."""
 _EVERY_S = 1.0
 """Seconds between two words of the same to a camera: each says when it was true."""
 
@@ -51,8 +53,12 @@ class Remembering:
         self._came: dict[str, float] = {}
         """When each camera came that has not said yet what it remembers."""
         self._said: dict[str, Remembered] = {}
-        self._returning: Returning | None = None
+        self._returning: list[Returning] = []
+        """First of all who had come when this began, then a camera each that came later."""
         self._begun = self._anybody = False
+        self._began_at = 0.0
+        self._free = 1
+        """The first number that this run may give, by what it began with."""
         self._heard: set[str] = set()
         """Cameras that have said what they remember: told sooner, they would have forgotten it."""
         self._sent: dict[str, Remembered] = {}
@@ -69,7 +75,10 @@ class Remembering:
             self._came.pop(camera, None)
 
     def heard(self, message: Message) -> None:
-        """A camera says what it remembers; after the beginning only which numbers are taken is of use.
+        """A camera says what it remembers.
+
+        One that reached the service only after the beginning is heard, too; of what a camera says again only
+        the numbers that are taken are of use.
 
         Raises:
             DecodeError or another of `UNREADABLE`: it is none.
@@ -77,12 +86,13 @@ class Remembering:
         camera = camera_of(message.key)
         if camera not in self._cameras:
             return
+        again = self._begun and camera in self._heard
         self._came.pop(camera, None)
         self._heard.add(camera)
         if not message.payload:
             return
         said = msgspec.json.decode(message.payload, type=Remembered)
-        if self._begun:
+        if again:
             self._people.begin_at(said.next)
         else:
             self._said[camera] = said
@@ -99,7 +109,13 @@ class Remembering:
         """Tell whether somebody of this number may be found again, or is and only nothing is decided yet."""
         if not self._begun or self._people.roll.whose(number) in self._people.roll.first_seen:
             return True
-        return self._returning is not None and number in self._returning.numbers
+        if (
+            number < self._free
+            and self._clock() < self._began_at + _COMES_S
+            and self._heard < set(self._cameras)
+        ):
+            return True
+        return any(number in it.numbers for it in self._returning)
 
     @property
     def numbers_since(self) -> float:
@@ -109,24 +125,31 @@ class Remembering:
     def begin(self, pulse: int) -> None:
         """Begin with what is remembered, before an epoch that ends with a pulse is taken in.
 
-        As long as no camera has come there is nothing to begin with.
+        As long as no camera has come there is nothing to begin with. What is said later adds to it.
         """
-        if self._begun or not self._anybody:
+        if not self._anybody or (self._begun and not self._said):
             return
-        self._begun = True
-        self._returning = Returning(self._said, pulse, round(LONGEST_S * self._fps))
-        self._returning.begin(self._people, pulse)
-        if self._said:
-            self._since = min(self._since, max(it.since for it in self._said.values()))
-            log.info("the cameras remember %d people", len(self._returning.numbers))
+        if self._begun:
+            said = {camera: _below(self._free, it) for camera, it in self._said.items()}
+        else:
+            said = self._said
+        returning = Returning(said, pulse, round(LONGEST_S * self._fps))
+        returning.begin(self._people, pulse)
+        if not self._begun:
+            self._begun, self._began_at = True, self._clock()
+            self._free = self._people.next_number
+            if said:
+                self._since = min(self._since, max(it.since for it in said.values()))
+        if said:
+            log.info("%s: remembered %d people", ", ".join(sorted(said)), len(returning.numbers))
+        self._returning.append(returning)
         self._said = {}
 
     def take(self, pulse: int) -> None:
         """Look at people after an epoch that ends with a pulse was taken in."""
-        if self._returning is not None:
-            self._returning.look(self._people, pulse)
-            if self._returning.over:
-                self._returning = None
+        for returning in self._returning:
+            returning.look(self._people, pulse)
+        self._returning = [it for it in self._returning if not it.over]
         if self._begun and self._tells:
             self._tell(pulse)
 
@@ -142,6 +165,12 @@ class Remembering:
             if len(payload) <= REMEMBERED_MOST:
                 self._sent[camera] = now
                 self._send(camera, payload)
+
+
+def _below(free: int, said: Remembered) -> Remembered:
+    """Leave out whom this run does not know by the number, since it may have given it to somebody else."""
+    known = [it for it in said.people if max(it.number, *it.also, 0) < free]
+    return msgspec.structs.replace(said, people=known)
 
 
 def _same(one: Remembered, other: Remembered) -> bool:

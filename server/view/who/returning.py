@@ -74,6 +74,8 @@ class Returning:
 
     def __init__(self, said: dict[str, Remembered], pulse: int, longest: int) -> None:
         self._until = -1
+        self._over = False
+        self._tracks: dict[Followed, int] = {}
         self._awaited: list[_Awaited] = []
         self._found: dict[Followed, int] = {}
         """The pulse at which each track was first heard of again."""
@@ -83,11 +85,12 @@ class Returning:
         if lately:
             self._until = max(it.pulse for it in lately.values()) + longest
             self._awaited = _awaited(lately)
+            self._tracks = {track: it.number for it in self._awaited for track in it.tracks}
 
     @property
     def over(self) -> bool:
-        """Whether nobody is awaited any more."""
-        return not self._awaited
+        """Whether nobody is awaited any more: tracks of those who were found may still come."""
+        return self._over
 
     @property
     def numbers(self) -> Collection[int]:
@@ -97,13 +100,13 @@ class Returning:
     def begin(self, people: People, pulse: int) -> None:
         """Tell whose the tracks will be, before anybody has heard of them."""
         people.begin_at(self.next_number)
-        people.expect({track: it.number for it in self._awaited for track in it.tracks}, pulse - 1)
+        people.expect(self._tracks, pulse - 1)
 
     def look(self, people: People, pulse: int) -> None:
         """Look for them after an epoch that ends with a pulse was taken in."""
         if pulse > self._until:
-            self._awaited = []
-            people.expect({}, pulse)
+            self._awaited, self._over = [], True
+            people.expect_no_more(self._tracks)
         self._awaited = [it for it in self._awaited if not self._give_back(it, people, pulse)]
 
     def _give_back(self, awaited: _Awaited, people: People, pulse: int) -> bool:
