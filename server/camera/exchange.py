@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import logging
 from collections import defaultdict
 from collections.abc import Callable
@@ -54,7 +53,10 @@ class Exchange:
         """Messages of the others that were none."""
 
     async def join(self) -> None:
-        """Join the others; where the router is not there yet, that goes on meanwhile."""
+        """Join the others; where the router is not there yet, that goes on meanwhile.
+
+        What goes wrong with it then ends whoever next asks what the others found.
+        """
         if not self._others:
             return
         self._joining = asyncio.create_task(self._join(), name="join")
@@ -67,8 +69,9 @@ class Exchange:
             self._joining.cancel()
             await asyncio.gather(self._joining, return_exceptions=True)
         if self._opening is not None:
-            with contextlib.suppress(UserError):
-                (await self._opening).close()
+            (opened,) = await asyncio.gather(self._opening, return_exceptions=True)
+            if isinstance(opened, Bus):
+                opened.close()
 
     async def _join(self) -> None:
         while True:
@@ -100,6 +103,8 @@ class Exchange:
         """
         if word is None:
             return Heard()
+        if self._joining is not None and self._joining.done():
+            self._joining.result()
         await self._tell(word)
         until = taken + self._patience
         self._earshot.ask(pulse, until)

@@ -189,6 +189,21 @@ async def test_words_go_both_ways_from_the_first_one_on(pair: tuple[Bus, Exchang
         assert second.words == (word("c0", pulse),)
 
 
+async def test_a_camera_that_cannot_join_for_a_reason_nobody_foresaw_does_not_go_on_by_itself(
+    recording: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def hearing(*_: object) -> Bus:
+        raise MemoryError("no memory")
+
+    monkeypatch.setattr(Bus, "hearing", hearing)
+    config = config_of(recording, wait=WAIT)
+    alone = Exchange(config, "c0", Witness(config, "c0", (192, 108), 1), 100)
+    await alone.join()
+    with pytest.raises(MemoryError, match="no memory"):
+        await alone.of(0, word("c0", 0), now(), needed=True)
+    await alone.leave()
+
+
 async def test_a_camera_that_is_gone_is_waited_for_once(pair: tuple[Bus, Exchange, Exchange]) -> None:
     _, one, two = pair
     await both(one, two, needed=True)

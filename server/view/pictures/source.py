@@ -112,26 +112,29 @@ class Source:
 
     async def run(self) -> None:
         """Draw until the stream ends; a process that dies is replaced."""
-        show = asyncio.create_task(self._show(), name=f"show {self._name}")
-        pause = _RETRY_FIRST_S
         try:
-            while True:
-                try:
-                    await self._run_process()
-                except ProcessDiedError as error:
-                    pause = _RETRY_FIRST_S if self._answered else min(2 * pause, _RETRY_MAX_S)
-                    if (more := self._dies.happened(str(error))) is not None:
-                        told = "drawing %s: the process %s%s; starting another"
-                        log.warning(told, self._name, error, more)
-                    self.restarts += 1
-                    self.film.interrupted()
-                    await asyncio.sleep(pause)
-                else:
-                    return
+            async with asyncio.TaskGroup() as both:
+                show = both.create_task(self._show(), name=f"show {self._name}")
+                await self._draw_on()
+                show.cancel()
         finally:
-            show.cancel()
-            await asyncio.gather(show, return_exceptions=True)
             self.close()
+
+    async def _draw_on(self) -> None:
+        pause = _RETRY_FIRST_S
+        while True:
+            try:
+                await self._run_process()
+            except ProcessDiedError as error:
+                pause = _RETRY_FIRST_S if self._answered else min(2 * pause, _RETRY_MAX_S)
+                if (more := self._dies.happened(str(error))) is not None:
+                    told = "drawing %s: the process %s%s; starting another"
+                    log.warning(told, self._name, error, more)
+                self.restarts += 1
+                self.film.interrupted()
+                await asyncio.sleep(pause)
+            else:
+                return
 
     def close(self) -> None:
         """End what is made of it for everybody."""
