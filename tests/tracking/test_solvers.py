@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from random_networks import Case, best_by_trying, cases, network_of
+from random_networks import SETTINGS, Case, best_by_trying, cases, network_of
 
 from tracking.detections import Detections
 from tracking.network import Template, build_network
@@ -59,6 +59,34 @@ def test_the_bound_is_below_the_optimum_and_whole_relaxations_are_optimal(name: 
     if report.integral:
         assert report.objective == pytest.approx(optimum, rel=CLOSE)
         assert report.gap < CLOSE
+
+
+@pytest.mark.parametrize("name", ["arcs", "columns", "exact", "extended-dp", "greedy-dp"])
+@settings(deadline=None, max_examples=40)
+@given(case=cases(objects=3, frames=3, places=3), share=st.sampled_from([0.2, 0.5, 0.8]))
+def test_where_objects_must_be_somewhere_they_are_there_or_the_answer_says_it_is_in_conflict(
+    name: str, case: Case, share: float
+) -> None:
+    network = network_of(case)
+    barred = np.random.default_rng(case.seed).uniform(size=network.node.shape) < share
+    network = replace(network, node=np.where(barred, np.inf, network.node))
+    optimum = best_by_trying(network)
+    assume(np.isfinite(optimum))
+    found = solver_named(name).solve(network)
+    assert found.report.conflicts == conflict_count(network, nodes_of(network, found.states))
+    if not found.report.conflicts:
+        assert found.report.objective >= optimum - CLOSE
+    if name != "greedy-dp":
+        assert not found.report.conflicts
+        assert np.isfinite(found.report.objective)
+    if name in {"exact", "extended-dp"} or found.report.integral:
+        assert found.report.objective == pytest.approx(optimum, rel=CLOSE)
+
+
+def test_greedy_ends_where_there_is_a_way_for_nobody() -> None:
+    network = network_of(Case(3, 3, 2, shared=True, settings=SETTINGS, seed=1))
+    found = solver_named("greedy-dp").solve(replace(network, node=np.full_like(network.node, np.inf)))
+    assert np.isinf(found.report.objective)
 
 
 @settings(deadline=None, max_examples=25)

@@ -37,6 +37,8 @@ def whole_nodes(network: Network, usage: Floats, power: int = 1) -> Ints:
     improver = Improver(network, power)
     nodes = improver.improved(nodes)
     greedy = improver.improved(greedy_paths(network, improver.alone).nodes)
+    if conflict_count(network, greedy):
+        return nodes
     return greedy if objective(network, greedy, power) < objective(network, nodes, power) else nodes
 
 

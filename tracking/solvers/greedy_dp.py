@@ -9,7 +9,7 @@ import numpy as np
 from tracking.network import Network
 from tracking.solvers.base import Solution, SolveReport
 from tracking.solvers.hint import Hint
-from tracking.solvers.objective import Ints, block, objective, states_of
+from tracking.solvers.objective import Ints, block, conflict_count, objective, states_of
 from tracking.solvers.timed import TimedSolver
 from tracking.solvers.viterbi import Paths, Trellis, best_paths
 
@@ -26,7 +26,8 @@ def greedy_paths(network: Network, alone: Paths | None = None) -> GreedyPaths:
     """Fix the cheapest path, bar its places to the others, and go on; the layout term is ignored.
 
     Of equal paths the one of the lowest object is fixed first. `alone`, where known, are the cheapest
-    paths of all.
+    paths of all. An object that may not be occluded somewhere, and to which nothing is left there, is in
+    conflict.
     """
     exclusions = network.exclusions()
     trellis = Trellis(network.source, network.node.copy(), network.pair, network.sink)
@@ -35,7 +36,8 @@ def greedy_paths(network: Network, alone: Paths | None = None) -> GreedyPaths:
     nodes, costs, bound = alone.nodes.copy(), alone.costs.copy(), float(alone.costs.sum())
     left = np.ones(network.objects, dtype=np.bool_)
     while left.any():
-        owner = int(np.where(left, costs, np.inf).argmin())
+        rest = np.flatnonzero(left)
+        owner = int(rest[costs[rest].argmin()])
         left[owner] = False
         block(network, exclusions, trellis.node, (owner, nodes[owner]))
         # A cheapest path of which nothing is barred is still the cheapest.
@@ -54,13 +56,13 @@ class GreedyDp(TimedSolver):
     def _answer(self, network: Network, _hint: Hint | None) -> Solution:
         """Give the greedy paths; the bound is the cost of all cheapest paths, conflicts ignored."""
         paths = greedy_paths(network)
-        cost = objective(network, paths.nodes)
+        cost, conflicts = objective(network, paths.nodes), conflict_count(network, paths.nodes)
         report = SolveReport(
             solver=self.name,
             objective=cost,
             bound=paths.bound,
-            integral=cost - paths.bound <= 1e-9 * max(1.0, abs(cost)),
-            conflicts=0,
+            integral=not conflicts and cost - paths.bound <= 1e-9 * max(1.0, abs(cost)),
+            conflicts=conflicts,
             rounds=network.objects,
         )
         return Solution(states_of(network, paths.nodes), report)
