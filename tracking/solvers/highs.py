@@ -85,6 +85,12 @@ def highs_model(program: LinearProgram) -> highspy.HighsLp:
     return model
 
 
+_OTHERWISE: tuple[tuple[str, str | float], ...] = (("presolve", "off"), ("qp_regularization_value", 0.0))
+"""What to try anew with, from no basis, where there is no optimum: a basis kept from before columns and rows
+came may be too ill-conditioned to go on from; presolve has called whole-number programs infeasible that
+had answers; and squares with a little added to be regular have ended in an error of the solver's own."""
+
+
 def optimum(solver: highspy.Highs) -> LinearSolution:
     """Run the solver and give what it found.
 
@@ -93,13 +99,15 @@ def optimum(solver: highspy.Highs) -> LinearSolution:
     """
     solver.run()
     status = solver.getModelStatus()
-    if status != highspy.HighsModelStatus.kOptimal:
-        # A basis kept from before columns and rows came may be too ill-conditioned to go on from; and
-        # presolve has called whole-number programs infeasible that had answers.
+    for name, value in _OTHERWISE:
+        if status == highspy.HighsModelStatus.kOptimal:
+            break
+        _, usual = solver.getOptionValue(name)
         solver.clearSolver()
-        solver.setOptionValue("presolve", "off")
+        solver.setOptionValue(name, value)
         solver.run()
         status = solver.getModelStatus()
+        solver.setOptionValue(name, usual)
     if status != highspy.HighsModelStatus.kOptimal:
         raise RuntimeError(f"the LP solver ended with {solver.modelStatusToString(status)}")
     found = solver.getSolution()
