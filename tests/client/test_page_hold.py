@@ -76,7 +76,9 @@ async def test_a_preferred_camera_gives_way_where_it_does_not_see_the_person(bro
         site.blind = range(first, site.edge - site.edge % GOP + 3 * GOP)
         await visit.until(f"myview.pulse > {site.blind.stop + GOP}")
         cuts = await visit.get("myview.cuts.slice(-2)")
-        assert [(it["pulse"], it["to"]) for it in cuts] == [(first, "c2"), (site.blind.stop + GOP, "c0")]
+        assert [it["to"] for it in cuts] == ["c2", "c0"]
+        for cut, since in zip(cuts, (first, site.blind.stop + GOP), strict=True):
+            assert 0 <= cut["pulse"] - since < GOP, "a slow core may leave the very first frame out"
         await visit.page.get_by_role("button", name="Prefer").click()
         await visit.until("new URL(location).searchParams.get('camera') === 'c0'")
         await visit.page.keyboard.press("0")
