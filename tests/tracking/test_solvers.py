@@ -61,7 +61,7 @@ def test_the_bound_is_below_the_optimum_and_whole_relaxations_are_optimal(name: 
         assert report.gap < CLOSE
 
 
-@pytest.mark.parametrize("name", ["arcs", "columns", "exact", "extended-dp", "greedy-dp"])
+@pytest.mark.parametrize("name", ["arcs", "extended-dp", "greedy-dp"])
 @settings(deadline=None, max_examples=40)
 @given(case=cases(objects=3, frames=2, places=2), share=st.sampled_from([0.2, 0.5, 0.8]))
 def test_where_objects_must_be_somewhere_they_are_there_or_the_answer_says_it_is_in_conflict(
@@ -79,7 +79,7 @@ def test_where_objects_must_be_somewhere_they_are_there_or_the_answer_says_it_is
     if name != "greedy-dp":
         assert not found.report.conflicts
         assert np.isfinite(found.report.objective)
-    if name in {"exact", "extended-dp"} or found.report.integral:
+    if name == "extended-dp" or found.report.integral:
         assert found.report.objective == pytest.approx(optimum, rel=CLOSE)
 
 

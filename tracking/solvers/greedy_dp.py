@@ -61,7 +61,7 @@ class GreedyDp(TimedSolver):
             solver=self.name,
             objective=cost,
             bound=paths.bound,
-            integral=not conflicts and cost - paths.bound <= 1e-9 * max(1.0, abs(cost)),
+            integral=not conflicts and np.isfinite(cost) and cost - paths.bound <= 1e-9 * max(1.0, abs(cost)),
             conflicts=conflicts,
             rounds=network.objects,
         )
