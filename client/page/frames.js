@@ -8,6 +8,7 @@
  */
 
 const SAME_PLAYBACK_S = 0.5; // a VideoFrame whose time is further off than this counts time otherwise
+const ARRIVING_MS = 1000; // for two frames to be shown after a seek, by a browser with much else to do
 
 /**
  * @typedef {object} Frame
@@ -32,6 +33,24 @@ export function watchFrames(video, wanted, tell, enough) {
     tell({ ...take(video, mediaTime, wanted()), shownAt });
   };
   video.requestVideoFrameCallback(shown);
+}
+
+/**
+ * Says when the picture is surely of what a seek has led to. A busy browser says that it has arrived a moment before
+ * the picture changes, and of the first frame that it tells of then it cannot be said which side it is from.
+ *
+ * @param {HTMLVideoElement} video that says so just now
+ * @param {() => void} then
+ */
+export function arrived(video, then) {
+  if (video.paused || !('requestVideoFrameCallback' in video)) return then();
+  let waits = true;
+  const end = () => {
+    if (waits) then();
+    waits = false;
+  };
+  setTimeout(end, ARRIVING_MS); // a page that is hidden is told of no frame
+  video.requestVideoFrameCallback(() => video.requestVideoFrameCallback(end));
 }
 
 /**

@@ -6,6 +6,7 @@
  */
 
 import { Backoff } from './backoff.js';
+import { arrived } from './frames.js';
 import { Going } from './going.js';
 import { pause } from './http.js';
 import { begunAnew, landingOf } from './landing.js';
@@ -182,7 +183,7 @@ export class Player {
     if (time === null) return;
     run.landed = true;
     this.#landing = run;
-    this.video.addEventListener('seeked', () => this.#showing(run), { once: true });
+    this.video.addEventListener('seeked', () => arrived(this.video, () => this.#showing(run)), { once: true });
     this.#seek(time);
     this.play();
   }
