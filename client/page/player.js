@@ -239,6 +239,7 @@ export class Player {
   /** Leave the stream and the element, for good. */
   close() {
     this.stop();
+    this.#landing = null;
     this.#turn += 1;
     this.#buffer = null;
     clearInterval(this.#ticking);

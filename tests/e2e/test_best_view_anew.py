@@ -90,14 +90,22 @@ async def killed(site: RunningSite, words: list[CameraTracks]) -> None:
             lines = "\n".join(site.lines)
             assert set(answers) <= {None, 503}, f"who may come again is said to be nobody: {numbers}\n{lines}"
             await asyncio.sleep(0.05)
-    await bounded(site.until(lambda: site.pulse > died + 50 and len(site.gops) > count + 3, "it goes on"))
+    told = whose(site.gops[:count], words)
+
+    def again() -> dict[Followed, set[int]]:
+        """Give the tracks that went on over the time without a service, as they are told now."""
+        on = {track for word in words if word.last > died for track in tracks_of(word)}
+        now = whose(site.gops[count:], words)
+        return {track: now[track] for track in told.keys() & now.keys() & on}
+
+    def goes_on() -> bool:
+        return site.pulse > died + 50 and len(site.gops) > count + 3 and len(again()) > 1
+
+    await bounded(site.until(goes_on, "it goes on, and so do tracks"))
     assert site.children()["bestview"] != before
-    told, now = whose(site.gops[:count], words), whose(site.gops[count:], words)
-    again = {track: (told[track], now[track]) for track in told.keys() & now.keys()}
-    last = [it for it in again if any(it in tracks_of(word) for word in words if word.last > died)]
-    assert last, "tracks that went on over the time without a service"
-    for track in last:
-        assert now[track] & told[track], f"{track}: {again[track]}"
+    for track, numbers_now in again().items():
+        assert numbers_now & told[track], f"{track}: {told[track]} {numbers_now}"
+    now = whose(site.gops[count:], words)
     used = {it for numbers in told.values() for it in numbers}
     new = {it for track, numbers in now.items() if track not in told for it in numbers} - used
     assert all(it > max(used) for it in new), "numbers are not used twice"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -57,11 +58,12 @@ class GreedyDp(TimedSolver):
         """Give the greedy paths; the bound is the cost of all cheapest paths, conflicts ignored."""
         paths = greedy_paths(network)
         cost, conflicts = objective(network, paths.nodes), conflict_count(network, paths.nodes)
+        attained = math.isfinite(cost) and cost - paths.bound <= 1e-9 * max(1.0, abs(cost))
         report = SolveReport(
             solver=self.name,
             objective=cost,
             bound=paths.bound,
-            integral=not conflicts and np.isfinite(cost) and cost - paths.bound <= 1e-9 * max(1.0, abs(cost)),
+            integral=not conflicts and attained,
             conflicts=conflicts,
             rounds=network.objects,
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import time
 from collections.abc import Callable, Sequence
 
@@ -55,10 +56,10 @@ class Remembering:
         self._said: dict[str, Remembered] = {}
         self._returning: list[Returning] = []
         """First of all who had come when this began, then a camera each that came later."""
-        self._begun = self._anybody = False
-        self._began_at = 0.0
-        self._free = 1
-        """The first number that this run may give, by what it began with."""
+        self._anybody = False
+        self._began_at: float | None = None
+        self._free = math.inf
+        """From this number on this run gives them anew, by what it began with; before that it gives none."""
         self._heard: set[str] = set()
         """Cameras that have said what they remember: told sooner, they would have forgotten it."""
         self._sent: dict[str, Remembered] = {}
@@ -86,7 +87,7 @@ class Remembering:
         camera = camera_of(message.key)
         if camera not in self._cameras:
             return
-        again = self._begun and camera in self._heard
+        again = self._began_at is not None and camera in self._heard
         self._came.pop(camera, None)
         self._heard.add(camera)
         if not message.payload:
@@ -100,57 +101,47 @@ class Remembering:
     @property
     def waits(self) -> bool:
         """Whether a camera may still say what it remembers, so that nothing should be decided yet."""
-        if self._begun:
+        if self._began_at is not None:
             return False
         now = self._clock()
         return any(now < came + PATIENCE_S for came in self._came.values())
 
     def awaits(self, number: int) -> bool:
         """Tell whether somebody of this number may be found again, or is and only nothing is decided yet."""
-        if not self._begun or self._people.roll.whose(number) in self._people.roll.first_seen:
+        if self._began_at is None or self._people.roll.whose(number) in self._people.roll.first_seen:
             return True
-        if (
-            number < self._free
-            and self._clock() < self._began_at + _COMES_S
-            and self._heard < set(self._cameras)
-        ):
-            return True
-        return any(number in it.numbers for it in self._returning)
+        comes = self._heard < set(self._cameras) and self._clock() < self._began_at + _COMES_S
+        return (comes and number < self._free) or any(number in it.numbers for it in self._returning)
 
     @property
     def numbers_since(self) -> float:
         """When numbers began, unix seconds: since then none was given twice. 0: nobody has one yet."""
-        return self._since if self._begun or self._people.roll.first_seen else 0.0
+        return self._since if self._began_at is not None or self._people.roll.first_seen else 0.0
 
     def begin(self, pulse: int) -> None:
         """Begin with what is remembered, before an epoch that ends with a pulse is taken in.
 
         As long as no camera has come there is nothing to begin with. What is said later adds to it.
         """
-        if not self._anybody or (self._begun and not self._said):
+        if not self._anybody or (self._began_at is not None and not self._said):
             return
-        if self._begun:
-            said = {camera: _below(self._free, it) for camera, it in self._said.items()}
-        else:
-            said = self._said
+        said = {camera: _below(self._free, it) for camera, it in self._said.items()}
+        self._said = {}
         returning = Returning(said, pulse, round(LONGEST_S * self._fps))
         returning.begin(self._people, pulse)
-        if not self._begun:
-            self._begun, self._began_at = True, self._clock()
-            self._free = self._people.next_number
-            if said:
-                self._since = min(self._since, max(it.since for it in said.values()))
+        self._returning.append(returning)
+        if self._began_at is None:
+            self._began_at, self._free = self._clock(), self._people.next_number
+            self._since = min(self._since, max((it.since for it in said.values()), default=self._since))
         if said:
             log.info("%s: remembered %d people", ", ".join(sorted(said)), len(returning.numbers))
-        self._returning.append(returning)
-        self._said = {}
 
     def take(self, pulse: int) -> None:
         """Look at people after an epoch that ends with a pulse was taken in."""
         for returning in self._returning:
             returning.look(self._people, pulse)
         self._returning = [it for it in self._returning if not it.over]
-        if self._begun and self._tells:
+        if self._began_at is not None and self._tells:
             self._tell(pulse)
 
     def _tell(self, pulse: int) -> None:
@@ -167,9 +158,9 @@ class Remembering:
                 self._send(camera, payload)
 
 
-def _below(free: int, said: Remembered) -> Remembered:
+def _below(free: float, said: Remembered) -> Remembered:
     """Leave out whom this run does not know by the number, since it may have given it to somebody else."""
-    known = [it for it in said.people if max(it.number, *it.also, 0) < free]
+    known = [it for it in said.people if max([it.number, *it.also]) < free]
     return msgspec.structs.replace(said, people=known)
 
 
