@@ -2,33 +2,39 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+RUNTIME := $(VENV)/.runtime
 STAMP := $(VENV)/.installed
 NODE_STAMP := node_modules/.installed
 TESTED := $(sort $(dir $(wildcard tests/*.py tests/*/*.py)))
-AGAIN ?= --reruns 2 --reruns-delay 1
 
-.PHONY: demo test test-slow lint format bench lock clean
+# uv takes a seventh of pip's time. It does not read pip's own settings: where those name the index, pip does it.
+install = $(BIN)/uv pip install --quiet --python $(BIN)/python --constraint requirements/lock.txt --editable $(1) \
+	|| $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint requirements/lock.txt --editable $(1)
 
-demo: $(STAMP)
+.PHONY: demo test test-slow test-loaded lint format bench lock clean node_modules
+
+demo: $(RUNTIME)
 	$(BIN)/myview demo
 
-# First libraries and services; then browsers and whole sites, which run in real time. Three at once for two cores:
-# a third of it waits for a disk, a browser or the next frame.
-# Machines are shared: what fails is tried again and told of as RERUN. What is wrong fails every time.
-test: $(STAMP) $(NODE_STAMP)
-	$(BIN)/pytest -m "not slow" $(AGAIN) -n 3 --dist loadfile --ignore tests/client --ignore tests/e2e
-	$(BIN)/pytest -m "not slow" $(AGAIN) -n 3 --dist loadfile tests/client tests/e2e
+# Every part runs, whatever fails, and the last line sums them up (tests/suite.py).
+test: $(STAMP) node_modules
+	$(BIN)/python tests/suite.py $(SUITE)
 
-test-slow: $(STAMP) $(NODE_STAMP)
-	$(BIN)/pytest -m slow --timeout 1800
+test-slow: $(STAMP) node_modules
+	$(BIN)/python tests/suite.py --slow $(SUITE)
 
-lint: $(STAMP) $(NODE_STAMP)
+# Whether a test depends on luck, or on a machine that has nothing else to do: hours.
+test-loaded: $(STAMP) node_modules
+	$(BIN)/python tests/suite.py --runs 20 --load 4 $(SUITE)
+
+lint: $(STAMP) node_modules
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	for room in $(TESTED); do MYPYPATH=tests:$$room $(BIN)/mypy --config-file tests/mypy.ini $$room*.py || exit 1; done
 	$(BIN)/lint-imports
-	$(BIN)/node node_modules/typescript/bin/tsc
+	@if [ -e $(NODE_STAMP) ]; then $(BIN)/node node_modules/typescript/bin/tsc; \
+		else echo "types of the page: left out, npm could not fetch the TypeScript compiler"; fi
 
 format: $(STAMP)
 	$(BIN)/ruff format .
@@ -39,24 +45,32 @@ bench: $(STAMP)
 
 # The pins in requirements/lock.txt, made anew from the ranges in pyproject.toml.
 lock: $(STAMP)
-	$(BIN)/python -m pip install --quiet uv
 	$(BIN)/uv pip compile --quiet --universal --no-emit-index-url --no-emit-find-links --no-header \
 		--extra dev --output-file requirements/lock.txt pyproject.toml
 
-$(STAMP): pyproject.toml requirements/lock.txt
+# What runs MyView, and no more: the demo starts soon.
+$(RUNTIME): pyproject.toml requirements/lock.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
 		|| { echo "MyView needs Python 3.11 or newer; say which with: make PYTHON=/path/to/python3.11"; exit 1; }
 	@$(PYTHON) -m venv $(VENV) \
 		|| { echo "Python cannot make a virtual environment here; on Debian: apt install python3-venv"; exit 1; }
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint requirements/lock.txt --editable '.[dev]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile --constraint requirements/lock.txt uv
+	$(call install,.)
 	@touch $@
 
-# What checks the page's JavaScript: the page itself needs nothing of it.
-$(NODE_STAMP): $(STAMP) package.json package-lock.json
+# What tests, lint and benchmarks need beside it.
+$(STAMP): $(RUNTIME)
+	$(call install,'.[dev]')
+	@touch $@
+
+# What checks the page's JavaScript, where npm answers: the page itself needs nothing of it.
+node_modules: $(STAMP)
+	@$(MAKE) --silent $(NODE_STAMP) || echo "npm could not fetch what checks the page's types and accessibility:" \
+		"those checks are left out. To see why: PATH=$(BIN):\$$PATH npm ci"
+
+$(NODE_STAMP): package.json package-lock.json
 	@echo "npm ci  (typescript and axe-core, to check the page)"
-	@PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/npm ci --silent \
-		|| { echo "npm could not fetch what checks the page; to see why: PATH=$(BIN):\$$PATH npm ci." \
-			"All else without it: $(BIN)/pytest -m 'not slow'"; exit 1; }
+	@PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/npm ci --silent --fetch-retries=1 --fetch-timeout=20000
 	@touch $@
 
 clean:

@@ -15,6 +15,7 @@ from typing import Any
 import msgspec
 import pytest
 import typer.main
+from patience import PATIENCE
 from prometheus_client import CollectorRegistry
 
 from server.run.cli import app as command_line
@@ -30,7 +31,6 @@ DOCS = sorted((ROOT / "docs").glob("*.md"))
 INTERFACES = (ROOT / "docs" / "interfaces.md").read_text(encoding="utf-8")
 OPERATING = (ROOT / "docs" / "operating.md").read_text(encoding="utf-8")
 URL = "http://localhost:8080"
-PATIENCE = 90.0  # seconds that an example may take
 _BLOCK = re.compile(
     r"^```python runnable\n(.*?)^```\n(?:\n```text output\n(.*?)^```\n)?", re.DOTALL | re.MULTILINE
 )

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from aiohttp import web
 from aiohttp.test_utils import TestServer
+from patience import PATIENCE
 
 from benchmarks.soak.samples import (
     DELAY,
@@ -141,7 +142,7 @@ async def test_a_person_may_be_forgotten_and_a_camera_may_not() -> None:
     async with TestServer(app) as server:
         visitors = Visitors(str(server.make_url("/")), 25.0, seed=1, coming=0)
         watching = asyncio.create_task(visitors.watch())
-        async with asyncio.timeout(20.0):
+        async with asyncio.timeout(PATIENCE):
             while len(visitors.person.delays) < 2 or not visitors.faults:  # noqa: ASYNC110 — nobody tells
                 await asyncio.sleep(0.01)
         watching.cancel()

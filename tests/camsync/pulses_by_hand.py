@@ -6,11 +6,12 @@ import asyncio
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 
+from patience import PATIENCE
+
 from camsync.clock import Clock, steady_unix_clock
 from camsync.messages import Beat, ServerLine
 from camsync.protocol import parse_server_line
 
-PATIENCE = 60.0  # seconds until a test that awaits something has failed
 BUSY = 0.5
 """Seconds by which a busy machine may measure a clock wrongly."""
 

@@ -7,7 +7,8 @@ import socket
 from contextlib import suppress
 
 import pytest
-from pulses_by_hand import PATIENCE, Connect
+from patience import PATIENCE
+from pulses_by_hand import Connect
 
 from camsync import Listener, PulseServer, SyncError, clients_of
 from camsync.messages import Clients, Greeting, Pong

@@ -12,7 +12,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pulses_by_hand import BUSY, PATIENCE, JumpingClock
+from patience import PATIENCE
+from pulses_by_hand import BUSY, JumpingClock
 
 import camsync
 from camsync import (

@@ -8,7 +8,8 @@ import logging
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from pulses_by_hand import PATIENCE, Connect, JumpingClock
+from patience import PATIENCE
+from pulses_by_hand import Connect, JumpingClock
 
 from camsync import PulseServer, ServerLimits
 from camsync.messages import Beat, Greeting, Pong, Refusal, Wait

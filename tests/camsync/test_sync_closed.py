@@ -9,7 +9,8 @@ from contextlib import asynccontextmanager
 from itertools import pairwise
 
 import pytest
-from pulses_by_hand import PATIENCE, ByHand, Connect
+from patience import PATIENCE
+from pulses_by_hand import ByHand, Connect
 
 from camsync import (
     ClientSettings,

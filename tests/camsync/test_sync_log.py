@@ -5,7 +5,8 @@ from __future__ import annotations
 import logging
 
 import pytest
-from pulses_by_hand import PATIENCE, Connect, JumpingClock
+from patience import PATIENCE
+from pulses_by_hand import Connect, JumpingClock
 from test_pulse_client import FPS, QUICK, pretended_server, take
 
 from camsync import PulseClient, PulseServer

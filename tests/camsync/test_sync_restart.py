@@ -6,7 +6,8 @@ import asyncio
 from collections.abc import Callable
 
 import pytest
-from pulses_by_hand import BUSY, PATIENCE, Connect
+from patience import PATIENCE
+from pulses_by_hand import BUSY, Connect
 
 from camsync import AxisLostError, ClientSettings, Pulse, PulseClient, PulseServer, ServerLimits
 from camsync.messages import Pong

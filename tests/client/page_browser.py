@@ -13,11 +13,11 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from page_site import FakeSite, SiteServer, serving
+from patience import PATIENCE_MS
 from playwright.async_api import Browser, Page, expect
 
 from benchmarks.browser import CHROMIUM
 
-PATIENCE_MS = 60_000  # a slow core with much other work; who waits for something goes on when it is there
 expect.set_options(timeout=PATIENCE_MS)
 
 needs_chromium = pytest.mark.skipif(not CHROMIUM.exists(), reason=f"needs a Chromium at {CHROMIUM}")

@@ -14,7 +14,6 @@ from aiohttp import web
 TIMESCALE = 90000
 FPS = 25
 GOP = 5
-PATIENCE = 60.0  # seconds until a test that awaits something has failed
 
 
 def box(kind: bytes, *content: bytes) -> bytes:

@@ -11,7 +11,8 @@ from contextlib import asynccontextmanager, suppress
 import pytest
 from aiohttp import web
 from aiohttp.test_utils import TestServer
-from site_by_hand import OBJECTS, PATIENCE, box, fragment, header
+from patience import PATIENCE
+from site_by_hand import OBJECTS, box, fragment, header
 
 import client
 from client.fmp4 import MAX_BOX, BoxReader, Mp4Error

@@ -8,7 +8,8 @@ import pytest
 from aiohttp import web
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from site_by_hand import CAMERAS, OBJECTS, PATIENCE, SITE, HandMadeSite, gop, nothing_more, sent
+from patience import PATIENCE
+from site_by_hand import CAMERAS, OBJECTS, SITE, HandMadeSite, gop, nothing_more, sent
 
 import client
 from client.sse import MAX_EVENT, EventStreamError, SentEvent, SseParser

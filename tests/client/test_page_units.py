@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from patience import PATIENCE
 
 _HERE = Path(__file__).parents[1] / "page"
 _NODE = Path(sys.executable).parent / "node"
@@ -20,6 +21,6 @@ def test_the_modules_of_the_page_do_as_they_say(file: Path) -> None:
         capture_output=True,
         check=False,
         text=True,
-        timeout=60,
+        timeout=PATIENCE,
     )
     assert done.returncode == 0, done.stdout + done.stderr

@@ -9,10 +9,10 @@ import pytest
 from aiohttp import web
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from patience import PATIENCE
 from site_by_hand import (
     FPS,
     GOP,
-    PATIENCE,
     SITE,
     HandMadeSite,
     Play,

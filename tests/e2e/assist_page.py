@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import yaml
+from patience import PATIENCE_MS
 from playwright.async_api import Page
-from running_site import RunningSite, running
+from running_site import PATIENT_CAMERAS, RunningSite, running
 
 from benchmarks.browser import chromium
 from server.run.setup import DEMO, free_port
 
-PATIENCE_MS = 60_000
 GOP = 10
 PLACE = """(wanted) => {
   const box = myview.boxes.find(([object]) => object === (wanted ?? myview.pointing.object));
@@ -39,8 +39,8 @@ async def helped(
         "sync": {"port": free_port(), "start_timeout_s": 60},
         "zenoh": {"connect": bus, "listen": bus},
         "http": {"port": free_port()},
-        "track": {"assist": {"enabled": True, "alike": 1000.0, "margin": 100.0, **assist}},
-        "view": {"flags": {"per_minute": 60, "risk": 0.0}},
+        "track": {"assist": {"enabled": True, "alike": 1000.0, "margin": 100.0, **assist}, **PATIENT_CAMERAS},
+        "view": {"late_after_s": 60, "flags": {"per_minute": 60, "risk": 0.0}},
     }
     path = folder / "demo.yaml"
     path.write_text(yaml.safe_dump(content), encoding="utf-8")

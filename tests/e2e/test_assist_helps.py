@@ -6,7 +6,8 @@ import asyncio
 from pathlib import Path
 
 import pytest
-from assist_page import PATIENCE_MS, PLACE, every_gop_once, helped, opened
+from assist_page import PLACE, every_gop_once, helped, opened
+from patience import PATIENCE_MS
 from playwright.async_api import Page
 from running_site import RunningSite
 from two_alike import FRAMES, MET, camera
@@ -18,7 +19,6 @@ from client.model import Split
 pytestmark = [
     pytest.mark.live,
     pytest.mark.asyncio,
-    pytest.mark.timeout(200),
     pytest.mark.skipif(not CHROMIUM.exists(), reason=f"needs a Chromium at {CHROMIUM}"),
 ]
 ALIKE = "alike"

@@ -8,7 +8,8 @@ from collections.abc import AsyncIterator
 import aiohttp
 import pytest
 import pytest_asyncio
-from assist_page import PATIENCE_MS, PLACE, every_gop_once, helped, opened
+from assist_page import PLACE, every_gop_once, helped, opened
+from patience import PATIENCE_MS
 from playwright.async_api import Page
 from running_site import RunningSite
 
@@ -18,7 +19,6 @@ from server.run.setup import DEMO
 pytestmark = [
     pytest.mark.live,
     pytest.mark.asyncio(loop_scope="module"),
-    pytest.mark.timeout(200),
     pytest.mark.skipif(not CHROMIUM.exists(), reason=f"needs a Chromium at {CHROMIUM}"),
 ]
 

@@ -11,7 +11,7 @@ import aiohttp
 import pytest
 from running_site import bounded, configuration, running
 
-pytestmark = [pytest.mark.live, pytest.mark.slow, pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.live, pytest.mark.slow]
 
 WITHIN_S = 2.0
 

@@ -18,14 +18,14 @@ from typing import Any
 import aiohttp
 import pytest
 import yaml
+from patience import PATIENCE
 from running_site import MYVIEW
 
 from server.camera.sources.stream import OPEN_S
 from server.run.setup import free_port
 
-pytestmark = [pytest.mark.live, pytest.mark.timeout(120)]
+pytestmark = [pytest.mark.live]
 
-PATIENCE_S = 100.0
 WAITS_S = 3600.0
 """What pulse 0 and the cameras wait for."""
 SCENE = "scene:room?camera=0&cameras=3&objects=4&seed=1"
@@ -101,7 +101,7 @@ async def answered(session: aiohttp.ClientSession, path: str) -> None:
 
 async def test_who_waits_for_others_ends_when_told(tmp_path: Path) -> None:
     config, content = site(tmp_path, SCENE, SCENE)
-    async with asyncio.timeout(PATIENCE_S):
+    async with asyncio.timeout(PATIENCE):
         sync, bestview = await asyncio.gather(
             start("sync", config, until="bestview is here"), start("bestview", config, until="pulse server")
         )
@@ -118,7 +118,7 @@ async def test_who_waits_for_others_ends_when_told(tmp_path: Path) -> None:
 
 
 async def test_a_camera_that_is_being_opened_keeps_nobody_waiting(tmp_path: Path) -> None:
-    async with asyncio.timeout(PATIENCE_S), silent_camera() as (address, came):
+    async with asyncio.timeout(PATIENCE), silent_camera() as (address, came):
         config, _ = site(tmp_path, address, SCENE)
         camera = await asyncio.create_subprocess_exec(*MYVIEW, "camera", config, "c0", stderr=PIPE)
         await came.wait()
@@ -128,7 +128,7 @@ async def test_a_camera_that_is_being_opened_keeps_nobody_waiting(tmp_path: Path
 
 @pytest.mark.slow
 async def test_a_whole_site_ends_while_it_starts_and_leaves_nothing_behind(tmp_path: Path) -> None:
-    async with asyncio.timeout(PATIENCE_S), silent_camera() as (address, came):
+    async with asyncio.timeout(PATIENCE), silent_camera() as (address, came):
         config, _ = site(tmp_path, address, SCENE)
         up = await start("up", config, until="sync: pulses at")
         await came.wait()
@@ -140,7 +140,7 @@ async def test_a_whole_site_ends_while_it_starts_and_leaves_nothing_behind(tmp_p
 @pytest.mark.slow
 async def test_the_demo_ends_while_it_starts(tmp_path: Path) -> None:
     environment = {**os.environ, "PYTHONUNBUFFERED": "1", "TMPDIR": str(tmp_path)}
-    async with asyncio.timeout(PATIENCE_S):
+    async with asyncio.timeout(PATIENCE):
         for number in (signal.SIGTERM, signal.SIGHUP):
             demo = await asyncio.create_subprocess_exec(
                 *(sys.executable, "-m", "server.run.cli", "demo", "--no-browser", "--port", "0"),

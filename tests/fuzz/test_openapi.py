@@ -16,6 +16,7 @@ import schemathesis
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.errors import Unsatisfiable
+from patience import PATIENCE
 from schemathesis import GenerationMode
 from schemathesis.checks import (
     content_type_conformance,
@@ -27,7 +28,6 @@ from benchmarks.fuzz.http_site import Served
 
 CASES = 4
 """Of each operation and mode; endless streams are only begun."""
-PATIENCE = 20.0
 CHECKS = [content_type_conformance, response_schema_conformance, status_code_conformance]
 """A 500 is described nowhere; a 400 may be, though a schema cannot say what is a moment."""
 ENDLESS = ("video/", "multipart/", "text/event-stream")
@@ -67,7 +67,6 @@ def endless(operation: Any) -> bool:
     return any(kind.startswith(ENDLESS) for kind in content)
 
 
-@pytest.mark.timeout(300)
 @pytest.mark.parametrize("mode", list(GenerationMode))
 def test_every_answer_is_one_that_is_described(
     described: Site, mode: GenerationMode, caplog: pytest.LogCaptureFixture

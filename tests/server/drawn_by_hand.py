@@ -12,8 +12,9 @@ import av
 import numpy as np
 from aiohttp import web
 from cameras_by_hand import GOP, STRIDE, FedService, TrackNumbers, small_config, tracks, video, word
-from halls import PATIENCE, Hall
+from halls import Hall
 from numpy.typing import NDArray
+from patience import PATIENCE
 
 from server.camera.encode import AccessUnit, Encoder
 from server.camera.scene import Scene

@@ -7,6 +7,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from patience import PATIENCE
 
 needs_ffprobe = pytest.mark.skipif(not shutil.which("ffprobe"), reason="needs ffprobe")
 
@@ -18,7 +19,7 @@ def probed(path: Path | str, entries: str) -> list[list[str]]:
          "-of", "csv=p=0", str(path)],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=PATIENCE,
         check=True,
     )  # fmt: skip
     assert done.stderr == ""

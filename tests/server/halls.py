@@ -9,11 +9,11 @@ from typing import Any
 import aiohttp
 import pytest
 from cameras_by_hand import CAMERAS, LARGE, SMALL, FedService, TrackNumbers, small_config
+from patience import PATIENCE
 
 from server.web.app import make_app, serving
 from server.wire.sections import Http
 
-PATIENCE = 60.0  # seconds until a test that awaits something has failed
 A, B = CAMERAS
 
 

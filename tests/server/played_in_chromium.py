@@ -7,11 +7,10 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from patience import PATIENCE
 
 from benchmarks.browser import CHROMIUM, chromium
 from server.view.streams.splice import Splicer
-
-PATIENCE_S = 60.0
 
 needs_chromium = pytest.mark.skipif(not CHROMIUM.exists(), reason=f"needs a Chromium at {CHROMIUM}")
 
@@ -62,6 +61,6 @@ async def seen_in_chromium(
             show(gop)
             await asyncio.sleep(0.01)
         splicer.close()
-        async with asyncio.timeout(PATIENCE_S):
+        async with asyncio.timeout(PATIENCE):
             found: dict[str, Any] = await playing
     return found

@@ -9,6 +9,7 @@ import threading
 from collections import deque
 
 import pytest
+from patience import PATIENCE
 from pydantic import ValidationError
 
 from server.run.setup import free_port
@@ -16,8 +17,6 @@ from server.wire.bus import Bus
 from server.wire.errors import UserError
 from server.wire.inbox import Inbox, Message
 from server.wire.sections import Zenoh
-
-PATIENCE = 60.0  # seconds until a test that awaits something has failed
 
 
 @pytest.fixture

@@ -12,6 +12,7 @@ from functools import partial
 from pathlib import Path
 
 import pytest
+from patience import PATIENCE
 
 from server.run.setup import free_port
 from server.wire.bus import Bus
@@ -25,7 +26,6 @@ from server.wire.users import password_of, read_users
 pytestmark = pytest.mark.skipif(shutil.which("openssl") is None, reason="needs openssl, to make certificates")
 
 SITE = Keys("hall")
-PATIENCE = 20.0
 SECURITY = (Path(__file__).parents[2] / "docs" / "security.md").read_text(encoding="utf-8")
 
 

@@ -12,13 +12,12 @@ import pytest
 import yaml
 from aiohttp import web
 from free_port import free
+from patience import PATIENCE
 from videos_by_hand import write_video
 
 from server.run.camera import camera_process
 from server.wire.errors import AwayError
 from server.wire.running import Running
-
-PATIENCE = 60.0  # seconds
 
 
 class Lines(logging.Handler):

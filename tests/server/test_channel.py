@@ -6,6 +6,7 @@ import asyncio
 from itertools import product
 
 import pytest
+from patience import PATIENCE
 
 from server.view.streams.channel import Channel, Chunk, Piece
 
@@ -16,7 +17,7 @@ def gop(number: int) -> Chunk:
 
 async def take(viewer: object, count: int) -> list[bytes]:
     got = []
-    async with asyncio.timeout(60):
+    async with asyncio.timeout(PATIENCE):
         async for data in viewer:  # type: ignore[attr-defined]
             got.append(data)
             if len(got) == count:
@@ -66,7 +67,7 @@ async def test_the_end_comes_after_what_was_queued() -> None:
     viewer = channel.join()
     channel.publish(gop(1))
     channel.close()
-    async with asyncio.timeout(60):
+    async with asyncio.timeout(PATIENCE):
         assert [data async for data in viewer] == [b"1"]
     assert channel.viewers == 1
     channel.leave(viewer)
@@ -77,7 +78,7 @@ async def test_whoever_joins_after_the_end_gets_what_was_last_and_the_end() -> N
     channel = Channel()
     channel.publish(gop(1))
     channel.close()
-    async with asyncio.timeout(60):
+    async with asyncio.timeout(PATIENCE):
         assert [data async for data in channel.join()] == [b"1"]
 
 
@@ -106,7 +107,7 @@ async def test_pieces_keep_their_order_whether_they_are_taken_at_once_or_wait(
         if number % 2:
             await asyncio.sleep(0)
     channel.close()
-    async with asyncio.timeout(60):
+    async with asyncio.timeout(PATIENCE):
         await sending
     assert sent == [b"%d" % number for number in range(5)]
 

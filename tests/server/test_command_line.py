@@ -17,6 +17,7 @@ import pytest
 import yaml
 from command_line import Run, refusal
 from free_port import free
+from patience import PATIENCE
 from videos_by_hand import write_video
 
 from server.camera.scene import scene_names
@@ -316,5 +317,5 @@ def test_it_says_which_version_it_is(run: Run) -> None:
 def test_help_does_not_wait_for_what_only_commands_need() -> None:
     look = "import sys, server.run.cli; print(*{'numpy', 'scipy', 'cv2', 'pydantic'} & set(sys.modules))"
     command = [sys.executable, "-c", look]
-    loaded = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
+    loaded = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=True)
     assert loaded.stdout.split() == []

@@ -14,6 +14,7 @@ import numpy as np
 from cameras_by_hand import FPS, GOP, HEIGHT, WIDTH, encoded
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from patience import PATIENCE
 
 from server.draw.__main__ import serve
 from server.draw.boxes import CHOSEN, OTHER, Image, draw_boxes
@@ -180,6 +181,6 @@ def test_the_process_itself_ends_when_nobody_is_left_to_ask() -> None:
     process = subprocess.Popen(
         [sys.executable, "-m", "server.draw"], stdin=subprocess.PIPE, stdout=subprocess.PIPE
     )
-    out, _ = process.communicate(framed(CANVAS) + framed(Draw(fragments=fragments(0, 1))), timeout=60)
+    out, _ = process.communicate(framed(CANVAS) + framed(Draw(fragments=fragments(0, 1))), timeout=PATIENCE)
     assert msgspec.msgpack.decode(out[4:], type=Drawn).newest == 0
     assert process.returncode == 0

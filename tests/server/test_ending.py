@@ -12,10 +12,9 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from patience import PATIENCE
 
 from server.run.ending import ending_later
-
-PATIENCE = 60.0  # seconds until a test that awaits something has failed
 
 
 @pytest.fixture(params=[signal.SIGTERM, signal.SIGINT])
@@ -78,7 +77,7 @@ def test_a_child_inherits_the_mask_and_can_lift_it() -> None:
     )
     with ending_later():
         done = subprocess.run(
-            [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True
+            [sys.executable, "-c", code], capture_output=True, text=True, timeout=PATIENCE, check=True
         )
     assert done.stdout.split() == ["2", "0"]
 

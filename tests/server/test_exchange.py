@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from patience import PATIENCE
 from test_process import Running, in_folder
 
 from server.camera.exchange import Exchange
@@ -28,7 +29,6 @@ from server.wire.loading import build_config
 from server.wire.messages import FOUND_MOST, Found, Keys
 from tracking import Detections
 
-PATIENCE = 60.0  # seconds until a test that awaits something has failed
 FRAMES = 60
 WAIT = 1.0  # seconds that two cameras wait for each other, and for a third one that never comes
 

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 import yaml
 from command_line import Run
-from halls import PATIENCE
+from patience import PATIENCE
 
 from server.run import site_commands
 from server.run.hang_up import hang_ups, mind_hang_ups

@@ -21,7 +21,8 @@ from cameras_by_hand import (
     video,
     word,
 )
-from test_past_store import everything_that_plays, plays_without_a_word
+from decoded import decodes_without_errors
+from test_past_store import everything_that_plays
 from test_service_turns import noted
 
 from server.view.streams.footage import Footage
@@ -86,7 +87,7 @@ def test_who_slept_decides_what_is_of_now_and_nothing_of_what_is_long_past(
     assert service.past.writer is not None
     assert (service.past.writer.written, service.past.writer.lost) == (len(decided), 0)
     for path in everything_that_plays(tmp_path / "kept"):
-        plays_without_a_word(path)
+        decodes_without_errors(path)
 
 
 @pytest.mark.parametrize("minutes", [5, 8 * 60])

@@ -18,12 +18,12 @@ import yaml
 from free_port import free
 from hypothesis import given
 from hypothesis import strategies as st
+from patience import PATIENCE
 
 from server.run.logs import say_failure
 from server.wire.errors import UserError
 from server.wire.log_lines import JsonLines, formatter
 
-PATIENCE = 60.0  # seconds that a process has to begin or to end
 FIELDS = {"time", "level", "process", "logger", "event"}
 
 

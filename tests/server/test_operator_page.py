@@ -18,6 +18,7 @@ import pytest_asyncio
 import yaml
 from cameras_by_hand import CAMERAS, FPS, LARGE, SMALL, small_config, status, tracks, word
 from halls import A, B, Hall, opened, see
+from patience import PATIENCE_MS
 from playwright.async_api import Browser, Page, Route, expect
 from tokens_by_hand import line_of, token_of, write_tokens
 from walk_by_hand import SITE, curved, errors_on_floor, words
@@ -34,7 +35,6 @@ SECTIONS = ["cameras", "floor", "known", "flagged", "downloads", "marks", "walk"
 PLAN = [[0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 1.0]]
 """Of a camera that looks straight down: ten pixels are one unit of the floor."""
 
-PATIENCE_MS = 60_000  # a slow core with much other work; what is set here holds for all tests of a process
 expect.set_options(timeout=PATIENCE_MS)
 
 pytestmark = [
@@ -332,7 +332,6 @@ async def test_places_on_the_floor_become_a_file_that_calibrate_takes(
     np.testing.assert_allclose(camera.image / (64, 48), np.abs(camera.floor) / 10, atol=0.01)
 
 
-@pytest.mark.timeout(300)
 async def test_a_walk_is_started_watched_and_finished_and_its_file_is_the_scenes_floor(
     browser: Browser, tmp_path: Path
 ) -> None:

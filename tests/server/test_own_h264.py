@@ -22,6 +22,7 @@ from av.video.stream import VideoStream
 from cameras_by_hand import FPS, GOP, HEIGHT, WIDTH, encoded, small_config
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from patience import PATIENCE
 from rtsp_by_hand import RtspCamera
 from videos_by_hand import write_video
 
@@ -42,7 +43,6 @@ from server.wire.errors import AwayError, UserError
 from server.wire.h264 import NAL_AUD, nal_type, nal_units
 
 FRAMES = 20
-PATIENCE_S = 60.0  # until a test that awaits something has failed
 
 
 def site(source: Path | str, h264: str = "pass", **changes: Any) -> Config:
@@ -326,7 +326,7 @@ def until_some_wait(camera: NetworkCamera | RtspCamera, source: OwnStream) -> No
     Never more than is on its way already: what a slow machine is late with would come all at once, and be
     too much.
     """
-    end = time.monotonic() + PATIENCE_S
+    end = time.monotonic() + PATIENCE
     while True:
         units = source._waiting._units
         come = numbers()[tuple(nals(units[-1].data))] // GOP + 1 if units else 0
@@ -440,7 +440,7 @@ def test_a_network_camera_that_comes_back_with_other_pictures_is_away(
     source = OwnStream(str(path), {}, None, wanted_by(config))
     (tmp_path / "other.h264").write_bytes(other)
     (tmp_path / "other.h264").replace(path)
-    end = time.monotonic() + PATIENCE_S
+    end = time.monotonic() + PATIENCE
     while "does not fit any more" not in caplog.text:
         assert time.monotonic() < end
         time.sleep(0.02)

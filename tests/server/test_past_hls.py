@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from cameras_by_hand import CAMERAS, FPS, GOP, NO_REASON, encoded, video
 from halls import A, B, Hall, opened
+from patience import PATIENCE
 from recorded_by_hand import PULSE0, Picture, own_pictures
 from sounds_by_hand import FRAMES as SOUNDING
 from sounds_by_hand import heard, sends, write_flashes
@@ -233,7 +234,9 @@ async def test_ffmpeg_plays_the_past_with_its_sound_to_the_end(tmp_path: Path) -
         out = tmp_path / "past.mp4"
         url = f"http://127.0.0.1:{hall.port}/objects/1/hls/index.m3u8?from=p0&to=p{SOUNDING}"
         command = ["ffmpeg", "-v", "warning", "-i", url, "-c", "copy", str(out)]
-        done = await asyncio.to_thread(subprocess.run, command, capture_output=True, text=True, timeout=60)
+        done = await asyncio.to_thread(
+            subprocess.run, command, capture_output=True, text=True, timeout=PATIENCE
+        )
         assert (done.returncode, done.stderr) == (0, "")
         times, _ = heard(out.read_bytes())
         assert np.diff(times) == pytest.approx(1 / 48_000, abs=1e-4)

@@ -9,13 +9,12 @@ from pathlib import Path
 
 import pytest
 from cameras_by_hand import CAMERAS, GOP, SMALL, FedService, TrackNumbers, encoded, small_config, video
+from patience import PATIENCE
 from recorded_by_hand import A, B, pictures, piece
 
 from server.view.past.store import Piece
 from server.view.past.writer import Writer
 from server.wire.errors import UserError
-
-PATIENCE = 60.0  # seconds until a test that awaits something has failed
 
 
 class Disk:

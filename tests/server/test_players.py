@@ -18,6 +18,7 @@ import pytest
 from cameras_by_hand import CAMERAS, FPS, HEIGHT, LARGE, SMALL, STRIDE, WIDTH, encoded, tracks, video, word
 from halls import A, B, Hall, opened
 from numpy.typing import NDArray
+from patience import PATIENCE
 
 from benchmarks.browser import CHROMIUM, chromium
 from server.wire.epochs import end_of_epoch
@@ -220,7 +221,7 @@ async def test_chromium_plays_hls_by_itself_up_to_the_end(live: Hall) -> None:
         page = await browser.new_page(bypass_csp=True)
         await page.goto(f"http://127.0.0.1:{live.port}/healthz")
         playing = asyncio.create_task(page.evaluate(HLS_BY_ITSELF, "/objects/1/hls/index.m3u8"))
-        async with asyncio.timeout(60):
+        async with asyncio.timeout(PATIENCE):
             for epoch in range(20, EPOCHS):
                 await asyncio.sleep(STRIDE / FPS / 5)
                 feed(live, epoch)

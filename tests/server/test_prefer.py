@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import pytest
 from cameras_by_hand import CAMERAS, FPS, GOP, NO_REASON, encoded, small_config
-from halls import PATIENCE
+from patience import PATIENCE
 
 from server.view.choice.decide import GopDecision, ObjectChoice
 from server.view.media.agreement import Agreement

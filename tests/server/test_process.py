@@ -12,6 +12,7 @@ from pathlib import Path
 import msgspec
 import pytest
 import zenoh
+from patience import PATIENCE
 from videos_by_hand import write_video
 
 from camsync import PulseServer
@@ -29,7 +30,6 @@ from server.wire.loading import build_config
 from server.wire.messages import CameraStatus, CameraTracks, FrameHead, GopChoices, pulse_client
 from server.wire.pulse_users import pulse_users
 
-PATIENCE = 60.0  # seconds until a test that awaits something has failed
 FPS = 50
 FRAMES = 60
 

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 import yaml
 from command_line import Run, refusal
+from patience import PATIENCE
 
 from camsync import Login, PulseClient, clients_of
 from server.run.setup import free_port
@@ -19,7 +20,6 @@ from server.wire.loading import load_config
 from server.wire.pulse_users import pulse_clients, pulse_login, pulse_users
 from server.wire.running import Running
 
-PATIENCE = 60.0  # seconds until a test that awaits something has failed
 LONG = "0123456789abcdef" * 2
 RIGHT = f"c0:{LONG}\nbestview:{LONG}!\nauditor:{LONG}?\n"
 

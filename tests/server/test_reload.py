@@ -16,9 +16,9 @@ import aiohttp
 import pytest
 import yaml
 from cameras_by_hand import CAMERAS, FedService, small_config
-from halls import PATIENCE
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from patience import PATIENCE
 
 from server.run.reload import reloaded
 from server.run.setup import free_port

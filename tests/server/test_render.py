@@ -16,13 +16,13 @@ import av
 import cv2
 import numpy as np
 import pytest
+from patience import PATIENCE
 from sounds_by_hand import EVERY, beeps, write_flashes
 from videos_by_hand import damage, write_video
 
 from server.camera.scene import Scene, write_recording
 from server.run.setup import camera_name, config_for_videos, free_port
 
-PATIENCE = 90.0  # seconds until a test that awaits something has failed
 MYVIEW = [sys.executable, "-m", "server.run.cli"]
 ROOT = Path(__file__).resolve().parents[2]
 

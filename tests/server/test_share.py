@@ -24,6 +24,7 @@ from cameras_by_hand import (
 )
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from patience import PATIENCE
 
 from bestview import EpisodeKey, IdentityUpdate, LocalTrack, Merge
 from server.run.setup import free_port
@@ -35,8 +36,6 @@ from server.wire.bus import Bus
 from server.wire.errors import UserError
 from server.wire.messages import Box, Keys
 from server.wire.sections import Http, Share
-
-PATIENCE_S = 60.0  # until a test that awaits something has failed
 
 
 def shared(index: int, of: int = 2, **more: Any) -> dict[str, Any]:
@@ -227,7 +226,7 @@ class Heard:
         self._more.set()
 
     async def all_of(self, *keys: str) -> None:
-        async with asyncio.timeout(PATIENCE_S):
+        async with asyncio.timeout(PATIENCE):
             while not set(keys) <= self._keys:
                 self._more.clear()
                 await self._more.wait()

@@ -9,13 +9,13 @@ from pathlib import Path
 import pytest
 import pytest_asyncio
 from halls import Hall, see
+from patience import PATIENCE_MS
 from playwright.async_api import Browser, Page, expect
 from tokens_by_hand import line_of, locked, token_of, write_tokens
 
 from benchmarks.browser import CHROMIUM, chromium
 
 AXE = Path(__file__).parents[2] / "node_modules/axe-core/axe.min.js"
-PATIENCE_MS = 60_000  # a slow core with much other work
 
 pytestmark = [
     pytest.mark.skipif(not CHROMIUM.exists(), reason=f"needs a Chromium at {CHROMIUM}"),

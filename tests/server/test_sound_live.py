@@ -14,6 +14,7 @@ from typing import Any
 
 import av
 import pytest
+from patience import PATIENCE
 from sounds_by_hand import EVERY, FPS, beeps, write_flashes
 
 from server.camera.sound import Frame, LiveSound
@@ -24,7 +25,6 @@ from server.wire.sections import Sound
 from server.wire.sound import Coding, SoundFormat
 
 FRAMES = 3 * EVERY
-PATIENCE_S = 60.0  # until a test that awaits something has failed
 FORM = SoundFormat(48_000, 2)
 
 
@@ -75,7 +75,7 @@ def test_a_camera_is_heard_beside_its_pictures(camera: str) -> None:
     begin = time.monotonic()
     while len(frames) < (FRAMES - 20) / FPS * FORM.rate / FRAME:
         time.sleep(1 / FPS)
-        assert time.monotonic() < begin + PATIENCE_S, "sound comes"
+        assert time.monotonic() < begin + PATIENCE, "sound comes"
         frames += sound.at(100 + int((time.monotonic() - begin) * FPS))
     assert source.take(0) is not None
     source.close()

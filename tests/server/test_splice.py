@@ -6,6 +6,7 @@ import asyncio
 from collections.abc import Iterable
 
 from cameras_by_hand import CAMERAS, FPS, GOP, NO_REASON, encoded, small_config
+from patience import PATIENCE
 
 from server.view.choice.decide import GopDecision, ObjectChoice
 from server.view.media.agreement import Agreement
@@ -37,7 +38,7 @@ def decision(
 
 async def received(viewer: Viewer) -> list[bytes]:
     viewer.close()
-    async with asyncio.timeout(60):
+    async with asyncio.timeout(PATIENCE):
         return [data async for data in viewer]
 
 
@@ -104,7 +105,7 @@ async def test_the_streams_of_the_forgotten_end() -> None:
     splicer.decision(decision(0, choice(1, A), choice(2, B)))
     viewer = splicer.objects[2].join()
     splicer.forget({1}, [])
-    async with asyncio.timeout(60):
+    async with asyncio.timeout(PATIENCE):
         assert [data async for data in viewer] == gops(shelves, [B])
     assert list(splicer.objects) == [1]
 
@@ -126,5 +127,5 @@ async def test_the_end_ends_every_stream() -> None:
     splicer.decision(decision(0, choice(1, A)))
     viewers = [splicer.objects[1].join(), splicer.cameras[A].join()]
     splicer.close()
-    async with asyncio.timeout(60):
+    async with asyncio.timeout(PATIENCE):
         assert [len([data async for data in viewer]) for viewer in viewers] == [1, 0]

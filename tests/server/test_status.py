@@ -21,6 +21,7 @@ from cameras_by_hand import (
 )
 from command_line import Run
 from halls import A, B, Hall, see
+from patience import PATIENCE
 from rich.console import Console
 from tokens_by_hand import locked, token_of
 
@@ -34,8 +35,6 @@ from server.web.app import make_app, serving
 from server.wire.errors import AwayError, UserError
 from server.wire.messages import Solve
 from server.wire.sections import Http
-
-PATIENCE = 30.0  # seconds until a site that is gone or back must have been noticed
 
 
 def url(hall: Hall) -> str:

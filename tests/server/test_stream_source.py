@@ -19,6 +19,7 @@ import pytest
 from av.audio.stream import AudioStream
 from av.video.frame import VideoFrame
 from av.video.stream import VideoStream
+from patience import PATIENCE
 from videos_by_hand import HEIGHT, STEP, WIDTH, frame_in, write_video
 
 from server.camera.sound import LiveSound
@@ -27,8 +28,6 @@ from server.camera.sources.opening import Opened, open_video
 from server.camera.sources.stream import Stream
 from server.wire.errors import AwayError, UserError
 from server.wire.sections import Camera, Site, Sound
-
-PATIENCE = 60.0  # seconds until a test that awaits something has failed
 
 
 class MotionJpeg:

@@ -9,13 +9,12 @@ from typing import Any
 
 import pytest
 from cameras_by_hand import small_config
+from patience import PATIENCE
 
 from server.run import supervise
 from server.run.ending import OVER
 from server.run.supervise import Supervisor
 from server.wire.errors import UserError
-
-PATIENCE = 60.0  # seconds until a test that awaits something has failed
 
 
 class Process:

@@ -13,6 +13,7 @@ from cameras_by_hand import CAMERAS, FPS, GOP, HEIGHT, NO_REASON, WIDTH, small_c
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from patience import PATIENCE
 
 from server.camera.encode import AccessUnit, Encoder
 from server.view.choice.decide import GopDecision, ObjectChoice
@@ -66,7 +67,7 @@ def shown(splicer_head: bytes, pieces: list[bytes]) -> list[Shown]:
 
 async def received(viewer: Viewer) -> list[bytes]:
     viewer.close()
-    async with asyncio.timeout(60):
+    async with asyncio.timeout(PATIENCE):
         return [data async for data in viewer]
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import aiohttp
 from cameras_by_hand import CAMERAS, GOP, LARGE, SMALL
 from halls import A, B, Hall
+from patience import PATIENCE
 
 from server.web.access.grant import ALL
 from server.web.events import Events
@@ -76,7 +77,7 @@ async def test_who_fell_behind_is_told_again_what_goes_on_to_hold(busy: Hall) ->
     speaking = asyncio.create_task(told.run())
     lists: set[str] = set()
     try:
-        async with asyncio.timeout(30):
+        async with asyncio.timeout(PATIENCE):
             async for data in reader:
                 name = data.partition(b"\n")[0].removeprefix(b"event: ").decode()
                 lists |= {name} & {"objects", "cameras", "site"}

@@ -17,6 +17,7 @@ import pytest
 from cameras_by_hand import CAMERAS, FPS, GOP, NO_REASON, encoded, video
 from halls import A, Hall, opened
 from numpy.typing import NDArray
+from patience import PATIENCE
 
 from server.view.choice.decide import GopDecision, ObjectChoice
 from server.view.streams.reel import Reel
@@ -256,7 +257,9 @@ async def test_ffmpeg_which_does_not_know_parts_plays_on_without_a_word(hall: Ha
     url = f"http://127.0.0.1:{hall.port}{STREAM}index.m3u8"
     command = ["ffmpeg", "-v", "error", "-live_start_index", "0", "-i", url, "-f", "framecrc", "-"]
     playing = asyncio.create_task(
-        asyncio.to_thread(subprocess.run, command, capture_output=True, text=True, timeout=60, check=False)
+        asyncio.to_thread(
+            subprocess.run, command, capture_output=True, text=True, timeout=PATIENCE, check=False
+        )
     )
     for gop in range(4 * PARTS + 1, 8 * PARTS):
         shows(hall, range(gop, gop + 1))

@@ -25,6 +25,7 @@ from cameras_by_hand import (
     word,
 )
 from halls import A, B, Hall
+from patience import PATIENCE_MS
 from played_in_chromium import PLAY, needs_chromium, seen_in_chromium
 from vp8_by_hand import EPOCHS, feed, own
 
@@ -141,7 +142,7 @@ async def test_the_page_plays_across_cuts_and_from_one_person_to_another(free: H
     async with chromium() as browser:
         page = await browser.new_page(bypass_csp=True)
         page.on("pageerror", lambda error: errors.append(str(error)))
-        page.set_default_timeout(20_000)
+        page.set_default_timeout(PATIENCE_MS)
         going_on = asyncio.create_task(go_on(free))
         await page.goto(f"http://127.0.0.1:{free.port}/?object=1")
         await page.wait_for_function("myview.state === 'playing' && myview.cuts.length > 1")

@@ -1,0 +1,184 @@
+"""Run the whole suite part by part, and close with one summary: ``make test``.
+
+Every part runs, whatever became of those before it. The last line has the form of pytest's own. ``--load 4``
+keeps every processor busy with four endless loops meanwhile, ``--runs 20`` repeats everything: `make
+test-loaded` shows with them that no test depends on luck.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from datetime import timedelta
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+ROOT = Path(__file__).resolve().parents[1]
+_NODE = Path(sys.executable).parent / "node"
+_TSC = ROOT / "node_modules/typescript/bin/tsc"
+_FETCHED = ROOT / "node_modules/.installed"
+"""Made when npm has fetched the compiler."""
+_SITES = ("tests/client", "tests/e2e")
+"""What runs in real time: browsers, and whole sites of processes."""
+_FAST = ("-m", "not slow", "-n", "3", "--dist", "loadgroup")
+"""Three workers for two processors: tests wait a third of the time, for a disk, a browser or a frame."""
+_SLOW = ("-m", "slow", "--timeout", "1800")
+_NO_TESTS = 5
+"""How pytest says that there was nothing to run."""
+_INTERRUPTED = 130
+_BUSY_LOOP = "import os; parent = os.getppid()\nwhile os.getppid() == parent: pass"
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What became of a part: how many tests passed, failed and were skipped, and what was left out."""
+
+    name: str
+    seconds: float = 0.0
+    passed: int = 0
+    failed: int = 0
+    skipped: Counter[str] = field(default_factory=Counter)
+    """How many, by the reason that they gave."""
+    left_out: str | None = None
+    """Why the part could not run at all."""
+
+
+def main() -> None:
+    """Run the suite as often as asked; exit with 1 if anything failed."""
+    asked = _arguments()
+    closing: list[str] = []
+    failed = False
+    with busy(asked.load * (os.cpu_count() or 1)):
+        for _ in range(asked.runs):
+            outcomes = run_slow(asked.may_skip) if asked.slow else run_fast(asked.may_skip)
+            closing.append(closing_line(outcomes))
+            failed |= any(it.failed for it in outcomes)
+            _tell(outcomes, closing if asked.runs > 1 else closing[-1:])
+    sys.exit(failed)
+
+
+def _arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--slow", action="store_true", help="run the tests that take minutes, and no others")
+    parser.add_argument("--runs", type=int, default=1, metavar="N", help="run everything N times")
+    parser.add_argument(
+        "--load", type=int, default=0, metavar="N", help="keep every processor busy with N loops"
+    )
+    parser.add_argument(
+        "--may-skip", metavar="WORD", help="count a test as failed that is skipped for another reason"
+    )
+    return parser.parse_args()
+
+
+def run_fast(may_skip: str | None = None) -> list[Outcome]:
+    """Run everything that takes no minutes: the libraries first, then what runs in real time."""
+    others = [f"--ignore={folder}" for folder in _SITES]
+    return [
+        check_page_types(may_be_left_out=may_skip is None),
+        run_pytest("libraries and services", [*_FAST, *others], may_skip),
+        run_pytest("browsers and whole sites", [*_FAST, *_SITES], may_skip),
+    ]
+
+
+def run_slow(may_skip: str | None = None) -> list[Outcome]:
+    """Run the tests that take minutes."""
+    return [run_pytest("slow tests", _SLOW, may_skip)]
+
+
+def check_page_types(*, may_be_left_out: bool) -> Outcome:
+    """Check the types of the page's JavaScript, where npm could fetch the compiler."""
+    name = "types of the page"
+    if not _FETCHED.exists():
+        why = "npm could not fetch the TypeScript compiler; `make node_modules` says how to see why"
+        return Outcome(name, left_out=why, failed=not may_be_left_out)
+    began = time.monotonic()
+    code = subprocess.run([_NODE, _TSC], cwd=ROOT, check=False).returncode
+    return Outcome(name, time.monotonic() - began, passed=code == 0, failed=code != 0)
+
+
+def run_pytest(
+    name: str, arguments: Sequence[str], may_skip: str | None = None, folder: Path = ROOT
+) -> Outcome:
+    """Run pytest in a process of its own, and count; a run that dies counts as one failure more."""
+    print(f"\n{name}", flush=True)
+    began = time.monotonic()
+    with tempfile.TemporaryDirectory(prefix="myview-suite-") as reports:
+        report = Path(reports) / "report.xml"
+        command = [
+            sys.executable,
+            "-m",
+            "pytest",
+            *arguments,
+            f"--junit-xml={report}",
+            "-o",
+            "junit_logging=no",
+        ]
+        try:
+            code = subprocess.run(command, cwd=folder, check=False).returncode
+        except KeyboardInterrupt:
+            sys.exit(_INTERRUPTED)
+        reported = report.exists()
+        cases = list(ET.parse(report).iter("testcase")) if reported else []  # noqa: S314 — our own
+    failed = sum(it.find("failure") is not None or it.find("error") is not None for it in cases)
+    skipped = Counter(it.get("message", "") for case in cases for it in case.iter("skipped"))
+    refused = {reason: n for reason, n in skipped.items() if may_skip is not None and may_skip not in reason}
+    for reason, n in refused.items():
+        print(f"{n} skipped that may not be here: {reason}")
+    if not reported or code not in {0, 1, _NO_TESTS} or (code == 1 and not failed):
+        print(f"pytest ended with exit code {code}")
+        failed += 1
+    passed = len(cases) - failed - skipped.total()
+    return Outcome(
+        name,
+        time.monotonic() - began,
+        passed=max(passed, 0),
+        failed=failed + sum(refused.values()),
+        skipped=skipped - Counter(refused),
+    )
+
+
+def closing_line(outcomes: Sequence[Outcome]) -> str:
+    """Return the sum of all parts in pytest's words: ``= 1 failed, 3 passed in 259.15s (0:04:19) =``."""
+    failed = sum(it.failed for it in outcomes)
+    skipped = sum(it.skipped.total() for it in outcomes)
+    counts = [f"{sum(it.passed for it in outcomes)} passed"]
+    counts = [f"{failed} failed"] * (failed > 0) + counts + [f"{skipped} skipped"] * (skipped > 0)
+    seconds = sum(it.seconds for it in outcomes)
+    return f" {', '.join(counts)} in {seconds:.2f}s ({timedelta(seconds=int(seconds))}) ".center(80, "=")
+
+
+def _tell(outcomes: Sequence[Outcome], closing: Sequence[str]) -> None:
+    print(f"\n{'part':<28}{'passed':>8}{'failed':>8}{'skipped':>9}{'time':>10}")
+    for it in outcomes:
+        if it.left_out is not None:
+            print(f"{it.name:<28}left out: {it.left_out}")
+            continue
+        time_taken = str(timedelta(seconds=int(it.seconds)))
+        print(f"{it.name:<28}{it.passed:>8}{it.failed:>8}{it.skipped.total():>9}{time_taken:>10}")
+    print("", *closing, sep="\n", flush=True)
+
+
+@contextlib.contextmanager
+def busy(loops: int) -> Iterator[None]:
+    """Run endless loops, each a process of its own, beside what is done meanwhile."""
+    running = [subprocess.Popen([sys.executable, "-c", _BUSY_LOOP]) for _ in range(loops)]
+    try:
+        yield
+    finally:
+        for process in running:
+            process.kill()
+            process.wait()
+
+
+if __name__ == "__main__":
+    main()
