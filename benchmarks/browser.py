@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import shutil
 from collections.abc import AsyncIterator
 from pathlib import Path
 
@@ -10,7 +11,6 @@ from playwright.async_api import Browser, async_playwright
 
 from benchmarks.surroundings import CannotRunError
 
-CHROMIUM = Path("/usr/bin/chromium")
 FLAGS = (
     "--no-sandbox",
     "--disable-gpu",
@@ -22,21 +22,27 @@ FLAGS = (
 )
 
 
+def chromium_path() -> Path | None:
+    """Return where the browser is, as Debian or another system names it; None: nowhere on the PATH."""
+    found = next(filter(None, map(shutil.which, ("chromium", "chromium-browser"))), None)
+    return None if found is None else Path(found)
+
+
 def check_chromium() -> None:
     """Make sure that there is a browser.
 
     Raises:
         CannotRunError: there is none.
     """
-    if not CHROMIUM.exists():
-        raise CannotRunError(f"needs a Chromium at {CHROMIUM}; on Debian: apt install chromium")
+    if chromium_path() is None:
+        raise CannotRunError("needs Chromium; on Debian: apt install chromium")
 
 
 @contextlib.asynccontextmanager
 async def chromium() -> AsyncIterator[Browser]:
     """Run a browser."""
     async with async_playwright() as playwright:
-        browser = await playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        browser = await playwright.chromium.launch(executable_path=chromium_path(), args=FLAGS)
         try:
             yield browser
         finally:

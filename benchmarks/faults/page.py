@@ -6,7 +6,7 @@ import asyncio
 import signal
 import time
 
-from benchmarks.browser import CHROMIUM, chromium
+from benchmarks.browser import chromium, chromium_path
 from benchmarks.demo_site import open_when_there
 from benchmarks.faults.site import Fault, Stand, with_up
 
@@ -25,8 +25,8 @@ async def killed(stand: Stand) -> None:
     Raises:
         RuntimeError: there is no browser, or the page does not come back.
     """
-    if not CHROMIUM.exists():
-        raise RuntimeError(f"there is no browser at {CHROMIUM}")
+    if chromium_path() is None:
+        raise RuntimeError("there is no browser: it needs Chromium")
     async with chromium() as browser:
         page = await browser.new_page(bypass_csp=True)  # the page's policy forbids eval, which asks it here
         await open_when_there(page, f"{stand.url}?object={stand.viewers[0].number}")

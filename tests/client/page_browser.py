@@ -11,16 +11,11 @@ from typing import Any
 import av
 import numpy as np
 import numpy.typing as npt
-import pytest
 from page_site import FakeSite, SiteServer, serving
 from patience import PATIENCE_MS
 from playwright.async_api import Browser, Page, expect
 
-from benchmarks.browser import CHROMIUM
-
 expect.set_options(timeout=PATIENCE_MS)
-
-needs_chromium = pytest.mark.skipif(not CHROMIUM.exists(), reason=f"needs a Chromium at {CHROMIUM}")
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,9 +6,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from page_browser import Visit, needs_chromium, visiting
+from page_browser import Visit, visiting
 from page_site import FakeSite
 from playwright.async_api import Browser
+from programs import needs_chromium
 
 AXE = Path(__file__).parents[2] / "node_modules/axe-core/axe.min.js"
 SERIOUS = ("serious", "critical")

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import pytest
-from page_browser import needs_chromium, visiting
+from page_browser import visiting
 from page_site import FakeSite
 from playwright.async_api import Browser, expect
+from programs import needs_chromium
 
 pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="session")]
 

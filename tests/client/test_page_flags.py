@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from page_browser import Visit, needs_chromium, visiting
+from page_browser import Visit, visiting
 from page_pattern import CAMERAS, HEIGHT, WIDTH
 from page_site import FakeSite
 from playwright.async_api import Browser, expect
+from programs import needs_chromium
 from test_page_accessible import AXE, faults
 from test_page_past import seconds_of_playing
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 import pytest
-from page_browser import needs_chromium, visiting
+from page_browser import visiting
 from page_pattern import CAMERAS, FPS, GROUNDS, HEIGHT, SQUARE, WIDTH
 from page_site import HOLD, LOOKAHEAD, FakeSite
 from playwright.async_api import Browser
+from programs import needs_chromium
 
 pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="session")]
 

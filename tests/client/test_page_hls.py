@@ -6,10 +6,11 @@ import contextlib
 from collections.abc import AsyncIterator
 
 import pytest
-from page_browser import Visit, needs_chromium, visiting
+from page_browser import Visit, visiting
 from page_pattern import FPS
 from page_site import SEGMENT, FakeSite
 from playwright.async_api import Browser, expect
+from programs import needs_chromium
 from test_page_hold import camera_on_the_stage
 
 pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="session")]

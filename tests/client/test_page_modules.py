@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 import pytest_asyncio
-from page_browser import needs_chromium
 from page_pattern import FPS, GOP
 from page_site import STARTS_AT, FakeSite, SiteServer, serving
 from playwright.async_api import Browser, Page
+from programs import needs_chromium
 
 pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="session")]
 

@@ -6,10 +6,11 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from page_browser import Visit, needs_chromium, visiting
+from page_browser import Visit, visiting
 from page_pattern import CAMERAS, FPS, GOP
 from page_site import STARTS_AT, FakeSite
 from playwright.async_api import Browser, expect
+from programs import needs_chromium
 
 pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="session")]
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import pytest
-from page_browser import Visit, needs_chromium, visiting
+from page_browser import Visit, visiting
 from page_pattern import FPS
 from page_site import FakeSite
 from playwright.async_api import Browser, expect
+from programs import needs_chromium
 
 pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="session")]
 

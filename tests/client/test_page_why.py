@@ -5,10 +5,11 @@ from __future__ import annotations
 import asyncio
 
 import pytest
-from page_browser import needs_chromium, visiting
+from page_browser import visiting
 from page_pattern import FPS
 from page_site import STARTS_AT, FakeSite
 from playwright.async_api import Browser, Route, expect
+from programs import needs_chromium
 
 pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="session")]
 

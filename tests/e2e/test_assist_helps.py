@@ -9,17 +9,17 @@ import pytest
 from assist_page import PLACE, every_gop_once, helped, opened
 from patience import PATIENCE_MS
 from playwright.async_api import Page
+from programs import needs_chromium
 from running_site import RunningSite
 from two_alike import FRAMES, MET, camera
 
-from benchmarks.browser import CHROMIUM
 from client import Gop
 from client.model import Split
 
 pytestmark = [
     pytest.mark.live,
     pytest.mark.asyncio,
-    pytest.mark.skipif(not CHROMIUM.exists(), reason=f"needs a Chromium at {CHROMIUM}"),
+    needs_chromium,
 ]
 ALIKE = "alike"
 

@@ -11,15 +11,15 @@ import pytest_asyncio
 from assist_page import PLACE, every_gop_once, helped, opened
 from patience import PATIENCE_MS
 from playwright.async_api import Page
+from programs import needs_chromium
 from running_site import RunningSite
 
-from benchmarks.browser import CHROMIUM
 from server.run.setup import DEMO
 
 pytestmark = [
     pytest.mark.live,
     pytest.mark.asyncio(loop_scope="module"),
-    pytest.mark.skipif(not CHROMIUM.exists(), reason=f"needs a Chromium at {CHROMIUM}"),
+    needs_chromium,
 ]
 
 

@@ -15,16 +15,17 @@ import pytest_asyncio
 from beeps import heard
 from patience import PATIENCE
 from playwright.async_api import Browser, Page
+from programs import needs_chromium
 from running_site import RunningSite, bounded
 from spliced import FPS, record
 
-from benchmarks.browser import CHROMIUM, chromium
+from benchmarks.browser import chromium
 
 pytestmark = [
     pytest.mark.live,
     pytest.mark.xdist_group("site"),
     pytest.mark.asyncio(loop_scope="session"),
-    pytest.mark.skipif(not CHROMIUM.exists(), reason=f"needs a Chromium at {CHROMIUM}"),
+    needs_chromium,
 ]
 
 PLAYED_ACROSS_A_CUT = f"""(() => {{

@@ -6,13 +6,10 @@ import asyncio
 from collections.abc import Callable
 from typing import Any
 
-import pytest
 from patience import PATIENCE
 
-from benchmarks.browser import CHROMIUM, chromium
+from benchmarks.browser import chromium
 from server.view.streams.splice import Splicer
-
-needs_chromium = pytest.mark.skipif(not CHROMIUM.exists(), reason=f"needs a Chromium at {CHROMIUM}")
 
 READ = """
   const video = document.createElement('video');

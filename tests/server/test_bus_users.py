@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import re
-import shutil
 import subprocess
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
@@ -13,6 +12,7 @@ from pathlib import Path
 
 import pytest
 from patience import PATIENCE
+from programs import needs_openssl
 
 from server.run.setup import free_port
 from server.wire.bus import Bus
@@ -23,7 +23,7 @@ from server.wire.messages import Keys
 from server.wire.sections import Zenoh, ZenohTls
 from server.wire.users import password_of, read_users
 
-pytestmark = pytest.mark.skipif(shutil.which("openssl") is None, reason="needs openssl, to make certificates")
+pytestmark = needs_openssl
 
 SITE = Keys("hall")
 SECURITY = (Path(__file__).parents[2] / "docs" / "security.md").read_text(encoding="utf-8")

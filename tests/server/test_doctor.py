@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 import socket
 import subprocess
 from collections.abc import Iterator
@@ -17,6 +16,7 @@ from cameras_by_hand import FPS, HEIGHT, WIDTH, encoded
 from command_line import Run
 from free_port import free
 from halls import Hall
+from programs import needs_openssl
 from rtsp_by_hand import RtspCamera
 from videos_by_hand import write_video
 
@@ -379,7 +379,7 @@ def expired(folder: Path) -> tuple[Path, Path]:
     return certificate, key
 
 
-@pytest.mark.skipif(shutil.which("openssl") is None, reason="needs openssl, to make certificates")
+@needs_openssl
 def test_a_certificate_is_good_for_as_long_as_it_says(tmp_path: Path) -> None:
     def made(name: str, *until: str) -> tuple[Path, Path]:
         certificate, key = tmp_path / f"{name}.pem", tmp_path / f"{name}.key"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import socket
 import subprocess
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any
 import pytest
 from command_line import Run
 from free_port import free
+from programs import needs_openssl
 from test_doctor import config, site
 
 from server.run import doctor, doctor_files, doctor_ports
@@ -160,7 +160,7 @@ def test_a_missing_file_of_tokens_is_said_once(tmp_path: Path) -> None:
     assert (said.check, said.do) == ("access.tokens", "`myview token NAME` prints a line for it")
 
 
-@pytest.mark.skipif(shutil.which("openssl") is None, reason="needs openssl, to make certificates")
+@needs_openssl
 def test_the_router_s_certificate_is_for_the_host_that_cameras_look_for(tmp_path: Path) -> None:
     made = "-newkey ec -pkeyopt ec_paramgen_curve:P-256 -nodes"
     for line in (

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from programs import needs_openssl
 
 from camsync import PulseServer
 from server.run.healthy import main
@@ -26,9 +27,6 @@ from server.wire.tokens import digest_of, read_tokens
 from server.wire.users import read_users
 
 ROOT = Path(__file__).resolve().parents[2]
-NEEDS_OPENSSL = pytest.mark.skipif(
-    shutil.which("openssl") is None, reason="needs openssl, to make certificates"
-)
 LIVE = {"camera": "c0", "state": "live", "fps": 25.0, "message": ""}
 
 
@@ -149,7 +147,7 @@ def test_an_answer_that_is_no_service_s_is_not_well(plain: Service) -> None:
     assert main(["camera", "c0"]) == 1
 
 
-@NEEDS_OPENSSL
+@needs_openssl
 @pytest.mark.usefixtures("secure")
 def test_by_https_the_certificate_and_the_token_count(
     secrets: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -164,7 +162,7 @@ def test_by_https_the_certificate_and_the_token_count(
     assert main(["camera", "c0"]) == 1
 
 
-@NEEDS_OPENSSL
+@needs_openssl
 def test_what_is_made_for_a_secure_site_fits_together(secrets: Path) -> None:
     assert (secrets.stat().st_mode & 0o777) == 0o700, "nobody else of the host looks in"
     operator, health = read_tokens(secrets / "web" / "tokens.yaml")
@@ -196,7 +194,7 @@ def test_without_openssl_nothing_is_made_and_that_is_said(tmp_path: Path) -> Non
     assert not (tmp_path / "secrets").exists()
 
 
-@NEEDS_OPENSSL
+@needs_openssl
 @pytest.mark.parametrize("camera", ["c 0", "../x", "bestview", "bestview-1", "a: b", ""])
 def test_a_camera_that_cannot_be_called_that_is_refused_before_anything_is_made(
     tmp_path: Path, camera: str
@@ -207,7 +205,7 @@ def test_a_camera_that_cannot_be_called_that_is_refused_before_anything_is_made(
     assert not (tmp_path / "secrets").exists()
 
 
-@NEEDS_OPENSSL
+@needs_openssl
 def test_a_name_that_no_certificate_takes_is_said_and_a_shorter_one_is_taken_then(tmp_path: Path) -> None:
     done = made(tmp_path, f"{'a' * 63}.example")
     assert done.returncode == 1
@@ -216,7 +214,7 @@ def test_a_name_that_no_certificate_takes_is_said_and_a_shorter_one_is_taken_the
     assert not [it.name for it in tmp_path.iterdir() if it.name in {"log", "names", "request"}]
 
 
-@NEEDS_OPENSSL
+@needs_openssl
 @pytest.mark.parametrize(
     ("name", "also"),
     [
@@ -240,7 +238,7 @@ def test_a_certificate_is_for_the_name_or_the_address(tmp_path: Path, name: str,
     assert said.splitlines()[1:] == [f"    {also}"]
 
 
-@NEEDS_OPENSSL
+@needs_openssl
 def test_a_camera_is_added_to_a_secure_site_that_stays_as_it_is(secrets: Path, tmp_path: Path) -> None:
     folder = tmp_path / "secrets"
     shutil.copytree(secrets, folder)
@@ -253,7 +251,7 @@ def test_a_camera_is_added_to_a_secure_site_that_stays_as_it_is(secrets: Path, t
     assert new == {f"cameras/yard/{it}" for it in ("bus", "pulses", "token")}
 
 
-@NEEDS_OPENSSL
+@needs_openssl
 def test_a_site_of_before_the_pulses_had_passwords_gets_them(secrets: Path, tmp_path: Path) -> None:
     folder = tmp_path / "secrets"
     shutil.copytree(secrets, folder)

@@ -7,7 +7,8 @@ from collections.abc import AsyncIterator
 import pytest
 from cameras_by_hand import CAMERAS, FPS, GOP, NO_REASON, SMALL, encoded
 from halls import A, Hall, opened
-from played_in_chromium import PLAY, needs_chromium, seen_in_chromium
+from played_in_chromium import PLAY, seen_in_chromium
+from programs import needs_chromium
 
 from server.view.choice.decide import GopDecision, ObjectChoice
 

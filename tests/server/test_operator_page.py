@@ -20,10 +20,11 @@ from cameras_by_hand import CAMERAS, FPS, LARGE, SMALL, small_config, status, tr
 from halls import A, B, Hall, opened, see
 from patience import PATIENCE_MS
 from playwright.async_api import Browser, Page, Route, expect
+from programs import needs_chromium
 from tokens_by_hand import line_of, token_of, write_tokens
 from walk_by_hand import SITE, curved, errors_on_floor, words
 
-from benchmarks.browser import CHROMIUM, chromium
+from benchmarks.browser import chromium
 from bestview import IdentityRegistry
 from server.run.calibrate_points import read_points
 from server.wire.help import Trouble
@@ -38,7 +39,7 @@ PLAN = [[0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 1.0]]
 expect.set_options(timeout=PATIENCE_MS)
 
 pytestmark = [
-    pytest.mark.skipif(not CHROMIUM.exists(), reason=f"needs a Chromium at {CHROMIUM}"),
+    needs_chromium,
     pytest.mark.asyncio(loop_scope="module"),
 ]
 

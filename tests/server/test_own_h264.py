@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import http.server
 import re
-import shutil
 import subprocess
 import threading
 import time
@@ -23,6 +22,7 @@ from cameras_by_hand import FPS, GOP, HEIGHT, WIDTH, encoded, small_config
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from patience import PATIENCE
+from programs import needs_ffmpeg
 from rtsp_by_hand import RtspCamera
 from videos_by_hand import write_video
 
@@ -131,7 +131,7 @@ def test_a_recording_begins_later_and_again(tmp_path: Path) -> None:
     assert [nals(it.data) for it in sent] == 2 * [nals(it.data) for it in encoded(0)[:FRAMES]]
 
 
-@pytest.mark.skipif(not shutil.which("ffmpeg"), reason="needs ffmpeg")
+@needs_ffmpeg
 def test_what_the_manual_tells_to_do_fits(tmp_path: Path) -> None:
     """A camera that is set up as docs/operating.md says passes through."""
     manual = (Path(__file__).parents[2] / "docs" / "operating.md").read_text(encoding="utf-8")

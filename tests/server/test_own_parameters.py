@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import io
-import shutil
 import subprocess
 from functools import cache
 from pathlib import Path
@@ -16,7 +15,8 @@ import pytest
 from cameras_by_hand import FPS, GOP, HEIGHT, NO_REASON, WIDTH, small_config
 from halls import A, B, Hall, opened
 from numpy.typing import NDArray
-from played_in_chromium import READ, needs_chromium, seen_in_chromium
+from played_in_chromium import READ, seen_in_chromium
+from programs import needs_chromium, needs_ffmpeg
 
 from server.camera.encode import AccessUnit, Encoder
 from server.view.choice.decide import GopDecision, ObjectChoice
@@ -122,7 +122,7 @@ async def test_every_frame_is_the_chosen_cameras_and_holes_stand_still(form: str
         np.testing.assert_array_equal(picture, right, f"pulse {pulse}")
 
 
-@pytest.mark.skipif(not shutil.which("ffmpeg"), reason="needs ffmpeg")
+@needs_ffmpeg
 async def test_ffmpeg_plays_it_without_a_warning(tmp_path: Path) -> None:
     for name, data in zip(("own.mp4", "own.ts"), await spliced(config()), strict=True):
         (tmp_path / name).write_bytes(data)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import io
 import re
-import shutil
 import subprocess
 from collections.abc import AsyncIterator
 from pathlib import Path
@@ -16,12 +15,13 @@ import pytest
 from cameras_by_hand import CAMERAS, FPS, GOP, NO_REASON, encoded, video
 from halls import A, B, Hall, opened
 from patience import PATIENCE
+from programs import needs_chromium, needs_ffmpeg
 from recorded_by_hand import PULSE0, Picture, own_pictures
 from sounds_by_hand import FRAMES as SOUNDING
 from sounds_by_hand import heard, sends, write_flashes
 from test_players import HLS_BY_ITSELF
 
-from benchmarks.browser import CHROMIUM, chromium
+from benchmarks.browser import chromium
 from server.view.choice.decide import GopDecision, ObjectChoice
 from server.wire.messages import GopChoices
 
@@ -220,7 +220,7 @@ async def test_what_cannot_be_had_is_told_in_one_line(hall: Hall, path: str, sta
     assert await hall.get(path) == (status, {"error": error})
 
 
-@pytest.mark.skipif(not shutil.which("ffmpeg"), reason="needs ffmpeg")
+@needs_ffmpeg
 async def test_ffmpeg_plays_the_past_with_its_sound_to_the_end(tmp_path: Path) -> None:
     recording = write_flashes(tmp_path / "flashes.mp4", SOUNDING)
     record = {"folder": str(tmp_path / "kept"), "segment_s": 1.0}
@@ -245,7 +245,7 @@ async def test_ffmpeg_plays_the_past_with_its_sound_to_the_end(tmp_path: Path) -
             assert sum(1 for _ in container.decode(video=0)) == SOUNDING
 
 
-@pytest.mark.skipif(not CHROMIUM.exists(), reason=f"needs a Chromium at {CHROMIUM}")
+@needs_chromium
 async def test_chromium_plays_the_past_to_its_end(hall: Hall) -> None:
     shows(hall, range(20))
     async with chromium() as browser:

@@ -9,10 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cameras_by_hand import CAMERAS, FPS, GOP, NO_REASON, FedService, video
-from ffprobe_by_hand import needs_ffprobe, probed
+from ffprobe_by_hand import probed
 from halls import A, Hall, opened
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from programs import needs_ffprobe
 from recorded_by_hand import AMPLE, PULSE0, head, piece
 from sounds_by_hand import (
     BEEPS,

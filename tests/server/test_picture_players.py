@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import asyncio
-import shutil
 from collections.abc import AsyncIterator
 
 import pytest
 from cameras_by_hand import FPS, GOP
 from drawn_by_hand import Drawn, drawn_room
+from programs import needs_chromium, needs_ffmpeg
 
-from benchmarks.browser import CHROMIUM, chromium
+from benchmarks.browser import chromium
 
 LOOKS = """
 async () => {
@@ -47,7 +47,7 @@ async def going() -> AsyncIterator[Drawn]:
         task.cancel()
 
 
-@pytest.mark.skipif(not CHROMIUM.exists(), reason=f"needs a Chromium at {CHROMIUM}")
+@needs_chromium
 async def test_chromium_shows_moving_pictures_in_an_img_and_boxes_in_a_video() -> None:
     async with chromium() as browser:
         async for drawn in drawn_room():
@@ -64,7 +64,7 @@ async def test_chromium_shows_moving_pictures_in_an_img_and_boxes_in_a_video() -
             going.cancel()
 
 
-@pytest.mark.skipif(not shutil.which("ffmpeg"), reason="needs ffmpeg")
+@needs_ffmpeg
 @pytest.mark.parametrize("path", ["/cameras/c0/live.mjpeg", "/objects/1/best.mp4?overlay=1"])
 async def test_ffmpeg_reads_it_without_a_complaint(going: Drawn, path: str) -> None:
     reading = await asyncio.create_subprocess_exec(

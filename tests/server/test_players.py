@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import os
 import re
-import shutil
 import tempfile
 from collections.abc import AsyncIterator, Iterator, Sequence
 from dataclasses import dataclass
@@ -19,8 +18,9 @@ from cameras_by_hand import CAMERAS, FPS, HEIGHT, LARGE, SMALL, STRIDE, WIDTH, e
 from halls import A, B, Hall, opened
 from numpy.typing import NDArray
 from patience import PATIENCE
+from programs import needs_chromium, needs_ffmpeg, needs_mpv, needs_vlc
 
-from benchmarks.browser import CHROMIUM, chromium
+from benchmarks.browser import chromium
 from server.wire.epochs import end_of_epoch
 
 EPOCHS = 48
@@ -37,10 +37,6 @@ OF_A_STREAM = re.compile(
 )
 # In fragmented MP4 the table of pictures is empty, in VLC's eyes a thing to mention.
 OF_EVERY_FRAGMENT = re.compile(r"no chunk defined|STTS table of 0 entries")
-
-needs_ffmpeg = pytest.mark.skipif(not shutil.which("ffmpeg"), reason="needs ffmpeg")
-needs_vlc = pytest.mark.skipif(not shutil.which("cvlc"), reason="needs cvlc, of VLC")
-needs_mpv = pytest.mark.skipif(not shutil.which("mpv"), reason="needs mpv")
 
 
 def feed(hall: Hall, epoch: int) -> None:
@@ -215,7 +211,7 @@ HLS_BY_ITSELF = """async (url) => {
 }"""
 
 
-@pytest.mark.skipif(not CHROMIUM.exists(), reason=f"needs a Chromium at {CHROMIUM}")
+@needs_chromium
 async def test_chromium_plays_hls_by_itself_up_to_the_end(live: Hall) -> None:
     async with chromium() as browser:
         page = await browser.new_page(bypass_csp=True)

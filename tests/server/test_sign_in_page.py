@@ -11,14 +11,15 @@ import pytest_asyncio
 from halls import Hall, see
 from patience import PATIENCE_MS
 from playwright.async_api import Browser, Page, expect
+from programs import needs_chromium
 from tokens_by_hand import line_of, locked, token_of, write_tokens
 
-from benchmarks.browser import CHROMIUM, chromium
+from benchmarks.browser import chromium
 
 AXE = Path(__file__).parents[2] / "node_modules/axe-core/axe.min.js"
 
 pytestmark = [
-    pytest.mark.skipif(not CHROMIUM.exists(), reason=f"needs a Chromium at {CHROMIUM}"),
+    needs_chromium,
     pytest.mark.asyncio(loop_scope="module"),
 ]
 

@@ -11,11 +11,12 @@ import av
 import numpy as np
 import pytest
 from cameras_by_hand import CAMERAS, FPS, GOP, NO_REASON, video
-from ffprobe_by_hand import needs_ffprobe, probed
+from ffprobe_by_hand import probed
 from halls import A, Hall, opened
 from hypothesis import given
 from hypothesis import strategies as st
 from played_in_chromium import PLAY
+from programs import needs_chromium, needs_ffprobe
 from sounds_by_hand import (
     BEEPS,
     EVERY,
@@ -32,7 +33,7 @@ from sounds_by_hand import (
 )
 
 import client
-from benchmarks.browser import CHROMIUM, chromium
+from benchmarks.browser import chromium
 from server.camera.sound import Frame, RecordedSound
 from server.camera.sound.encoding import Encoding
 from server.camera.sound.opus import samples_in
@@ -224,7 +225,7 @@ async def test_what_somebody_keeps_has_it_too(hall: Hall, recording: Path, tmp_p
     assert [it[0] for it in probed(out, "codec_name,nb_read_frames")] == ["h264", "opus"]
 
 
-@pytest.mark.skipif(not CHROMIUM.exists(), reason=f"needs a Chromium at {CHROMIUM}")
+@needs_chromium
 async def test_chromium_plays_it(hall: Hall, recording: Path) -> None:
     sends(hall.service, recording)
     decide(hall, range(GOPS))

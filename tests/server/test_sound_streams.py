@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cameras_by_hand import CAMERAS, FPS, GOP, NO_REASON, SMALL, FedService, encoded, small_config, video
-from ffprobe_by_hand import needs_ffprobe, probed
+from ffprobe_by_hand import probed
 from halls import A, B, Hall, opened
-from played_in_chromium import PLAY, needs_chromium, seen_in_chromium
+from played_in_chromium import PLAY, seen_in_chromium
+from programs import needs_chromium, needs_ffprobe
 from sounds_by_hand import (
     BEEPS,
     FRAMES,

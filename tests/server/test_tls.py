@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import logging
 import os
-import shutil
 import ssl
 import subprocess
 import sys
@@ -16,6 +15,7 @@ import aiohttp
 import pytest
 from cameras_by_hand import CAMERAS, SMALL
 from halls import A, B, opened
+from programs import needs_openssl
 from pydantic import ValidationError
 from tokens_by_hand import line_of, token_of, write_tokens
 
@@ -25,7 +25,7 @@ from server.wire.errors import UserError
 from server.wire.loading import build_config
 from server.wire.sections import Tls
 
-pytestmark = pytest.mark.skipif(shutil.which("openssl") is None, reason="needs openssl, to make certificates")
+pytestmark = needs_openssl
 
 
 def make_certificate(folder: Path, name: str) -> Tls:

@@ -10,9 +10,10 @@ from pathlib import Path
 import av
 import numpy as np
 from cameras_by_hand import CAMERAS, FPS, GOP, encoded
-from ffprobe_by_hand import needs_ffprobe, probed
+from ffprobe_by_hand import probed
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from programs import needs_ffprobe
 
 from server.view.media.agreement import Agreement
 from server.view.media.fmp4 import Sample, fragment, ticks

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import shutil
 import subprocess
 from functools import cache
 from pathlib import Path
@@ -14,6 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from programs import needs_ffprobe
 
 from server.camera.encode import AccessUnit, Encoder
 from server.draw.unpack_webm import webm_frames
@@ -180,7 +180,7 @@ def test_frames_come_out_of_clusters_as_they_went_in_and_damage_ends_them(
     list(webm_frames(data.draw(st.binary(max_size=100)), FPS))
 
 
-@pytest.mark.skipif(not shutil.which("ffprobe"), reason="needs ffprobe")
+@needs_ffprobe
 def test_ffprobe_has_nothing_to_complain_of(tmp_path: Path) -> None:
     units = encoded(64, 48)
     data = header(64, 48, FPS, FRAMES) + b"".join(it.fragment for it in shelved(units))

@@ -15,11 +15,12 @@ import numpy as np
 import pytest
 from cameras_by_hand import CAMERAS, FPS, GOP, HEIGHT, LARGE, SMALL, WIDTH
 from halls import Hall, opened
+from programs import needs_chromium, needs_ffprobe
 from recorded_by_hand import A, B, own_pictures, pictures
 from typer.testing import CliRunner
 
 import client
-from benchmarks.browser import CHROMIUM, chromium
+from benchmarks.browser import chromium
 from client.commentary import Frame
 from client.model import Box, Site
 from client.sidecar import write_sidecars
@@ -87,7 +88,7 @@ async def test_what_is_live_is_recorded_likewise(tmp_path: Path) -> None:
         assert (tmp_path / "one.vtt").read_text().count("\np") == 3 * GOP
 
 
-@pytest.mark.skipif(not CHROMIUM.exists(), reason=f"needs a Chromium at {CHROMIUM}")
+@needs_chromium
 async def test_a_browser_plays_the_film_as_a_plain_file_of_its_length(hall: Hall, tmp_path: Path) -> None:
     await watched(hall, tmp_path / "one.mp4")
     (tmp_path / "page.html").write_text("<video src=one.mp4 muted></video>")
@@ -107,7 +108,7 @@ async def test_a_browser_plays_the_film_as_a_plain_file_of_its_length(hall: Hall
     assert ended == pytest.approx([(28 - FIRST) / FPS, (28 - FIRST) / FPS, WIDTH, 0.0])
 
 
-@pytest.mark.skipif(shutil.which("ffprobe") is None, reason="needs ffprobe")
+@needs_ffprobe
 async def test_ffprobe_has_nothing_to_say_about_the_film(hall: Hall, tmp_path: Path) -> None:
     await watched(hall, tmp_path / "one.mp4")
     asked = ["-v", "warning", "-show_entries", "format=start_time,duration", "-of", "csv=p=0"]

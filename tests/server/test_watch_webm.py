@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import shutil
 import subprocess
 from pathlib import Path
 
@@ -14,6 +13,7 @@ from cameras_by_hand import FPS, GOP, HEIGHT, STRIDE, WIDTH, encoded
 from halls import Hall
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from programs import needs_ffmpeg
 from vp8_by_hand import EPOCHS, feed, own
 
 import client
@@ -114,7 +114,7 @@ def test_however_often_it_was_interrupted_the_film_is_the_same(
             assert next(film.decode(video=0)).time == pytest.approx(number / FPS)
 
 
-@pytest.mark.skipif(not shutil.which("ffmpeg"), reason="needs ffmpeg")
+@needs_ffmpeg
 def test_ffmpeg_has_nothing_to_complain_of(tmp_path: Path) -> None:
     part, out = tmp_path / "part", tmp_path / "film.webm"
     with part.open("wb") as file:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import io
 import re
-import shutil
 import subprocess
 from collections.abc import AsyncIterator
 from dataclasses import dataclass
@@ -18,6 +17,7 @@ from cameras_by_hand import CAMERAS, FPS, GOP, NO_REASON, encoded, video
 from halls import A, Hall, opened
 from numpy.typing import NDArray
 from patience import PATIENCE
+from programs import needs_ffmpeg
 
 from server.view.choice.decide import GopDecision, ObjectChoice
 from server.view.streams.reel import Reel
@@ -251,7 +251,7 @@ async def test_parts_show_what_their_segments_show_and_any_that_says_so_can_be_b
             np.testing.assert_array_equal(picture, at(segments, pulse), uri)
 
 
-@pytest.mark.skipif(not shutil.which("ffmpeg"), reason="needs ffmpeg")
+@needs_ffmpeg
 async def test_ffmpeg_which_does_not_know_parts_plays_on_without_a_word(hall: Hall) -> None:
     shows(hall, range(4 * PARTS + 1))
     url = f"http://127.0.0.1:{hall.port}{STREAM}index.m3u8"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import shutil
 
 import av
 import cv2
@@ -26,7 +25,8 @@ from cameras_by_hand import (
 )
 from halls import A, B, Hall
 from patience import PATIENCE_MS
-from played_in_chromium import PLAY, needs_chromium, seen_in_chromium
+from played_in_chromium import PLAY, seen_in_chromium
+from programs import needs_chromium, needs_ffmpeg, needs_mpv
 from vp8_by_hand import EPOCHS, feed, own
 
 from benchmarks.browser import chromium
@@ -34,9 +34,6 @@ from server.view.choice.decide import GopDecision, ObjectChoice
 from server.wire.epochs import end_of_epoch
 
 PATHS = ("/objects/1/best.webm", "/cameras/c1/live.webm")
-
-needs_ffmpeg = pytest.mark.skipif(not shutil.which("ffmpeg"), reason="needs ffmpeg")
-needs_mpv = pytest.mark.skipif(not shutil.which("mpv"), reason="needs mpv")
 
 
 async def played(hall: Hall, command: str) -> list[tuple[int | None, bytes, str]]:
