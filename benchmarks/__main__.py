@@ -33,6 +33,7 @@ class Benchmark:
 
 
 BENCHMARKS = (
+    Benchmark("startup", "from a fresh clone to the first picture, part by part; 1 minute"),
     Benchmark("render", "how fast recordings are rendered, and where the processor time goes"),
     Benchmark(
         "delay", "from the pulse to the browser, stage by stage; 2 minutes, part of it drawing the scene"

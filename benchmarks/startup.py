@@ -1,0 +1,139 @@
+"""From a fresh clone to the first picture: what `make demo` takes, part by part; a plot.
+
+    python -m benchmarks.startup --out out/bench
+
+A clone of the committed tree in a temporary folder; nothing of it is installed before. Packages come from the
+index, or from the caches of pip and uv where they are: what has none is a bare machine (`tests/bare_machine.sh`).
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import signal
+import subprocess
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from benchmarks.report import Report
+from benchmarks.surroundings import ROOT, parser
+
+_GIVE_UP_S = 600.0
+_ANSI = re.compile(r"\x1b\[[0-9;]*m")
+
+
+@dataclass(frozen=True, slots=True)
+class Milestone:
+    """A line of the output at which a part has ended."""
+
+    part: str
+    line: re.Pattern[str]
+    times: int = 1
+    """How often the line must come."""
+
+
+MILESTONES = (
+    Milestone("make the virtual environment", re.compile(r"pip install .*\buv$")),
+    Milestone("install uv", re.compile(r"uv pip install")),
+    Milestone("install what MyView runs on", re.compile(r"^\S*myview demo$")),
+    Milestone("start the demo", re.compile(r"^Three cameras at")),
+    Milestone("start the best-view service: the page answers", re.compile(r"page, streams and API on")),
+    Milestone("start the cameras", re.compile(r"camera c\d is there"), 3),
+    Milestone("find somebody and show them", re.compile(r"^MyView is ready")),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """What a part took, and when it was over."""
+
+    name: str
+    seconds: float
+    over: float
+
+
+def measure(clone: Path) -> list[Part]:
+    """Run `make demo` in a fresh clone until it shows somebody; return the seconds of every part.
+
+    Raises:
+        RuntimeError: it ended before.
+    """
+    found: list[Part] = []
+    said: list[str] = []
+    began = last = time.monotonic()
+    with _demo(clone) as lines:
+        waiting = list(MILESTONES)
+        seen = 0
+        for line in lines:
+            said.append(_ANSI.sub("", line).rstrip())
+            seen += bool(waiting[0].line.search(said[-1]))
+            if seen >= waiting[0].times:
+                now = time.monotonic()
+                found.append(Part(waiting.pop(0).part, now - last, now - began))
+                last, seen = now, 0
+            if not waiting:
+                return found
+    raise RuntimeError("`make demo` ended before it was ready:\n" + "\n".join(said[-20:]))
+
+
+@contextlib.contextmanager
+def _demo(clone: Path) -> Iterator[Iterator[str]]:
+    """Run it, and give the lines that it prints; in the end it is told to end."""
+    environment = {**os.environ, "PYTHONUNBUFFERED": "1", "BROWSER": "true"}
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)  # or every process would compile everything for itself
+    process = subprocess.Popen(
+        ["make", "demo"],
+        cwd=clone,
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        start_new_session=True,
+    )
+    signal.signal(signal.SIGALRM, lambda *_: os.killpg(process.pid, signal.SIGTERM))
+    signal.setitimer(signal.ITIMER_REAL, _GIVE_UP_S)
+    try:
+        yield iter(process.stdout or ())
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGTERM)
+        process.communicate()
+
+
+def plot(parts: Sequence[Part], path: Path) -> None:
+    """Draw a bar for every part, each from when the one before was over."""
+    figure = Figure(figsize=(8, 3), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.add_subplot()
+    names = [it.name for it in parts]
+    axes.barh(names, [it.seconds for it in parts], left=[it.over - it.seconds for it in parts])
+    axes.invert_yaxis()
+    axes.set_xlabel("seconds since `make demo`")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path)
+
+
+def main() -> None:
+    """Measure and print."""
+    chosen = parser(__doc__ or "", "startup").parse_args()
+    report = Report()
+    with tempfile.TemporaryDirectory(prefix="myview-startup-") as folder:
+        clone = Path(folder) / "clone"
+        subprocess.run(["git", "clone", "--quiet", "--local", str(ROOT), str(clone)], check=True)
+        parts = measure(clone)
+    rows = [[it.name, f"{it.seconds:.1f}", f"{it.over:.1f}"] for it in parts]
+    report.table("From a fresh clone to the first picture, seconds", ["part", "took", "over after"], rows)
+    plot(parts, chosen.out / "startup.png")
+    report.save(chosen.out / "startup.txt")
+
+
+if __name__ == "__main__":
+    main()
