@@ -235,4 +235,6 @@ def _why_away(error: aiohttp.ClientError) -> str:
         number, told = error.os_error.errno, error.os_error.strerror
         # A name that is not known has a number below 0, and words of its own.
         words = (os.strerror(number) if number and number > 0 else told) or words
+    if isinstance(error, aiohttp.InvalidURL):  # it repeats the address, with all that is in it
+        words = "leads to what is no HTTP address"
     return " ".join(words.split())[:_MAX_SHOWN] or type(error).__name__

@@ -1,7 +1,7 @@
 """Addresses as they may be shown: the protocol and the host. All else may be a password, or hold one.
 
-Nothing tells a password from a path: some cameras have it there, others behind ``?p=`` or ``?sig=``, and a space,
-a slash or an @ that stands in one as it is ends a login too early. So what is shown is what surely is none.
+Nothing tells a password from a path: some cameras have it there, others behind ``?p=`` or ``?sig=``, and
+one with a slash or a space in it ends a login too early. So what is shown is what surely is none.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _PROTOCOL = rf"(?:{_PROTOCOLS})(?:[+](?:{_PROTOCOLS}))*"
 _OPENED = re.compile(rf"{_PROTOCOL}:|subfile,", re.IGNORECASE)
 """How an address begins where no // follows: ``rtsp:host``, ``concat:a|b``."""
 _LOGIN = re.compile(r"(?![./])[^@]*:[^@]*@")
-"""An address whose protocol was left out or mistyped: ``name:password@host``, ``rtsp//name:password@host``."""
+"""An address whose protocol was left out or mistyped: ``name:password@host``, ``rtsp//name:…@host``."""
 _IN_PATH = re.compile(rf"(?<=/)(?:{_PROTOCOL}:|[a-z][a-z0-9+.-]+:/(?=.*@))", re.IGNORECASE | re.DOTALL)
 """An address that was taken for a path in a folder, where ``//`` becomes ``/``."""
 _ANYWHERE = re.compile(rf"[a-z][a-z0-9+.-]*:/|\b{_PROTOCOL}:(?!\s)", re.IGNORECASE)
@@ -65,7 +65,7 @@ def _shown_place(rest: str) -> str:
     login, _, place = authority.rpartition("@")
     if "@" in beyond or not _PLACE.fullmatch(place):
         return _MORE
-    return f"{place}/{_MORE}" if login or beyond.strip("/") else place
+    return f"{place}/{_MORE}" if login or beyond.strip("/") else f"{place}{beyond}"
 
 
 def shown_endpoint(endpoint: str) -> str:

@@ -58,7 +58,7 @@ def build_config(content: Mapping[str, Any], *, where: str, folder: Path) -> Con
     try:
         config = Config(**content)
     except ValidationError as error:
-        raise UserError(_one_line(where, error)) from error
+        raise UserError(_one_line(where, error)) from None  # its own words repeat keys as they are
     except SettingsError as error:
         raise UserError(f"{where}: environment: {error}; a list, or a whole section, must be JSON") from error
     check_numbers(config.model_dump(), where)
@@ -125,7 +125,7 @@ def changed_view(view: View, changes: Mapping[str, Any], where: str) -> View:
     try:
         return View.model_validate(_merged(view.model_dump(), changes))
     except ValidationError as error:
-        raise UserError(_one_line(where, error, ("view",))) from error
+        raise UserError(_one_line(where, error, ("view",))) from None
 
 
 def _merged(content: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:

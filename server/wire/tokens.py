@@ -86,4 +86,4 @@ def _token(path: Path, number: int, content: Any) -> Token:
         place = ".".join(["tokens", str(number), *(shortened(str(it)) for it in first["loc"])])
         said = "unknown key" if first["type"] == "extra_forbidden" else first["msg"]
         line = f"{path}: {place}: {said.removeprefix('Value error, ')}"
-        raise UserError(" ".join(line.split())) from error
+        raise UserError(" ".join(line.split())) from None
