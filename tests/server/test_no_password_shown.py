@@ -22,6 +22,7 @@ from server.camera.own.opening import open_own
 from server.camera.sound import open_sound
 from server.camera.sources import open_source
 from server.web.operator.settings import settings_of
+from server.wire import yaml_file
 from server.wire.config import Config
 from server.wire.errors import UserError
 from server.wire.loading import build_config
@@ -31,8 +32,8 @@ from server.wire.yaml_file import read_yaml
 
 HARMLESS = "0000"
 NAIVE = ("QXZ/JKV7", "QXZ JKV7", "QXZ@JKV7", "QXZ#JKV7", "QXZ?JKV7", "QXZJKV7")
-"""Read without care, an address with one of these ends in the midst of it. The user is a host of this machine, so
-that no other name is looked for when FFmpeg does so."""
+"""Read without care, an address with one of these ends in the midst of it. The users below are hosts of this
+machine: FFmpeg reads so, and would look for others."""
 SOURCES = (
     "rtsp://127.0.0.1:{}@127.0.0.1:1/x",
     "rtsp://127.0.0.1:1/x/{}",
@@ -147,7 +148,6 @@ def test_what_is_no_yaml_is_not_repeated(
     text: str, loader: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     if loader == "without libyaml":
-        from server.wire import yaml_file
 
         class Plain(yaml.SafeLoader):
             pass

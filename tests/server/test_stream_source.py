@@ -306,7 +306,7 @@ def test_closing_ends_the_thread(camera: MotionJpeg) -> None:
     assert not source._thread.is_alive()
 
 
-@pytest.mark.parametrize("url", ["http://127.0.0.1:1/", "rtsp://127.0.0.1:1/door", "nonsense://door"])
+@pytest.mark.parametrize("url", ["http://127.0.0.1:1/", "rtsp://127.0.0.1:1/", "nonsense://door"])
 def test_a_camera_that_is_not_there_is_refused_in_one_line(url: str) -> None:
     with pytest.raises(UserError, match="camera door: ") as caught:
         open_source(Camera(id="door", source=url), Site())
