@@ -103,7 +103,7 @@ class Session:
                     raise
                 except (Mp4Error, WebmError) as error:
                     what = "WebM" if is_webm else "fragmented MP4"
-                    raise ContractError(f"{address.origin()}: what comes is not a {what}: {error}") from error
+                    raise ContractError(f"{address.origin()}: its {address.name} is not a {what}: {error}") from error
         return False
 
     def _take(self, taken: Iterator[bool]) -> bool:

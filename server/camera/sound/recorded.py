@@ -45,7 +45,7 @@ class RecordedSound:
         form = settings.format
         if form is None:
             raise ValueError("a site without sound")
-        self._path, self._name = path, shown(path)
+        self._path = path
         self._fps = Fraction(fps).limit_denominator(100_000)
         self._begin = offset / self._fps
         container, stream = _open(path)
@@ -108,7 +108,7 @@ class RecordedSound:
                 yield (time - self._start) * self._speed, packet
         except av.error.FFmpegError as error:
             if not self._told:  # it may be read over and over
-                log.warning("%s: its sound cannot be read any further: %s", self._name, error.strerror)
+                log.warning("%s: its sound cannot be read any further: %s", shown(self._path), error.strerror)
             self._told = True
         finally:
             container.close()
@@ -123,7 +123,7 @@ class RecordedSound:
         speed = Fraction(1) if rate is None else Fraction(rate) / self._fps
         if abs(speed - 1) > _SPEED_OFF:
             raise UserError(
-                f"{self._name}: has {float(speed * self._fps):g} pictures a second, but site.fps is "
+                f"{shown(self._path)}: has {float(speed * self._fps):g} pictures a second, but site.fps is "
                 f"{float(self._fps):g}: its sound cannot be in step"
             )
         return Fraction(start), speed
