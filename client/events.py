@@ -49,7 +49,7 @@ async def _once(address: URL, settings: HttpSettings) -> AsyncIterator[Event]:
             try:
                 sent = parser.feed(data)
             except EventStreamError as error:
-                raise ContractError(f"{address}: {error}") from error
+                raise ContractError(f"{address.origin()}: {error}") from error
             for one in sent:
                 event = _decode(one)
                 if event is not None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import os
+import re
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
@@ -74,12 +75,19 @@ def server_url(text: str) -> URL:
     Raises:
         ValueError: it is no HTTP address.
     """
+    # What was typed is not repeated: there may be a token or a password in it.
+    typed = text if "://" in text else f"http://{text}"
+    _, *beyond = re.split("[/?#]", typed.partition("://")[2])
+    if any("@" in part for part in beyond):  # what looks like the host may be the login's beginning
+        raise ValueError(
+            "the address has an @ behind its host: in a name or password / ? # and @ are %2F %3F %23 and %40"
+        )
     try:
-        url = URL(text if "://" in text else f"http://{text}")
-    except ValueError as error:
-        raise ValueError(f"{text!r} is not an address: {error}") from error
+        url = URL(typed)
+    except ValueError:
+        url = URL()
     if url.scheme not in {"http", "https"} or not url.host:
-        raise ValueError(f"{text!r} is not an address like http://host:port")
+        raise ValueError("what is given is not an address like http://host:port")
     return url.with_query(None).with_fragment(None)
 
 
@@ -141,7 +149,7 @@ async def read_body(answer: aiohttp.ClientResponse, settings: HttpSettings, most
         async for data in answer.content.iter_any():
             body += data
             if len(body) > most:
-                raise ContractError(f"{answer.url}: the answer is larger than {most} bytes")
+                raise ContractError(f"{answer.url.origin()}: the answer is larger than {most} bytes")
     return bytes(body)
 
 
@@ -159,7 +167,7 @@ async def read_lines(answer: aiohttp.ClientResponse, most: int) -> AsyncIterator
             rest.clear()
         rest += last
         if len(rest) > most:
-            raise ContractError(f"{answer.url}: a line of the answer is larger than {most} bytes")
+            raise ContractError(f"{answer.url.origin()}: a line of the answer is larger than {most} bytes")
 
 
 async def get_json(url: URL, kind: type[_ANSWER], settings: HttpSettings) -> _ANSWER:
@@ -172,7 +180,7 @@ async def get_json(url: URL, kind: type[_ANSWER], settings: HttpSettings) -> _AN
     try:
         return decoded(body, kind)
     except ValueError as error:
-        raise ContractError(f"{url} does not answer like MyView: {error}") from error
+        raise ContractError(f"{url.origin()} does not answer like MyView: {error}") from error
 
 
 def decoded(text: bytes | str, kind: type[_ANSWER]) -> _ANSWER:
@@ -227,4 +235,6 @@ def _why_away(error: aiohttp.ClientError) -> str:
         number, told = error.os_error.errno, error.os_error.strerror
         # A name that is not known has a number below 0, and words of its own.
         words = (os.strerror(number) if number and number > 0 else told) or words
+    if isinstance(error, aiohttp.InvalidURL):  # it repeats the address, with all that is in it
+        words = "leads to what is no HTTP address"
     return " ".join(words.split())[:_MAX_SHOWN] or type(error).__name__

@@ -103,7 +103,8 @@ class Session:
                     raise
                 except (Mp4Error, WebmError) as error:
                     what = "WebM" if is_webm else "fragmented MP4"
-                    raise ContractError(f"{address} is not a {what}: {error}") from error
+                    where = f"{address.origin()}: its {address.name}"
+                    raise ContractError(f"{where} is not a {what}: {error}") from error
         return False
 
     def _take(self, taken: Iterator[bool]) -> bool:

@@ -24,6 +24,7 @@ from server.camera.pointed import Pointed
 from server.camera.sound import LiveSound, open_sound, runs
 from server.camera.sources import Image, SourceEnded
 from server.camera.thumbs import thumbnails
+from server.wire.addresses import shown_endpoint
 from server.wire.bus import Bus
 from server.wire.config import Config
 from server.wire.messages import CameraStatus, CameraTracks, FrameHead, Keys, SoundHead, ThumbHead
@@ -145,7 +146,11 @@ class CameraProcess:
         try:
             await asyncio.wait_for(there.wait(), self._config.sync.start_timeout_s)
         except TimeoutError:
-            log.warning("camera %s: no best-view service at %s yet", self._id, self._config.zenoh.connect)
+            log.warning(
+                "camera %s: no best-view service at %s yet",
+                self._id,
+                shown_endpoint(self._config.zenoh.connect),
+            )
 
     async def _follow_pulses(self) -> None:
         sync, fps = self._config.sync, self._config.site.fps

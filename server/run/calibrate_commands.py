@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from server.wire.addresses import shown
 from server.wire.errors import UserError
 from server.wire.output import whole_file
 
@@ -45,7 +46,7 @@ def calibrate(
 
     for path in given:
         if not path.exists():
-            raise UserError(f"{path}: is not there")
+            raise UserError(f"{shown(str(path))}: is not there")
     plan = plan or out.with_suffix(".png")
     if plan.resolve() == out.resolve():
         raise UserError(f"--out: {out}: the floor plan would be written there too; name a .json, or --plan")

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from bestview.calibrate import MarkedPoints
+from server.wire.duplicate_keys import DuplicateKeyError, parse_json
 from server.wire.errors import UserError
 from server.wire.values import check_camera_name
 
@@ -81,6 +82,9 @@ def _from_rows(rows: csv.DictReader[str], name: str) -> Iterator[_Pair]:
         raise UserError(
             f"{name}:1: has no column {missing[0]!r}; the first line names the columns: {','.join(COLUMNS)}"
         )
+    twice = next((column for column in COLUMNS if (rows.fieldnames or []).count(column) > 1), None)
+    if twice is not None:
+        raise UserError(f"{name}:1: has two columns {twice!r}, and only the last would count: keep one")
     for row in rows:
         where = f"{name}:{rows.line_num}"
         camera = (row["camera"] or "").strip()
@@ -92,9 +96,11 @@ def _from_rows(rows: csv.DictReader[str], name: str) -> Iterator[_Pair]:
 
 def _json(text: str, name: str) -> dict[str, Any]:
     try:
-        content = json.loads(text)
+        content = parse_json(text)
     except json.JSONDecodeError as error:
         raise UserError(f"{name}:{error.lineno}: is not JSON: {error.msg}") from error
+    except DuplicateKeyError as error:
+        raise UserError(f"{name}: {error}") from error
     except (ValueError, RecursionError) as error:  # a number of thousands of digits, brackets in brackets
         raise UserError(f"{name}: is not JSON that can be read: {error}") from error
     if not isinstance(content, dict) or not isinstance(content.get("cameras"), dict):

@@ -24,6 +24,7 @@ from server.run import (
 from server.run.ending import SUPERVISED, end_with_parent
 from server.run.logs import say_failure
 from server.run.several import one_value_per_flag
+from server.wire.addresses import shown
 from server.wire.errors import UserError
 
 app = typer.Typer(
@@ -97,7 +98,7 @@ def main() -> None:
     except OSError as error:  # of a path that leads nowhere, wherever it is first looked into
         if error.filename is None or error.errno not in _NO_WAY:
             raise
-        say_failure(f"{error.filename}: {error.strerror}")
+        say_failure(f"{shown(str(error.filename))}: {error.strerror}")
         sys.exit(_BAD_INPUT)
     except KeyboardInterrupt:
         sys.exit(_INTERRUPTED)

@@ -8,7 +8,7 @@ import time
 from collections.abc import Mapping
 
 from server.camera.sound import open_sound
-from server.run.doctor_findings import Finding, bad, ok, reason_of, warning
+from server.run.doctor_findings import Finding, bad, mistake, ok, reason_of, warning
 from server.run.doctor_probe import Probe, probe
 from server.wire.addresses import shown
 from server.wire.config import Config
@@ -33,7 +33,7 @@ def probe_all(config: Config, seconds: float) -> dict[str, Probe]:
         except OSError as error:
             found[camera] = Probe(reason_of(error))
         except Exception as error:  # noqa: BLE001 — of one camera; the others are still to be told of
-            found[camera] = Probe(f"a mistake in MyView: {type(error).__name__}: {error}")
+            found[camera] = Probe(mistake(error))
 
     # Daemons: what hangs in a driver must not keep the doctor from ending.
     threads = [threading.Thread(target=run, args=(it,), daemon=True) for it in config.camera_ids]
@@ -59,8 +59,7 @@ def sound_findings(config: Config) -> list[Finding]:
     try:
         open_sound(config, config.sounding)
     except UserError as error:
-        problem = shown(str(error).removeprefix("sound: "))
-        return [bad("sound", problem, "another file, or a camera that has sound")]
+        return [bad("sound", str(error).removeprefix("sound: "), "another file, or a camera that has sound")]
     return [
         ok("sound", f"{shown(str(config.sound.source))}: {config.sound.codec}, {config.sound.kbps} kbit/s")
     ]
@@ -87,11 +86,10 @@ def _shared(config: Config) -> list[Finding]:
 def _of(config: Config, camera: str, found: Probe, *, runs: bool) -> list[Finding]:
     check = f"camera {camera}"
     if found.problem or found.size is None:
-        problem = shown(found.problem)  # what is printed here is shown to others
         if runs:
             do = "the site runs, and may have it to itself: see /api/cameras"
-            return [warning(check, problem, do)]
-        return [bad(check, problem, _remedy(config.camera(camera).source))]
+            return [warning(check, found.problem, do)]
+        return [bad(check, found.problem, _remedy(config.camera(camera).source))]
     parts = [f"{_size(found.size)} pixels"]
     rate = found.recorded_fps if found.sent is None else found.sent.fps
     if rate is not None:

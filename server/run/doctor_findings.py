@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from server.run.printable import printable
-from server.wire.addresses import shown
+from server.wire.addresses import shown, without_addresses
 from server.wire.errors import UserError
 
 
@@ -69,16 +69,21 @@ def kept_apart(check: str, found: list[Finding]) -> Iterator[None]:
     try:
         yield
     except (OSError, UserError) as error:
-        found.append(bad(check, shown(reason_of(error)), "mend that, and try again"))
+        found.append(bad(check, reason_of(error), "mend that, and try again"))
     except Exception as error:  # noqa: BLE001 — a mistake in one check is no reason to say nothing of the others
-        found.append(bad(check, shown(f"a mistake in MyView: {type(error).__name__}: {error}"), "tell of it"))
+        found.append(bad(check, mistake(error), "tell of it"))
 
 
 def reason_of(error: Exception) -> str:
     """Give an error as a part of a line."""
     if isinstance(error, OSError) and error.strerror:
-        return f"{error.filename}: {error.strerror}" if error.filename else error.strerror
+        return f"{shown(str(error.filename))}: {error.strerror}" if error.filename else error.strerror
     return str(error)
+
+
+def mistake(error: Exception) -> str:
+    """Say that something failed that should not have; an address in what it says is left out."""
+    return f"a mistake in MyView: {type(error).__name__}: {without_addresses(str(error))}"
 
 
 _COLOURS = {Level.OK: "green", Level.WARNING: "yellow", Level.BAD: "red"}

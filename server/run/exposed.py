@@ -5,6 +5,7 @@ from __future__ import annotations
 import ipaddress
 import re
 
+from server.wire.addresses import shown_endpoint
 from server.wire.config import Config
 from server.wire.errors import UserError
 from server.wire.tokens import read_tokens
@@ -49,7 +50,7 @@ def check_bus(config: Config) -> None:
         return
     found = _AUTHORITY.match(zenoh.listen)
     if found is None or not is_loopback(found["host"].strip("[]")):
-        what = f"zenoh.listen: {zenoh.listen} lets other machines send frames and tracks"
+        what = f"zenoh.listen: {shown_endpoint(zenoh.listen)} lets other machines send frames and tracks"
         _check_network(config, what, "let it be tls/ and name zenoh.users")
 
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from server.wire.addresses import shown
 from server.wire.errors import UserError
 
 _ENDINGS = (".txt", ".txt.gz")
@@ -103,7 +104,7 @@ def _given(option: str, paths: Sequence[Path], inner: str) -> _Given:
     files: list[Path] = []
     for path in paths:
         if not path.exists():
-            raise UserError(f"{path}: is not there")
+            raise UserError(f"{shown(str(path))}: is not there")
         files += _files(path, inner) if path.is_dir() else [path]
     return _Given(option, tuple(files), any(path.is_dir() for path in paths))
 

@@ -8,6 +8,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from server.camera.sources.opening import open_video
+from server.wire.addresses import shown
 from server.wire.errors import UserError
 
 
@@ -18,7 +19,7 @@ def total_frames(videos: list[Path]) -> int | None:
         if video.is_dir():
             return None
         if not video.exists():
-            raise UserError(f"{video}: no such file or folder")
+            raise UserError(f"{shown(str(video))}: no such file or folder")
         opened = open_video(str(video))
         opened.container.close()
         if not opened.frames:

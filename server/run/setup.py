@@ -11,6 +11,7 @@ from typing import Any
 import yaml
 
 from server.camera.sources.opening import open_video
+from server.wire.addresses import shown
 from server.wire.config import Config
 from server.wire.errors import UserError
 from server.wire.loading import build_config
@@ -77,9 +78,9 @@ def camera_name(video: Path) -> str:
 
 def _check_recorded(video: Path) -> None:
     if kind_of(str(video)) not in {SourceKind.FILE, SourceKind.FOLDER}:
-        raise UserError(f"{video}: is not a recorded video or a folder of images")
+        raise UserError(f"{shown(str(video))}: is not a recorded video or a folder of images")
     if not video.exists():
-        raise UserError(f"{video}: no such file or folder")
+        raise UserError(f"{shown(str(video))}: no such file or folder")
 
 
 def _cameras_of(content: Mapping[str, Any], where: str) -> list[dict[str, Any]]:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from server.run.recorded import Size
 from server.wire.config import Config
+from server.wire.duplicate_keys import parse_json
 from server.wire.errors import UserError
 
 SITE_FILE = "site.json"
@@ -54,7 +55,7 @@ def read_site(path: Path) -> SiteFacts:
         UserError: it cannot be read, or is none.
     """
     try:
-        content = json.loads(path.read_text(encoding="ascii"))
+        content = parse_json(path.read_text(encoding="ascii"))
         sizes = {str(name): (int(width), int(height)) for name, (width, height) in content["sizes"].items()}
         facts = SiteFacts(float(content["fps"]), float(content["switch_cost_s"]), sizes)
     except OSError as error:

@@ -59,7 +59,7 @@ async def status_live(url: str, token: str | None, *, as_json: bool) -> None:
         return
     before: SiteNow | None = None
     restarted = ""
-    with Live(Text(f"asking {url}"), auto_refresh=False, console=Console()) as live:
+    with Live(Text("asking the server"), auto_refresh=False, console=Console()) as live:
         async for look in looks:
             if look.now is None:
                 notice = f"{look.away}; trying again"

@@ -1,17 +1,94 @@
-"""Addresses as they may be shown: what a camera wants to hear from us is nobody else's business."""
+"""Addresses as they may be shown: the protocol and the host. All else may be a password, or hold one.
+
+Nothing tells a password from a path: some cameras have it there, others behind ``?p=`` or ``?sig=``, and
+one with a slash or a space in it ends a login too early. So what is shown is what surely is none.
+"""
 
 from __future__ import annotations
 
 import re
 
 HIDDEN = "(not shown)"
-SECRET_WORDS = "pas|pwd|psw|token|secret|key|auth"  # noqa: S105 — parts of names
-"""What a name has in it whose value is a password or as good as one."""
-_LOGIN = re.compile(r"(?<=://)[^/\s]+@")
-_QUERY = re.compile(rf"((?:(?:{SECRET_WORDS})[^=&?/#\s]*|(?<![a-z])pw)=)[^&#\s]*", re.IGNORECASE)
-"""Some cameras have their password in the path, as ``user=…_password=…_channel=1``."""
+_MORE = "..."
+"""What stands for the rest of an address."""
+_PROTOCOLS = (
+    r"amqp|async|bluray|cache|concatf?|crypto|data|dtls|dvd|fd|ffrtmpcrypt|ffrtmphttp|file|ftps?|gophers?|hls|"
+    r"https?|httpproxy|icecast|ip[fn]s|md5|mms[htu]?|nfs|onvif|pipe|prompeg|rist|rtmp(?:e|s|t|te|ts)?|rtp|"
+    r"rtsp[stu]?|sap|satip|sctp|sdp|sftp|smb|srtp?|subfile|tcp|tee|tls|udp|udplite|unix|webrtc|whip|wss?|zmq"
+)
+"""What FFmpeg opens, and what people take for it."""
+_PROTOCOL = rf"(?:{_PROTOCOLS})(?:[+](?:{_PROTOCOLS}))*"
+_OPENED = re.compile(rf"{_PROTOCOL}:|subfile,", re.IGNORECASE)
+"""How an address begins where no // follows: ``rtsp:host``, ``concat:a|b``."""
+_LOGIN = re.compile(r"(?![./])[^@]*:[^@]*@")
+"""An address whose protocol was left out or mistyped: ``name:password@host``, ``rtsp//name:…@host``."""
+_IN_PATH = re.compile(rf"(?<=/)(?:{_PROTOCOL}:|[a-z][a-z0-9+.-]+:/(?=.*@))", re.IGNORECASE | re.DOTALL)
+"""An address that was taken for a path in a folder, where ``//`` becomes ``/``."""
+_ANYWHERE = re.compile(rf"[a-z][a-z0-9+.-]*:/|\b{_PROTOCOL}:(?!\s)", re.IGNORECASE)
+_SCHEME = re.compile(r"[a-z][a-z0-9+.-]*(?=://)", re.IGNORECASE)
+_PLACE = re.compile(r"(?:\[[0-9a-z:.%_-]+\]|[\w.-]+)(?::[0-9]{1,5})?", re.IGNORECASE)
+"""A host, and perhaps a port."""
+_ENDPOINT = re.compile(r"[a-z]+/(?:\[[0-9a-z:.%_-]+\]|[\w.*-]+):[0-9]{1,5}(?![^?#])", re.IGNORECASE)
 
 
-def shown(text: str) -> str:
-    """Take passwords out of an address, or of a text in which there is one."""
-    return _QUERY.sub(rf"\1{HIDDEN}", _LOGIN.sub(f"{HIDDEN}@", text)) if "://" in text else text
+def has_protocol(source: str) -> bool:
+    """Tell whether FFmpeg would look for a protocol in this, rather than for a file."""
+    return "://" in source or _OPENED.match(source) is not None
+
+
+def is_login(source: str) -> bool:
+    """Tell whether this looks like a name and a password for a host, though it has no protocol."""
+    return _LOGIN.match(source) is not None
+
+
+def shown(source: str) -> str:
+    """Give a source, or another address or path, as it may be shown: of an address its protocol and host.
+
+    ``rtsp://name:password@10.0.0.1/live`` is shown as ``rtsp://10.0.0.1/...``. Where an @ stands behind what
+    looks like the host, that may be the login's beginning, and is not shown. A path is shown as it is.
+    """
+    if source.startswith("scene:"):
+        return source
+    if source.startswith("/") and (found := _IN_PATH.search(source)) is not None:
+        return f"{source[: found.start()]}{_MORE}"
+    if (found := _SCHEME.match(source)) is not None:
+        return f"{found[0]}://{_shown_place(source[found.end() + 3 :])}"
+    if (found := _OPENED.match(source)) is not None:
+        return f"{found[0][:-1]}:{_MORE}"
+    return HIDDEN if "://" in source or is_login(source) else source
+
+
+def _shown_place(rest: str) -> str:
+    """Give host and port of what stands behind ``://``, if they are surely that."""
+    authority = re.split(r"[/?#]", rest, maxsplit=1)[0]
+    beyond = rest[len(authority) :]
+    login, _, place = authority.rpartition("@")
+    if "@" in beyond or not _PLACE.fullmatch(place):
+        return _MORE
+    return f"{place}/{_MORE}" if login or beyond.strip("/") else f"{place}{beyond}"
+
+
+def shown_endpoint(endpoint: str) -> str:
+    """Give zenoh's ``protocol/host:port`` without the settings that may stand behind it: keys, for one."""
+    found = _ENDPOINT.match(endpoint)
+    if found is None:
+        return HIDDEN
+    return found[0] if found.end() == len(endpoint) else f"{found[0]} {_MORE}"
+
+
+def without_addresses(text: str) -> str:
+    """Give others' words, such as a traceback, with each line only up to where an address begins."""
+    return "".join(_cut(line) for line in text.splitlines(keepends=True))
+
+
+def _cut(line: str) -> str:
+    found = _ANYWHERE.search(line)
+    if found is None:
+        return line
+    end = "\n" if line.endswith("\n") else ""
+    return f"{line[: found.start()]}{_MORE}{end}"
+
+
+def ffmpeg_reason(error: Exception) -> str:
+    """Say why FFmpeg could not, by its error's number: the error's own text repeats the whole address."""
+    return getattr(error, "strerror", None) or "it is no address or path that FFmpeg understands"

@@ -8,6 +8,7 @@ from typing import Any, Self
 
 import zenoh
 
+from server.wire.addresses import shown_endpoint
 from server.wire.bus_users import SETTING
 from server.wire.errors import UserError
 from server.wire.inbox import Inbox, Message
@@ -53,7 +54,7 @@ class Bus:
             return cls(zenoh.open(config))
         except zenoh.ZError as error:
             raise UserError(
-                f"zenoh.listen: cannot listen on {settings.listen}; is the port in use?"
+                f"zenoh.listen: cannot listen on {shown_endpoint(settings.listen)}; is the port in use?"
                 + (" Are zenoh.tls.certificate and key a pair?" if settings.tls.key is not None else "")
             ) from error
 
@@ -96,7 +97,9 @@ class Bus:
             return cls(zenoh.open(config))
         except zenoh.ZError as error:
             refused = "" if settings.users is None else ", or who is there refuses this user"
-            raise UserError(f"zenoh.connect: nobody is at {settings.connect}{refused}") from error
+            raise UserError(
+                f"zenoh.connect: nobody is at {shown_endpoint(settings.connect)}{refused}"
+            ) from error
 
     @classmethod
     def _connected(cls, settings: Zenoh, mode: str, user: str | None) -> Self:
@@ -110,8 +113,11 @@ class Bus:
         try:
             config.insert_json5("connect/endpoints", json.dumps([settings.connect]))
             return cls(zenoh.open(config))
-        except zenoh.ZError as error:
-            raise UserError(f"zenoh.connect: cannot use {settings.connect}: {error}") from error
+        except zenoh.ZError:
+            raise UserError(
+                f"zenoh.connect: cannot use {shown_endpoint(settings.connect)}: has zenoh this protocol, "
+                "and is all right that stands behind the port?"
+            ) from None
 
     def publish(self, key: str, payload: bytes, attachment: bytes | None = None) -> None:
         """Send a message; it is dropped where a receiver is too slow or nobody is there."""

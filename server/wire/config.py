@@ -20,7 +20,7 @@ from server.wire.library import validated
 from server.wire.sections import Access, Camera, Encode, Http, Record, Site, Sound, Sync, Track, View, Zenoh
 from tracking.yardsticks import TEMPORAL
 
-_PREFIX = "MYVIEW_"
+PREFIX = "MYVIEW_"
 _SERVICE = re.compile(r"bestview(-\d+)?")
 """What best-view services are called beside the cameras, where pulses and passwords are given out."""
 
@@ -31,7 +31,8 @@ class Config(BaseSettings):
     model_config = SettingsConfigDict(
         extra="forbid",
         frozen=True,
-        env_prefix=_PREFIX,
+        hide_input_in_errors=True,
+        env_prefix=PREFIX,
         env_nested_delimiter="__",
     )
 
@@ -62,7 +63,7 @@ class Config(BaseSettings):
     ) -> tuple[PydanticBaseSettingsSource, ...]:
         """Let the environment go before the file; where it has nothing to say, it is not asked at length."""
         del settings_cls, dotenv_settings, file_secret_settings
-        told = any(name.upper().startswith(_PREFIX) for name in os.environ)
+        told = any(name.upper().startswith(PREFIX) for name in os.environ)
         return (env_settings, init_settings) if told else (init_settings,)
 
     @model_validator(mode="after")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import difflib
 import json
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -17,6 +16,8 @@ from pydantic_settings import SettingsError
 
 from bestview import checked_homography, turns
 from server.wire.config import Config
+from server.wire.duplicate_keys import DuplicateKeyError, parse_json
+from server.wire.environment import check_environment
 from server.wire.errors import UserError
 from server.wire.ground_unit import checked_unit
 from server.wire.sections import Camera, View, Zenoh, ZenohTls
@@ -52,12 +53,12 @@ def build_config(content: Mapping[str, Any], *, where: str, folder: Path) -> Con
     Raises:
         UserError: something is wrong; the text begins with ``where``.
     """
-    _no_unknown_environment(where)
+    check_environment(where)
     check_values(content, where)
     try:
         config = Config(**content)
     except ValidationError as error:
-        raise UserError(_one_line(where, error)) from error
+        raise UserError(_one_line(where, error)) from None  # its own words repeat keys as they are
     except SettingsError as error:
         raise UserError(f"{where}: environment: {error}; a list, or a whole section, must be JSON") from error
     check_numbers(config.model_dump(), where)
@@ -124,7 +125,7 @@ def changed_view(view: View, changes: Mapping[str, Any], where: str) -> View:
     try:
         return View.model_validate(_merged(view.model_dump(), changes))
     except ValidationError as error:
-        raise UserError(_one_line(where, error, ("view",))) from error
+        raise UserError(_one_line(where, error, ("view",))) from None
 
 
 def _merged(content: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
@@ -175,10 +176,12 @@ def _homographies(path: Path, where: str) -> tuple[dict[str, list[list[float]]],
         UserError: it cannot be read, a matrix in it is not an invertible 3x3, or the unit is not understood.
     """
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = parse_json(path.read_text(encoding="utf-8"))
         matrices = dict(content["homography"].items())
     except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
         raise UserError(f"{where}: ground: cannot read {path}: {_reason(error)}") from error
+    except DuplicateKeyError as error:
+        raise UserError(f"{where}: ground: {path}: {error}") from error
     except (KeyError, TypeError, AttributeError, ValueError, RecursionError) as error:
         raise UserError(f'{where}: ground: {path} has no {{"homography": {{camera: 3x3}}}}') from error
     for camera_id, matrix in matrices.items():
@@ -224,12 +227,3 @@ def _known_keys(section: tuple[int | str, ...]) -> list[str]:
         elif isinstance(model, type) and issubclass(model, BaseModel) and part in model.model_fields:
             model = model.model_fields[part].annotation
     return list(model.model_fields) if isinstance(model, type) and issubclass(model, BaseModel) else []
-
-
-def _no_unknown_environment(where: str) -> None:
-    """Refuse ``MYVIEW_HTP__PORT``: pydantic-settings would pass over it in silence."""
-    sections = [name.upper() for name in Config.model_fields if name != "ground"]
-    for name in os.environ:
-        section, nested, _ = name.removeprefix("MYVIEW_").partition("__")
-        if name.startswith("MYVIEW_") and nested and section not in sections:
-            raise UserError(f"{where}: environment: {name}: there is no section {section.lower()!r}")

@@ -13,17 +13,29 @@ import logging
 import os
 import re
 from datetime import UTC, datetime
+from types import TracebackType
 
 import msgspec
 
+from server.wire.addresses import without_addresses
 from server.wire.errors import UserError
+
+_ExcInfo = tuple[type[BaseException], BaseException, TracebackType | None] | tuple[None, None, None]
 
 VARIABLE = "MYVIEW_LOG_FORMAT"
 _FORMATS = ("text", "json")
 _PLACE = re.compile(r"(?:\b(camera|object) )?%[-#0 +]*[0-9]*(?:\.[0-9]+)?([a-zA-Z%])")
 
 
-class JsonLines(logging.Formatter):
+class TextLines(logging.Formatter):
+    """Writes lines for people, and tracebacks below them, in which errors' own words repeat no address."""
+
+    def formatException(self, ei: _ExcInfo) -> str:  # noqa: N802 — as logging calls it
+        """Give a traceback, each line up to where an address begins."""
+        return without_addresses(super().formatException(ei))
+
+
+class JsonLines(TextLines):
     """Writes each record as one line of JSON, with its traceback inside, if there is one."""
 
     def __init__(self, process: str) -> None:
@@ -61,7 +73,7 @@ def formatter(process: str) -> logging.Formatter:
     if is_json():
         return JsonLines(process)
     name = process.replace("%", "%%")
-    return logging.Formatter(f"%(asctime)s %(levelname)-7s {name}: %(message)s", datefmt="%H:%M:%S")
+    return TextLines(f"%(asctime)s %(levelname)-7s {name}: %(message)s", datefmt="%H:%M:%S")
 
 
 def is_json() -> bool:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from enum import Enum
 from pathlib import Path
 
+from server.wire.addresses import has_protocol, is_login
+
 _MEMORY = Path("/dev/shm")  # noqa: S108 — nothing is written there
 """Below /dev, and yet of files: a folder in memory."""
 
@@ -26,7 +28,7 @@ def kind_of(source: str) -> SourceKind:
     """Tell the kind of a source from how it is written."""
     if source.startswith("scene:"):
         return SourceKind.SCENE
-    if "://" in source or is_device(source):
+    if has_protocol(source) or is_device(source):
         return SourceKind.STREAM
     try:
         return SourceKind.FOLDER if Path(source).is_dir() else SourceKind.FILE
@@ -57,7 +59,11 @@ def is_missing(path: str) -> bool:
 
 
 def resolved(source: str, folder: Path) -> str:
-    """Make a relative path relative to ``folder`` (the configuration's); leave URLs and scenes alone."""
+    """Make a relative path relative to ``folder`` (the configuration's); leave addresses and scenes alone.
+
+    What looks like an address, or like one without its protocol, and is no file, is none: ``rtsp:host``.
+    """
     if source.startswith("scene:") or "://" in source:
         return source
-    return str((folder / source).absolute())
+    path = str((folder / source).absolute())
+    return source if (has_protocol(source) or is_login(source)) and is_missing(path) else path

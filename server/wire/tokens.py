@@ -72,7 +72,9 @@ def read_tokens(path: Path) -> tuple[Token, ...]:
         given = Counter(getattr(it, what) for it in tokens)
         twice = next((it for it, count in given.items() if count > 1), None)
         if twice is not None:
-            raise UserError(f"{path}: two tokens have the {what} {twice}; each has its own")
+            numbers = [number for number, it in enumerate(tokens) if getattr(it, what) == twice]
+            places = " and ".join(f"tokens.{number}" for number in numbers[:2])
+            raise UserError(f"{path}: {places}: have the same {what}, {twice}; each has its own")
     return tokens
 
 
@@ -84,4 +86,4 @@ def _token(path: Path, number: int, content: Any) -> Token:
         place = ".".join(["tokens", str(number), *(shortened(str(it)) for it in first["loc"])])
         said = "unknown key" if first["type"] == "extra_forbidden" else first["msg"]
         line = f"{path}: {place}: {said.removeprefix('Value error, ')}"
-        raise UserError(" ".join(line.split())) from error
+        raise UserError(" ".join(line.split())) from None

@@ -19,11 +19,16 @@ def read_users(path: Path, setting: str) -> dict[str, str]:
         reason = getattr(error, "strerror", None) or "it is no text"
         raise UserError(f"{setting}: cannot read {path}: {reason}") from error
     users: dict[str, str] = {}
+    numbers: dict[str, int] = {}
     for number, line in enumerate(lines, start=1):
         name, colon, password = line.partition(":")
-        if not (name and colon and password) or name in users or line != line.strip():
-            raise UserError(f"{setting}: {path}: line {number} is no name:password, or a name is there twice")
-        users[name] = password
+        if not (name and colon and password) or line != line.strip():
+            raise UserError(f"{setting}: {path}: line {number} is no name:password")
+        if name in users:
+            raise UserError(
+                f"{setting}: {path}: lines {numbers[name]} and {number} are for the same name: keep one"
+            )
+        users[name], numbers[name] = password, number
     return users
 
 

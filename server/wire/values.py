@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+from server.wire.addresses import shown
 from server.wire.errors import UserError
 
 _DEEPEST = 32
@@ -18,7 +19,8 @@ _HOLDING = (dict, list, tuple, set)
 
 
 def shortened(key: str) -> str:
-    """Give a key as a line can name it: it may be as long as its file."""
+    """Give a key as a line can name it: it may be as long as its file, or an address by mistake."""
+    key = shown(key)
     return key if len(key) <= _SHOWN else f"{key[:_SHOWN]}…"
 
 
@@ -43,9 +45,9 @@ def check_values(content: Any, where: str) -> None:
             try:
                 value.encode()
             except UnicodeEncodeError:
-                raise UserError(f"{where}: {value[:_SHOWN]!a}: has characters that are none") from None
+                raise UserError(f"{where}: {_named(place)}has characters that are none") from None
             if value and value.splitlines() != [value]:
-                raise UserError(f"{where}: {_named(place)}{value[:_SHOWN]!a} is more than a line")
+                raise UserError(f"{where}: {_named(place)}is more than a line")
 
 
 def check_numbers(content: Any, where: str) -> None:

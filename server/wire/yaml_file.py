@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
 import yaml
 
+from server.wire.duplicate_keys import DuplicateKeyError, check_yaml_keys
 from server.wire.errors import UserError
 
 try:
@@ -21,6 +23,9 @@ _MOST_MERGED = 100_000
 """Keys that merges (``<<``) bring into mappings; each may refer to all of one before."""
 _DEEPEST = 200
 """Lists in lists: libyaml's loader calls itself for each, and with many the process would die."""
+
+_QUOTED = re.compile(r" '[^'<>]{2,}'")
+"""A name from the file in a library's words, such as a tag's; ``'<block end>'`` and ``']'`` are none."""
 
 _WIDTH = 1000
 """Characters after which what is written is folded."""
@@ -54,19 +59,50 @@ def read_yaml(path: Path, what: str) -> Any:
         raise UserError(f"{path}: cannot read {what}: {reason}") from error
     try:
         _check_depth(text)
-        return yaml.load(text, Loader=_Loader)  # noqa: S506 — the safe loader, made safer
+        return _loaded(text)
+    except DuplicateKeyError as error:
+        raise UserError(f"{path}: {error}") from error
     except yaml.YAMLError as error:
-        # It names the file as it knows it, which is a string in memory.
-        words = " ".join(str(error).split()).replace(' in "<unicode string>",', ",")
-        raise UserError(f"{path}: is not valid YAML: {words[:_SHOWN]}") from error
-    except (ValueError, LookupError, TypeError, AttributeError) as error:  # how PyYAML says `!!int x` is none
-        raise UserError(f"{path}: is not valid YAML: a date, a number or a tag that cannot be one") from error
+        raise UserError(f"{path}: is not valid YAML: {_words(error)[:_SHOWN]}") from None
+    except (ValueError, LookupError, TypeError, AttributeError):  # how PyYAML says `!!int x` is none
+        raise UserError(f"{path}: is not valid YAML: a date, a number or a tag that cannot be one") from None
+
+
+def _loaded(text: str) -> Any:
+    """Give what a text stands for.
+
+    Raises:
+        DuplicateKeyError: a mapping in it has a key twice.
+        YAMLError: it is no YAML.
+        ValueError, LookupError, TypeError, AttributeError: a value is not of the kind that it says it is.
+    """
+    loader = _Loader(text)
+    try:
+        root = loader.get_single_node()
+        if root is None:
+            return None
+        check_yaml_keys(root, loader.construct_object)
+        return loader.construct_document(root)
+    finally:
+        loader.dispose()
+
+
+def _words(error: yaml.YAMLError) -> str:
+    """Say what is wrong and where, without what is in the file: it may be a password."""
+    if not isinstance(error, yaml.MarkedYAMLError):
+        return " ".join(str(error).replace(' in "<unicode string>"', "").split())
+    parts = []
+    for words, mark in ((error.context, error.context_mark), (error.problem, error.problem_mark)):
+        if words is not None:
+            place = "" if mark is None else f", line {mark.line + 1}, column {mark.column + 1}"
+            parts.append(f"{_QUOTED.sub('', words)}{place}")
+    return " ".join(" ".join(parts).split())
 
 
 def one_line(value: Any) -> str:
     """Write a value as it may stand behind its key."""
     written: str = yaml.dump(value, Dumper=SafeDumper, default_flow_style=True, width=_WIDTH)
-    return written.removesuffix("...\n").strip()
+    return written.removesuffix("\n...\n").strip()
 
 
 def as_lines(content: Any) -> str:

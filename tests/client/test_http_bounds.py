@@ -194,6 +194,38 @@ async def test_a_status_that_cannot_be_read_is_one_clear_line() -> None:
             await ask_status(url)
 
 
+@pytest.mark.parametrize(
+    "typed",
+    [
+        "http://me:QXZ/JKV7@127.0.0.1:9/",
+        "http://127.0.0.1:12/QXZJKV7@127.0.0.1:9/",
+        "http://me:QXZ JKV7@127.0.0.1:9/",
+        "http://me:QXZ#JKV7@127.0.0.1:9/",
+        "http://me:QXZJKV7@127.0.0.1:9/",
+        "http://127.0.0.1:99999/?token=QXZJKV7",
+        "ftp://127.0.0.1:9/?token=QXZJKV7",
+        "127.0.0.1:9/?token=QXZJKV7",
+        "127.0.0.1:9/QXZJKV7/",
+        "http://[::1/?token=QXZJKV7",
+        "?token=QXZJKV7",
+    ],
+)
+async def test_what_is_secret_in_an_address_is_in_no_error(typed: str) -> None:
+    for asking in (ask, ask_status, ask_past, ask_events):
+        with pytest.raises((client.ClientError, ValueError)) as refused:
+            await asking(typed)
+        assert not any(it in str(refused.value) for it in ("QXZ", "JKV7")), refused.value
+
+
+@pytest.mark.parametrize("asking", [ask, ask_status, ask_past, ask_events])
+async def test_who_is_no_myview_is_named_by_host_alone(asking: Callable[[str], Awaitable[object]]) -> None:
+    async with answering(endless(PIECE), "/QXZJKV7/{rest:.*}") as url:
+        typed = url.replace("http://", "http://me:QXZJKV7@") + "QXZJKV7/?token=QXZJKV7"
+        with pytest.raises(client.ContractError, match=r"^http://127\.0\.0\.1:\d+: ") as refused:
+            await asking(typed)
+    assert "QXZ" not in str(refused.value)
+
+
 def test_boxes_without_media_are_not_kept_without_end() -> None:
     record = Recording(None, None)
     boxes = list(BoxReader().feed(header() + fragment(1)))

@@ -245,10 +245,16 @@ def _users(folder: Path, text: str) -> Path:
     return path
 
 
-@pytest.mark.parametrize("text", ["c0\n", "c0:\n", ":p\n", "c0:a\nc0:b\n", " c0:a\n", "c0:a\n\nc1:b\n"])
+@pytest.mark.parametrize("text", ["c0\n", "c0:\n", ":p\n", " c0:a\n", "c0:a\n\nc1:b\n"])
 def test_a_file_of_users_that_is_none_is_said_in_one_line(tmp_path: Path, text: str) -> None:
     with pytest.raises(UserError, match=r"zenoh\.users: .*: line \d is no name:password"):
         read_users(_users(tmp_path, text), SETTING)
+
+
+def test_a_user_with_two_lines_is_refused_with_both(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match=r"zenoh\.users: .*: lines 1 and 3 are for the same name") as refused:
+        read_users(_users(tmp_path, "c0:secret-1\nc1:b\nc0:secret-2\n"), SETTING)
+    assert "secret" not in str(refused.value)
 
 
 def test_who_has_no_line_is_told_so(tmp_path: Path) -> None:

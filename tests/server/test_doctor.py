@@ -230,12 +230,12 @@ def test_a_password_from_a_file_is_used_and_others_should_not_read_it(tmp_path: 
     ]
     there = config(tmp_path, cameras=cameras)
     missing = only(camera_findings(there, probe_all(there, 1.0), runs=False), "camera gate").text
-    assert "secret: cannot be read" in missing
+    assert "the file that it names cannot be read: No such file or directory" in missing
     (tmp_path / "secret").write_text("open sesame\n")
     (tmp_path / "secret").chmod(0o644)
     assert "others may read" in only(file_findings(there), "camera gate").text
     shown = only(camera_findings(there, probe_all(there, 1.0), runs=False), "camera gate").text
-    assert "rtsp://(not shown)@127.0.0.1" in shown
+    assert f"rtsp://127.0.0.1:{taken}/..." in shown
 
 
 def test_sound_that_cannot_be_opened_is_bad(tmp_path: Path) -> None:
@@ -258,7 +258,7 @@ def test_a_cameras_password_is_not_shown(tmp_path: Path, taken: int) -> None:
     source = f"rtsp://me:pa@ss:w@127.0.0.1:{taken}/live?x=a:b@c"
     there = config(tmp_path, cameras=[{"id": "gate", "source": source}])
     shown = only(camera_findings(there, probe_all(there, 1.0), runs=False), "camera gate").text
-    assert f"rtsp://(not shown)@127.0.0.1:{taken}/live?x=a:b@c: cannot open" in shown
+    assert "rtsp://...: cannot open" in shown
 
 
 def test_what_a_recording_takes_is_held_against_the_disk(tmp_path: Path) -> None:

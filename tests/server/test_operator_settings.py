@@ -143,12 +143,10 @@ async def test_the_configuration_says_what_differs_and_no_secret(open_hall: Hall
     assert settings["view.quality.whole"]["differs"] is False
     assert settings["view.quality.whole"]["value"] == str(QualitySettings().whole)
     source, options = settings[f"cameras.{A}.source"], settings[f"cameras.{A}.options"]
-    assert source["value"] == "rtsp://(not shown)@10.0.0.1/live?token=(not shown)&size=1"
+    assert source["value"] == "rtsp://10.0.0.1/..."
     assert (source["default"], source["differs"]) == (None, False)
-    assert (
-        options["value"]
-        == "{headers: (not shown), http_proxy: 'http://(not shown)@proxy', rtsp_transport: tcp}"
-    )
+    names = ("headers", "http_proxy", "rtsp_transport")
+    assert options["value"] == f"{{{', '.join(f'{it}: (not shown)' for it in names)}}}"
 
 
 @pytest.mark.parametrize(
@@ -162,5 +160,4 @@ async def test_the_configuration_says_what_differs_and_no_secret(open_hall: Hall
 def test_a_password_is_not_shown_wherever_a_camera_has_it(source: str) -> None:
     config = small_config(cameras=[{"id": A, "source": source}])
     [shown] = [it.value for it in settings_of(config) if it.key == f"cameras.{A}.source"]
-    assert "hush" not in shown
-    assert shown.startswith(source.partition("=")[0])
+    assert shown.strip("'") in {"rtsp://10.0.0.1/...", "http://10.0.0.1/...", "rtsp://10.0.0.1:554/..."}

@@ -69,7 +69,7 @@ def test_every_service_of_a_site_has_its_line(tmp_path: Path) -> None:
     [
         (None, r"sync\.users: cannot read .*sync\.users: No such file"),
         ("c0\n", "line 1 is no name:password"),
-        (f"c0:{LONG}\nc0:{LONG}\n", "line 2 is no name:password, or a name is there twice"),
+        (f"c0:{LONG}\nc0:{LONG}\n", "lines 1 and 2 are for the same name"),
         (f"c0:{LONG}\nbestview:secret\n", "the password of 'bestview' has less than 32 characters"),
         (f"c0:{LONG}\n", "has no line for bestview"),
     ],

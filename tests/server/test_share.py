@@ -113,7 +113,7 @@ def test_an_old_numbers_stream_goes_on_at_its_own_service() -> None:
     [
         ({"of": 2, "index": 2}, "index is 2, but of 2 services the last is 1"),
         ({"of": 2, "servers": ["http://a/"]}, "servers names 1, but there are 2"),
-        ({"of": 1, "servers": ["nowhere"]}, "'nowhere' is not an address"),
+        ({"of": 1, "servers": ["nowhere"]}, "servers.0: is not an address"),
         ({"of": 0}, "view.share.of"),
     ],
 )

@@ -15,6 +15,7 @@ from server.camera.own.passing import Unit
 from server.camera.sources.base import Image, SourceEnded
 from server.camera.sources.opening import Opened, open_video
 from server.camera.sources.recording import frames_at
+from server.wire.addresses import ffmpeg_reason, shown
 from server.wire.colours import bgr
 from server.wire.errors import UserError
 from server.wire.sources import is_missing
@@ -32,7 +33,7 @@ class OwnRecording:
 
     def __init__(self, path: str, offset: int, at_end: Literal["stop", "loop"], wanted: Wanted) -> None:
         if is_missing(path):
-            raise UserError(f"{path}: no such file or folder")
+            raise UserError(f"{shown(path)}: no such file or folder")
         self._path, self._offset, self._loop = path, offset, at_end == "loop"
         self._length = _checked(path, offset, wanted)
         if self._loop and self._length % wanted.gop:
@@ -114,9 +115,10 @@ def _checked(path: str, offset: int, wanted: Wanted) -> int:
             data = packing.annex_b(bytes(packet))
             fitting.unit(frame, frame + offset, data, packet.pts, packet.dts)
     except (av.error.FFmpegError, ValueError) as error:
-        raise MisfitError(f"it cannot be read: {error}") from error
+        why = ffmpeg_reason(error) if isinstance(error, av.error.FFmpegError) else str(error)
+        raise MisfitError(f"it cannot be read: {why}") from None
     finally:
         opened.container.close()
     if frame < 0:
-        raise UserError(f"{path}: there is not one picture in this video; is the file whole?")
+        raise UserError(f"{shown(path)}: there is not one picture in this video; is the file whole?")
     return frame + 1

@@ -18,7 +18,7 @@ from server.camera.sound import LiveSound
 from server.camera.sources.base import Image
 from server.camera.sources.opening import Opened, no_answer, open_video
 from server.camera.sources.stream import OPEN_S, READ_S, Stream
-from server.wire.addresses import shown
+from server.wire.addresses import ffmpeg_reason, shown
 from server.wire.errors import UserError
 
 _LOOKED_AT_GOPS = 2
@@ -111,9 +111,10 @@ def _check(url: str, options: Mapping[str, str], wanted: Wanted) -> None:
         if begun < 0:
             raise MisfitError(f"no GOP begins within {_LOOKED_AT_GOPS * wanted.gop} frames (encode.gop)")
     except (av.error.InvalidDataError, ValueError) as error:
-        raise MisfitError(f"it cannot be read: {shown(str(error))}") from error
+        why = ffmpeg_reason(error) if isinstance(error, av.error.FFmpegError) else str(error)
+        raise MisfitError(f"it cannot be read: {why}") from None
     except av.error.FFmpegError as error:  # it has gone, which says nothing of what it sends
-        why = no_answer(error, READ_S) or error.strerror
-        raise UserError(f"{shown(url)}: it stopped while it was looked at: {why}") from error
+        why = no_answer(error, READ_S) or ffmpeg_reason(error)
+        raise UserError(f"{shown(url)}: it stopped while it was looked at: {why}") from None
     finally:
         opened.container.close()

@@ -33,4 +33,4 @@ def open_sound(config: Config, camera_id: str) -> RecordedSound | LiveSound | No
     try:
         return RecordedSound(path, settings, fps, offset, at_end)
     except UserError as error:
-        raise UserError(f"sound: {shown(str(error))}") from error
+        raise UserError(f"sound: {error}") from error

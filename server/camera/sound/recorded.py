@@ -15,6 +15,7 @@ from av.video.stream import VideoStream
 
 from server.camera.sound.frames import Frame, Packet, Way
 from server.camera.sound.ways import way_for
+from server.wire.addresses import ffmpeg_reason, shown
 from server.wire.errors import UserError
 from server.wire.sections import Sound
 from server.wire.sources import is_missing
@@ -107,7 +108,7 @@ class RecordedSound:
                 yield (time - self._start) * self._speed, packet
         except av.error.FFmpegError as error:
             if not self._told:  # it may be read over and over
-                log.warning("%s: its sound cannot be read any further: %s", self._path, error.strerror)
+                log.warning("%s: its sound cannot be read any further: %s", shown(self._path), error.strerror)
             self._told = True
         finally:
             container.close()
@@ -122,7 +123,7 @@ class RecordedSound:
         speed = Fraction(1) if rate is None else Fraction(rate) / self._fps
         if abs(speed - 1) > _SPEED_OFF:
             raise UserError(
-                f"{self._path}: has {float(speed * self._fps):g} pictures a second, but site.fps is "
+                f"{shown(self._path)}: has {float(speed * self._fps):g} pictures a second, but site.fps is "
                 f"{float(self._fps):g}: its sound cannot be in step"
             )
         return Fraction(start), speed
@@ -165,14 +166,14 @@ def _pictures(container: InputContainer) -> VideoStream | None:
 
 
 def _open(path: str) -> tuple[InputContainer, AudioStream]:
+    name = shown(path)
     if is_missing(path):
-        raise UserError(f"{path}: is neither a camera of this site nor a file")
+        raise UserError(f"{name}: is neither a camera of this site nor a file")
     try:
         container = av.open(path)
     except (av.error.FFmpegError, OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or " ".join(str(error).split())
-        raise UserError(f"{path}: cannot open this file: {reason}") from error
+        raise UserError(f"{name}: cannot open this file: {ffmpeg_reason(error)}") from None
     if not container.streams.audio:
         container.close()
-        raise UserError(f"{path}: there is no sound in this file")
+        raise UserError(f"{name}: there is no sound in this file")
     return container, container.streams.audio[0]

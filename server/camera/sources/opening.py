@@ -13,7 +13,7 @@ from av.container import InputContainer
 from av.video.codeccontext import VideoCodecContext
 from av.video.stream import VideoStream
 
-from server.wire.addresses import shown
+from server.wire.addresses import ffmpeg_reason, shown
 from server.wire.errors import UserError
 from server.wire.sources import is_device
 
@@ -50,7 +50,8 @@ def open_video(
         )
     except (av.error.FFmpegError, OSError, ValueError) as error:
         why = no_answer(error, timeout[0]) if timeout else None
-        raise UserError(f"{name}: cannot open this video: {why or _reason(source, error)}") from error
+        # FFmpeg's own words repeat the address, and so would a traceback that goes on to them.
+        raise UserError(f"{name}: cannot open this video: {why or _reason(source, error)}") from None
     if container.format.name == _TEXT:
         container.close()
         raise UserError(
@@ -86,4 +87,4 @@ def _reason(source: str, error: Exception) -> str:
             return str(unknown.strerror)
         except ValueError:
             pass  # no address that could be taken apart
-    return getattr(error, "strerror", None) or " ".join(shown(str(error)).split())
+    return ffmpeg_reason(error)

@@ -10,6 +10,7 @@ from av.video.frame import VideoFrame
 from av.video.stream import VideoStream
 
 from server.camera.sources.opening import Opened
+from server.wire.addresses import shown
 
 log = logging.getLogger(__name__)
 
@@ -79,7 +80,7 @@ def _packets(opened: Opened, *, again: bool) -> Iterator[av.Packet[VideoStream]]
         yield from opened.container.demux(opened.stream)
     except av.error.FFmpegError as error:
         if not again:
-            log.warning("%s: cannot be read any further: %s", opened.container.name, error.strerror)
+            log.warning("%s: cannot be read any further: %s", shown(opened.container.name), error.strerror)
 
 
 def _half_a_frame(stream: VideoStream) -> int:

@@ -10,6 +10,7 @@ from av.video.frame import VideoFrame
 from server.camera.sources.base import Image, SourceEnded
 from server.camera.sources.opening import open_video
 from server.camera.sources.pictures import pictures
+from server.wire.addresses import shown
 from server.wire.colours import bgr
 from server.wire.errors import UserError
 from server.wire.sources import is_missing
@@ -28,7 +29,7 @@ class Recording:
 
     def __init__(self, path: str, offset: int, at_end: Literal["stop", "loop"]) -> None:
         if is_missing(path):
-            raise UserError(f"{path}: no such file or folder")
+            raise UserError(f"{shown(path)}: no such file or folder")
         self._path, self._offset, self._loop = path, offset, at_end == "loop"
         self._opened = open_video(path)
         self.size = self._opened.size
@@ -43,7 +44,9 @@ class Recording:
             self._forward(0)  # a broken file is refused now, not at its first pulse
         except SourceEnded:
             self.close()
-            raise UserError(f"{path}: there is not one picture in this video; is the file whole?") from None
+            raise UserError(
+                f"{shown(path)}: there is not one picture in this video; is the file whole?"
+            ) from None
 
     def take(self, pulse: int) -> Image | None:
         """Give frame ``pulse - offset``; None before the recording begins."""

@@ -17,7 +17,7 @@ from camsync import Spell
 from server.camera.sound import LiveSound
 from server.camera.sources.base import Image
 from server.camera.sources.opening import Opened, no_answer, open_video
-from server.wire.addresses import shown
+from server.wire.addresses import ffmpeg_reason, shown
 from server.wire.colours import bgr
 from server.wire.errors import AwayError, UserError
 
@@ -113,7 +113,7 @@ class Stream:
         except _OddSizeError as error:
             why = str(error)  # by damage or for good: a new connection will tell
         except (av.error.FFmpegError, OSError) as error:
-            why = f"reading stopped: {no_answer(error, READ_S) or shown(str(error))}"
+            why = f"reading stopped: {no_answer(error, READ_S) or ffmpeg_reason(error)}"
         finally:
             opened.container.close()
         if not self._closing.is_set():

@@ -16,7 +16,7 @@ from server.web.access.grant import OPERATING
 from server.web.api import answer, asked_for, problem
 from server.web.keys import ON_DISK, SERVICE
 from server.web.operator.schema import Choosing, Setting, Settings
-from server.wire.addresses import HIDDEN, SECRET_WORDS, shown
+from server.wire.addresses import HIDDEN, shown, shown_endpoint
 from server.wire.config import Config
 from server.wire.errors import UserError
 from server.wire.loading import changed_view
@@ -25,7 +25,9 @@ from server.wire.yaml_file import as_lines, one_line
 
 routes = web.RouteTableDef()
 
-_SECRET = re.compile(f"{SECRET_WORDS}|header|cookie", re.IGNORECASE)
+_ENDPOINTS = frozenset({"zenoh.connect", "zenoh.listen"})
+_PASSWORD = re.compile(r"cameras[.][^.]+[.]password")
+"""The name of a file; but who misunderstands that writes the password itself there."""
 
 
 @routes.get(f"{OPERATING}/config")
@@ -90,8 +92,8 @@ def _setting(key: str, value: Any, usual: Any) -> Iterator[Setting]:
     if isinstance(value, BaseModel) or dataclasses.is_dataclass(value):
         yield from _settings(key, value, usual)
     else:
-        default = None if usual is PydanticUndefined else _written(usual)
-        yield Setting(key, _written(value), default, usual is not PydanticUndefined and value != usual)
+        default = None if usual is PydanticUndefined else _written(key, usual)
+        yield Setting(key, _written(key, value), default, usual is not PydanticUndefined and value != usual)
 
 
 def _names(section: Any) -> list[str]:
@@ -100,21 +102,26 @@ def _names(section: Any) -> list[str]:
     return [field.name for field in dataclasses.fields(section)]
 
 
-def _written(value: Any) -> str:
-    """Write a value as a configuration does, without what is nobody's business."""
-    if isinstance(value, Mapping):
-        value = {it: HIDDEN if _SECRET.search(it) else _shown(inner) for it, inner in value.items()}
-    value = _shown(value)
-    plain = value if isinstance(value, bool | int | float | str | list | dict | None) else _plain(value)
-    return one_line(plain)
+def _written(key: str, value: Any) -> str:
+    """Write a value as a configuration does, without what may be secret."""
+    if key in _ENDPOINTS:
+        return one_line(shown_endpoint(value))
+    if value is not None and _PASSWORD.fullmatch(key):
+        return one_line(HIDDEN)
+    return one_line(_shown(value))
 
 
 def _shown(value: Any) -> Any:
-    return shown(value) if isinstance(value, str) else value
-
-
-def _plain(value: Any) -> Any:
-    return list(value) if isinstance(value, tuple) else str(value)
+    """Give a value as YAML has it: of addresses their hosts, and of options for FFmpeg their names alone."""
+    match value:
+        case Mapping():
+            return {shown(it): HIDDEN for it in value}
+        case list() | tuple():
+            return [_shown(it) for it in value]
+        case bool() | int() | float() | None:
+            return value
+        case _:
+            return shown(str(value))
 
 
 def _choosing(service: BestViewService) -> Choosing:

@@ -23,7 +23,7 @@ def _even(value: int) -> int:
 def _endpoint(value: str) -> str:
     found = _ENDPOINT.fullmatch(value)
     if found is None or not 0 < int(found["port"]) <= _PORT_MOST:
-        raise ValueError(f"{value!r} is not an address such as tcp/127.0.0.1:7447")
+        raise ValueError("is not an address such as tcp/127.0.0.1:7447")
     return value
 
 
@@ -42,4 +42,4 @@ Port = Annotated[int, Field(ge=1, le=_PORT_MOST)]
 class Section(BaseModel):
     """A part of the configuration: a key that it does not know is an error, never ignored."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, hide_input_in_errors=True)

@@ -34,9 +34,9 @@ class Share(Section):
             raise ValueError(f"index is {self.index}, but of {self.of} services the last is {self.of - 1}")
         if self.servers and len(self.servers) != self.of:
             raise ValueError(f"servers names {len(self.servers)}, but there are {self.of}; name all or none")
-        for server in self.servers:
+        for number, server in enumerate(self.servers):
             if not re.fullmatch(r"https?://[^\s/?#]+(/[^\s?#]*)?", server):
-                raise ValueError(f"servers: {server!r} is not an address such as http://127.0.0.1:8081/")
+                raise ValueError(f"servers.{number}: is not an address such as http://127.0.0.1:8081/")
         return self
 
 

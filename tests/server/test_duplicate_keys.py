@@ -1,0 +1,182 @@
+"""What stands twice in a file that people write is refused, with both lines: or the last would count."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from server.run.calibrate_points import read_points
+from server.wire.duplicate_keys import DuplicateKeyError, parse_json
+from server.wire.errors import UserError
+from server.wire.loading import build_config, load_config
+from server.wire.tokens import read_tokens
+from server.wire.yaml_file import read_yaml
+
+SITE = """\
+cameras:
+  - {id: c0, source: c0.mp4}
+access:
+  tokens: tokens.yaml
+"""
+SUM = "0" * 64
+
+
+def refusal(folder: Path, text: str) -> str:
+    path = folder / "site.yaml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(UserError, match=r"site\.yaml: ") as refused:
+        read_yaml(path, "the configuration")
+    assert "\n" not in str(refused.value)
+    return str(refused.value)
+
+
+def test_two_sections_of_one_name_do_not_drop_the_tokens_in_silence(tmp_path: Path) -> None:
+    path = tmp_path / "site.yaml"
+    path.write_text(f"{SITE}http:\n  host: 0.0.0.0\naccess:\n  open_to_all: true\n")
+    with pytest.raises(UserError, match=r"site\.yaml: 'access' is there twice, in lines 3 and 7") as refused:
+        load_config(path)
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("a:\n  b: 1\n  c: 2\n  b: 3\n", "'b' is there twice, in lines 2 and 4"),
+        ("a: [{b: 1, b: 2}]\n", "'b' is there twice, in line 1"),
+        ("- {a: {b: {c: 1,\n  d: 2,\n  c: 3}}}\n", "'c' is there twice, in lines 1 and 3"),
+        ('1: a\n"1": b\n', "'1' is there twice, in lines 1 and 2"),
+        ("16: a\n0x10: b\n", "'0x10' is there twice, in lines 1 and 2"),
+        ("yes: a\ntrue: b\n", "'true' is there twice, in lines 1 and 2"),
+        ("1: a\n1.0: b\n", "'1.0' is there twice, in lines 1 and 2"),
+        ("~: a\nnull: b\n", "'null' is there twice, in lines 1 and 2"),
+        ("a: 1\n'a': 2\n", "'a' is there twice, in lines 1 and 2"),
+        ("a: 1\n? a\n: 2\n", "'a' is there twice, in lines 1 and 2"),
+        ("x: &x {a: 1}\ny: &y {a: 2}\nz:\n  <<: *x\n  <<: *y\n", "'<<' is there twice, in lines 4 and 5"),
+        ("x: &x {a: 1, a: 2}\ny: {<<: *x}\n", "'a' is there twice, in line 1"),
+        ("!!set {a, b, a}\n", "'a' is there twice, in line 1"),
+    ],
+)
+def test_a_key_that_is_there_twice_is_refused_with_its_lines(tmp_path: Path, text: str, said: str) -> None:
+    assert said in refusal(tmp_path, text)
+
+
+def test_what_a_merge_brings_may_be_said_anew(tmp_path: Path) -> None:
+    path = tmp_path / "site.yaml"
+    path.write_text(
+        "usual: &usual {fps: 25, at_end: loop}\n"
+        "other: &other {fps: 30}\n"
+        "a: {<<: *usual, fps: 5}\n"
+        "b: {fps: 6, <<: [*other, *usual]}\n"
+        "c: &c {<<: *usual, at_end: stop}\n"
+        "d: {<<: *c}\n"
+        "again: [*c, *c]\n"
+    )
+    read: Mapping[str, Any] = read_yaml(path, "it")
+    assert read["a"] == {"fps": 5, "at_end": "loop"}
+    assert read["b"] == {"fps": 6, "at_end": "loop"}
+    assert read["c"] == read["d"] == {"fps": 25, "at_end": "stop"}
+    assert read["again"] == [read["c"], read["c"]]
+
+
+KEYS = st.dictionaries(st.text('abc\u00e4"\\\n{}:', max_size=4), st.integers(), max_size=4)
+NESTED = st.recursive(KEYS, lambda inner: st.dictionaries(st.text("abc", max_size=2), inner, max_size=3))
+
+
+@given(NESTED, st.sampled_from([None, 1]))
+def test_json_without_duplicates_is_read_as_it_is(content: Any, indent: int | None) -> None:
+    assert parse_json(json.dumps(content, indent=indent)) == content
+
+
+@given(NESTED, KEYS.filter(bool), st.data())
+def test_a_key_twice_in_json_is_found_wherever_it_is(content: Any, inner: Any, data: st.DataObject) -> None:
+    key = data.draw(st.sampled_from(sorted(inner)))
+    twice = json.dumps(inner)[:-1] + f", {json.dumps(key)}: 0}}"
+    text = '{\n"around": ' + json.dumps([content]) + ',\n"here":\n' + twice + "\n}"
+    assert json.loads(text)["here"] == {**inner, key: 0}
+    with pytest.raises(DuplicateKeyError, match="is there twice, in line 4"):
+        parse_json(text)
+
+
+def test_a_camera_twice_in_a_ground_file_is_refused_with_both_lines(tmp_path: Path) -> None:
+    matrix = "[[1, 0, 0], [0, 1, 0], [0, 0, 1]]"
+    text = f'{{"homography": {{\n"c0": {matrix},\n"c1": {matrix},\n"c\\u0030": {matrix}}}}}'
+    (tmp_path / "ground.json").write_text(text)
+    content = {"cameras": [{"id": "c0", "source": "c0.mp4"}], "ground": "ground.json"}
+    with pytest.raises(UserError, match=r"ground: .*ground\.json: 'c0' is there twice, in lines 2 and 4"):
+        build_config(content, where="site.yaml", folder=tmp_path)
+
+
+def test_a_camera_twice_in_a_file_of_points_is_refused_with_both_lines(tmp_path: Path) -> None:
+    path = tmp_path / "points.json"
+    path.write_text('{"cameras": {\n"c0": [{"image": [1, 2], "floor": [3, 4]}],\n"c0": []}}')
+    with pytest.raises(UserError, match=r"points\.json: 'c0' is there twice, in lines 2 and 3"):
+        read_points(path)
+
+
+def test_a_column_twice_in_a_file_of_points_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "points.csv"
+    path.write_text("camera,image_x,image_y,floor_x,floor_y,image_x\nc0,1,2,3,4,5\n")
+    with pytest.raises(UserError, match=r"points\.csv:1: has two columns 'image_x'"):
+        read_points(path)
+
+
+def test_a_setting_twice_in_a_token_is_refused_with_both_lines(tmp_path: Path) -> None:
+    path = tmp_path / "tokens.yaml"
+    path.write_text(f"tokens:\n- name: a\n  sha256: '{SUM}'\n  role: watch\n  role: operate\n")
+    with pytest.raises(UserError, match=r"tokens\.yaml: 'role' is there twice, in lines 4 and 5"):
+        read_tokens(path)
+
+
+def test_two_lists_of_tokens_are_refused_with_both_lines(tmp_path: Path) -> None:
+    path = tmp_path / "tokens.yaml"
+    path.write_text(f"tokens:\n- {{name: a, sha256: '{SUM}', role: watch}}\ntokens: []\n")
+    with pytest.raises(UserError, match=r"tokens\.yaml: 'tokens' is there twice, in lines 1 and 3"):
+        read_tokens(path)
+
+
+@pytest.mark.parametrize(
+    ("variables", "said"),
+    [
+        (
+            {"MYVIEW_ACCESS__TOKENS": "a.yaml", "MYVIEW_access__tokens": ""},
+            "MYVIEW_ACCESS__TOKENS and MYVIEW_access__tokens both say access.tokens",
+        ),
+        (
+            {"MYVIEW_ACCESS__TOKENS": "a.yaml", "myview_Access__Tokens": "b.yaml"},
+            "MYVIEW_ACCESS__TOKENS and myview_Access__Tokens both say access.tokens",
+        ),
+        (
+            {"MYVIEW_ACCESS": '{"tokens": null}', "MYVIEW_ACCESS__TOKENS": "a.yaml"},
+            "MYVIEW_ACCESS and MYVIEW_ACCESS__TOKENS both say access.tokens",
+        ),
+        (
+            {"MYVIEW_VIEW": '{"flags": {"risk": 1}}', "MYVIEW_VIEW__FLAGS__RISK": "0"},
+            "MYVIEW_VIEW and MYVIEW_VIEW__FLAGS__RISK both say view.flags.risk",
+        ),
+        ({"MYVIEW_GROUND": "a", "MYVIEW_ground": "b"}, "MYVIEW_GROUND and MYVIEW_ground both say ground"),
+        ({"MYVIEW_ACCESS": '{"tokens": "a", "tokens": null}'}, "MYVIEW_ACCESS: 'tokens' is there twice"),
+        ({"myview_htp__port": "1"}, "myview_htp__port: there is no section 'htp'"),
+    ],
+)
+def test_what_the_environment_says_twice_is_refused(
+    variables: dict[str, str], said: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name, value in variables.items():
+        monkeypatch.setenv(name, value)
+    with pytest.raises(UserError, match=r"site\.yaml: environment: ") as refused:
+        build_config({"cameras": [{"id": "c0", "source": "a"}]}, where="site.yaml", folder=Path())
+    assert said in str(refused.value)
+
+
+def test_parts_of_a_section_may_come_from_several_variables(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("MYVIEW_HTTP", '{"host": "127.0.0.2"}')
+    monkeypatch.setenv("myview_http__port", "9999")
+    monkeypatch.setenv("MYVIEW_LOG", "DEBUG")
+    config = build_config({"cameras": [{"id": "c0", "source": "a"}]}, where="site.yaml", folder=Path())
+    assert (config.http.host, config.http.port) == ("127.0.0.2", 9999)
