@@ -3,7 +3,7 @@
     python -m benchmarks.startup --out out/bench
 
 A clone of the committed tree in a temporary folder; nothing of it is installed before. Packages come from the
-index, or from the caches of pip and uv where they are: what has none is a bare machine (`tests/bare_machine.sh`).
+index, or from the caches of pip and uv where they are: `tests/bare_machine.sh` has none.
 """
 
 from __future__ import annotations
