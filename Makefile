@@ -8,7 +8,7 @@ NODE_STAMP := node_modules/.installed
 TESTED := $(sort $(dir $(wildcard tests/*.py tests/*/*.py)))
 
 # uv takes a seventh of pip's time. It does not read pip's own settings: where those name the index, pip does it.
-install = $(BIN)/uv pip install --quiet --python $(BIN)/python --constraint requirements/lock.txt --editable $(1) \
+install = UV_SYSTEM_CERTS=1 $(BIN)/uv pip install --quiet --python $(BIN)/python --constraint requirements/lock.txt --editable $(1) \
 	|| $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint requirements/lock.txt --editable $(1)
 
 .PHONY: demo test test-slow test-loaded lint format bench lock clean node_modules

@@ -10,8 +10,9 @@
 set -euo pipefail
 IMAGE=${IMAGE:-python:3.11-slim-bookworm}
 ROOT=$(cd "$(dirname "$0")/.." && pwd)
+# shellcheck disable=SC2016  # expanded inside
 COMMANDS='
-    git -c safe.directory="*" clone --quiet file:///source "$CLONE"
+    git clone --quiet file:///source "$CLONE"
     cd "$CLONE"
     failed=0
     make test || failed=$?
@@ -20,12 +21,13 @@ COMMANDS='
 
 in_container() {  # NAME CLONE "OPTIONS OF docker run" BEFORE
     echo "== $1"
-    # shellcheck disable=SC2086 — the options are words
+    # shellcheck disable=SC2086  # the options are words
     docker run --rm --init --volume "$ROOT:/source:ro" --env CLONE="$2" --env PIP_NO_CACHE_DIR=1 --env UV_NO_CACHE=1 $3 \
         "$IMAGE" bash -ceu "
             apt-get update -qq
             DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends git make >/dev/null
             useradd --create-home somebody
+            git config --system --add safe.directory '*'  # the sources are somebody else's
             $4 bash -ceu '$COMMANDS'"
 }
 
