@@ -4,28 +4,22 @@ from __future__ import annotations
 
 import json
 import resource
-import socket
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 import pytest
-import yaml
 from cameras_by_hand import small_config
 from command_line import Run
+from few_descriptors import FEW, MYVIEW, PATIENCE, awaited, connected, running, written
 from free_port import free
 
 from server.run.doctor_findings import Level
 from server.run.doctor_machine import descriptor_findings
 from server.wire.descriptors import FOR_OPERATORS, limit, places, raise_limit
-
-PATIENCE = 60.0  # seconds that a process has to begin, to say something or to end
-FEW = 64  # descriptors: hardly more than a process needs for itself
-MYVIEW = f"{sys.executable} -m server.run.cli"
 
 
 @pytest.fixture
@@ -90,33 +84,6 @@ def test_the_doctor_tells_of_it(myview: Run, tmp_path: Path) -> None:
     assert str(limit()) in found["text"]
 
 
-def written(folder: Path, port: int) -> Path:
-    path = folder / "site.yaml"
-    content = {
-        "site": {"name": "hall"},
-        "cameras": [{"id": "c0", "source": "c0.mp4"}],
-        "sync": {"port": port},
-        "http": {"port": free()},
-        "zenoh": dict.fromkeys(("connect", "listen"), f"tcp/127.0.0.1:{free()}"),
-    }
-    path.write_text(yaml.safe_dump(content))
-    return path
-
-
-@contextmanager
-def running(command: str, log: Path) -> Iterator[subprocess.Popen[bytes]]:
-    """Run a command with few descriptors until the block is over, its log in a file."""
-    with (
-        log.open("wb") as out,
-        subprocess.Popen(f"ulimit -n {FEW}; exec {command}", shell=True, stderr=out) as process,  # noqa: S602
-    ):
-        try:
-            yield process
-        finally:
-            process.terminate()
-            process.wait(PATIENCE)
-
-
 def test_a_process_that_can_accept_nobody_says_so_once_and_takes_them_when_it_can(tmp_path: Path) -> None:
     port, log = free(), tmp_path / "log"
     with running(f"{MYVIEW} sync {written(tmp_path, port)}", log), ExitStack() as silent:
@@ -130,21 +97,3 @@ def test_a_process_that_can_accept_nobody_says_so_once_and_takes_them_when_it_ca
     told = log.read_bytes()
     assert told.count(b"cannot be accepted: Too many open files") == 1
     assert b"Traceback" not in told
-
-
-def connected(port: int) -> socket.socket:
-    """Connect as soon as somebody listens."""
-    end = time.monotonic() + PATIENCE
-    while True:
-        try:
-            return socket.create_connection(("127.0.0.1", port), PATIENCE)
-        except ConnectionRefusedError:
-            assert time.monotonic() < end, "nobody listens"
-            time.sleep(0.02)
-
-
-def awaited(log: Path, what: bytes) -> None:
-    end = time.monotonic() + PATIENCE
-    while what not in log.read_bytes():
-        assert time.monotonic() < end, log.read_bytes()
-        time.sleep(0.02)

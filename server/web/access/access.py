@@ -102,6 +102,14 @@ class Access:
         asking = self._asking.get(id(request))
         return Grant(operates=is_from_here(request)) if asking is None else asking.grant
 
+    def operates(self, request: web.Request) -> bool:
+        """Tell whether whoever asks may operate, before anything is answered."""
+        if self._file is None:
+            return is_from_here(request)
+        holder = self._holder(request)
+        held = self.held(holder) if isinstance(holder, Holder) else None
+        return isinstance(held, Grant) and held.operates
+
     async def answer(self, request: web.Request, need: Need, handler: Handler) -> web.StreamResponse:
         """Answer a request, if whoever asks may have the answer."""
         if self._file is None:

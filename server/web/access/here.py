@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import ipaddress
 import re
 
 from aiohttp import HttpVersion11, web
 from yarl import URL
+
+from server.web.access.networks import is_loopback
 
 _FROM_A_PROXY = re.compile(
     r"via|cdn-loop|front-end-https|(x-)?(url-)?scheme|x-(proto|ssl|host|varnish|proxied|proxyuser-ip)|x-azure-ref"
@@ -25,7 +26,7 @@ def is_from_here(request: web.Request) -> bool:
         return False  # HTTP/1.0 is what some proxies speak; no browser does
     named = [f"http://{request.host}"]
     named += [request.headers[it] for it in ("Origin", "Referer") if it in request.headers]
-    return _is_loopback(request.remote or "") and all(_names_this_machine(it) for it in named)
+    return is_loopback(request.remote or "") and all(_names_this_machine(it) for it in named)
 
 
 def _is_of_a_proxy(head: str) -> bool:
@@ -38,13 +39,4 @@ def _names_this_machine(address: str) -> bool:
         host = URL(address).host or ""
     except ValueError:
         return False
-    return host == "localhost" or _is_loopback(host)
-
-
-def _is_loopback(address: str) -> bool:
-    try:
-        ip = ipaddress.ip_address(address)
-    except ValueError:
-        return False
-    mapped = getattr(ip, "ipv4_mapped", None)
-    return (mapped or ip).is_loopback
+    return host == "localhost" or is_loopback(host)
