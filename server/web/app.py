@@ -25,12 +25,14 @@ from server.web.cors import preflight
 from server.web.events import Events
 from server.web.hls import routes as hls
 from server.web.keys import EVENTS, METRICS, ON_DISK, PICTURES, READERS, SERVICE
+from server.web.limits import LISTENING, WATCHING
 from server.web.metrics.service import registry
 from server.web.metrics.stages import measure
 from server.web.operator import routes as operator
 from server.web.queries import refuse_what_is_not_there
 from server.web.readers import Readers
 from server.web.share import to_the_right_service
+from server.web.shares import Shares
 from server.web.strangers import REQUESTS
 from server.web.streams import break_off
 from server.web.tls import Certificate
@@ -107,7 +109,8 @@ def make_app(
     app[SERVICE], app[EVENTS], app[PICTURES] = service, Events(service), Pictures(service)
     app[ON_DISK], app[_MISTAKES] = on_disk, Spell()
     app[openapi.DESCRIBED] = openapi.Described(app)
-    app[READERS] = Readers(service.splicer.plan.target_s)
+    app[WATCHING], app[LISTENING] = Shares(), Shares()
+    app[READERS] = Readers(service.splicer.plan.target_s, app[WATCHING])
     what = f"{service.config.site.name}_{service.config.view.share.index}"
     app[ACCESS] = Access(
         service.config.access.tokens,

@@ -1,24 +1,70 @@
-"""How many may watch: all streams together, and one of them."""
+"""How many may watch: all streams together, and one of them; and how many may be told what happens."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 from aiohttp import web
 
+from server.web.access.access import ACCESS
 from server.web.api import not_now
 from server.web.keys import PICTURES, READERS, SERVICE
+from server.web.shares import Place, Shares
+from server.web.streams import break_off
+
+WATCHING = web.AppKey("watching", Shares)
+"""Who watches which stream."""
+LISTENING = web.AppKey("listening", Shares)
+"""Who is told what happens, or what has happened."""
 
 
-def no_place(request: web.Request, watching: int = 0) -> web.Response | None:
-    """Say why nobody else may watch a stream that so many watch; None: there is place.
+def no_place(request: web.Request, watching: int = 0, streams: tuple[str, ...] = ()) -> web.Response | None:
+    """Say why nobody else may watch a stream that so many watch; None: there is place, or there is now.
 
-    A process that draws a stream counts as one of its viewers, and so does who fetches it (HLS).
+    ``streams`` are by what names they hold their places. A process that draws a stream counts as one of its
+    viewers, and so does who fetches it (HLS).
     """
-    service = request.app[SERVICE]
-    limits = service.config.http
+    service, shares = request.app[SERVICE], request.app[WATCHING]
+    holder, limits = request.app[ACCESS].share_holder(request), service.config.http
     everybody = service.splicer.viewers + service.past.viewers
     everybody += request.app[PICTURES].viewers + request.app[READERS].all
-    if everybody >= limits.viewers_max:
-        return not_now("as many viewers as this server takes (http.viewers_max) are watching")
-    if watching >= limits.viewers_per_object:
+    if watching - shares.ending(streams) >= limits.viewers_per_object:
+        if shares.make_room(holder, streams):
+            return None  # one less of all, too
         return not_now("as many viewers as one stream takes (http.viewers_per_object) are watching")
+    if everybody - shares.ending() >= limits.viewers_max and not shares.make_room(holder):
+        return not_now("as many viewers as this server takes (http.viewers_max) are watching")
     return None
+
+
+@contextmanager
+def watching(request: web.Request, stream: str) -> Iterator[Place]:
+    """Hold a place among those who watch, inside."""
+    with _held(request, request.app[WATCHING], stream) as place:
+        yield place
+
+
+def no_ear(request: web.Request) -> web.Response | None:
+    """Say why nobody else may be told what happens; None: there is place, or there is now."""
+    shares, most = request.app[LISTENING], request.app[SERVICE].config.http.viewers_max
+    if shares.all < most or shares.make_room(request.app[ACCESS].share_holder(request)):
+        return None
+    return not_now("as many as this server takes (http.viewers_max) are told what happens")
+
+
+@contextmanager
+def listening(request: web.Request) -> Iterator[None]:
+    """Hold a place among those who are told, inside."""
+    with _held(request, request.app[LISTENING], ""):
+        yield
+
+
+@contextmanager
+def _held(request: web.Request, shares: Shares, stream: str) -> Iterator[Place]:
+    holder = request.app[ACCESS].share_holder(request)
+    place = shares.take(Place(holder, stream, lambda: break_off(request)))
+    try:
+        yield place
+    finally:
+        shares.give_up(place)
