@@ -36,7 +36,7 @@ class Http(Section):
     host: str = "127.0.0.1"
     port: Annotated[int, Field(ge=0, le=65535)] = 8080
     viewers_max: PositiveInt = 1000
-    """Streams served at once; one more gets 503."""
+    """Streams served at once, and as many readers of events; one more gets 503, or another's place."""
     viewers_per_object: PositiveInt = 1000
     """The same of one object, or of one camera."""
     connections_max: PositiveInt | None = None
