@@ -26,14 +26,14 @@ def no_place(request: web.Request, watching: int = 0, streams: tuple[str, ...] =
     viewers, and so does who fetches it (HLS).
     """
     service, shares = request.app[SERVICE], request.app[WATCHING]
-    holder, limits = request.app[ACCESS].share_holder(request), service.config.http
+    limits = service.config.http
     everybody = service.splicer.viewers + service.past.viewers
     everybody += request.app[PICTURES].viewers + request.app[READERS].all
     if watching - shares.ending(streams) >= limits.viewers_per_object:
-        if shares.make_room(holder, streams):
+        if _makes_room(request, shares, streams):
             return None  # one less of all, too
         return not_now("as many viewers as one stream takes (http.viewers_per_object) are watching")
-    if everybody - shares.ending() >= limits.viewers_max and not shares.make_room(holder):
+    if everybody - shares.ending() >= limits.viewers_max and not _makes_room(request, shares):
         return not_now("as many viewers as this server takes (http.viewers_max) are watching")
     return None
 
@@ -48,7 +48,7 @@ def watching(request: web.Request, stream: str) -> Iterator[Place]:
 def no_ear(request: web.Request) -> web.Response | None:
     """Say why nobody else may be told what happens; None: there is place, or there is now."""
     shares, most = request.app[LISTENING], request.app[SERVICE].config.http.viewers_max
-    if shares.all < most or shares.make_room(request.app[ACCESS].share_holder(request)):
+    if shares.all < most or _makes_room(request, shares):
         return None
     return not_now("as many as this server takes (http.viewers_max) are told what happens")
 
@@ -58,6 +58,11 @@ def listening(request: web.Request) -> Iterator[None]:
     """Hold a place among those who are told, inside."""
     with _held(request, request.app[LISTENING], ""):
         yield
+
+
+def _makes_room(request: web.Request, shares: Shares, streams: tuple[str, ...] | None = None) -> bool:
+    """Take a place away for who asks, if it is theirs; who asks for a head alone takes no place."""
+    return request.method != "HEAD" and shares.make_room(request.app[ACCESS].share_holder(request), streams)
 
 
 @contextmanager

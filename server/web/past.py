@@ -178,9 +178,12 @@ async def _stream(
         wish = wish_of(request, service, source.end)
     except MomentError as error:
         return problem(400, str(error))
-    refused = nothing_kept(source, wish, what) or no_place(request)
-    if refused is not None:
-        return refused
+    missing = nothing_kept(source, wish, what)
+    if missing is not None:
+        return missing
+    full = no_place(request)
+    if full is not None:
+        return full
     counted = 1
 
     def joined() -> Channel | None:

@@ -94,6 +94,8 @@ async def test_one_token_with_many_connections_does_either(tmp_path: Path, path:
         *held, newest, refused = flood
         assert refused == 503
         assert isinstance(newest, Viewer)
+        async with hall.session.head(path, headers=desk) as answer:
+            assert answer.status == 503, "who does not take the place does not take it away"
         mine = await joined(stack, hall, path, **desk)
         assert isinstance(mine, Viewer)
         await newest.ends()
