@@ -131,11 +131,13 @@ class Listener:
                 await _cancelled([*tasks, *self._opening])
 
     def _accepting(self, listening: socket.socket) -> Callable[[], Coroutine[Any, Any, None]]:
-        loop = asyncio.get_running_loop()
-
         async def accept() -> None:
             try:
-                sock, address = await loop.sock_accept(listening)
+                # Nothing is awaited until somebody looks after it: else it could be lost at the end.
+                sock, address = listening.accept()
+            except BlockingIOError:
+                await _knocked(listening)
+                return
             except ConnectionAbortedError:
                 return  # it has gone again
             except OSError as error:
@@ -143,6 +145,7 @@ class Listener:
                 self._places.make_way()
                 await asyncio.sleep(_FAILED_PAUSE_S)
                 return
+            sock.setblocking(False)  # noqa: FBT003 — the name of the method says it
             self._take(sock, str(address[0]))
 
         return accept
@@ -157,7 +160,13 @@ class Listener:
             return
         opening.task = asyncio.create_task(self._open(opening, connection), name="connection")
         self._opening.add(opening.task)
-        opening.task.add_done_callback(self._opening.discard)
+        opening.task.add_done_callback(lambda task: self._opened(task, opening, connection))
+
+    def _opened(self, task: asyncio.Task[None], opening: _Opening, connection: Connection) -> None:
+        self._opening.discard(task)
+        if not opening.begun:  # it was cancelled before
+            opening.socket.close()
+            self._places.left(connection)
 
     async def _open(self, opening: _Opening, connection: Connection) -> None:
         opening.begun = True
@@ -225,6 +234,17 @@ def _listening(family: socket.AddressFamily, address: tuple[Any, ...]) -> socket
         listening.close()
         raise
     return listening
+
+
+async def _knocked(listening: socket.socket) -> None:
+    """Wait until somebody wants to be let in."""
+    loop = asyncio.get_running_loop()
+    knocked = asyncio.Event()
+    loop.add_reader(listening, knocked.set)
+    try:
+        await knocked.wait()
+    finally:
+        loop.remove_reader(listening)
 
 
 async def _cancelled(tasks: list[asyncio.Task[Any]]) -> None:
