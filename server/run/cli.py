@@ -25,6 +25,7 @@ from server.run.ending import SUPERVISED, end_with_parent
 from server.run.logs import say_failure
 from server.run.several import one_value_per_flag
 from server.wire.addresses import shown
+from server.wire.descriptors import raise_limit
 from server.wire.errors import UserError
 
 app = typer.Typer(
@@ -79,6 +80,7 @@ def main() -> None:
     """Run the command line; no traceback for bad input."""
     # All memory goes with the process: to look for cycles in a thousand modules first takes half a second.
     atexit.register(gc.freeze)
+    raise_limit()
     if os.environ.get(SUPERVISED):
         end_with_parent()
     # So that what is half-written is tidied away; what runs until it is told to end writes nothing before it

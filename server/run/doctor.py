@@ -23,12 +23,13 @@ from server.run.doctor_findings import (
     show,
     show_counts,
 )
-from server.run.doctor_machine import clock_findings, machine_findings
+from server.run.doctor_machine import clock_findings, descriptor_findings, machine_findings
 from server.run.doctor_ports import port_findings
 from server.run.doctor_probe import Probe
 from server.run.doctor_ways import way_findings
 from server.run.scene_ground import with_scene_ground
 from server.wire.config import Config
+from server.wire.descriptors import limit
 from server.wire.errors import UserError
 from server.wire.loading import load_config
 
@@ -110,6 +111,7 @@ def _last(config: Config, probes: dict[str, Probe], *, runs: bool) -> list[Findi
         ("sound", lambda: sound_findings(config)),
         ("disk", lambda: disk_findings(config, probes)),
         ("machine", lambda: machine_findings(config, probes)),
+        ("open files", lambda: descriptor_findings(config, limit())),
     )
     found: list[Finding] = []
     for check, find in checks:

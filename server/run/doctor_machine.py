@@ -14,6 +14,7 @@ from server.run.doctor_findings import Finding, ok, warning
 from server.run.doctor_probe import Probe
 from server.run.processors import processors
 from server.wire.config import Config
+from server.wire.descriptors import places
 
 _TIME_ERROR = 5
 """What adjtimex(2) returns where nobody keeps the clock."""
@@ -71,6 +72,21 @@ def machine_findings(config: Config, probes: Mapping[str, Probe]) -> list[Findin
             else warning("memory", text, "a lower track.backlog_s, fewer cameras, or more memory")
         )
     return found
+
+
+def descriptor_findings(config: Config, descriptors: int) -> list[Finding]:
+    """Say how many connections and viewers the files let that a process may have open."""
+    wanted, most = config.http.connections, places(config, descriptors)
+    viewers = min(config.http.viewers_max, most)
+    has = f"{descriptors} may be open in a process that is started from here: {most} connections"
+    if viewers < config.http.viewers_max:
+        text = f"{has}, and so {viewers} viewers; http.viewers_max says {config.http.viewers_max}"
+    elif most < wanted:
+        text = f"{has}, {viewers} viewers among them; http.connections_max says {wanted}"
+    else:
+        return [ok("open files", f"{has} and {viewers} viewers fit")]
+    do = "a higher hard limit: ulimit -Hn, LimitNOFILE= of systemd, ulimits of compose; or lower settings"
+    return [warning("open files", text, do)]
 
 
 def available_mb() -> float | None:

@@ -14,6 +14,8 @@ from collections.abc import Callable, Coroutine, Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from server.wire.accept_errors import AcceptErrors
+
 log = logging.getLogger(__name__)
 
 _PR_SET_PDEATHSIG = 1
@@ -41,6 +43,7 @@ async def run_until_told(
     """
     task = asyncio.create_task(main())
     loop = asyncio.get_running_loop()
+    loop.set_exception_handler(AcceptErrors())
 
     def end() -> None:
         told()

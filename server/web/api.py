@@ -11,6 +11,7 @@ from prometheus_client import CollectorRegistry, generate_latest
 from server.view.past.moment import MomentError, pulse_at
 from server.view.ready import why_not_ready
 from server.view.service import BestViewService
+from server.web.connections.listener import still_coming
 from server.web.keys import METRICS, SERVICE
 from server.web.schema import Problem
 from server.web.views import choice_info, thumbnail_of
@@ -64,7 +65,9 @@ async def asked_for(request: web.Request, kind: type[Asked]) -> Asked:
         HTTPBadRequest: it is not JSON of that kind.
     """
     try:
-        return msgspec.json.decode(await request.read(), type=kind)
+        with still_coming(request):
+            asked = await request.read()
+        return msgspec.json.decode(asked, type=kind)
     except UNREADABLE as error:
         raise web.HTTPBadRequest(reason=f"the request's JSON: {' '.join(str(error).split())}") from error
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import math
 from collections.abc import AsyncIterator, Awaitable, Callable
-from contextlib import asynccontextmanager
+from contextlib import AsyncExitStack, asynccontextmanager
 
 from aiohttp import web
 
@@ -16,20 +17,27 @@ from server.web import api, openapi, page, past, pictures, session, site, video
 from server.web.access.access import ACCESS, Access, keep_no_copies, only_who_may
 from server.web.access.other_sites import tell_no_other_origin
 from server.web.api import problem
+from server.web.connections.beyond import keep_places
+from server.web.connections.listener import Listener
+from server.web.connections.places import Bounds, Places
 from server.web.containers import refuse_other_containers
 from server.web.cors import preflight
 from server.web.events import Events
 from server.web.hls import routes as hls
 from server.web.keys import EVENTS, METRICS, ON_DISK, PICTURES, READERS, SERVICE
+from server.web.limits import LISTENING, WATCHING
 from server.web.metrics.service import registry
 from server.web.metrics.stages import measure
 from server.web.operator import routes as operator
 from server.web.queries import refuse_what_is_not_there
 from server.web.readers import Readers
 from server.web.share import to_the_right_service
+from server.web.shares import Shares
 from server.web.strangers import REQUESTS
 from server.web.streams import break_off
 from server.web.tls import Certificate
+from server.wire.config import Config
+from server.wire.descriptors import FOR_OPERATORS, limit, places
 from server.wire.errors import UserError
 from server.wire.running import OnDisk
 from server.wire.sections import Http
@@ -39,6 +47,8 @@ log = logging.getLogger(__name__)
 _MISTAKES = web.AppKey("mistakes", Spell)
 _BEGUN = web.RequestKey("begun", web.StreamResponse)
 """The answer to a request, once its head has been sent."""
+_ASKED_BYTES = 65_536
+"""What may follow the head of a request: JSON, of which strangers could else have much kept in memory."""
 _CLOSE_S = 1.0
 """How long viewers have to take what was sent before the server ends."""
 
@@ -87,17 +97,20 @@ def make_app(
     app = web.Application(
         middlewares=[
             one_line_errors,
+            keep_places,
             only_who_may,
             preflight,
             refuse_what_is_not_there,
             refuse_other_containers,
             to_the_right_service,
-        ]
+        ],
+        client_max_size=_ASKED_BYTES,
     )
     app[SERVICE], app[EVENTS], app[PICTURES] = service, Events(service), Pictures(service)
     app[ON_DISK], app[_MISTAKES] = on_disk, Spell()
     app[openapi.DESCRIBED] = openapi.Described(app)
-    app[READERS] = Readers(service.splicer.plan.target_s)
+    app[WATCHING], app[LISTENING] = Shares(), Shares()
+    app[READERS] = Readers(service.splicer.plan.target_s, app[WATCHING])
     what = f"{service.config.site.name}_{service.config.view.share.index}"
     app[ACCESS] = Access(
         service.config.access.tokens,
@@ -123,31 +136,49 @@ async def serving(app: web.Application, settings: Http) -> AsyncIterator[int]:
         UserError: the port cannot be listened on, or the certificate cannot be read.
     """
     certificate = Certificate.of(settings.tls)
-    context = None if certificate is None else certificate.context
-    runner = web.AppRunner(
-        app,
-        access_log=None,
-        logger=REQUESTS,
-        shutdown_timeout=_CLOSE_S,
-        handler_cancellation=True,
-        auto_decompress=False,  # a little that unpacks to much would keep all streams waiting
-    )
+    handling = {"access_log": None, "logger": REQUESTS, "keepalive_timeout": settings.keepalive_timeout_s}
+    # What is packed is not unpacked: a little that unpacks to much would keep all streams waiting.
+    runner = web.AppRunner(app, shutdown_timeout=_CLOSE_S, handler_cancellation=True)
     await runner.setup()
+    assert runner.server is not None  # noqa: S101 — tells mypy that it was made
+    context = None if certificate is None else certificate.context
+    bounds = _bounds(app[SERVICE].config.model_copy(update={"http": settings}))
+    listener = Listener(runner.server, Places(bounds), context, auto_decompress=False, **handling)
     looking = None if certificate is None else asyncio.create_task(certificate.run(), name="certificate")
     try:
-        site = web.TCPSite(runner, settings.host, settings.port, ssl_context=context)
-        try:
-            await site.start()
-        except OSError as error:
-            reason = error.strerror or error
-            raise UserError(
-                f"http.port: cannot listen on {settings.host}:{settings.port}: {reason}"
-            ) from error
-        yield runner.addresses[0][1]
+        async with AsyncExitStack() as stack:
+            try:
+                port = await stack.enter_async_context(listener.listening(settings.host, settings.port))
+            except OSError as error:
+                reason = error.strerror or error
+                raise UserError(
+                    f"http.port: cannot listen on {settings.host}:{settings.port}: {reason}"
+                ) from error
+            yield port
     finally:
         if looking is not None:
             looking.cancel()
         await runner.cleanup()
+
+
+def _bounds(config: Config) -> Bounds:
+    """Return how many connections are taken: as many as are wanted, where that many files may be open."""
+    http, descriptors = config.http, limit()
+    most = places(config, descriptors)
+    if most < http.connections:
+        log.warning(
+            "%d files may be open (ulimit -n): %d connections are taken, not %d (http.connections_max)",
+            descriptors,
+            most,
+            http.connections,
+        )
+    return Bounds(
+        most=most,
+        per_address=min(most, http.connections_per_address or math.ceil(most / 2)),
+        for_operators=FOR_OPERATORS,
+        request_s=http.request_timeout_s,
+        keepalive_s=http.keepalive_timeout_s,
+    )
 
 
 async def _telling(app: web.Application) -> AsyncIterator[None]:

@@ -58,9 +58,13 @@ _OTHER = {
     **OPERATOR_FILES,
     **OPERATOR_RESULTS,
 }
-_UNAVAILABLE = {"/objects/{object}/best.mp4", "/cameras/{camera}/live.mp4", "/readyz"} | {
-    path for path in _OTHER if path.endswith((".webm", ".ts", ".m3u8", ".mjpeg", "best.jpg", "live.jpg"))
-}
+_UNAVAILABLE = {
+    "/objects/{object}/best.mp4",
+    "/cameras/{camera}/live.mp4",
+    "/readyz",
+    "/api/events",
+    "/api/past",
+} | {path for path in _OTHER if path.endswith((".webm", ".ts", ".m3u8", ".mjpeg", "best.jpg", "live.jpg"))}
 _OF_PEOPLE = {"/api/operator/people", "/api/operator/pointing"}
 _FROM_IS_NEEDED = {"/api/past", *OPERATOR_FILES}
 _SPANS = {"/api/objects/{object}/past", "/api/cameras/{camera}/past"}

@@ -21,8 +21,9 @@ from server.web.access.access import ACCESS
 from server.web.api import answer, no_camera, no_object, not_now, problem
 from server.web.forms import Form
 from server.web.keys import SERVICE
-from server.web.limits import no_place
+from server.web.limits import listening, no_ear, no_place, watching
 from server.web.narrow import told_for
+from server.web.readers import of_live, of_person
 from server.web.schema import Past, PastSpan, PastView
 from server.web.streams import send_bytes
 
@@ -45,7 +46,11 @@ async def best_of_the_past(request: web.Request, form: Form) -> web.StreamRespon
 
     if live() is None and kept_from(source, 0) is None:
         return no_object(service, number)
-    return await _stream(request, form, source, f"object {number}", live)
+
+    def named() -> str:
+        return of_person(service.board.resolve(number))
+
+    return await _stream(request, form, source, f"object {number}", live, named)
 
 
 async def camera_of_the_past(request: web.Request, form: Form) -> web.StreamResponse:
@@ -55,8 +60,11 @@ async def camera_of_the_past(request: web.Request, form: Form) -> web.StreamResp
     if camera not in service.shelves:
         return no_camera(service, camera)
     source = CameraPast(service.past, camera)
-    what = f"camera {camera}"
-    return await _stream(request, form, source, what, lambda: service.splicer.cameras.get(camera))
+
+    def live() -> Channel | None:
+        return service.splicer.cameras.get(camera)
+
+    return await _stream(request, form, source, f"camera {camera}", live, lambda: of_live(camera))
 
 
 @routes.get("/api/objects/{object:[0-9]{1,9}}/past")
@@ -91,7 +99,11 @@ async def get_told(request: web.Request) -> web.StreamResponse:
     end = service.past.recent.end if wish.end is None else wish.end
     sees = request.app[ACCESS].grant(request).sees
     lines = told_for(told(service.past, wish.start, end), sees, service.board.resolve)
-    return await send_bytes(request, lines, b"", {"Content-Type": "application/x-ndjson"})
+    full = no_ear(request)
+    if full is not None:
+        return full
+    with listening(request):
+        return await send_bytes(request, lines, b"", {"Content-Type": "application/x-ndjson"})
 
 
 def object_past(service: BestViewService, number: int) -> ObjectPast:
@@ -148,15 +160,18 @@ def new_timeline(service: BestViewService) -> Timeline:
 
 
 async def _stream(
-    request: web.Request, form: Form, source: Source, what: str, live: Callable[[], Channel | None]
+    request: web.Request,
+    form: Form,
+    source: Source,
+    what: str,
+    live: Callable[[], Channel | None],
+    named: Callable[[], str],
 ) -> web.StreamResponse:
+    """Stream from a moment on; ``live`` is what the stream goes on with, by that name then."""
     service, past = request.app[SERVICE], request.app[SERVICE].past
     head, fps = form.head(service), service.config.site.fps
     if head is None:
         return not_now("no camera has delivered a picture yet")
-    full = no_place(request)
-    if full is not None:
-        return full
     if request.query.get("overlay", "0") != "0":
         return problem(400, "overlay: boxes are not burnt into the past; /api/past tells where they are")
     try:
@@ -166,24 +181,29 @@ async def _stream(
     missing = nothing_kept(source, wish, what)
     if missing is not None:
         return missing
+    full = no_place(request)
+    if full is not None:
+        return full
     counted = 1
 
     def joined() -> Channel | None:
         nonlocal counted
         past.viewers -= counted
         counted = 0  # from now on the channel counts
+        place.stream = named()
         return live()
 
     sound = past.sound
     hearing = None if sound is None else Hearing(sound, lambda: sounds(past), lambda: source.end)
     stream = PastStream(source, new_timeline(service), fps, joined, hearing)
-    past.viewers += 1
-    try:
-        async with aclosing(stream.send(wish)) as pieces:
-            data = (form.packed(piece) async for piece in pieces)
-            return await send_bytes(request, data, head, {"Content-Type": form.content_type})
-    finally:
-        past.viewers -= counted
+    with watching(request, "past") as place:
+        past.viewers += 1
+        try:
+            async with aclosing(stream.send(wish)) as pieces:
+                data = (form.packed(piece) async for piece in pieces)
+                return await send_bytes(request, data, head, {"Content-Type": form.content_type})
+        finally:
+            past.viewers -= counted
 
 
 def _past(request: web.Request, source: Source) -> web.Response:

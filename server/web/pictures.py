@@ -20,7 +20,7 @@ from server.view.pictures.multipart import BEGIN, CONTENT_TYPE, PULSE, part
 from server.web.api import no_camera, no_object, not_now, problem
 from server.web.forms import MP4
 from server.web.keys import PICTURES, SERVICE
-from server.web.limits import no_place
+from server.web.limits import no_place, watching
 from server.web.streams import send_stream, send_viewer
 from server.wire.drawing import Still
 
@@ -84,7 +84,7 @@ async def best_with_boxes(request: web.Request) -> web.StreamResponse:
     if request.method == "HEAD":
         return _headers_only(headers)
     _check_place(request, subject)
-    with request.app[PICTURES].using(subject) as source:
+    with watching(request, _named(subject)), request.app[PICTURES].using(subject) as source:
         film = source.film
         film.wanted += 1
         try:
@@ -101,7 +101,7 @@ async def _mjpeg(request: web.Request, subject: Subject) -> web.StreamResponse:
     if request.method == "HEAD":
         return _headers_only(headers)
     _check_place(request, subject)
-    with request.app[PICTURES].using(subject) as source:
+    with watching(request, _named(subject)), request.app[PICTURES].using(subject) as source:
         first = await source.still(_kind(request), pulse)
         viewer = source.series.join(series)
         try:
@@ -173,8 +173,12 @@ def _rate(request: web.Request) -> float:
     return min(rate, most)
 
 
+def _named(subject: Subject) -> str:
+    return f"pictures of {subject}"
+
+
 def _check_place(request: web.Request, subject: Subject) -> None:
     source = request.app[PICTURES].sources.get(subject)
-    full = no_place(request, 0 if source is None else source.viewers)
+    full = no_place(request, 0 if source is None else source.viewers, (_named(subject),))
     if full is not None:
         raise _RefusedError(full)

@@ -9,6 +9,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+from server.web.access.grant import ShareHolder
+from server.web.shares import Place, Shares
+
 _TARGETS = 3
 """Target durations: a player asks once in each; who has not for so many has gone."""
 
@@ -23,10 +26,21 @@ def of_camera(name: str) -> str:
     return f"camera {name}"
 
 
+def of_live(camera: str) -> str:
+    """Name a camera's stream as it is shown at once, over a connection."""
+    return f"live {camera}"
+
+
+def of_decided(camera: str) -> str:
+    """Name the stream of a person that is held to a camera."""
+    return f"decided {camera}"
+
+
 class Reader(NamedTuple):
     """Somebody who fetches a stream."""
 
     stream: str
+    holder: ShareHolder
     address: str
     agent: str
     """What the player calls itself: behind one address there may be several."""
@@ -35,6 +49,9 @@ class Reader(NamedTuple):
 @dataclass(slots=True)
 class _Kept:
     until: float
+    place: Place
+    ended: bool = False
+    """It was taken away from them: they have to ask for a place anew."""
     awaited: Counter[str] = field(default_factory=Counter)
     """Questions that may have to wait and are not answered yet, by kind."""
 
@@ -45,10 +62,10 @@ class _Kept:
 
 
 class Readers:
-    """Counts readers; the clock is in seconds, and never steps."""
+    """Counts readers, who hold places; the clock is in seconds, and never steps."""
 
-    def __init__(self, target_s: float, clock: Callable[[], float] = time.monotonic) -> None:
-        self._kept_s, self._clock = _TARGETS * target_s, clock
+    def __init__(self, target_s: float, shares: Shares, clock: Callable[[], float] = time.monotonic) -> None:
+        self._kept_s, self._shares, self._clock = _TARGETS * target_s, shares, clock
         self._readers: dict[Reader, _Kept] = {}
         """Whoever has asked last is the last."""
         self._of: Counter[str] = Counter()
@@ -73,21 +90,42 @@ class Readers:
     @contextmanager
     def asking(self, reader: Reader, awaits: str | None) -> Iterator[None]:
         """Count somebody while a question is answered, and for a while after."""
-        self._change(reader, awaits, 1)
+        kept = self._change(reader, self._readers.get(reader), awaits, 1)
         try:
             yield
         finally:
-            self._change(reader, awaits, -1)
+            if not kept.ended:
+                self._change(reader, kept, awaits, -1)
 
-    def _change(self, reader: Reader, awaits: str | None, by: int) -> None:
-        known = self._readers.pop(reader, None)
-        before = 0 if known is None else known.weight
-        now = known or _Kept(0.0)
+    def _change(self, reader: Reader, known: _Kept | None, awaits: str | None, by: int) -> _Kept:
+        there = self._readers.pop(reader, None)
+        before = 0 if there is None else there.weight
+        now = there or known or self._new(reader)
         if awaits is not None:
             now.awaited[awaits] += by
         now.until = self._clock() + self._kept_s
+        now.place.weight = now.weight
+        self._shares.take(now.place)
         self._readers[reader] = now
         self._of[reader.stream] += now.weight - before
+        return now
+
+    def _new(self, reader: Reader) -> _Kept:
+        kept = _Kept(0.0, Place(reader.holder, reader.stream, lambda: self._end(reader, kept)))
+        return kept
+
+    def _end(self, reader: Reader, kept: _Kept) -> None:
+        """Count somebody no more, though they may still wait for an answer."""
+        kept.ended = True
+        if self._readers.get(reader) is kept:
+            self._drop(reader)
+
+    def _drop(self, reader: Reader) -> None:
+        kept = self._readers.pop(reader)
+        self._shares.give_up(kept.place)
+        self._of[reader.stream] -= kept.weight
+        if not self._of[reader.stream]:
+            del self._of[reader.stream]
 
     def _forget(self) -> None:
         """Forget who has not asked for long. Whoever waits for an answer is there."""
@@ -96,11 +134,9 @@ class Readers:
             reader, oldest = next(iter(self._readers.items()))
             if oldest.until > now:
                 return
-            del self._readers[reader]
-            if any(oldest.awaited.values()):
-                oldest.until = now + self._kept_s
-                self._readers[reader] = oldest
+            if not any(oldest.awaited.values()):
+                self._drop(reader)
                 continue
-            self._of[reader.stream] -= oldest.weight
-            if not self._of[reader.stream]:
-                del self._of[reader.stream]
+            del self._readers[reader]
+            oldest.until = now + self._kept_s
+            self._readers[reader] = oldest

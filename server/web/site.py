@@ -8,6 +8,7 @@ from server.web.access.access import ACCESS
 from server.web.api import answer
 from server.web.events import Events
 from server.web.keys import EVENTS, SERVICE
+from server.web.limits import listening, no_ear
 from server.web.narrow import cameras_for, flag_for, objects_for, site_for
 from server.web.schema import FlagList
 from server.web.streams import send_viewer
@@ -49,8 +50,12 @@ async def get_events(request: web.Request) -> web.StreamResponse:
     """Tell what happens as it happens: server-sent events."""
     events: Events = request.app[EVENTS]
     sees = request.app[ACCESS].grant(request).sees
-    viewer = events.join(sees)
-    try:
-        return await send_viewer(request, viewer, b"", {"Content-Type": "text/event-stream"})
-    finally:
-        events.leave(sees, viewer)
+    full = no_ear(request)
+    if full is not None:
+        return full
+    with listening(request):
+        viewer = events.join(sees)
+        try:
+            return await send_viewer(request, viewer, b"", {"Content-Type": "text/event-stream"})
+        finally:
+            events.leave(sees, viewer)

@@ -8,10 +8,10 @@ from server.view.streams.channel import Channel
 from server.web.api import no_camera, no_object, not_now
 from server.web.forms import MP4, TS, WEBM, Form
 from server.web.keys import READERS, SERVICE
-from server.web.limits import no_place
+from server.web.limits import no_place, watching
 from server.web.past import asks_for_the_past, best_of_the_past, camera_of_the_past
 from server.web.pictures import best_with_boxes, wants_boxes
-from server.web.readers import of_camera, of_person
+from server.web.readers import of_camera, of_decided, of_live, of_person
 from server.web.streams import send_stream
 
 routes = web.RouteTableDef()
@@ -68,14 +68,15 @@ async def _best(request: web.Request, form: Form) -> web.StreamResponse:
     for camera in (held, preferred):
         if camera is not None and camera not in service.shelves:
             return no_camera(service, camera)
-    watching = channel.viewers + request.app[READERS].of(of_person(person))
+    by_channel = of_person(person)
+    fetched: str | None = by_channel
     if held is not None:
         channel = service.splicer.decided[held]
-        watching = channel.viewers + request.app[READERS].of(of_camera(held))
+        by_channel, fetched = of_decided(held), of_camera(held)
     elif preferred is not None:
         channel = service.splicer.preferring.channel(person, preferred)
-        watching = channel.viewers
-    return await _send(request, channel, watching, form)
+        by_channel, fetched = f"object {person} preferring {preferred}", None
+    return await _send(request, channel, by_channel, fetched, form)
 
 
 async def _live(request: web.Request, form: Form) -> web.StreamResponse:
@@ -86,15 +87,19 @@ async def _live(request: web.Request, form: Form) -> web.StreamResponse:
     channel = service.splicer.cameras.get(camera)
     if channel is None:
         return no_camera(service, camera)
-    watching = channel.viewers + request.app[READERS].of(of_camera(camera))
-    return await _send(request, channel, watching, form)
+    return await _send(request, channel, of_live(camera), of_camera(camera), form)
 
 
-async def _send(request: web.Request, channel: Channel, watching: int, form: Form) -> web.StreamResponse:
+async def _send(
+    request: web.Request, channel: Channel, stream: str, fetched: str | None, form: Form
+) -> web.StreamResponse:
+    """Send a channel, whose viewers hold places by one name, and who fetches the same (HLS) by another."""
     head = form.head(request.app[SERVICE])
     if head is None:
         return not_now("no camera has delivered a picture yet")
-    full = no_place(request, watching)
+    readers = 0 if fetched is None else request.app[READERS].of(fetched)
+    full = no_place(request, channel.viewers + readers, (stream, fetched or stream))
     if full is not None:
         return full
-    return await send_stream(request, channel, head, {"Content-Type": form.content_type}, form.packed)
+    with watching(request, stream):
+        return await send_stream(request, channel, head, {"Content-Type": form.content_type}, form.packed)

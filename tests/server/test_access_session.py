@@ -25,6 +25,21 @@ from server.wire.tokens import digest_of
 SESSION = "/api/session"
 CAMERAS = "/api/operator/cameras"
 MINE = {CHANGES: "1"}
+HEADS_OF_PROXIES = (
+    *("X-Forwarded-Proto", "x-forwarded-proto", "X-Forwarded-Host", "X-Forwarded-Port", "X-Forwarded-Server"),
+    *("X-Forwarded-Prefix", "X-Forwarded-Ssl", "X-Forwarded-Scheme", "X-Forwarded", "Forwarded-For"),
+    *("X-Original-Forwarded-For", "X-Original-Host", "X-Client-IP", "Client-IP", "True-Client-IP"),
+    *(
+        "CF-Connecting-IP",
+        "CF-Ray",
+        "Fastly-Client-IP",
+        "X-Cluster-Client-IP",
+        "X-Azure-ClientIP",
+        "CDN-Loop",
+    ),
+    *("X-Envoy-External-Address", "Front-End-Https", "X-Amzn-Trace-Id", "X-Scheme", "WL-Proxy-Client-IP"),
+)
+"""What one proxy or another sends as the only sign of itself; the first is what docs/security.md asks for."""
 
 
 @pytest.fixture
@@ -59,6 +74,7 @@ async def test_without_tokens_anybody_may_watch_and_this_machine_may_operate(hal
         ("X-Real-IP", "127.0.0.1"),
         ("Forwarded", "for=127.0.0.1"),
         ("Via", "1.1 proxy"),
+        *((head, "https") for head in HEADS_OF_PROXIES),
         ("Host", "cameras.example"),  # a name that somebody made lead to this machine
         ("Origin", "https://cameras.example"),
         ("Referer", "https://cameras.example/operator"),
@@ -71,6 +87,32 @@ async def test_without_tokens_nobody_else_may_operate_and_one_line_says_what_to_
     assert status == 403
     assert "access.tokens" in error
     assert "\n" not in error
+
+
+def test_what_browsers_and_programs_send_by_themselves_is_no_proxy() -> None:
+    heads = {
+        "Host": "localhost",
+        "User-Agent": "Mozilla/5.0",
+        "Accept": "*/*",
+        "Accept-Language": "en",
+        "Accept-Encoding": "gzip",
+        "Connection": "keep-alive",
+        "Cookie": "myview=1",
+        "Cache-Control": "no-cache",
+        "Sec-Fetch-Site": "same-origin",
+        "Sec-CH-UA": '"x"',
+        "Priority": "u=1",
+        "DNT": "1",
+        "Range": "bytes=0-",
+        "Upgrade-Insecure-Requests": "1",
+        "Origin": "http://localhost",
+        "Referer": "http://localhost/",
+        "Last-Event-ID": "4",
+        "Icy-MetaData": "1",
+        "Content-Type": "application/json",
+        CHANGES: "1",
+    }
+    assert is_from_here(make_mocked_request("GET", CAMERAS, headers=heads).clone(remote="127.0.0.1"))
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,9 @@ from halls import A, B, Hall, opened
 from hypothesis import given
 from hypothesis import strategies as st
 
+from server.web.access.grant import ShareHolder
 from server.web.readers import Reader, Readers
+from server.web.shares import Shares
 
 KEPT_S = 6.0
 PATHS = ["init.mp4", "index.m3u8", "0.m4s", "0.0.m4s"]
@@ -28,7 +30,7 @@ class Clock:
 
 
 def reader(stream: int, player: int = 0) -> Reader:
-    return Reader(f"object {stream}", "10.0.0.1", f"player {player}")
+    return Reader(f"object {stream}", ShareHolder("10.0.0.1"), "10.0.0.1", f"player {player}")
 
 
 ACTS = st.lists(
@@ -47,7 +49,8 @@ ACTS = st.lists(
 def test_who_has_asked_lately_or_waits_is_counted(acts: list[tuple[str, int, int, str | None, int]]) -> None:
     """Against a count from the beginning, over all that anybody has asked."""
     clock = Clock()
-    readers = Readers(KEPT_S / 3, clock)
+    shares = Shares()
+    readers = Readers(KEPT_S / 3, shares, clock)
     asked: dict[Reader, float] = {}
     open_ones: list[tuple[Reader, str | None, ExitStack]] = []
 
@@ -77,13 +80,14 @@ def test_who_has_asked_lately_or_waits_is_counted(acts: list[tuple[str, int, int
         assert [readers.of(f"object {it}") for it in (0, 1)] == [
             sum(least(who) for who in everybody if who.stream == f"object {it}") for it in (0, 1)
         ]
-        assert readers.all == sum(map(least, everybody))
+        assert readers.all == shares.all == sum(map(least, everybody))
     for _, _, stack in open_ones:
         stack.close()
     clock.now += KEPT_S
     assert readers.all == 0
     assert not readers._readers
     assert not readers._of
+    assert not shares._held
 
 
 @pytest.fixture

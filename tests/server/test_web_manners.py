@@ -18,6 +18,8 @@ STREAMS = {
     "/objects/1/best.ts": "video/mp2t",
     "/cameras/c0/live.ts": "video/mp2t",
 }
+NOT_HERE = {"Host": "hall"}
+"""Of somebody who is no operator: it is no name of this machine."""
 GET = "GET {} HTTP/1.1\r\nHost: hall\r\n\r\n"
 
 
@@ -101,11 +103,11 @@ async def test_beyond_the_limit_a_viewer_is_told_when_to_come_again(limit: str) 
             hall.service.feed(epoch, {A: {1: SMALL, 2: SMALL}, B: {}})
         _, first, _ = await asked(hall, GET.format("/objects/1/best.mp4"))
         _, second, _ = await asked(hall, GET.format("/objects/1/best.ts"))
-        async with hall.session.get("/objects/1/best.mp4") as answer:
+        async with hall.session.get("/objects/1/best.mp4", headers=NOT_HERE) as answer:
             assert answer.status == 503
             assert int(answer.headers["Retry-After"]) > 0
             assert limit in (await answer.json())["error"]
-        async with hall.session.get("/objects/2/best.mp4") as answer:
+        async with hall.session.get("/objects/2/best.mp4", headers=NOT_HERE) as answer:
             assert answer.status == (503 if limit == "viewers_max" else 200)
         for writer in (first, second):
             writer.close()

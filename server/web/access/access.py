@@ -20,8 +20,9 @@ from aiohttp import web
 
 from server.web.access.failures import Failures
 from server.web.access.file import TokenFile
-from server.web.access.grant import Grant, Need, need_of
+from server.web.access.grant import Grant, Need, ShareHolder, need_of
 from server.web.access.here import is_from_here
+from server.web.access.networks import network_of
 from server.web.access.other_sites import path_of, refused_to_other_sites
 from server.web.access.sessions import Sessions
 from server.web.api import problem
@@ -101,6 +102,23 @@ class Access:
         """Give what whoever asks may, while the request is being answered."""
         asking = self._asking.get(id(request))
         return Grant(operates=is_from_here(request)) if asking is None else asking.grant
+
+    def share_holder(self, request: web.Request) -> ShareHolder:
+        """Return in whose name somebody comes, while the request is being answered."""
+        asking = self._asking.get(id(request))
+        if asking is not None:
+            return ShareHolder(f"token {asking.holder.token}", asking.grant.operates)
+        if is_from_here(request):
+            return ShareHolder("this machine", operates=True)
+        return ShareHolder(network_of(request.remote or ""))
+
+    def operates(self, request: web.Request) -> bool:
+        """Tell whether whoever asks may operate, before anything is answered."""
+        if self._file is None:
+            return is_from_here(request)
+        holder = self._holder(request)
+        held = self.held(holder) if isinstance(holder, Holder) else None
+        return isinstance(held, Grant) and held.operates
 
     async def answer(self, request: web.Request, need: Need, handler: Handler) -> web.StreamResponse:
         """Answer a request, if whoever asks may have the answer."""

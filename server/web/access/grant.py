@@ -83,6 +83,15 @@ ALL = Scope()
 
 
 @dataclass(frozen=True, slots=True)
+class ShareHolder:
+    """In whose name somebody comes: what there is of places is shared out among those."""
+
+    key: str
+    """By it they are told apart: a token, or an address."""
+    operates: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class Grant:
     """What somebody may."""
 

@@ -8,6 +8,7 @@ from functools import wraps
 from aiohttp import web
 
 from server.view.past.play import CameraPast
+from server.web.access.access import ACCESS
 from server.web.api import no_camera, no_object, not_now, problem
 from server.web.forms import mp4_head
 from server.web.hls.live import coming_part, newest
@@ -16,7 +17,7 @@ from server.web.hls.token import with_token
 from server.web.keys import READERS, SERVICE
 from server.web.limits import no_place
 from server.web.past import asks_for_the_past, object_past
-from server.web.readers import Reader, of_camera, of_person
+from server.web.readers import Reader, of_camera, of_live, of_person
 
 routes = web.RouteTableDef()
 
@@ -45,7 +46,9 @@ def _counted(awaits: str | None = None) -> Callable[[_OfStream], _Handler]:
                 return await handler(request, stream)
             readers, reader = request.app[READERS], _reader(request)
             if readers.is_one_more(reader, awaits):
-                full = no_place(request, _connected(request) + readers.of(reader.stream))
+                by_channel, connected = _connected(request)
+                counted = connected + readers.of(reader.stream)
+                full = no_place(request, counted, (reader.stream, by_channel))
                 if full is not None:
                     return full
             with readers.asking(reader, awaits):
@@ -133,16 +136,18 @@ def _reader(request: web.Request) -> Reader:
         stream = of_camera(names["camera"])
     else:
         stream = of_person(service.board.resolve(int(names["object"])))
-    return Reader(stream, request.remote or "", request.headers.get("User-Agent", "")[:_AGENT])
+    holder = request.app[ACCESS].share_holder(request)
+    return Reader(stream, holder, request.remote or "", request.headers.get("User-Agent", "")[:_AGENT])
 
 
-def _connected(request: web.Request) -> int:
-    """Give how many are sent the same stream over a connection of their own."""
+def _connected(request: web.Request) -> tuple[str, int]:
+    """Give the same stream's name over connections of their own, and how many are sent it so."""
     service, names = request.app[SERVICE], request.match_info
     if "camera" in names:
-        return service.splicer.cameras[names["camera"]].viewers
-    channel = service.splicer.objects.get(service.board.resolve(int(names["object"])))
-    return 0 if channel is None else channel.viewers
+        return of_live(names["camera"]), service.splicer.cameras[names["camera"]].viewers
+    number = service.board.resolve(int(names["object"]))
+    channel = service.splicer.objects.get(number)
+    return of_person(number), 0 if channel is None else channel.viewers
 
 
 def _nobody(request: web.Request) -> web.Response:

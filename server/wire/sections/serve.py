@@ -25,15 +25,28 @@ class Tls(Section):
         return self
 
 
+_CONNECTIONS_PER_VIEWER = 4
+"""A stream, events, and what a browser fetches besides."""
+_CONNECTIONS_LEAST = 1000
+
+
 class Http(Section):
     """The page, the streams and the API."""
 
     host: str = "127.0.0.1"
     port: Annotated[int, Field(ge=0, le=65535)] = 8080
     viewers_max: PositiveInt = 1000
-    """Streams served at once; one more gets 503."""
+    """Streams served at once, and as many readers of events; one more gets 503, or another's place."""
     viewers_per_object: PositiveInt = 1000
     """The same of one object, or of one camera."""
+    connections_max: PositiveInt | None = None
+    """Connections at once; none: four for each of `viewers_max`, and 1000 at least."""
+    connections_per_address: PositiveInt | None = None
+    """The same of one address, this machine's own excepted; none: half of them."""
+    request_timeout_s: PositiveFloat = 10.0
+    """Seconds in which what a connection asks for must have come."""
+    keepalive_timeout_s: PositiveFloat = 150.0
+    """Seconds after which a connection is closed that has nothing more to ask for."""
     viewer_queue_gops: PositiveInt = 8
     """A viewer that falls behind by more loses whole GOPs."""
     hls_segment_s: PositiveFloat = 1.0
@@ -44,6 +57,11 @@ class Http(Section):
     """People and cameras whose pictures are decoded at once: JPEG, and boxes burnt in. One more gets 503."""
     jpeg_quality: Annotated[int, Field(ge=1, le=100)] = 80
     tls: Tls = Tls()
+
+    @property
+    def connections(self) -> int:
+        """How many connections are taken at once, where the system lets that many be open."""
+        return self.connections_max or max(_CONNECTIONS_LEAST, _CONNECTIONS_PER_VIEWER * self.viewers_max)
 
 
 class Record(Section):

@@ -1,0 +1,1 @@
+"""The connections that are taken: how many, of whom, and for how long they may ask for nothing."""
