@@ -54,9 +54,11 @@ def camera(
 ) -> None:
     """Run one camera: take, encode, track, publish: one process of a site."""
     from server.run.camera import camera_process
+    from server.wire.niceness import be_nicer
 
     log_to_stderr(camera_id)
     running = _read(config)
+    be_nicer(running.now.site.niceness)  # a supervisor has seen to that while it loaded
     if camera_id not in running.now.camera_ids:
         raise UserError(
             f"{config}: there is no camera {camera_id!r}; there are {', '.join(running.now.camera_ids)}"
