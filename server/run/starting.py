@@ -1,7 +1,7 @@
 """How a process that has been started says that it has loaded, so that the next one may be.
 
-A process loads for a second of a processor's time or two. Forty that do so together keep each other, and whoever
-is to answer meanwhile, from getting anywhere.
+A process loads for a second of a processor's time or two. Forty that do so together keep each other, and
+whoever is to answer meanwhile, from getting anywhere.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 STARTED = "MYVIEW_STARTED_FD"
-"""In the environment of a process that a supervisor starts: the descriptor that it closes once it has started."""
+"""In the environment of a process that a supervisor starts: the descriptor that it closes when it has loaded."""
 
 
 def say_started() -> None:
@@ -41,7 +41,7 @@ class Pipe:
         loop = asyncio.get_running_loop()
         loop.add_reader(self.own, ended.set)
         try:
-            # Not wait_for: up to Python 3.11 it passes over being cancelled in the moment in which it is over.
+            # Not wait_for: up to Python 3.11 who is cancelled just when it is over is not cancelled by it.
             with contextlib.suppress(TimeoutError):
                 async with asyncio.timeout(within_s):
                     await ended.wait()

@@ -56,8 +56,8 @@ class Supervisor:
     A camera whose recording is over says so (`OVER`) and stays so; when the best-view service does,
     everything is over. ``before_start`` is called whenever a process is about to be started.
 
-    The best view and the pulses come first and never wait. Then the cameras, no more of which load at a time than
-    there are processors: a site answers while they come.
+    The best view and the pulses come first and never wait. Then the cameras, no more of which load at a time
+    than there are processors: a site answers while they come.
     """
 
     def __init__(

@@ -8,7 +8,6 @@ import sys
 
 from server.wire.niceness import make_nicer
 
-
 _NICER = 5
 """Somebody waits for what it does, but everybody for the service; cameras yield to both (`site.niceness`)."""
 

@@ -29,7 +29,7 @@ def configuration(folder: Path, recording: Path, **sections: Any) -> Path:
     """Write the configuration of a site of three recorded views; ``sections`` are merged into it."""
     bus = f"tcp/127.0.0.1:{free_port()}"
     content: dict[str, Any] = {
-        # Cameras are hardly nicer than what else runs here: where there is much of it, they would wait for that.
+        # Cameras are hardly nicer than what else runs here: where that is much, they would wait for it.
         "site": {"name": "e2e", "fps": 25, "width": 320, "height": 180, "niceness": 1},
         "sync": {"port": free_port(), "start_timeout_s": 60},
         "zenoh": {"connect": bus, "listen": bus},
