@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 STARTED = "MYVIEW_STARTED_FD"
-"""In the environment of a process that a supervisor starts: the descriptor that it closes when it has loaded."""
+"""In the environment of a process that a supervisor starts: the descriptor that it closes once loaded."""
 
 
 def say_started() -> None:
