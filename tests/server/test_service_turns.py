@@ -86,10 +86,11 @@ async def test_what_has_come_is_taken_in_before_the_next_epoch_is_decided() -> N
 
 async def test_a_flood_does_not_keep_the_service_from_deciding() -> None:
     service = behind()
-    inbox: Inbox[int] = Inbox(lambda _: inbox.put(1), turn_s=0.0)
+    inbox: Inbox[int] = Inbox(lambda left: inbox.put(left - 1) if left else None, turn_s=0.0)
     service.inboxes.append(inbox)
-    inbox.put(0)
+    inbox.put(100_000)
     await service.decide_by_turns()
+    assert inbox.waiting
     assert service.aligner._next == EPOCHS
     service.close()
 

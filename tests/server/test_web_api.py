@@ -40,9 +40,9 @@ async def test_before_the_first_picture_there_is_no_codec_and_no_stream_yet(hall
 
 
 async def test_health_is_answered_however_much_comes_from_the_cameras(hall: Hall) -> None:
-    """There is always one more message, as when more come than can be handled."""
-    flood: Inbox[int] = Inbox(lambda _: flood.put(1))
-    flood.put(1)
+    """There is one more message for so long that nobody would wait for the last one."""
+    flood: Inbox[int] = Inbox(lambda left: flood.put(left - 1) if left else None, turn_s=0.0)
+    flood.put(100_000)
     for _ in range(3):
         async with hall.session.get("/healthz") as answer:
             assert answer.status == 200
