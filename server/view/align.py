@@ -104,9 +104,13 @@ class Aligner:
         first = min(self._words(), default=None)
         return 0 if first is None else max(0, now - end_of_epoch(first, self.stride))
 
-    def leave_out(self) -> int:
-        """Go on with the newest epoch that anybody has spoken of; give how many are left out for that."""
-        to = max(self._words(), default=0)
+    def leave_out(self, now: int) -> int:
+        """Go on with the newest epoch up to pulse ``now`` that anybody has spoken of.
+
+        Returns:
+            How many are left out for that.
+        """
+        to = max((it for it in self._words() if end_of_epoch(it, self.stride) <= now), default=0)
         if self._next is None or to <= self._next:
             return 0
         return self._leap(self._next, to)

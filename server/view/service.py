@@ -199,7 +199,7 @@ class BestViewService:
         behind = self.aligner.behind(self.pulse)
         if not self._keeping_up.is_lost(behind):
             return
-        self.left_out += self.aligner.leave_out()
+        self.left_out += self.aligner.leave_out(self.pulse)
         if (more := self._leaving_out.happened()) is not None:
             told = "decisions are %.1f s behind, and do not catch up%s: they go on with now"
             log.warning(told, behind / self.config.site.fps, more)
