@@ -62,6 +62,7 @@ BENCHMARKS = (
     Benchmark("endurance", "memory and time over 50 000 frames; 10 minutes"),
     Benchmark("soak", "an hour of a whole site, 22 times as fast; 4 minutes (--hours 24)", ("--hours", "1")),
     Benchmark("load", "ever more cameras than the machine carries, and the way back; up to 15 minutes"),
+    Benchmark("load.health", "far too many cameras: whether the site still answers; 7 minutes"),
     Benchmark("calibration", "cameras placed from nothing but people who walk; 5 minutes"),
     Benchmark("scaling", "many simulated cameras: what one best-view process carries; 4 minutes"),
     Benchmark("stream", "splices, viewers and their delay beside ffmpeg and nginx; 6 minutes"),

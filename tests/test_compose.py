@@ -86,6 +86,14 @@ def test_no_service_can_take_the_whole_host(limit: str) -> None:
         assert service.get(limit), name
 
 
+def test_cameras_yield_to_the_best_view_and_the_pulses() -> None:
+    """In containers niceness orders only what is in the same one."""
+    cameras = load_config(ROOT / "configs" / "demo.yaml").camera_ids
+    default = 1024  # docker run --cpu-shares
+    shares = {name: it.get("cpu_shares", default) for name, it in content(PLAIN)["services"].items()}
+    assert all(shares[name] < min(shares["bestview"], shares["sync"]) for name in cameras)
+
+
 def test_every_service_is_closed_watched_and_keeps_little_log() -> None:
     for name, service in content(PLAIN)["services"].items():
         assert service["read_only"] is True, name

@@ -11,6 +11,7 @@ import pytest
 
 from benchmarks.load.__main__ import load, step_of
 from benchmarks.load.found import Loaded, Sample, Step
+from benchmarks.load.health import Asked, lag_below, row
 from benchmarks.load.report import plot
 from benchmarks.load.site import running
 
@@ -49,6 +50,28 @@ def test_what_was_found_is_drawn(tmp_path: Path) -> None:
     samples = [replace(CALM, at=float(it), delays=(400.0,)) for it in range(5)]
     plot(Loaded(samples=samples, started=[(0.0, 1), (3.0, 2)]), tmp_path / "load.png")
     assert (tmp_path / "load.png").stat().st_size > 1000
+
+
+def test_who_was_not_answered_counts_with_the_time_that_they_waited() -> None:
+    asked = Asked(60.0, waits=[(0.0, None), (1.0, 2.0), (10.0, 0.5), (20.0, None), (5.0, 1.5), (2.0, 9.0)])
+    assert asked.first == 3.0
+    assert [asked.wait(it) for it in (0, 50, 100)] == [0.5, 1.5, 40.0], (
+        "those that came before are not counted"
+    )
+    assert Asked(60.0, waits=[(0.0, None)]).first == np.inf
+
+
+def test_a_lag_is_told_by_the_bound_that_it_does_not_pass() -> None:
+    lags = [(0.1, 90.0), (0.5, 95.0), (1.0, 95.0), (np.inf, 100.0)]
+    assert [lag_below(it, lags) for it in (0.5, 0.95, 1.0)] == [0.1, 0.5, np.inf]
+
+
+def test_frames_are_counted_at_the_end_and_what_is_not_known_is_told_so() -> None:
+    frames = [(1.0, 0.0), (40.0, 100.0), (50.0, 600.0), (60.0, 1100.0)]
+    asked = Asked(60.0, frames=frames, lags=[(0.1, 1.0)])
+    assert asked.rate == 50.0
+    assert row(40, 10, asked)[:3] == ["40", "10", "inf"]
+    assert np.isnan(Asked(60.0, frames=frames[:1]).rate)
 
 
 @pytest.mark.slow

@@ -10,6 +10,7 @@ from camsync import SyncError
 from server.run.exposed import check_bus, check_viewers
 from server.run.hang_up import reloads
 from server.run.scene_ground import with_scene_ground
+from server.run.starting import say_started
 from server.view.service import BestViewService
 from server.web.app import make_app, serving
 from server.wire.errors import AwayError, UserError
@@ -36,6 +37,7 @@ async def bestview_process(running: Running, out: Path | None = None) -> None:
         async with serving(make_app(service, running.on_disk), config.http) as port:
             scheme = "http" if config.http.tls.key is None else "https"
             log.info("page, streams and API on %s://%s:%d/", scheme, config.http.host, port)
+            say_started()
             await service.run()
     except SyncError as error:
         raise AwayError(f"bestview: {error}") from error

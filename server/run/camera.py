@@ -11,10 +11,12 @@ from server.camera.process import CameraProcess
 from server.run.checks import check_recording
 from server.run.hang_up import reloads
 from server.run.reload import Reload
+from server.run.starting import say_started
 from server.wire.camera_password import with_password
 from server.wire.config import Config
 from server.wire.errors import AwayError, UserError
 from server.wire.running import Running
+from server.wire.sources import SourceKind, kind_of
 
 log = logging.getLogger(__name__)
 
@@ -30,10 +32,13 @@ async def camera_process(running: Running, camera_id: str) -> None:
         UserError: its source cannot be opened.
         AwayError: it lost the pulses for good, or cannot begin anew.
     """
+    if kind_of(running.now.camera(camera_id).source) is SourceKind.STREAM:
+        say_started()  # opening it is mostly waiting for a network or a device, which keeps no processor
     anew = asyncio.Event()
     following = asyncio.create_task(_follow(running, camera_id, anew), name="reload")
     try:
         camera = await _made(running, camera_id, anew, begun=False)
+        say_started()
         while not await _run(camera, anew):
             camera = await _made(running, camera_id, anew, begun=True)
     except SyncError as error:

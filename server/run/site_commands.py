@@ -6,8 +6,9 @@ Each imports what it runs only when it runs, so that a process loads no more tha
 from __future__ import annotations
 
 import os
+from collections.abc import Coroutine
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -54,6 +55,7 @@ def camera(
 ) -> None:
     """Run one camera: take, encode, track, publish: one process of a site."""
     from server.run.camera import camera_process
+    from server.wire.niceness import be_nicer
 
     log_to_stderr(camera_id)
     running = _read(config)
@@ -61,7 +63,12 @@ def camera(
         raise UserError(
             f"{config}: there is no camera {camera_id!r}; there are {', '.join(running.now.camera_ids)}"
         )
-    run_process(lambda: camera_process(running, camera_id))
+
+    def run() -> Coroutine[Any, Any, None]:
+        be_nicer(running.now.site.niceness)  # a supervisor has seen to that before
+        return camera_process(running, camera_id)
+
+    run_process(run)
 
 
 def bestview(config: ConfigPath, out: LogFolder = None) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
 import os
 import signal
@@ -13,14 +14,19 @@ from pathlib import Path
 
 from camsync import Spell
 from server.run.ending import OVER, SUPERVISED
+from server.run.processors import processors
+from server.run.starting import STARTED, started_pipe
 from server.wire.config import Config
 from server.wire.errors import UserError
+from server.wire.niceness import make_nicer
 
 log = logging.getLogger(__name__)
 
 _RETRY_FIRST_S, _RETRY_MAX_S = 0.2, 10.0
 _SETTLED_S = 10.0
 """A process that ran this long has started well: its next restart is quick again."""
+_STARTS_WITHIN_S = 10.0
+"""How long a process that loads keeps others from being started: it may hang, and never say that it has."""
 _END_S = 1.6
 """How long processes have to end before they are killed; they end by themselves a little sooner."""
 
@@ -31,9 +37,15 @@ class Child:
 
     name: str
     arguments: Sequence[str]
+    awaits: Sequence[Child] = ()
+    """Those that must have started before it is."""
+    nicer: int = 0
+    """By how much it yields to the supervisor, and to those that are started as the supervisor is."""
     process: asyncio.subprocess.Process | None = None
     restarts: int = 0
     dies: Spell = field(default_factory=Spell)
+    started: asyncio.Event = field(default_factory=asyncio.Event)
+    """It has loaded once, or had the time to."""
     done: asyncio.Event = field(default_factory=asyncio.Event)
     """It has ended by itself with nothing left to do."""
 
@@ -43,6 +55,9 @@ class Supervisor:
 
     A camera whose recording is over says so (`OVER`) and stays so; when the best-view service does,
     everything is over. ``before_start`` is called whenever a process is about to be started.
+
+    The best view and the pulses come first and never wait. Then the cameras, no more of which load at a time
+    than there are processors: a site answers while they come.
     """
 
     def __init__(
@@ -57,11 +72,11 @@ class Supervisor:
         self._environment = {**os.environ, **environment, SUPERVISED: "1"}
         path = str(config_path)
         self._out = out
-        self.children = [
-            Child("bestview", ["bestview", path]),
-            Child("sync", ["sync", path]),
-            *(Child(camera, ["camera", path, camera]) for camera in config.camera_ids),
-        ]
+        self._places = asyncio.Semaphore(max(1, int(processors())))
+        """For cameras that load."""
+        first = [Child("bestview", ["bestview", path]), Child("sync", ["sync", path])]
+        cameras = [Child(it, ["camera", path, it], first, config.site.niceness) for it in config.camera_ids]
+        self.children = [*first, *cameras]
 
     async def run(self) -> None:
         """Run everything until the best-view service has nothing left to do, or this task is cancelled.
@@ -90,18 +105,13 @@ class Supervisor:
     async def _watch(self, child: Child) -> None:
         pause = _RETRY_FIRST_S
         loop = asyncio.get_running_loop()
+        for other in child.awaits:
+            await other.started.wait()
         while True:
-            self._before_start()
-            started = loop.time()
-            child.process = await asyncio.create_subprocess_exec(
-                sys.executable,
-                "-m",
-                "server.run.cli",
-                *self._arguments(child),
-                env=self._environment,
-                process_group=0,  # Ctrl-C in a terminal is for the supervisor alone
-            )
-            code = await child.process.wait()
+            async with self._places if child.awaits else contextlib.nullcontext():
+                started = loop.time()
+                process = await self._start(child)
+            code = await process.wait()
             if code == OVER:
                 log.info("%s has ended", child.name)
                 child.done.set()
@@ -116,6 +126,27 @@ class Supervisor:
             await asyncio.sleep(pause)
             pause = min(2 * pause, _RETRY_MAX_S)
             child.restarts += 1
+
+    async def _start(self, child: Child) -> asyncio.subprocess.Process:
+        """Start a process, and give it once it has loaded, has died, or takes too long for others to wait."""
+        with started_pipe() as pipe:
+            try:
+                self._before_start()
+                process = child.process = await asyncio.create_subprocess_exec(
+                    sys.executable,
+                    "-m",
+                    "server.run.cli",
+                    *self._arguments(child),
+                    env={**self._environment, STARTED: str(pipe.given)},
+                    pass_fds=(pipe.given,),
+                    process_group=0,  # Ctrl-C in a terminal is for the supervisor alone
+                )
+            finally:
+                os.close(pipe.given)
+            make_nicer(process.pid, child.nicer)
+            await pipe.ended(_STARTS_WITHIN_S)
+        child.started.set()
+        return process
 
     def _arguments(self, child: Child) -> Sequence[str]:
         """Give a process's arguments; what a restarted best view decides is in files of its own."""

@@ -8,6 +8,7 @@ import logging
 from camsync import PulseServer
 from server.run.exposed import check_pulses
 from server.run.hang_up import reloads
+from server.run.starting import say_started
 from server.wire.errors import UserError
 from server.wire.pulse_users import pulse_clients, pulse_users
 from server.wire.running import Running
@@ -41,6 +42,7 @@ async def sync_process(running: Running) -> None:
         reason = "the port is in use" if taken else (error.strerror or error)
         raise UserError(f"sync.port: cannot listen on {sync.bind}:{sync.port}: {reason}") from error
     log.info("pulses at %g a second on %s:%d", config.site.fps, sync.bind, server.port)
+    say_started()
     try:
         async for reload in reloads(running):
             log.info("%s", reload.line)

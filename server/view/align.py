@@ -99,6 +99,22 @@ class Aligner:
         place.waiting[message.epoch] = message
         place.trusted = True
 
+    def behind(self, now: int) -> int:
+        """Give the pulses between the end of the next epoch that somebody has spoken of and pulse ``now``."""
+        first = min(self._words(), default=None)
+        return 0 if first is None else max(0, now - end_of_epoch(first, self.stride))
+
+    def leave_out(self, now: int) -> int:
+        """Go on with the newest epoch up to pulse ``now`` that anybody has spoken of.
+
+        Returns:
+            How many are left out for that.
+        """
+        to = max((it for it in self._words() if end_of_epoch(it, self.stride) <= now), default=0)
+        if self._next is None or to <= self._next:
+            return 0
+        return self._leap(self._next, to)
+
     @property
     def waiting(self) -> int:
         """How many windows wait for others of their epoch."""
@@ -156,9 +172,13 @@ class Aligner:
         if end_of_epoch(number, self.stride) > now or self._is_near(number, now) or number in self._words():
             return number
         to = min((it for it in self._words() if self._is_near(it, now)), default=now // self.stride)
-        self._drop(lambda epoch: epoch < to)
-        self._left_out, self._heard = self._left_out + to - number, None
+        self._leap(number, to)
         return to
+
+    def _leap(self, number: int, to: int) -> int:
+        self._drop(lambda epoch: epoch < to)
+        self._left_out, self._heard, self._next = self._left_out + to - number, None, to
+        return to - number
 
     def _words(self) -> list[int]:
         """List the epochs of all words that wait."""

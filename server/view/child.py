@@ -6,6 +6,11 @@ import asyncio
 import os
 import sys
 
+from server.wire.niceness import make_nicer
+
+_NICER = 5
+"""Somebody waits for what it does, but everybody for the service; cameras yield to both (`site.niceness`)."""
+
 
 async def start_child(module: str) -> asyncio.subprocess.Process:
     """Start a module as a process of its own; it is asked by its input, and answers by its output.
@@ -13,7 +18,7 @@ async def start_child(module: str) -> asyncio.subprocess.Process:
     Raises:
         OSError: the system does not let it start.
     """
-    return await asyncio.create_subprocess_exec(
+    process = await asyncio.create_subprocess_exec(
         sys.executable,
         "-m",
         module,
@@ -22,3 +27,5 @@ async def start_child(module: str) -> asyncio.subprocess.Process:
         env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
         process_group=0,  # Ctrl-C in a terminal is for the service alone
     )
+    make_nicer(process.pid, _NICER)
+    return process

@@ -34,6 +34,7 @@ class Lacking:
         """Windows that were decided without a camera that was there."""
         self.lost_pictures = dict.fromkeys(shelves, 0)
         """By camera: pictures of decided GOPs that did not come though it was delivering."""
+        self._holes = Spell(clock)
         self._until: int | None = None
         """The first pulse of which nothing is decided yet."""
 
@@ -69,7 +70,9 @@ class Lacking:
                 self.recorder.late(camera, lost, "no picture")
 
     def _hole(self, pulses: range) -> None:
-        """Note frames that nobody spoke of until they were long past: in one line, there may be millions."""
-        log.warning("pulses %d to %d are not decided: they were long past", pulses.start, pulses.stop - 1)
+        """Note frames that are past and left out: in one line, there may be millions."""
+        if (more := self._holes.happened()) is not None:
+            told = "pulses %d to %d are not decided: they were long past%s"
+            log.warning(told, pulses.start, pulses.stop - 1, more)
         if self.recorder is not None:
             self.recorder.late("", [pulses.start], f"not decided up to {pulses.stop}")

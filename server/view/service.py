@@ -12,13 +12,14 @@ from pathlib import Path
 
 import msgspec
 
-from camsync import Login, PulseClient
+from camsync import Login, PulseClient, Spell
 from server.view.align import Aligner, Epoch
 from server.view.board import Board
 from server.view.calibrate.walking import Walking
 from server.view.choice.decide import Decider, GopDecision, homographies
 from server.view.helping.assist import Assist
 from server.view.intake import Intake
+from server.view.keeping_up import KeepingUp
 from server.view.lacking import Lacking
 from server.view.media.codec import agreement_for
 from server.view.past.past import Past
@@ -42,6 +43,8 @@ log = logging.getLogger(__name__)
 _FAR_S = 60.0
 """How far a camera may have counted ahead of this service, which may have been held up; or this service be
 behind the pulses, and still go through all that it has missed."""
+_TURNS = 10
+"""How often, between two epochs, all inboxes have their turn, as long as something waits in them."""
 _FIRST_PULSE_S = 3.0
 """How long the first pulse is waited for: where there is no pulse server, cameras count alone."""
 
@@ -64,6 +67,10 @@ class BestViewService:
         self.aligner = Aligner(cameras, stride, grace, behind, far + grace + behind)
         form = config.sound.format
         self.sound = None if form is None else SoundShelf(form, config.site.fps, frames / config.site.fps)
+        self._keeping_up = KeepingUp(frames - config.view.lookahead - config.encode.gop)
+        self.left_out = 0
+        """Epochs that were not decided, since there was more to decide than could be."""
+        self._leaving_out = Spell()
         self.splicer = Splicer(self.shelves, self.agreement, config, self.sound)
         self.intake = Intake(
             self.shelves,
@@ -175,10 +182,27 @@ class BestViewService:
     async def decide_by_turns(self) -> None:
         """Do the same, and let viewers, cameras and signals have their turn between two epochs.
 
-        On a machine with too much to do there may always be one more.
+        On a machine with too much to do there may always be one more. What has come by then is taken in
+        first: pictures that are lost cannot be shown however well they are chosen. What would be decided too
+        late to be shown is left out.
         """
-        while self._decide_next():  # noqa: ASYNC110 — it waits for nothing
+        while self._decide_next():
             await asyncio.sleep(0)
+            for _ in range(_TURNS):
+                if not any(inbox.waiting for inbox in self.inboxes):
+                    break
+                await asyncio.sleep(0)
+            self._keep_up()
+
+    def _keep_up(self) -> None:
+        """Go on with the present where decisions are of pictures that are gone, and do not catch up."""
+        behind = self.aligner.behind(self.pulse)
+        if not self._keeping_up.is_lost(behind):
+            return
+        self.left_out += self.aligner.leave_out(self.pulse)
+        if (more := self._leaving_out.happened()) is not None:
+            told = "decisions are %.1f s behind, and do not catch up%s: they go on with now"
+            log.warning(told, behind / self.config.site.fps, more)
 
     def _decide_next(self) -> bool:
         epoch = self.aligner.next_ready(self.pulse)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,6 +16,9 @@ log = logging.getLogger(__name__)
 
 PENDING_MAX = 4096
 """Messages held for a busy event loop: several seconds of a site of eight cameras."""
+
+TURN_S = 0.02
+"""How long items are handled at a time, but for the last of them: then others have their turn of the loop."""
 
 Item = TypeVar("Item")
 
@@ -32,11 +36,13 @@ class Inbox(Generic[Item]):
     """Keeps the newest items and wakes the loop once for as many as have come.
 
     When the loop is too slow the oldest are lost and counted in ``lost``: memory never grows and the sender
-    never waits.
+    never waits. However many come, no more are handled in one turn of the loop than ``turn_s`` seconds take.
     """
 
-    def __init__(self, handler: Callable[[Item], None], pending_max: int = PENDING_MAX) -> None:
-        self._handler = handler
+    def __init__(
+        self, handler: Callable[[Item], None], pending_max: int = PENDING_MAX, turn_s: float = TURN_S
+    ) -> None:
+        self._handler, self._turn_s = handler, turn_s
         self._loop = asyncio.get_running_loop()
         self._pending: deque[Item] = deque(maxlen=pending_max)
         self._woken = False
@@ -62,6 +68,7 @@ class Inbox(Generic[Item]):
 
     def _drain(self) -> None:
         self._woken = False
+        until = time.perf_counter() + self._turn_s
         while self._pending:
             item = self._pending.popleft()
             try:
@@ -69,3 +76,8 @@ class Inbox(Generic[Item]):
             except Exception as error:  # one bad item must not keep back those behind it
                 if (more := self._failing.happened(repr(error))) is not None:
                     log.exception("handling what came failed%s", more)
+            if self._pending and time.perf_counter() >= until:
+                if not self._woken:  # else whoever has put something meanwhile has seen to it
+                    self._woken = True
+                    self._loop.call_soon(self._drain)
+                return

@@ -35,7 +35,7 @@ async def helped(
     content = {
         **DEMO,
         "cameras": list(cameras),
-        "site": {"name": "demo", "fps": 10, "width": 320, "height": 180},
+        "site": {"name": "demo", "fps": 10, "width": 320, "height": 180, "niceness": 1},
         "sync": {"port": free_port(), "start_timeout_s": 60},
         "zenoh": {"connect": bus, "listen": bus},
         "http": {"port": free_port()},

@@ -30,7 +30,8 @@ def configuration(folder: Path, recording: Path, **sections: Any) -> Path:
     """Write the configuration of a site of three recorded views; ``sections`` are merged into it."""
     bus = f"tcp/127.0.0.1:{free_port()}"
     content: dict[str, Any] = {
-        "site": {"name": "e2e", "fps": FPS, "width": 320, "height": 180},
+        # Cameras are hardly nicer than what else runs here: where that is much, they would wait for it.
+        "site": {"name": "e2e", "fps": FPS, "width": 320, "height": 180, "niceness": 1},
         "sync": {"port": free_port(), "start_timeout_s": 60},
         "zenoh": {"connect": bus, "listen": bus},
         "http": {"port": free_port()},

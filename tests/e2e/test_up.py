@@ -33,6 +33,17 @@ async def test_it_is_five_processes(site: RunningSite) -> None:
     assert sorted(site.children()) == ["bestview", *CAMERAS, "sync"]
 
 
+async def test_cameras_yield_to_the_best_view_and_the_pulses(site: RunningSite) -> None:
+    """Every thread of theirs, which begins as nice as the one that has begun it."""
+    niceness = {
+        name: {os.getpriority(os.PRIO_PROCESS, int(it.name)) for it in Path(f"/proc/{pid}/task").iterdir()}
+        for name, pid in site.children().items()
+    }
+    own = os.getpriority(os.PRIO_PROCESS, site.process.pid)
+    assert niceness["bestview"] == niceness["sync"] == {own}
+    assert all(niceness[camera] == {own + site.config["site"]["niceness"]} for camera in CAMERAS)
+
+
 async def test_pulses_are_readable_with_nc(site: RunningSite) -> None:
     program = shutil.which("nc") or shutil.which("ncat")
     port = str(site.config["sync"]["port"])

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import yaml
 from free_port import free
+from patience import PATIENCE
 
-PATIENCE = 60.0  # seconds that a process has to begin, to say something or to end
 FEW = 64  # descriptors: hardly more than a process needs for itself
 MYVIEW = f"{sys.executable} -m server.run.cli"
 

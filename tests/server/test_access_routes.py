@@ -172,6 +172,17 @@ async def test_who_may_see_a_person_may_see_whom_they_turned_out_to_be(site: Hal
     assert await status(site, "GET", "/objects/1/best.mp4", "family") == 200
 
 
+async def test_health_asks_nobody_who_they_are_and_has_nobody_wait(site: Hall) -> None:
+    wrong = {"Authorization": "Bearer nothing-that-was-given"}
+    for _ in range(100):
+        async with site.session.get("/api/site", headers=wrong) as answer:
+            if answer.status == 429:  # too many wrong ones
+                break
+    assert answer.status == 429
+    async with site.session.get("/healthz", headers=wrong) as answer:
+        assert answer.status == 200
+
+
 async def test_a_route_that_nobody_has_decided_about_is_closed() -> None:
     async def handler(_: web.Request) -> web.Response:
         return web.Response()

@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from server.view.align import Aligner, Epoch
+from server.wire.epochs import end_of_epoch
 from server.wire.messages import CameraTracks
 
 STRIDE, GRACE = 5, 12
@@ -227,3 +228,20 @@ def test_the_others_are_waited_for_from_the_first_word_on() -> None:
     assert aligner.ready(now=40) == []
     assert aligner.ready(now=40 + GRACE) == []
     assert heard(aligner.ready(now=41 + GRACE)) == [(0, ("c0",), ("c1",))]
+
+
+def test_what_cannot_be_decided_in_time_is_left_out_up_to_the_newest_word_of_now() -> None:
+    aligner = Aligner(CAMERAS, STRIDE, GRACE)
+    for camera in CAMERAS:
+        aligner.come(camera)
+    for epoch in (0, 1, 2, 3, 4, 90):  # the last one is of a camera that has counted too far
+        for camera in CAMERAS:
+            aligner.tracks(word(camera, epoch))
+    now = end_of_epoch(4, STRIDE)
+    assert [it.number for it in [aligner.next_ready(now)] if it] == [0]
+    assert aligner.behind(now) == 3 * STRIDE
+    assert aligner.leave_out(now) == 3
+    found = aligner.next_ready(now)
+    assert found is not None
+    assert (found.number, found.skipped, set(found.tracks)) == (4, 3, set(CAMERAS))
+    assert aligner.leave_out(now) == 0

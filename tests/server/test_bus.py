@@ -232,9 +232,33 @@ async def test_what_comes_from_threads_is_handled_on_the_loop_in_order() -> None
     assert got == [(number, threading.get_ident()) for number in range(1000)]
 
 
+async def test_between_some_items_and_the_next_others_have_their_turn_and_the_order_stays() -> None:
+    got: list[int] = []
+    inbox = Inbox(got.append, turn_s=0.0)
+    for number in range(20):
+        inbox.put(number)
+    seen = []
+    while inbox.waiting:
+        await asyncio.sleep(0)
+        seen.append(len(got))
+    assert got == list(range(20))
+    assert seen == list(range(1, 21))
+
+
+async def test_a_flood_without_end_keeps_nobody_from_the_loop() -> None:
+    """Each item is followed by another before it is handled: there is always one more."""
+    most = 5_000_000  # some seconds of them
+    inbox: Inbox[int] = Inbox(lambda left: inbox.put(left - 1) if left else None)
+    inbox.put(most)
+    async with asyncio.timeout(PATIENCE):
+        for _ in range(10):
+            await asyncio.sleep(0)
+    assert inbox.waiting
+
+
 async def test_a_busy_loop_loses_the_oldest_and_counts_them() -> None:
     got: list[int] = []
-    inbox = Inbox(got.append, pending_max=10)
+    inbox = Inbox(got.append, pending_max=10, turn_s=PATIENCE)
     for number in range(25):
         inbox.put(number)
     await asyncio.sleep(0)
@@ -244,7 +268,7 @@ async def test_a_busy_loop_loses_the_oldest_and_counts_them() -> None:
 
 async def test_one_item_that_cannot_be_handled_keeps_back_no_other(caplog: pytest.LogCaptureFixture) -> None:
     got: list[float] = []
-    inbox: Inbox[int] = Inbox(lambda number: got.append(1 / number))
+    inbox: Inbox[int] = Inbox(lambda number: got.append(1 / number), turn_s=PATIENCE)
     for number in (1, 0, 2, *[0] * 20):
         inbox.put(number)
     await asyncio.sleep(0)

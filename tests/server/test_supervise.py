@@ -3,29 +3,42 @@
 from __future__ import annotations
 
 import asyncio
+import os
 from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
-from cameras_by_hand import small_config
+from cameras_by_hand import CAMERAS, small_config
 from patience import PATIENCE
 
 from server.run import supervise
 from server.run.ending import OVER
+from server.run.starting import STARTED
 from server.run.supervise import Supervisor
 from server.wire.errors import UserError
 
+NOBODY = 2**22 + 1  # more than a process's number can be (proc(5), pid_max)
+
 
 class Process:
-    """A process by hand."""
+    """A process by hand; ``told`` is what it closes once it has loaded."""
 
-    def __init__(self, arguments: tuple[str, ...]) -> None:
+    pid = NOBODY
+
+    def __init__(self, arguments: tuple[str, ...], told: int) -> None:
         self.arguments = arguments
+        self._told: int | None = told
         self.returncode: int | None = None
         self._over = asyncio.Event()
 
+    def loaded(self) -> None:
+        if self._told is not None:
+            os.close(self._told)
+        self._told = None
+
     def end(self, code: int) -> None:
+        self.loaded()
         self.returncode = code
         self._over.set()
 
@@ -41,14 +54,18 @@ class Process:
 
 
 class Machine:
-    """A machine on which a supervisor starts processes by hand."""
+    """A machine on which a supervisor starts processes by hand; they load at once, or when told to."""
 
     def __init__(self) -> None:
+        self.loads_at_once = True
         self.started: asyncio.Queue[Process] = asyncio.Queue()
         self.task: asyncio.Task[None] | None = None
 
-    async def start(self, *_: str, **__: Any) -> Process:
-        process = Process(_[3:])
+    async def start(self, *words: str, env: dict[str, str], pass_fds: tuple[int], **_: Any) -> Process:
+        assert env[STARTED] == str(pass_fds[0])
+        process = Process(words[3:], os.dup(pass_fds[0]))
+        if self.loads_at_once:
+            process.loaded()
         self.started.put_nowait(process)
         return process
 
@@ -59,10 +76,19 @@ class Machine:
             process.arguments[-1 if process.arguments[0] == "camera" else 0]: process for process in found
         }
 
+    async def nothing_more(self) -> None:
+        """Make sure that nothing else is started as things stand."""
+        for _ in range(20):  # turns of the loop: nothing here waits for anything else
+            await asyncio.sleep(0)
+        assert self.started.empty()
+
     def run(
-        self, out: Path | None = None, before_start: Callable[[], None] = lambda: None
+        self,
+        out: Path | None = None,
+        before_start: Callable[[], None] = lambda: None,
+        cameras: tuple[str, ...] = CAMERAS,
     ) -> asyncio.Task[None]:
-        supervisor = Supervisor(Path("site.yaml"), small_config(), {}, out, before_start)
+        supervisor = Supervisor(Path("site.yaml"), small_config(cameras=cameras), {}, out, before_start)
         self.task = asyncio.create_task(supervisor.run())
         return self.task
 
@@ -86,6 +112,60 @@ async def test_everything_is_started_and_ended_together(machine: Machine) -> Non
     task.cancel()
     await asyncio.gather(task, return_exceptions=True)
     assert all(process.returncode == -15 for process in processes.values())
+
+
+async def test_the_best_view_and_the_pulses_load_before_any_camera(machine: Machine) -> None:
+    machine.loads_at_once = False
+    machine.run()
+    first = await machine.processes(2)
+    assert list(first) == ["bestview", "sync"]
+    for process in first.values():
+        await machine.nothing_more()
+        process.loaded()
+    await machine.processes(1)
+
+
+async def test_no_more_cameras_load_at_a_time_than_there_are_processors(
+    machine: Machine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(supervise, "processors", lambda: 2.5)
+    machine.run(cameras=("c0", "c1", "c2", "c3", "c4"))
+    await machine.processes(2)
+    machine.loads_at_once = False
+    processes = await machine.processes(2)
+    assert list(processes) == ["c0", "c1"]
+    await machine.nothing_more()
+    processes["c0"].loaded()
+    processes |= await machine.processes(1)
+    await machine.nothing_more()
+    processes["c1"].end(-9)  # it will not load any more, and asks for another turn behind those that wait
+    processes |= await machine.processes(1)
+    await machine.nothing_more()
+    assert list(processes) == ["c0", "c1", "c2", "c3"]
+    processes["c3"].loaded()
+    assert list(await machine.processes(1)) == ["c4"]
+    processes["c2"].loaded()
+    assert list(await machine.processes(1)) == ["c1"]
+
+
+async def test_a_best_view_that_died_waits_for_no_camera_that_loads(machine: Machine) -> None:
+    machine.run()
+    processes = await machine.processes(2)
+    machine.loads_at_once = False
+    await machine.processes(1)
+    processes["bestview"].end(-9)
+    found = await machine.processes(1)
+    while "bestview" not in found:  # the other camera, where there are more processors
+        found |= await machine.processes(1)
+
+
+async def test_what_never_says_that_it_has_loaded_keeps_nobody_for_ever(
+    machine: Machine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(supervise, "_STARTS_WITHIN_S", 0.01)
+    machine.loads_at_once = False
+    machine.run()
+    assert len(await machine.processes(4)) == 4
 
 
 @pytest.mark.parametrize("code", [-9, 1, 0])

@@ -9,6 +9,8 @@ import pytest
 from cameras_by_hand import CAMERAS, FPS, GOP, HEIGHT, LARGE, SMALL, WIDTH, encoded, status, thumbnail, video
 from halls import A, B, Hall
 
+from server.wire.inbox import Inbox
+
 
 async def test_the_site_is_described(busy: Hall) -> None:
     site = await busy.get_json("/api/site")
@@ -35,6 +37,16 @@ async def test_before_the_first_picture_there_is_no_codec_and_no_stream_yet(hall
         assert answer.status == 503
     async with hall.session.get("/healthz") as answer:
         assert (answer.status, await answer.text()) == (200, "ok\n")
+
+
+async def test_health_is_answered_however_much_comes_from_the_cameras(hall: Hall) -> None:
+    """There is one more message for so long that nobody would wait for the last one."""
+    flood: Inbox[int] = Inbox(lambda left: flood.put(left - 1) if left else None, turn_s=0.0)
+    flood.put(100_000)
+    for _ in range(3):
+        async with hall.session.get("/healthz") as answer:
+            assert answer.status == 200
+    assert flood.waiting
 
 
 async def test_everybody_is_listed_with_who_shows_and_who_sees_them(busy: Hall) -> None:

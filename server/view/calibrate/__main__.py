@@ -18,8 +18,6 @@ from server.view.calibrate.plan import plan_of, plot_plan
 from server.view.calibrate.task import Done, Seen, Task
 from server.view.calibrate.walked import Walked, moment, walk_settings
 
-_NICE = 5
-
 
 def done(task: Task) -> Done:
     """Calibrate; say what has come of it, or why nothing has."""
@@ -51,7 +49,6 @@ def _walk(seen: Seen, fps: float) -> Walk:
 
 def main() -> None:
     """Answer the process that started this one."""
-    os.nice(_NICE)
     task = msgspec.msgpack.decode(sys.stdin.buffer.read(), type=Task)
     sys.stdout.buffer.write(msgspec.msgpack.encode(done(task)))
 

@@ -38,6 +38,11 @@ class ServiceCollector(Collector):
             value=service.lacking.late_epochs,
         )
         yield CounterMetricFamily(
+            "myview_left_out_epochs",
+            "Windows not decided at all: their pictures would have been gone by then.",
+            value=service.left_out,
+        )
+        yield CounterMetricFamily(
             "myview_wrong_tokens",
             "Tokens that there is not, or not any more.",
             value=self._access.wrong_tokens,

@@ -17,6 +17,8 @@ class Site(Section):
     fps: Annotated[float, Field(ge=0.001, le=1000, allow_inf_nan=False)] = 25.0
     width: Side = 640
     height: Side = 360
+    niceness: Annotated[int, Field(ge=0, le=19)] = 10
+    """How much nicer a camera's process is than who starts it, as in nice(1): a busy machine serves first."""
 
 
 class Sync(Section):

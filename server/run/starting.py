@@ -1,0 +1,59 @@
+"""How a process that has been started says that it has loaded, so that the next one may be.
+
+A process loads for a second of a processor's time or two. Forty that do so together keep each other, and
+whoever is to answer meanwhile, from getting anywhere.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+STARTED = "MYVIEW_STARTED_FD"
+"""In the environment of a process that a supervisor starts: the descriptor that it closes once loaded."""
+
+
+def say_started() -> None:
+    """Tell the supervisor, if there is one, that this process has loaded; saying it again does nothing."""
+    with contextlib.suppress(ValueError, OSError):
+        os.close(int(os.environ.pop(STARTED, "")))
+
+
+@dataclass(frozen=True, slots=True)
+class Pipe:
+    """Its end tells that a process has started, or has died.
+
+    Attributes:
+        own: the supervisor's end.
+        given: the other one, which the process inherits and closes.
+    """
+
+    own: int
+    given: int
+
+    async def ended(self, within_s: float) -> None:
+        """Wait until nobody has the other end any more, but no longer than so many seconds."""
+        ended = asyncio.Event()
+        loop = asyncio.get_running_loop()
+        loop.add_reader(self.own, ended.set)
+        try:
+            # Not wait_for: up to Python 3.11 who is cancelled just when it is over is not cancelled by it.
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(within_s):
+                    await ended.wait()
+        finally:
+            loop.remove_reader(self.own)
+
+
+@contextmanager
+def started_pipe() -> Iterator[Pipe]:
+    """Open a pipe; its supervisor's end is closed with the block, the other one by whoever hands it on."""
+    own, given = os.pipe()
+    try:
+        yield Pipe(own, given)
+    finally:
+        os.close(own)

@@ -1,0 +1,39 @@
+"""Who yields to whom where the processors do not do for all (nice(1)). To be nicer takes no privilege.
+
+The disk is yielded likewise: without a priority of its own a process has one by its niceness (ioprio_set(2)).
+"""
+
+from __future__ import annotations
+
+import os
+
+_NICEST = 19
+
+
+def be_nicer(by: int) -> None:
+    """Make this process nicer by so much than the one that has started it.
+
+    Called before it has threads: each has a niceness of its own, and begins with that of who begins it.
+    """
+    _nicer(0, _niceness(os.getppid()) + by)
+
+
+def make_nicer(pid: int, by: int) -> None:
+    """Make a process that this one has just started nicer by so much than this one.
+
+    What it starts with, libraries that load above all, is then as nice; it may be gone already.
+    """
+    _nicer(pid, _niceness(0) + by)
+
+
+def _nicer(pid: int, to: int) -> None:
+    """Make a process as nice as that, if it is not nicer: less nice again it cannot become."""
+    try:
+        if to > _niceness(pid):
+            os.setpriority(os.PRIO_PROCESS, pid, min(to, _NICEST))
+    except ProcessLookupError:
+        return
+
+
+def _niceness(pid: int) -> int:
+    return os.getpriority(os.PRIO_PROCESS, pid)

@@ -1,0 +1,38 @@
+"""When what waits to be decided is left out: too far behind, for a while, and no nearer."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import pytest
+
+from server.view.keeping_up import KeepingUp
+
+REACH = 100  # pulses
+
+
+def lost(behind: Sequence[int], every_s: float = 1.0) -> list[bool]:
+    """Give what is said to so many pulses behind, second by second."""
+    times = iter(it * every_s for it in range(len(behind)))
+    keeping_up = KeepingUp(REACH, lambda: next(times))
+    return [keeping_up.is_lost(it) for it in behind]
+
+
+@pytest.mark.parametrize(
+    "behind",
+    [
+        [0, REACH] * 10,
+        [1500 - 100 * it for it in range(14)],  # it was stopped, and makes up for it
+        [REACH + 1] * 2,  # it may, by then
+        [REACH + 1, REACH + 1, REACH] * 5,
+    ],
+    ids=["in time", "catching up", "not for long", "now and then"],
+)
+def test_who_keeps_up_or_catches_up_leaves_nothing_out(behind: list[int]) -> None:
+    assert not any(lost(behind))
+
+
+@pytest.mark.parametrize("more", [0, 5, 25])
+def test_who_does_not_catch_up_leaves_out_and_is_given_time_anew(more: int) -> None:
+    behind = [REACH + 1 + more * it for it in range(3)]
+    assert lost(behind + behind) == [False, False, True] * 2
