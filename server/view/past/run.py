@@ -17,6 +17,7 @@ Pulses and people's numbers may begin anew when a service does; so every run has
 from __future__ import annotations
 
 import contextlib
+import os
 from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,12 +25,18 @@ from typing import Annotated
 
 import msgspec
 
+from server.view.past.files import MISSING, clear, file_size, is_gone, media_sizes
 from server.view.past.playlist import CAMERA, Playlist, file_name
 from server.view.past.sounds import NAME as SOUND
+from server.view.past.stretch import Stretch
+from server.wire.private_files import FOLDER, write_private
 
 HEAD = "run.json"
 _HEADER = "init.mp4"
 
+
+_LONGEST_S = 1e12
+"""Beyond what any clock has counted: what says more was damaged."""
 
 Camera = Annotated[str, msgspec.Meta(pattern=rf"^{CAMERA}\Z")]
 """A camera's name is part of files' names: what was damaged leads nowhere else."""
@@ -52,6 +59,8 @@ class RunHead(msgspec.Struct, frozen=True, kw_only=True):
     """When pulse 0 was due, unix seconds; null where it is not known."""
     numbers_since: float | None = None
     """When people's numbers began, unix seconds: in runs of the same time they are the same people's."""
+    clock0: Annotated[float, msgspec.Meta(ge=-_LONGEST_S, le=_LONGEST_S)] | None = None
+    """What the recording's own clock (:mod:`server.view.past.age`) said at pulse 0; null: it had none yet."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +79,9 @@ class Segment:
     first: int
     bytes: int
     written: float
-    """When something was last added, unix seconds."""
+    """When something was last added, by the recording's own clock."""
+    is_stuck: bool = False
+    """Some of its files could not be taken away when they should have been."""
 
 
 class Run:
@@ -93,13 +104,14 @@ class Run:
         Raises:
             OSError: it cannot be made.
         """
+        folder.mkdir(mode=FOLDER)  # the one around it is the store's to make: it may have been removed
         for part in ("cameras", "objects", "index"):
-            (folder / part).mkdir(parents=True, exist_ok=True)
-        (folder / "cameras" / _HEADER).write_bytes(headers.pictures)
+            (folder / part).mkdir(mode=FOLDER)
+        write_private(folder / "cameras" / _HEADER, headers.pictures)
         if headers.sound:
-            (folder / SOUND).mkdir(exist_ok=True)
-            (folder / SOUND / _HEADER).write_bytes(headers.sound)
-        (folder / HEAD).write_bytes(_text(head))
+            (folder / SOUND).mkdir(mode=FOLDER)
+            write_private(folder / SOUND / _HEADER, headers.sound)
+        write_private(folder / HEAD, _text(head))
         return cls(folder, head, headers, longest_s)
 
     def number_since(self, since: float | None) -> None:
@@ -108,10 +120,26 @@ class Run:
         Raises:
             OSError: the disk does not take it.
         """
-        head = msgspec.structs.replace(self.head, numbers_since=since)
+        self._write_head(msgspec.structs.replace(self.head, numbers_since=since))
+
+    def date(self, clock0: float) -> None:
+        """Note what the recording's clock said at pulse 0, where nobody had.
+
+        Raises:
+            OSError: the disk does not take it.
+        """
+        self.head = msgspec.structs.replace(self.head, clock0=clock0)
+        self._write_head(self.head)
+
+    def _write_head(self, head: RunHead) -> None:
         draft = self.folder / f".{HEAD}"
-        draft.write_bytes(_text(head))
-        draft.replace(self.folder / HEAD)
+        try:
+            write_private(draft, _text(head))
+            draft.replace(self.folder / HEAD)
+        except OSError:
+            with contextlib.suppress(OSError):
+                draft.unlink(missing_ok=True)
+            raise
         self.head = head
 
     @classmethod
@@ -130,15 +158,90 @@ class Run:
         for path in sorted((folder / "objects").glob("*.m3u8")):
             if path.stem.isdecimal():
                 run.object(int(path.stem)).read()
-        for path in sorted((folder / "index").glob("*.jsonl")):
-            if path.stem.isdecimal():
-                first = int(path.stem)
-                size = sum(it.stat().st_size for it in run.files(first) if it.exists())
-                run.segments.append(Segment(first, size, path.stat().st_mtime))
+        run.segments = [Segment(first, 0, 0.0) for first in sorted(run._firsts)]
+        run.recount()
         firsts = {segment.first for segment in run.segments}
         for playlist in run._playlists:  # the files may be gone, and the playlist not written since
             playlist.drop({it.file for it in playlist.tape.all} - firsts)
+        with contextlib.suppress(OSError):  # what a process that was killed had begun
+            for draft in (*folder.rglob("*.new"), folder / f".{HEAD}"):
+                draft.unlink(missing_ok=True)
         return run
+
+    @property
+    def _firsts(self) -> set[int]:
+        """The first pulses that files of pictures, sound and choices are named by."""
+        media = (*self.folder.glob("cameras/*/*.mp4"), *self.folder.glob(f"{SOUND}/*.mp4"))
+        names = [it.stem for it in (*media, *self.folder.glob("index/*.jsonl"))]
+        return {int(it) for it in names if it.isdecimal()}
+
+    @property
+    def end(self) -> int:
+        """The pulse after the last that is known of; 0 where nothing is."""
+        ends = [it.tape.all[-1].end for it in (*self.cameras.values(), self.sound) if it.tape.all]
+        return max([*ends, *(it.first for it in self.segments[-1:])], default=0)
+
+    def stamp(self, now: float) -> None:
+        """Say when segments were written, by when their pulses were; nothing was after ``now``."""
+        if self.head.clock0 is None:
+            return
+        ends = [*(it.first for it in self.segments[1:]), self.end]
+        for segment, end in zip(self.segments, ends, strict=True):
+            segment.written = min(now, self.head.clock0 + end / self.head.fps)
+
+    @property
+    def is_there(self) -> bool:
+        """Whether the run still is where it was begun: a folder may be removed, or its disk unmounted."""
+        return not is_gone(self.folder / HEAD)
+
+    def recount(self) -> None:
+        """Say again what segments take, and let go of those of which nothing is left."""
+        for segment in self.segments:
+            segment.bytes = sum(file_size(it) for it in self.files(segment.first))
+        self.segments = [it for it in self.segments if not all(map(is_gone, self.files(it.first)))]
+
+    def restore_head(self) -> None:
+        """Write again what holds for the whole run: without it nobody finds what is left of it.
+
+        Raises:
+            OSError: the disk does not take it.
+        """
+        self._write_head(self.head)
+
+    def holds(self, stretch: Stretch, *, sound: bool = False) -> bool:
+        """Tell whether what is referred to is on the disk, as far as its length says.
+
+        Raises:
+            OSError: nobody can tell: it may not be read, or the disk fails.
+        """
+        path = self.sound_file(stretch.file) if sound else self.camera_file(stretch.camera, stretch.file)
+        try:
+            with path.open("rb") as file:
+                return os.fstat(file.fileno()).st_size >= stretch.offset + stretch.length
+        except MISSING:
+            return False
+
+    def forget_missing(self) -> None:
+        """Forget references to what is not on the disk any more; any thread may do so.
+
+        Segments are as they were: their files may be there again, and are to be taken away some day.
+
+        Raises:
+            OSError: nobody can tell what there is.
+        """
+        told = [
+            (it, it.tape.all) for it in self._playlists
+        ]  # before the disk is asked: it may grow meanwhile
+        cameras = {camera: media_sizes(self.folder / "cameras" / camera) for camera in self.head.cameras}
+        sound = {SOUND: media_sizes(self.folder / SOUND)}
+        for playlist, stretches in told:
+            there = sound if playlist is self.sound else cameras
+            gone = {
+                (it.camera, it.file)
+                for it in stretches
+                if there.get(it.camera, {}).get(it.file, -1) < it.offset + it.length
+            }
+            playlist.drop_pieces(gone)
 
     @property
     def size(self) -> int:
@@ -205,6 +308,8 @@ class Run:
                 kept.add(first)
                 failed = error
         self.segments = [it for it in self.segments if it.first not in files or it.first in kept]
+        for segment in self.segments:
+            segment.is_stuck = segment.first in kept or segment.is_stuck
         self.tidy()
         if failed is not None:
             raise failed
@@ -216,6 +321,10 @@ class Run:
                 with contextlib.suppress(OSError):
                     playlist.tidy()
         self.objects = {number: it for number, it in self.objects.items() if it.tape.all or it.stale}
+
+    def remove(self) -> None:
+        """Take away the folder, but what somebody else has put into it."""
+        clear(self.folder)
 
     def _playlist(self, path: Path, cameras: str = "", header: str = _HEADER) -> Playlist:
         return Playlist(path, cameras, header, self.head.fps, self.head.pulse0, self._longest_s)
