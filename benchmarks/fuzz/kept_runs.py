@@ -107,7 +107,9 @@ class Runs(Scripts):
             if drops:
                 size = sum(run.size for run in (*store.earlier, *([store.run] if store.run else [])))
                 for bounds in (Bounds(_LONG_S, (size - 1) * 8 / 7 / 1e6, 60.0), Bounds(-_LONG_S, 1e6, 60.0)):
-                    store._retention = Retention(bounds, lambda: store._clock.now)  # the oldest segment goes, then all
+                    store._retention = Retention(
+                        bounds, lambda: store._clock.now
+                    )  # the oldest segment goes, then all
                     store._retain()
                 assert self._precious.exists(), "what is not recorded was taken away"
         finally:

@@ -53,6 +53,15 @@ def media_sizes(folder: Path) -> dict[int, int]:
         return {}
 
 
+def identity_of(folder: Path) -> tuple[int, int] | None:
+    """Return what a folder is told by, whatever else gets its name: its disk and its number there."""
+    try:
+        status = folder.stat()
+    except OSError:
+        return None
+    return status.st_dev, status.st_ino
+
+
 def is_gone(path: Path) -> bool:
     """Tell whether there surely is no such file: where nobody can tell, there may be one."""
     try:

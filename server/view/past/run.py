@@ -25,7 +25,7 @@ from typing import Annotated
 
 import msgspec
 
-from server.view.past.files import MISSING, clear, file_size, is_gone, media_sizes
+from server.view.past.files import MISSING, clear, file_size, identity_of, is_gone, media_sizes
 from server.view.past.playlist import CAMERA, Playlist, file_name
 from server.view.past.sounds import NAME as SOUND
 from server.view.past.stretch import Stretch
@@ -89,6 +89,7 @@ class Run:
 
     def __init__(self, folder: Path, head: RunHead, headers: Headers, longest_s: float) -> None:
         self.folder, self.head, self.headers = folder, head, headers
+        self._identity = identity_of(folder)
         self._longest_s = longest_s
         self.segments: list[Segment] = []
         self.objects: dict[int, Playlist] = {}
@@ -190,9 +191,19 @@ class Run:
             segment.written = min(now, self.head.clock0 + end / self.head.fps)
 
     @property
+    def is_in_place(self) -> bool:
+        """Whether its folder is the one it was: it may be removed, or its disk be another one."""
+        return self._identity is not None and identity_of(self.folder) == self._identity
+
+    @property
     def is_there(self) -> bool:
-        """Whether the run still is where it was begun: a folder may be removed, or its disk unmounted."""
-        return not is_gone(self.folder / HEAD)
+        """Whether it is in place, and whoever begins will find it."""
+        try:
+            return self.is_in_place and (self.folder / HEAD).stat().st_size == len(_text(self.head))
+        except MISSING:
+            return False
+        except OSError:
+            return True  # nobody can tell
 
     def recount(self) -> None:
         """Say again what segments take, and let go of those of which nothing is left."""
@@ -208,15 +219,14 @@ class Run:
         """
         self._write_head(self.head)
 
-    def holds(self, stretch: Stretch, *, sound: bool = False) -> bool:
-        """Tell whether what is referred to is on the disk, as far as its length says.
+    def holds(self, stretch: Stretch) -> bool:
+        """Tell whether a camera's frames that are referred to are on the disk, as far as lengths say.
 
         Raises:
             OSError: nobody can tell: it may not be read, or the disk fails.
         """
-        path = self.sound_file(stretch.file) if sound else self.camera_file(stretch.camera, stretch.file)
         try:
-            with path.open("rb") as file:
+            with self.camera_file(stretch.camera, stretch.file).open("rb") as file:
                 return os.fstat(file.fileno()).st_size >= stretch.offset + stretch.length
         except MISSING:
             return False
@@ -323,8 +333,9 @@ class Run:
         self.objects = {number: it for number, it in self.objects.items() if it.tape.all or it.stale}
 
     def remove(self) -> None:
-        """Take away the folder, but what somebody else has put into it."""
-        clear(self.folder)
+        """Take away the folder if it is in place, but not what somebody else has put into it."""
+        if self.is_in_place:
+            clear(self.folder)
 
     def _playlist(self, path: Path, cameras: str = "", header: str = _HEADER) -> Playlist:
         return Playlist(path, cameras, header, self.head.fps, self.head.pulse0, self._longest_s)

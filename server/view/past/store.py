@@ -181,18 +181,19 @@ class Store:
         if run is None or self.run is None:
             return
         self.run = None
+        if not run.is_in_place:
+            return
         with contextlib.suppress(OSError):
             run.forget_missing()
         run.recount()
-        if run.segments:
-            run.tidy()
-            if not run.is_there:
-                with contextlib.suppress(OSError):
-                    run.restore_head()
-            self.earlier = [*self.earlier, run]
-        else:
+        if not run.segments:
             run.remove()
-        self._closed_bytes = sum(it.size for it in self.earlier)
+            return
+        run.tidy()
+        if not run.is_there:
+            with contextlib.suppress(OSError):
+                run.restore_head()
+        self.earlier = [*self.earlier, run]
 
     def _put(self, piece: Piece, head: RunHead, headers: Headers) -> None:
         first, now = piece.choices.first, self._clock.now
