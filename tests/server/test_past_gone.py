@@ -19,6 +19,7 @@ from server.view.past.retention import Bounds
 from server.view.past.run import Headers, Run
 from server.view.past.store import Store
 
+NOTHING = "of object 1 nothing is kept from p0 on; there is nothing"
 Harm = Callable[[Path, Path], None]
 """What somebody does to a folder, and the run in it."""
 
@@ -304,6 +305,7 @@ async def shows(hall: Hall) -> None:
     hall.service.past.recent._frames = GOP
     hall.service.past.open()
     hall.service.come(*CAMERAS)
+    hall.service.remembering.begin(0)
     for epoch in range(7):
         hall.service.feed(epoch, {A: {1: LARGE}, B: {1: SMALL}})
     await until(lambda: written(hall) == 6)
@@ -354,7 +356,7 @@ async def test_nobody_is_promised_what_is_gone(hall: Hall, harm: Harm) -> None:
     [
         ("/api/objects/1/past", 404, "nothing is kept of object 1"),
         ("/objects/1/best.mp4?from=p0&to=p10", 404, "there is no object 1"),
-        ("/objects/1/hls/index.m3u8?from=p0&to=p10", 416, "of object 1 nothing is kept from p0 on; there is nothing"),
+        ("/objects/1/hls/index.m3u8?from=p0&to=p10", 416, NOTHING),
         ("/objects/1/hls/0.m4s", 404, "there is no segment 0 here, or not any more"),
     ],
 )  # fmt: skip
@@ -363,10 +365,10 @@ async def test_who_is_nowhere_else_is_gone_with_what_was_recorded(
 ) -> None:
     store = hall.service.past.store
     assert store is not None
-    hall.service.remembering.begin(0)
     hall.service.past.recent._choices.clear()
     hall.service.splicer.forget([], [])
     hall.service.splicer._gone.clear()
+    hall.service.decider.people.roll.first_seen.clear()
     assert len((await hall.get_json("/api/objects/1/past"))["spans"]) == 1
     shutil.rmtree(store.folder)
     assert await hall.get(path) == (status, {"error": error})

@@ -8,7 +8,7 @@ seconds, which only ever goes forward. It goes by
   machine itself starts again (its boot has another id);
 * the machine's clock alone for the time that the machine was off: if it is kept right now, and was when the
   recording last went by it, by NTP as the system has it or by the operator's word (``record.trust_clock``),
-  and if it has not jumped for ten minutes.
+  and if it has not jumped for ten minutes. That it jumps while the service runs never counts.
 
 Where nobody vouches for the machine's clock, the time that the machine was off does not count: what is
 recorded is kept for longer, never for less long.
@@ -93,7 +93,9 @@ class AgeClock:
         self._apart, self._looked = machine.wall() - machine.steady(), machine.steady()
         """How far the two clocks were apart, and when that was looked at."""
         self._right_since = self._looked
-        self._told: str = ""
+        self._follows = False
+        """Whether the machine's clock was right and went beside this one when it was looked at last."""
+        self._told = ""
 
     def open(self, least: float) -> None:
         """Go on from what the ledger says; where there is none, from now, or ``least`` if that is later."""
@@ -126,15 +128,17 @@ class AgeClock:
         """Look at the machine's clock: the time that it was off counts once that is to be believed."""
         steady, wall = self._machine.steady(), self._machine.wall()
         apart, passed = wall - steady, steady - self._looked
-        is_right = self.is_right
-        if not is_right or abs(apart - self._apart) > _JUMP_S + _DRIFT * passed:
+        is_right, jumped = self.is_right, abs(apart - self._apart) > _JUMP_S + _DRIFT * passed
+        if not is_right or jumped:
             self._right_since = steady
+        if jumped and self._follows:  # the machine was not off meanwhile: nothing is owed
+            self._origin, self._follows = None, False
         self._apart, self._looked = apart, steady
         away = 0.0 if self._origin is None else wall - self._origin - self.now
         if away < _AWAY_S:
             self._told = ""
             if is_right:
-                self._origin = wall - self.now
+                self._origin, self._follows = wall - self.now, True
         elif not is_right:
             self._tell_once("unkept", away)
         elif steady - self._right_since < _TRIAL_S:
@@ -166,7 +170,7 @@ class AgeClock:
         if self._told == what:
             return
         self._told = what
-        said = f"recording: by its clock this machine was off for {_span(away)}, or somebody has set it"
+        said = f"recording: by its clock this machine was off for {_span(away)}"
         if what == "unkept":
             log.warning(
                 "%s; that does not count for record.keep_s, since nobody keeps the clock right (NTP): "
