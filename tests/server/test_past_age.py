@@ -81,6 +81,8 @@ def test_a_clock_that_jumps_while_it_records_is_not_believed_later_either(
     clocks.wall += YEAR_S  # and whoever keeps it says that it is right
     records(store, clocks, range(2, 4))
     clocks.now += TRIAL_S
+    store.close()
+    store = opened(tmp_path, clocks, bounds)
     records(store, clocks, range(4, 6))
     store.close()
     clocks.off(TRIAL_S)
@@ -217,7 +219,31 @@ def test_a_machine_without_a_clock_of_its_own_counts_when_the_network_has_told_i
     clocks.now += TRIAL_S
     records(store, clocks, range(11, 12))
     assert kept(tmp_path) == [10, 11], "it was there for a week, as the clock says that is right now"
+    records(store, clocks, range(12, 14))
+    assert kept(tmp_path) == [10, 11, 12, 13], "but for what was recorded since the machine is on"
     store.close()
+
+
+@pytest.mark.parametrize("restarts", [False, True])
+def test_what_was_recorded_before_the_clock_was_believed_is_no_older_for_it(
+    tmp_path: Path, clocks: ClocksByHand, restarts: bool
+) -> None:
+    bounds = Bounds(keep_s=2 * TRIAL_S, most_mb=1e6, segment_s=0.2)
+    store = opened(tmp_path, clocks, bounds)
+    records(store, clocks, range(8))
+    store.close()
+    clocks.off(YEAR_S)
+    store = opened(tmp_path, clocks, bounds)
+    records(store, clocks, range(10, 12))
+    if restarts:
+        store.close()
+        store = opened(tmp_path, clocks, bounds)
+    clocks.now += TRIAL_S
+    records(store, clocks, range(12, 14))
+    assert kept(tmp_path) == [10, 11, 12, 13]
+    store.close()
+    opened(tmp_path, clocks, bounds).close()
+    assert kept(tmp_path) == [10, 11, 12, 13], "and so it is known later on"
 
 
 def test_what_takes_too_much_goes_by_age_though_the_clock_went_back(

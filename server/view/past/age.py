@@ -81,6 +81,8 @@ class Ledger(msgspec.Struct, frozen=True, kw_only=True):
     steady: float
     origin: float | None
     """When the recording's clock was 0, unix seconds, by a clock that was kept right; null: none was."""
+    anchored: float = 0.0
+    """What the recording's clock said when that was last seen to be so: the machine was on until then."""
 
 
 class AgeClock:
@@ -90,6 +92,8 @@ class AgeClock:
         self._path, self._machine, self._trusted = folder / LEDGER, machine, trusted
         self._seconds, self._at = 0.0, machine.steady()
         self._origin: float | None = None
+        self.anchored = 0.0
+        """When this clock last went beside the machine's: if that was off since, it was after this."""
         self._apart, self._looked = machine.wall() - machine.steady(), machine.steady()
         """How far the two clocks were apart, and when that was looked at."""
         self._right_since = self._looked
@@ -106,7 +110,7 @@ class AgeClock:
             self._seconds, self._at = max(self.now, least), steady
             return
         self._seconds, self._at = ledger.seconds, steady
-        self._origin = ledger.origin
+        self._origin, self.anchored = ledger.origin, ledger.anchored
         if ledger.boot and ledger.boot == machine.boot():
             self._seconds += max(0.0, steady - ledger.steady)
 
@@ -124,8 +128,12 @@ class AgeClock:
         """Return the time by the machine's own clock, unix seconds."""
         return self._machine.wall()
 
-    def look(self) -> None:
-        """Look at the machine's clock: the time that it was off counts once that is to be believed."""
+    def look(self) -> float:
+        """Look at the machine's clock: the time that it was off counts once that is to be believed.
+
+        Return the seconds by which this clock goes forward for that: what was recorded since the machine is
+        on again, after :attr:`anchored`, is no older by them.
+        """
         steady, wall = self._machine.steady(), self._machine.wall()
         apart, passed = wall - steady, steady - self._looked
         is_right, jumped = self.is_right, abs(apart - self._apart) > _JUMP_S + _DRIFT * passed
@@ -138,7 +146,7 @@ class AgeClock:
         if away < _AWAY_S:
             self._told = ""
             if is_right:
-                self._origin, self._follows = wall - self.now, True
+                self._origin, self._follows, self.anchored = wall - self.now, True, self.now
         elif not is_right:
             self._tell_once("unkept", away)
         elif steady - self._right_since < _TRIAL_S:
@@ -149,6 +157,8 @@ class AgeClock:
             log.warning(
                 "recording: %s in which this machine was off count now for record.keep_s", _span(away)
             )
+            return away
+        return 0.0
 
     def keep(self) -> None:
         """Write the ledger.
@@ -157,7 +167,13 @@ class AgeClock:
             OSError: it cannot be written; it is as before.
         """
         machine = self._machine
-        ledger = Ledger(seconds=self.now, boot=machine.boot(), steady=machine.steady(), origin=self._origin)
+        ledger = Ledger(
+            seconds=self.now,
+            boot=machine.boot(),
+            steady=machine.steady(),
+            origin=self._origin,
+            anchored=self.anchored,
+        )
         draft = self._path.with_suffix(".new")
         try:
             write_private(draft, msgspec.json.format(msgspec.json.encode(ledger)) + b"\n")

@@ -191,6 +191,19 @@ class Run:
             segment.written = min(now, self.head.clock0 + end / self.head.fps)
 
     @property
+    def begun(self) -> float:
+        """When what is left of it begins, by the recording's own clock."""
+        first = self.segments[0].first if self.segments else self.end
+        return (self.head.clock0 or 0.0) + first / self.head.fps
+
+    def put_off(self, seconds: float) -> None:
+        """Say that all of it was so much later by the recording's clock, if the disk takes that."""
+        for segment in self.segments:
+            segment.written += seconds
+        with contextlib.suppress(OSError):
+            self.date((self.head.clock0 or 0.0) + seconds)
+
+    @property
     def is_in_place(self) -> bool:
         """Whether its folder is the one it was: it may be removed, or its disk be another one."""
         return self._identity is not None and identity_of(self.folder) == self._identity

@@ -115,8 +115,8 @@ class Store:
         """End the run; the playlists become short."""
         try:
             self._finish()
-            with contextlib.suppress(OSError):  # it goes on from what was written last
-                self._clock.keep()
+            if self._lock is not None and is_at(self._lock, self.folder / _LOCK):
+                self._look_at_the_clock()
         finally:
             if self._lock is not None:
                 os.close(self._lock)
@@ -251,7 +251,7 @@ class Store:
 
         What cannot be taken away is tried again each time, and keeps nobody from recording.
         """
-        self._clock.look()
+        self._look_at_the_clock()
         runs = [*self.earlier, *([self.run] if self.run else [])]
         due = self._retention.due(runs)
         failed: OSError | None = None
@@ -271,6 +271,14 @@ class Store:
                 run.remove()
         self.earlier = [run for run in self.earlier if run.segments]
         self._closed_bytes = sum(run.size for run in runs)
+
+    def _look_at_the_clock(self) -> None:
+        """Count the time that the machine was off, if that is known now; what came since is no older by it."""
+        anchored = self._clock.anchored
+        if (away := self._clock.look()) > 0:
+            for run in (*self.earlier, *([self.run] if self.run else [])):
+                if run is self.run or run.begun >= anchored:
+                    run.put_off(away)
         with contextlib.suppress(OSError):  # it goes on from what was written last
             self._clock.keep()
 
