@@ -30,8 +30,8 @@ from server.wire.private_files import make_private_folder, open_private
 
 log = logging.getLogger(__name__)
 
-_FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
-"""What a disk says that has no room; after anything else a run is not gone on with."""
+_NOT_THE_RUNS = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EMFILE, errno.ENFILE, errno.ENOMEM}
+"""No room, no more files, no memory: another folder has no more of it. After anything else a run is left."""
 _LOCK = ".lock"
 _MEGA = 1_000_000
 _MACHINE = MachineClocks()
@@ -91,7 +91,7 @@ class Store:
         try:
             self._put(piece, head, headers)
         except OSError as error:
-            if error.errno in _FULL:
+            if error.errno in _NOT_THE_RUNS:
                 raise
             self._leave(error.strerror or str(error))
             self._hold_folder()
@@ -229,6 +229,7 @@ class Store:
         if self.run is not None:
             self.earlier = [*self.earlier, self.run]
         self.run, self._end = begun, first
+        self._closed_bytes = sum(run.size for run in self.earlier)
 
     def _is_full(self, segment: Segment, first: int) -> bool:
         run = self.run
@@ -273,7 +274,7 @@ class Store:
         self._closed_bytes = sum(run.size for run in runs)
 
     def _look_at_the_clock(self) -> None:
-        """Count the time that the machine was off, if that is known now; what came since is no older by it."""
+        """Count the time that the machine was off, if it is known now; what came since is no older by it."""
         anchored = self._clock.anchored
         if (away := self._clock.look()) > 0:
             for run in (*self.earlier, *([self.run] if self.run else [])):
