@@ -51,7 +51,12 @@ class Runs(Scripts):
         (self._run,) = (self._path / "kept").glob("2*")
         files = sorted(it for it in self._run.rglob("*") if it.is_file())
         self._right = {str(it.relative_to(self._run)): it.read_bytes() for it in files}
-        when = {"began": _PULSE0, "numbers_since": _PULSE0, "clock0": 1.0}  # inputs are the same in every run
+        when = {
+            "began": _PULSE0,
+            "numbers_since": _PULSE0,
+            "clock": "",
+            "clock0": 1.0,
+        }  # inputs are the same in every run
         self._right[HEAD] = as_json({**msgspec.json.decode(self._right[HEAD]), **when})
         self._kinds = {it.suffix: [name for name in self._right if name.endswith(it.suffix)] for it in files}
         self._restore()

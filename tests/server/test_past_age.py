@@ -21,8 +21,8 @@ BOUNDS = Bounds(keep_s=KEEP_S, most_mb=1e6, segment_s=0.2)
 STEP_S = GOP / FPS
 TRIAL_S = 600.0
 YEAR_S = 365 * 86_400.0
-PARTLY = '{"seconds": -5}'
-ENDLESS = '{"seconds": 1e300, "boot": "", "steady": 0, "origin": null}'
+PARTLY = '{"id": "x", "seconds": -5}'
+ENDLESS = '{"id": "x", "seconds": 1e300, "boot": "", "steady": 0, "origin": null}'
 
 
 @pytest.fixture
@@ -271,7 +271,7 @@ def test_recordings_of_an_earlier_version_are_dated_once(tmp_path: Path, clocks:
     (tmp_path / "clock.json").unlink()
     (path,) = tmp_path.glob("*/run.json")
     told = json.loads(path.read_bytes())
-    del told["clock0"]
+    del told["clock0"], told["clock"]
     path.write_text(json.dumps(told))
     for index in path.parent.glob("index/*"):
         os.utime(index, (clocks.wall, clocks.wall))
@@ -291,8 +291,25 @@ def test_a_damaged_ledger_takes_nothing_away(tmp_path: Path, clocks: ClocksByHan
     assert kept(tmp_path) == list(range(10))
     clocks.now += KEEP_S - 4.5 * STEP_S
     records(store, clocks, range(10, 11))
-    assert kept(tmp_path) == list(range(5, 11)), "it gets as old as by its pulses"
+    assert kept(tmp_path) == list(range(5, 11)), "its end is new, and gets old"
     store.close()
+
+
+@pytest.mark.parametrize("clock0", [1e9, -1e9])
+def test_a_run_of_another_clock_takes_no_other_one_away_and_is_not_kept_for_ever(
+    tmp_path: Path, clocks: ClocksByHand, clock0: float
+) -> None:
+    recorded(tmp_path, clocks, 5)
+    (path,) = tmp_path.glob("*/run.json")
+    path.write_text(json.dumps({**json.loads(path.read_bytes()), "clock": "another", "clock0": clock0}))
+    clocks.now += 1.0
+    store = opened(tmp_path, clocks)
+    records(store, clocks, range(10, 15))
+    store.close()
+    assert kept(tmp_path) == [*range(5), *range(10, 15)]
+    clocks.now += KEEP_S + 1.0
+    opened(tmp_path, clocks).close()
+    assert kept(tmp_path) == []
 
 
 def test_what_a_pass_takes_away_is_told_seldom_and_says_why(

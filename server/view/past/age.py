@@ -19,6 +19,7 @@ from __future__ import annotations
 import logging
 import math
 import time
+import uuid
 from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -75,6 +76,8 @@ class MachineClocks:
 class Ledger(msgspec.Struct, frozen=True, kw_only=True):
     """What ``clock.json`` says: the recording's clock, and the machine's clocks at that moment."""
 
+    id: Annotated[str, msgspec.Meta(min_length=1, max_length=64)]
+    """Of this clock: another one says nothing about what was recorded by this one."""
     seconds: Annotated[float, msgspec.Meta(ge=0, le=1e12)]
     """The recording's clock."""
     boot: str
@@ -89,6 +92,7 @@ class AgeClock:
     """The clock of a recording: what was written when it said *a* is older by *b - a* when it says *b*."""
 
     def __init__(self, folder: Path, machine: MachineClocks, *, trusted: bool) -> None:
+        self.id = ""
         self._path, self._machine, self._trusted = folder / LEDGER, machine, trusted
         self._seconds, self._at = 0.0, machine.steady()
         self._origin: float | None = None
@@ -101,14 +105,16 @@ class AgeClock:
         """Whether the machine's clock was right and went beside this one when it was looked at last."""
         self._told = ""
 
-    def open(self, least: float) -> None:
-        """Go on from what the ledger says; where there is none, from now, or ``least`` if that is later."""
+    def open(self) -> None:
+        """Go on from what the ledger says; where there is none another clock begins."""
         machine, steady = self._machine, self._machine.steady()
         try:
             ledger = msgspec.json.decode(self._path.read_bytes(), type=Ledger)
         except (OSError, *UNREADABLE):
-            self._seconds, self._at = max(self.now, least), steady
+            self.id = uuid.uuid4().hex
+            self._seconds, self._at, self._origin, self.anchored = 0.0, steady, None, 0.0
             return
+        self.id = ledger.id
         self._seconds, self._at = ledger.seconds, steady
         self._origin, self.anchored = ledger.origin, ledger.anchored
         if ledger.boot and ledger.boot == machine.boot():
@@ -168,6 +174,7 @@ class AgeClock:
         """
         machine = self._machine
         ledger = Ledger(
+            id=self.id,
             seconds=self.now,
             boot=machine.boot(),
             steady=machine.steady(),

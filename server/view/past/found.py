@@ -48,13 +48,17 @@ def find_runs(folder: Path, known: Collection[Path], longest_s: float) -> list[R
 
 
 def date(run: Run, clock: AgeClock) -> None:
-    """Say when a run was by the recording's clock, which an earlier version did not write down."""
+    """Say when a run went by the recording's clock that went by another one, or by none.
+
+    So does what an earlier version has recorded, and a recording that is put back into another folder. Its age
+    is that of its files if the machine's clock is right; else nobody knows it, and it is new.
+    """
     age = 0.0
     if clock.is_right:
         written = [_written(run.index_file(it.first)) for it in run.segments]
         age = max(0.0, clock.wall() - max(written, default=0.0))
     with contextlib.suppress(OSError):  # then it is dated again next time
-        run.date(clock.now - age - run.end / run.head.fps)
+        run.date(clock.id, clock.now - age - run.end / run.head.fps)
 
 
 def _tidy(folder: Path) -> None:

@@ -59,8 +59,10 @@ class RunHead(msgspec.Struct, frozen=True, kw_only=True):
     """When pulse 0 was due, unix seconds; null where it is not known."""
     numbers_since: float | None = None
     """When people's numbers began, unix seconds: in runs of the same time they are the same people's."""
-    clock0: Annotated[float, msgspec.Meta(ge=-_LONGEST_S, le=_LONGEST_S)] | None = None
-    """What the recording's own clock (:mod:`server.view.past.age`) said at pulse 0; null: it had none yet."""
+    clock: str = ""
+    """The id of the recording's own clock (:mod:`server.view.past.age`), by which it gets old."""
+    clock0: Annotated[float, msgspec.Meta(ge=-_LONGEST_S, le=_LONGEST_S)] = 0.0
+    """What that said at pulse 0."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,13 +125,13 @@ class Run:
         """
         self._write_head(msgspec.structs.replace(self.head, numbers_since=since))
 
-    def date(self, clock0: float) -> None:
-        """Note what the recording's clock said at pulse 0, where nobody had.
+    def date(self, clock: str, clock0: float) -> None:
+        """Note what the recording's clock of this id said at pulse 0.
 
         Raises:
             OSError: the disk does not take it.
         """
-        self.head = msgspec.structs.replace(self.head, clock0=clock0)
+        self.head = msgspec.structs.replace(self.head, clock=clock, clock0=clock0)
         self._write_head(self.head)
 
     def _write_head(self, head: RunHead) -> None:
@@ -184,8 +186,6 @@ class Run:
 
     def stamp(self, now: float) -> None:
         """Say when segments were written, by when their pulses were; nothing was after ``now``."""
-        if self.head.clock0 is None:
-            return
         ends = [*(it.first for it in self.segments[1:]), self.end]
         for segment, end in zip(self.segments, ends, strict=True):
             segment.written = min(now, self.head.clock0 + end / self.head.fps)
@@ -194,14 +194,14 @@ class Run:
     def begun(self) -> float:
         """When what is left of it begins, by the recording's own clock."""
         first = self.segments[0].first if self.segments else self.end
-        return (self.head.clock0 or 0.0) + first / self.head.fps
+        return self.head.clock0 + first / self.head.fps
 
     def put_off(self, seconds: float) -> None:
         """Say that all of it was so much later by the recording's clock, if the disk takes that."""
         for segment in self.segments:
             segment.written += seconds
         with contextlib.suppress(OSError):
-            self.date((self.head.clock0 or 0.0) + seconds)
+            self.date(self.head.clock, self.head.clock0 + seconds)
 
     @property
     def is_in_place(self) -> bool:
@@ -326,7 +326,8 @@ class Run:
         for first in sorted(files):
             try:
                 for path in self.files(first):
-                    path.unlink(missing_ok=True)
+                    with contextlib.suppress(*MISSING):
+                        path.unlink()
             except OSError as error:
                 kept.add(first)
                 failed = error

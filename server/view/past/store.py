@@ -150,10 +150,9 @@ class Store:
         known = {run.folder for run in (*runs, current) if run is not None}
         found = find_runs(self.folder, known, self._bounds.segment_s)
         if not known:  # else it is their clock that goes
-            dated = [it.head.clock0 + it.end / it.head.fps for it in found if it.head.clock0 is not None]
-            self._clock.open(max(dated, default=0.0))
+            self._clock.open()
         for run in found:
-            if run.head.clock0 is None:
+            if run.head.clock != self._clock.id:
                 date(run, self._clock)
             run.stamp(self._clock.now)
         self.earlier = sorted(
@@ -198,7 +197,8 @@ class Store:
     def _put(self, piece: Piece, head: RunHead, headers: Headers) -> None:
         first, now = piece.choices.first, self._clock.now
         if self._begins(first):
-            self._begin(msgspec.structs.replace(head, clock0=now - first / head.fps), headers, first)
+            dated = msgspec.structs.replace(head, clock=self._clock.id, clock0=now - first / head.fps)
+            self._begin(dated, headers, first)
         run = self.run
         assert run is not None  # noqa: S101 — it has begun
         if run.head.numbers_since != head.numbers_since:
