@@ -50,8 +50,8 @@ def find_runs(folder: Path, known: Collection[Path], longest_s: float) -> list[R
 def date(run: Run, clock: AgeClock) -> None:
     """Say when a run went by the recording's clock that went by another one, or by none.
 
-    So does what an earlier version has recorded, and a recording that is put back into another folder. Its age
-    is that of its files if the machine's clock is right; else nobody knows it, and it is new.
+    So does what an earlier version has recorded, and a recording that is put back into another folder. Its
+    age is that of its files if the machine's clock is right; else nobody knows it, and it is new.
     """
     age = 0.0
     if clock.is_right:

@@ -92,6 +92,7 @@ class Run:
     def __init__(self, folder: Path, head: RunHead, headers: Headers, longest_s: float) -> None:
         self.folder, self.head, self.headers = folder, head, headers
         self._identity = identity_of(folder)
+        self._head_bytes = file_size(folder / HEAD)
         self._longest_s = longest_s
         self.segments: list[Segment] = []
         self.objects: dict[int, Playlist] = {}
@@ -143,7 +144,7 @@ class Run:
             with contextlib.suppress(OSError):
                 draft.unlink(missing_ok=True)
             raise
-        self.head = head
+        self.head, self._head_bytes = head, len(_text(head))
 
     @classmethod
     def found(cls, folder: Path, longest_s: float) -> Run:
@@ -212,7 +213,7 @@ class Run:
     def is_there(self) -> bool:
         """Whether it is in place, and whoever begins will find it."""
         try:
-            return self.is_in_place and (self.folder / HEAD).stat().st_size == len(_text(self.head))
+            return self.is_in_place and (self.folder / HEAD).stat().st_size == self._head_bytes
         except MISSING:
             return False
         except OSError:
