@@ -17,8 +17,8 @@ from benchmarks.fuzz.target import Scripts, folder
 from server.view.past.kept import kept_from, kept_until, known, shown
 from server.view.past.past import Past
 from server.view.past.play import CameraPast, ObjectPast, Source, last_before, play, sounds
+from server.view.past.retention import Bounds, Retention
 from server.view.past.run import HEAD
-from server.view.past.store import Bounds
 from server.view.past.told import told
 
 WORDS = (
@@ -51,7 +51,12 @@ class Runs(Scripts):
         (self._run,) = (self._path / "kept").glob("2*")
         files = sorted(it for it in self._run.rglob("*") if it.is_file())
         self._right = {str(it.relative_to(self._run)): it.read_bytes() for it in files}
-        when = {"began": _PULSE0, "numbers_since": _PULSE0}  # inputs are the same in every run
+        when = {
+            "began": _PULSE0,
+            "numbers_since": _PULSE0,
+            "clock": "",
+            "clock0": 1.0,
+        }  # inputs are the same in every run
         self._right[HEAD] = as_json({**msgspec.json.decode(self._right[HEAD]), **when})
         self._kinds = {it.suffix: [name for name in self._right if name.endswith(it.suffix)] for it in files}
         self._restore()
@@ -107,7 +112,9 @@ class Runs(Scripts):
             if drops:
                 size = sum(run.size for run in (*store.earlier, *([store.run] if store.run else [])))
                 for bounds in (Bounds(_LONG_S, (size - 1) * 8 / 7 / 1e6, 60.0), Bounds(-_LONG_S, 1e6, 60.0)):
-                    store._bounds = bounds  # the oldest segment goes, then all
+                    store._retention = Retention(
+                        bounds, lambda: store._clock.now
+                    )  # the oldest segment goes, then all
                     store._retain()
                 assert self._precious.exists(), "what is not recorded was taken away"
         finally:

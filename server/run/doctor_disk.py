@@ -12,6 +12,7 @@ from pathlib import Path
 from server.run.doctor_findings import Finding, bad, ok, warning
 from server.run.doctor_probe import Probe
 from server.wire.config import Config
+from server.wire.private_files import rights_of_others
 
 _INDEX_BYTES = 100
 """A frame of a camera, beside its picture: docs/operating.md, "Recording"."""
@@ -30,8 +31,18 @@ def disk_findings(config: Config, probes: Mapping[str, Probe]) -> list[Finding]:
     except OSError as error:
         text = f"{_place(folder, error)}: cannot write there: {error.strerror}"
         return [bad("record.folder", text, "another folder, or let this user write there")]
-    found = [ok("record.folder", f"{folder} can be written")]
+    found = [_writable(folder)]
     return found + _sizes(config, probes, shutil.disk_usage(there).free / 1e6, _held_bytes(folder) / 1e6)
+
+
+def _writable(folder: Path) -> Finding:
+    """Say that a folder can be written, and whether others may look into it: what is made in it is closed."""
+    text = f"{folder} can be written"
+    with suppress(OSError):  # it is not there yet, and is made for one user alone
+        if mode := rights_of_others(folder):
+            text += f", but has mode {mode}: others on this machine may see when it was recorded, not what"
+            return warning("record.folder", text, f"chmod 700 {folder}")
+    return ok("record.folder", text)
 
 
 def _sizes(config: Config, probes: Mapping[str, Probe], free: float, held: float) -> list[Finding]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import ctypes
 import time
 from collections.abc import Mapping
 from pathlib import Path
@@ -15,11 +14,8 @@ from server.run.doctor_probe import Probe
 from server.run.processors import processors
 from server.wire.config import Config
 from server.wire.descriptors import places
+from server.wire.kept_clock import clock_is_kept
 
-_TIME_ERROR = 5
-"""What adjtimex(2) returns where nobody keeps the clock."""
-_TIMEX_BYTES = 512
-"""More than struct timex has."""
 _FAR_S = 1.0
 _ANSWER_S = 2.0
 _SERVICE_CORES = 0.3
@@ -32,7 +28,7 @@ _PROCESS_MB = 250
 
 async def clock_findings(config: Config) -> list[Finding]:
     """Say whether somebody keeps this machine's clock, and how far it is from the pulse server's."""
-    found = [_kept()]
+    found = [_kept(config)]
     offset = await _offset(config.sync.host, config.sync.port)
     if offset is None:
         found.append(ok("pulse server", "is not running: its clock cannot be compared"))
@@ -99,18 +95,17 @@ def available_mb() -> float | None:
     return None if kilobytes is None else int(kilobytes) * 1024 / 1e6
 
 
-def _kept() -> Finding:
-    try:
-        state = ctypes.CDLL(None).adjtimex(ctypes.create_string_buffer(_TIMEX_BYTES))
-    except (OSError, AttributeError):
-        state = -1
-    if state < 0:
+def _kept(config: Config) -> Finding:
+    kept = clock_is_kept()
+    if kept is None:
         return ok("clock", "the system does not say whether it is kept by NTP")
-    if state == _TIME_ERROR:
-        return warning(
-            "clock", "nobody keeps it right (NTP)", "timedatectl set-ntp true, or chrony; frames do not mind"
-        )
-    return ok("clock", "is kept right (NTP)")
+    if kept:
+        return ok("clock", "is kept right (NTP)")
+    text, do = "nobody keeps it right (NTP)", "timedatectl set-ntp true, or chrony; frames do not mind"
+    if config.record.folder is not None and not config.record.trust_clock:
+        text += ": what is recorded does not get older while this machine is off"
+        do += ". Where the clock goes on by itself: record.trust_clock: true"
+    return warning("clock", text, do)
 
 
 async def _offset(host: str, port: int) -> float | None:

@@ -50,7 +50,9 @@ def picture(now: SiteNow, rates: Rates, notice: str = "") -> RenderableType:
 def _head(now: SiteNow) -> Text:
     at = datetime.fromtimestamp(now.now, UTC).strftime("%H:%M:%S UTC")
     pulse = "no pulse" if now.pulse is None else f"pulse {now.pulse}"
-    ready = ("ready", "green") if now.ready else (f"not ready: {printable(now.why)}", "red")
+    ready = (f"ready: {printable(now.why)}", "green")
+    if not now.ready:
+        ready = (f"not ready: {printable(now.why)}", "red")
     return Text.assemble((printable(now.name), "bold"), f"  {at}  {pulse}  ", ready)
 
 

@@ -13,6 +13,7 @@ from server.view.choice.decide import GopDecision
 from server.view.whole_files import WholeFiles
 from server.wire.fit import Fit
 from server.wire.messages import NumberedBox
+from server.wire.private_files import make_private_folder
 from tracking.motchallenge import MotRow, format_row
 
 CHOICES_HEAD = "frame,object,camera\n"
@@ -31,20 +32,25 @@ class Recorder:
     writes for the same recordings.
     """
 
-    def __init__(self, folder: Path, cameras: Sequence[str], fits: Mapping[str, Fit]) -> None:
-        """Begin new files in a folder, which may exist.
+    def __init__(
+        self, folder: Path, cameras: Sequence[str], fits: Mapping[str, Fit], *, private: bool = False
+    ) -> None:
+        """Begin new files in a folder, which may exist; ``private``: for this user alone.
 
         Raises:
             OSError: one cannot be written.
         """
         self._fits = fits
-        (folder / "tracks").mkdir(parents=True, exist_ok=True)
+        if private:
+            make_private_folder(folder / "tracks")
+        else:
+            (folder / "tracks").mkdir(parents=True, exist_ok=True)
         self._tracks = {camera: folder / "tracks" / f"{camera}.txt" for camera in cameras}
         self._choices = folder / "choices.csv"
         self._corrections = folder / "corrections.csv"
         self._late = folder / "late.csv"
         heads = {self._choices: CHOICES_HEAD, self._corrections: CORRECTIONS_HEAD, self._late: LATE_HEAD}
-        self._files = WholeFiles(dict.fromkeys(self._tracks.values(), "") | heads)
+        self._files = WholeFiles(dict.fromkeys(self._tracks.values(), "") | heads, private=private)
 
     def write(self, decision: GopDecision, late: Sequence[str] = ()) -> None:
         """Write a decision, and rows of ``late.csv``.

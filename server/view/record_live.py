@@ -35,13 +35,13 @@ class LiveRecorder:
     """
 
     def __init__(self, folder: Path, cameras: Sequence[str], fits: Mapping[str, Fit]) -> None:
-        """Begin new files in a folder, which may exist.
+        """Begin new files, for this user alone, in a folder, which may exist.
 
         Raises:
             OSError: one cannot be written.
         """
         self._folder = folder
-        self._recorder = Recorder(folder, cameras, fits)
+        self._recorder = Recorder(folder, cameras, fits, private=True)
         self._late: list[_Late] = []
         self._missing = range(0)
         """Pulses of which nothing could be written, and ``late.csv`` does not say so yet."""

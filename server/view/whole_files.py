@@ -7,18 +7,21 @@ from collections.abc import Mapping
 from io import FileIO
 from pathlib import Path
 
+from server.wire.private_files import open_private
+
 
 class WholeFiles:
     """Files to which texts are appended: what is appended at once stands in all of them, or in none."""
 
-    def __init__(self, heads: Mapping[Path, str]) -> None:
-        """Begin new files with their heads, ASCII.
+    def __init__(self, heads: Mapping[Path, str], *, private: bool = False) -> None:
+        """Begin new files with their heads, ASCII; ``private``: for this user alone.
 
         Raises:
             OSError: one cannot be written.
         """
         with contextlib.ExitStack() as opened:
-            self._files = {it: opened.enter_context(FileIO(it, "w")) for it in heads}
+            opener = open_private if private else None
+            self._files = {it: opened.enter_context(FileIO(it, "w", opener=opener)) for it in heads}
             self.append(heads)
             self._opened = opened.pop_all()
 

@@ -126,7 +126,9 @@ async def get_ready(request: web.Request) -> web.Response:
     if reasons:
         return web.Response(text=f"{'; '.join(reasons)}\n", status=503)
     live = [camera for camera, state in service.intake.states.items() if state.word == "live"]
-    return web.Response(text=f"{len(live)} of {len(service.intake.states)} cameras\n")
+    writer = service.past.writer
+    stands = f"; nothing is recorded: {writer.stands}" if writer is not None and writer.stands else ""
+    return web.Response(text=f"{len(live)} of {len(service.intake.states)} cameras{stands}\n")
 
 
 @routes.get("/metrics")

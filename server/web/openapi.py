@@ -148,9 +148,9 @@ def _operation(path: str, summary: str) -> dict[str, Any]:
         }
         responses["403"] = {"description": "The token is not for this.", "content": error}
         responses["429"] = {"description": "Too many wrong tokens; try again later.", "content": error}
-    if path in PAST - {"/api/past"}:
+    if path in PAST | OPERATOR_FILES.keys():
         responses["416"] = {"description": "Nothing is kept of that time.", "content": error}
-    if path in _UNAVAILABLE | _OF_PEOPLE or "object" in names:
+    if path in _UNAVAILABLE | _OF_PEOPLE | _SPANS or "object" in names:
         responses["503"] = {"description": "Not now; try again later."}
     parameters = [{"name": name, "in": "path", "required": True, "schema": _SCHEMAS[name]} for name in names]
     queries = ["prefer"] * (path in HELD)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import AsyncIterator, Callable
 from contextlib import aclosing
 
 from aiohttp import web
 
+from server.view.past.disk import from_disk
+from server.view.past.gone import forget_all_gone, forget_gone
 from server.view.past.hearing import Hearing
 from server.view.past.kept import kept_from, known, shown
 from server.view.past.moment import MomentError, moment_of, pulse_at
@@ -44,8 +46,11 @@ async def best_of_the_past(request: web.Request, form: Form) -> web.StreamRespon
     def live() -> Channel | None:
         return service.splicer.objects.get(service.board.resolve(number))
 
-    if live() is None and kept_from(source, 0) is None:
-        return no_object(service, number)
+    if live() is None:
+        if (unread := await unreadable(source, 0)) is not None:
+            return unread
+        if kept_from(source, 0) is None:
+            return no_object(service, number)
 
     def named() -> str:
         return of_person(service.board.resolve(number))
@@ -73,9 +78,11 @@ async def getobject_past(request: web.Request) -> web.Response:
     service = request.app[SERVICE]
     number = int(request.match_info["object"])
     source = object_past(service, number)
+    if (unread := await unreadable(source, 0)) is not None:
+        return unread
     if kept_from(source, 0) is None:
         return problem(404, f"nothing is kept of object {number}")
-    return _past(request, source)
+    return await _past(request, source)
 
 
 @routes.get("/api/cameras/{camera}/past")
@@ -85,7 +92,7 @@ async def get_camera_past(request: web.Request) -> web.Response:
     camera = request.match_info["camera"]
     if camera not in service.shelves:
         return no_camera(service, camera)
-    return _past(request, CameraPast(service.past, camera))
+    return await _past(request, CameraPast(service.past, camera))
 
 
 @routes.get("/api/past")
@@ -98,7 +105,11 @@ async def get_told(request: web.Request) -> web.StreamResponse:
         return problem(400, str(error))
     end = service.past.recent.end if wish.end is None else wish.end
     sees = request.app[ACCESS].grant(request).sees
-    lines = told_for(told(service.past, wish.start, end), sees, service.board.resolve)
+    kept = told(service.past, wish.start, end)
+    first = await anext(kept, None)
+    if first is None and (missing := nothing_said(service, wish)) is not None:
+        return missing
+    lines = told_for(led_by(first, kept), sees, service.board.resolve)
     full = no_ear(request)
     if full is not None:
         return full
@@ -144,14 +155,49 @@ def wish_of(
     return Wish(start, end)
 
 
-def nothing_kept(source: Source, wish: Wish, what: str) -> web.Response | None:
+async def unreadable(source: Source, start: int, end: int | None = None) -> web.Response | None:
+    """Forget what has gone from the disk where a time begins and ends; say so where nobody can tell."""
+    try:
+        await from_disk(forget_gone, source, start, end)
+    except OSError as error:
+        return _unread(error)
+    return None
+
+
+async def nothing_kept(source: Source, wish: Wish, what: str) -> web.Response | None:
     """Say that nothing is kept of the time that somebody wants to see, and what is; None: something is."""
+    if (unread := await unreadable(source, wish.start, wish.end)) is not None:
+        return unread
     first = kept_from(source, wish.start)
     if first is not None and (wish.end is None or first < wish.end):
         return None
+    try:
+        await from_disk(forget_all_gone, source, 0, sys.maxsize)
+    except OSError as error:
+        return _unread(error)
     there = known(source)
     kept = ", ".join(f"p{it.first} to p{it.end - 1}" for it in there) or "nothing"
     return problem(416, f"of {what} nothing is kept from p{wish.start} on; there is {kept}")
+
+
+def nothing_said(service: BestViewService, wish: Wish) -> web.Response | None:
+    """Say that of a time nothing is kept that was said about it; None: nothing has been said yet."""
+    if wish.start >= service.past.recent.end:
+        return None
+    end = "on" if wish.end is None else f"to p{wish.end - 1}"
+    return problem(416, f"nothing is kept of what was said from p{wish.start} {end}")
+
+
+async def led_by(first: bytes | None, lines: AsyncIterator[bytes]) -> AsyncIterator[bytes]:
+    """Give a line, where there is one, and then others."""
+    if first is not None:
+        yield first
+    async for line in lines:
+        yield line
+
+
+def _unread(error: OSError) -> web.Response:
+    return not_now(f"what is recorded cannot be read: {error.strerror or error}")
 
 
 def new_timeline(service: BestViewService) -> Timeline:
@@ -178,7 +224,7 @@ async def _stream(
         wish = wish_of(request, service, source.end)
     except MomentError as error:
         return problem(400, str(error))
-    missing = nothing_kept(source, wish, what)
+    missing = await nothing_kept(source, wish, what)
     if missing is not None:
         return missing
     full = no_place(request)
@@ -206,7 +252,7 @@ async def _stream(
             past.viewers -= counted
 
 
-def _past(request: web.Request, source: Source) -> web.Response:
+async def _past(request: web.Request, source: Source) -> web.Response:
     service = request.app[SERVICE]
     fps, pulse0 = service.config.site.fps, service.pulse0
     try:
@@ -214,6 +260,10 @@ def _past(request: web.Request, source: Source) -> web.Response:
     except MomentError as error:
         return problem(400, str(error))
     end = sys.maxsize if wish.end is None else wish.end
+    try:
+        await from_disk(forget_all_gone, source, wish.start, end)
+    except OSError as error:
+        return _unread(error)
     spans = [
         PastSpan(
             it.first, it.end - it.first, moment_of(it.first, fps, pulse0), moment_of(it.end, fps, pulse0)

@@ -22,9 +22,10 @@ from server.view.media.agreement import Agreement
 from server.view.media.mp4_sound import sound_fragment
 from server.view.media.skip import UnfitError, continuing
 from server.view.past.playlist import Playlist
+from server.view.past.retention import Bounds
 from server.view.past.run import Headers, Run, RunHead
 from server.view.past.sounds import frames_in
-from server.view.past.store import Bounds, Store
+from server.view.past.store import Store
 from server.web.app import make_app, serving
 from server.wire.errors import UserError
 from server.wire.h264 import ParameterSets, nal_units, parameter_sets
@@ -206,6 +207,7 @@ def test_a_recorded_run_whose_cameras_no_site_has_is_left_alone(tmp_path: Path, 
         site="hall", fps=25.0, width=64, height=48, codec="avc1", cameras=["c0"], began=0.0, pulse0=0.0
     )
     run = tmp_path / "kept" / "20260101T000000Z"
+    run.parent.mkdir()
     Run.begin(run, head, Headers(b""), 60.0)
     (run / "index" / "000000000000.jsonl").write_bytes(b"")
     told = json.loads((run / "run.json").read_bytes())

@@ -14,9 +14,11 @@ from numpy.typing import NDArray
 
 from server.view.media.agreement import Agreement
 from server.view.media.fmp4 import init_segment
+from server.view.past.age import MachineClocks
 from server.view.past.media import Gop, _fragments
+from server.view.past.retention import Bounds
 from server.view.past.run import Headers, RunHead
-from server.view.past.store import Bounds, Piece, Store
+from server.view.past.store import Piece, Store
 from server.view.streams.shelf import Shelf
 from server.wire.messages import GopChoices
 
@@ -27,6 +29,38 @@ AMPLE = Bounds(keep_s=1e6, most_mb=1e6, segment_s=1.0)
 """Nothing is taken away; five GOPs in a segment."""
 
 Picture = NDArray[np.uint8]
+
+
+class ClocksByHand:
+    """A machine's clocks as a test says. They stand still until :attr:`now` is set: then time passes."""
+
+    def __init__(self, now: float = PULSE0) -> None:
+        self.wall, self.steady = now, 1000.0
+        self.boot = "first"
+        self.is_kept = True
+        self.machine = MachineClocks(
+            lambda: self.wall, lambda: self.steady, lambda: self.boot, lambda: self.is_kept
+        )
+
+    @property
+    def now(self) -> float:
+        return self.wall
+
+    @now.setter
+    def now(self, now: float) -> None:
+        self.steady += now - self.wall
+        self.wall = now
+
+    def jump(self, seconds: float) -> None:
+        """Set the clock, as somebody does by hand: nobody keeps it any more."""
+        self.wall += seconds
+        self.is_kept = False
+
+    def off(self, seconds: float, *, wrong_by: float = 0.0) -> None:
+        """Switch the machine off for a while; when it is on again its clock is wrong by so much."""
+        self.wall += seconds + wrong_by
+        self.steady = 10.0
+        self.boot += " and the next"
 
 
 @cache

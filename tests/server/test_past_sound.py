@@ -14,7 +14,7 @@ from halls import A, Hall, opened
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from programs import needs_ffprobe
-from recorded_by_hand import AMPLE, PULSE0, head, piece
+from recorded_by_hand import AMPLE, PULSE0, ClocksByHand, head, piece
 from sounds_by_hand import (
     BEEPS,
     FRAMES,
@@ -33,9 +33,10 @@ from test_ts import check_counters, taken_apart
 from server.view.choice.decide import GopDecision, ObjectChoice
 from server.view.media.heard import Heard
 from server.view.media.mp4_sound import sound_fragment
+from server.view.past.retention import Bounds
 from server.view.past.run import Headers
 from server.view.past.sounds import frames_in
-from server.view.past.store import Bounds, Piece, Store
+from server.view.past.store import Piece, Store
 from server.wire.aac import SAMPLES as FRAME
 from server.wire.messages import GopChoices
 from server.wire.sound import SoundFormat
@@ -201,11 +202,11 @@ async def test_the_sound_of_an_earlier_run_is_heard_after_a_restart(recording: P
 
 
 async def test_sound_goes_with_the_segments_it_is_of(tmp_path: Path) -> None:
-    now = [PULSE0]
-    store = Store(tmp_path, Bounds(keep_s=2.0, most_mb=1e6, segment_s=0.4), lambda: now[0])
+    clocks = ClocksByHand()
+    store = Store(tmp_path, Bounds(keep_s=2.0, most_mb=1e6, segment_s=0.4), clocks.machine)
     store.open()
     for gop in range(GOPS):
-        now[0] = PULSE0 + gop * GOP / FPS
+        clocks.now = PULSE0 + gop * GOP / FPS
         it = piece(gop, {1: A})
         begin, end = (FORM.frame_at(pulse, FPS) for pulse in (gop * GOP, (gop + 1) * GOP))
         heard = Heard(begin, tuple(bytes([number % 251]) * 9 for number in range(begin, end)), FORM)

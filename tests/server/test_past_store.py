@@ -13,12 +13,25 @@ from cameras_by_hand import FPS, GOP
 from decoded import decodes_without_errors
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from recorded_by_hand import AMPLE, PULSE0, A, B, filled, head, own_pictures, pictures, piece, written
+from recorded_by_hand import (
+    AMPLE,
+    PULSE0,
+    A,
+    B,
+    ClocksByHand,
+    filled,
+    head,
+    own_pictures,
+    pictures,
+    piece,
+    written,
+)
 from small_disk import files_of_at_most
 
 from server.view.past.media import CameraFile, gops
+from server.view.past.retention import Bounds
 from server.view.past.run import Headers
-from server.view.past.store import Bounds, Store
+from server.view.past.store import Store
 
 
 def only_run(folder: Path) -> Path:
@@ -142,11 +155,11 @@ def test_two_processes_do_not_record_into_one_folder(tmp_path: Path) -> None:
 
 
 def test_what_is_too_old_goes_in_whole_segments_with_what_refers_to_it(tmp_path: Path) -> None:
-    now = [PULSE0]
-    store = Store(tmp_path, Bounds(keep_s=3.0, most_mb=1e6, segment_s=1.0), lambda: now[0])
+    clocks = ClocksByHand()
+    store = Store(tmp_path, Bounds(keep_s=3.0, most_mb=1e6, segment_s=1.0), clocks.machine)
     store.open()
     for gop in range(40):
-        now[0] = PULSE0 + gop * GOP / FPS
+        clocks.now = PULSE0 + gop * GOP / FPS
         store.write(piece(gop, {1: A, 2 if gop < 10 else 3: B}), head(), Headers(filled()[1]))
     store.close()
     run = store.run

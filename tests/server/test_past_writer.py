@@ -116,6 +116,21 @@ def until(condition: Callable[[], bool]) -> None:
         threading.Event().wait(0.001)
 
 
+def test_a_disk_that_does_not_answer_is_told_of() -> None:
+    disk = Disk()
+    disk.open.clear()
+    writer = writer_on(disk)
+    writer.put(piece(0, {1: A}))
+    assert disk.asked.acquire(timeout=PATIENCE)
+    assert writer._since is not None
+    writer._since -= 1000.0
+    assert writer.stands.startswith("the disk has not answered for 10")
+    disk.open.set()
+    until(lambda: writer.written == 1)
+    until(lambda: not writer.stands)
+    writer.close()
+
+
 def test_a_mistake_does_not_end_the_recording(caplog: pytest.LogCaptureFixture) -> None:
     class Mistaken(Disk):
         def write(self, it: Piece) -> None:

@@ -70,5 +70,5 @@ def _frames_of(
     path = recorded.run.sound_file(stretch.file)
     try:
         return frames_in(path, stretch.offset, stretch.length, begin, end, form)
-    except FileNotFoundError:  # retention has just taken it away
+    except OSError:  # retention has just taken it away, or it cannot be read: it is silent
         return {}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import struct
 from collections.abc import Callable, Generator, Iterator
@@ -12,6 +13,7 @@ from typing import BinaryIO
 from server.view.media.agreement import Agreement
 from server.view.media.picture import Picture
 from server.wire.drawing import TIMESCALE
+from server.wire.private_files import FOLDER, open_private
 
 _HEAD = 8
 """Bytes of a box's size and kind."""
@@ -60,9 +62,9 @@ class CameraFile:
     """
 
     def __init__(self, path: Path, header: bytes) -> None:
-        path.parent.mkdir(parents=True, exist_ok=True)
+        path.parent.mkdir(mode=FOLDER, exist_ok=True)  # that of the run is there, or was removed
         self._path, self._draft = path, path.with_suffix(".new")
-        self._handle = os.open(self._draft, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o666)
+        self._handle = open_private(self._draft, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
         self._is_empty = True
         self.size = 0
         try:
@@ -92,11 +94,32 @@ class CameraFile:
         self.size += len(data)
         return place
 
+    @property
+    def is_empty(self) -> bool:
+        """Whether there is no GOP in it yet."""
+        return self._is_empty
+
+    @property
+    def is_there(self) -> bool:
+        """Whether it is still where it was made: what is written to a file that was removed is lost."""
+        return is_at(self._handle, self._draft if self._is_empty else self._path)
+
     def close(self) -> None:
         """Close the file; without a GOP there is none."""
-        os.close(self._handle)
-        if self._is_empty:
-            self._draft.unlink(missing_ok=True)
+        try:
+            os.close(self._handle)
+        finally:
+            if self._is_empty:
+                with contextlib.suppress(OSError):  # its folder may be gone, or closed
+                    self._draft.unlink(missing_ok=True)
+
+
+def is_at(handle: int, path: Path) -> bool:
+    """Tell whether an open file is what a path leads to: it may have been removed, or be on another disk."""
+    try:
+        return os.path.samestat(os.fstat(handle), path.stat())
+    except (FileNotFoundError, NotADirectoryError):
+        return False
 
 
 def write_at(handle: int, data: bytes, offset: int) -> None:

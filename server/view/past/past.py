@@ -11,8 +11,9 @@ from server.view.media.agreement import Agreement
 from server.view.media.fmp4 import init_segment
 from server.view.media.mp4_sound import sound_init_segment
 from server.view.past.recent import Recent
+from server.view.past.retention import Bounds
 from server.view.past.run import Headers, Run, RunHead
-from server.view.past.store import Bounds, Piece, Store
+from server.view.past.store import Piece, Store
 from server.view.past.writer import Writer
 from server.view.streams.shelf import Shelf
 from server.view.streams.sound import SoundShelf
@@ -20,6 +21,7 @@ from server.wire.config import Config
 from server.wire.errors import UserError
 from server.wire.h264 import ParameterSets
 from server.wire.messages import GopChoices
+from server.wire.private_files import rights_of_others
 
 log = logging.getLogger(__name__)
 
@@ -55,10 +57,10 @@ class Past:
         self.store: Store | None = None
         self.writer: Writer | None = None
         if record.folder is not None:
-            bounds = Bounds(record.keep_s, record.most_mb, record.segment_s)
+            bounds = Bounds(record.keep_s, record.most_mb, record.segment_s, record.trust_clock)
             self.store = store = Store(record.folder, bounds)
             most = max(4, frames // config.encode.gop)  # no more than the shelves hold anyway
-            self.writer = Writer(self._write, store.abandon, store.close, most)
+            self.writer = Writer(self._write, store.abandon, store.close, most, where=str(record.folder))
 
     def open(self) -> None:
         """Begin to record, where that is configured.
@@ -78,6 +80,13 @@ class Past:
             ) from error
         self.writer.start()
         log.info("recording to %s", self.store.folder)
+        if mode := rights_of_others(self.store.folder):
+            log.warning(
+                "record.folder: %s has mode %s: others on this machine may see when it was recorded, "
+                "not what; chmod 700 closes it",
+                self.store.folder,
+                mode,
+            )
 
     def put(self, choices: GopChoices, pulse0: float | None, numbers_since: float | None = None) -> None:
         """Take a decision over, and since when pulses and people's numbers are these; never waits."""

@@ -197,8 +197,8 @@ async def _read(run: Run, stretch: Stretch, pulse: int) -> AsyncGenerator[Gop, N
 
 
 def _some(reading: Generator[Gop, None, None], pulse: int) -> list[Gop]:
-    """Read some GOPs that end after a pulse; none where there are no more."""
+    """Read some GOPs that end after a pulse; none where there are no more, or they cannot be read."""
     try:
         return list(islice((gop for gop in reading if gop.end > pulse), _AT_ONCE))
-    except FileNotFoundError:
+    except OSError:
         return []

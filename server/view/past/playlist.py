@@ -16,6 +16,7 @@ from pathlib import Path
 
 from server.view.past.media import write_at
 from server.view.past.stretch import Stretch, Tape
+from server.wire.private_files import write_private
 
 CAMERA = "[A-Za-z0-9][A-Za-z0-9_-]{0,31}"
 """What a camera is called (:data:`server.wire.sections.base.Name`); the folder of the sound is, too."""
@@ -73,25 +74,22 @@ class Playlist:
         if files:
             self.stale |= self.tape.drop(files)
 
+    def drop_pieces(self, gone: Collection[tuple[str, int]]) -> None:
+        """Forget what is in these cameras' files, likewise; any thread may say so."""
+        if gone and self.tape.drop_pieces(gone):
+            self.stale = True
+
     def append(self, stretch: Stretch) -> None:
         """Add to the file, then to what is known.
 
         Raises:
             OSError: the disk does not take it; file and memory are as before.
         """
-        if self._tail is None:
-            self._replace([*self.tape.all, stretch])
-        else:
-            entry = self._entry(stretch, self._end)
-            handle = os.open(self.path, os.O_WRONLY)
-            try:
-                write_at(handle, (entry + _END).encode(), self._tail)
-            except OSError:
-                self._tail = None  # it may be half there: written anew next time
-                raise
-            finally:
-                os.close(handle)
+        entry = self._entry(stretch, self._end)
+        if self._tail is not None and self._add(entry, self._tail):
             self._tail += len(entry.encode())
+        else:
+            self._replace(stretch)
         self.tape.add(stretch)
         self._end = stretch.end
 
@@ -101,15 +99,32 @@ class Playlist:
         Raises:
             OSError: the disk does not take it; the file is as before.
         """
-        stretches = self.tape.all
-        if stretches:
-            self._replace(stretches)
+        if self.tape.all:
+            self._replace()
         else:
             self.path.unlink(missing_ok=True)
             self._tail, self.stale = None, False
 
-    def _replace(self, stretches: Iterable[Stretch]) -> None:
-        stretches = list(stretches)
+    def _add(self, entry: str, tail: int) -> bool:
+        """Write an entry over the end line; tell whether the file is there, and is as it was left."""
+        try:
+            handle = os.open(self.path, os.O_WRONLY)
+        except FileNotFoundError:
+            return False
+        try:
+            if os.fstat(handle).st_size != tail + len(_END):
+                return False
+            write_at(handle, (entry + _END).encode(), tail)
+        except OSError:
+            self._tail = None  # it may be half there: written anew next time
+            raise
+        finally:
+            os.close(handle)
+        return True
+
+    def _replace(self, *added: Stretch) -> None:
+        self.stale = False  # before it is looked at what there is: more may be found gone meanwhile
+        stretches = [*self.tape.all, *added]
         longest = max([self._longest_s, *(it.frames / self._fps for it in stretches)])
         text = (
             "#EXTM3U\n#EXT-X-VERSION:7\n"
@@ -122,14 +137,15 @@ class Playlist:
             text += self._entry(stretch, end)
             end = stretch.end
         draft = self.path.with_suffix(".new")
-        self.path.parent.mkdir(parents=True, exist_ok=True)
         try:
-            draft.write_text(text + _END, encoding="utf-8", newline="\n")
+            write_private(draft, (text + _END).encode())
             draft.replace(self.path)
         except OSError:
-            draft.unlink(missing_ok=True)
+            self.stale = True
+            with contextlib.suppress(OSError):
+                draft.unlink(missing_ok=True)
             raise
-        self._tail, self.stale = len(text.encode()), False
+        self._tail = len(text.encode())
 
     def _entry(self, stretch: Stretch, end: int | None) -> str:
         hole = "" if end in (None, stretch.first) else "#EXT-X-DISCONTINUITY\n"

@@ -17,6 +17,7 @@ Pulses and people's numbers may begin anew when a service does; so every run has
 from __future__ import annotations
 
 import contextlib
+import os
 from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,12 +25,18 @@ from typing import Annotated
 
 import msgspec
 
+from server.view.past.files import MISSING, clear, file_size, identity_of, is_gone, media_sizes
 from server.view.past.playlist import CAMERA, Playlist, file_name
 from server.view.past.sounds import NAME as SOUND
+from server.view.past.stretch import Stretch
+from server.wire.private_files import FOLDER, write_private
 
 HEAD = "run.json"
 _HEADER = "init.mp4"
 
+
+_LONGEST_S = 1e12
+"""Beyond what any clock has counted: what says more was damaged."""
 
 Camera = Annotated[str, msgspec.Meta(pattern=rf"^{CAMERA}\Z")]
 """A camera's name is part of files' names: what was damaged leads nowhere else."""
@@ -52,6 +59,10 @@ class RunHead(msgspec.Struct, frozen=True, kw_only=True):
     """When pulse 0 was due, unix seconds; null where it is not known."""
     numbers_since: float | None = None
     """When people's numbers began, unix seconds: in runs of the same time they are the same people's."""
+    clock: str = ""
+    """The id of the recording's own clock (:mod:`server.view.past.age`), by which it gets old."""
+    clock0: Annotated[float, msgspec.Meta(ge=-_LONGEST_S, le=_LONGEST_S)] = 0.0
+    """What that said at pulse 0."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +81,9 @@ class Segment:
     first: int
     bytes: int
     written: float
-    """When something was last added, unix seconds."""
+    """When something was last added, by the recording's own clock."""
+    is_stuck: bool = False
+    """Some of its files could not be taken away when they should have been."""
 
 
 class Run:
@@ -78,6 +91,8 @@ class Run:
 
     def __init__(self, folder: Path, head: RunHead, headers: Headers, longest_s: float) -> None:
         self.folder, self.head, self.headers = folder, head, headers
+        self._identity = identity_of(folder)
+        self._head_bytes = file_size(folder / HEAD)
         self._longest_s = longest_s
         self.segments: list[Segment] = []
         self.objects: dict[int, Playlist] = {}
@@ -93,13 +108,14 @@ class Run:
         Raises:
             OSError: it cannot be made.
         """
+        folder.mkdir(mode=FOLDER)  # the one around it is the store's to make: it may have been removed
         for part in ("cameras", "objects", "index"):
-            (folder / part).mkdir(parents=True, exist_ok=True)
-        (folder / "cameras" / _HEADER).write_bytes(headers.pictures)
+            (folder / part).mkdir(mode=FOLDER)
+        write_private(folder / "cameras" / _HEADER, headers.pictures)
         if headers.sound:
-            (folder / SOUND).mkdir(exist_ok=True)
-            (folder / SOUND / _HEADER).write_bytes(headers.sound)
-        (folder / HEAD).write_bytes(_text(head))
+            (folder / SOUND).mkdir(mode=FOLDER)
+            write_private(folder / SOUND / _HEADER, headers.sound)
+        write_private(folder / HEAD, _text(head))
         return cls(folder, head, headers, longest_s)
 
     def number_since(self, since: float | None) -> None:
@@ -108,11 +124,27 @@ class Run:
         Raises:
             OSError: the disk does not take it.
         """
-        head = msgspec.structs.replace(self.head, numbers_since=since)
+        self._write_head(msgspec.structs.replace(self.head, numbers_since=since))
+
+    def date(self, clock: str, clock0: float) -> None:
+        """Note what the recording's clock of this id said at pulse 0.
+
+        Raises:
+            OSError: the disk does not take it.
+        """
+        self.head = msgspec.structs.replace(self.head, clock=clock, clock0=clock0)
+        self._write_head(self.head)
+
+    def _write_head(self, head: RunHead) -> None:
         draft = self.folder / f".{HEAD}"
-        draft.write_bytes(_text(head))
-        draft.replace(self.folder / HEAD)
-        self.head = head
+        try:
+            write_private(draft, _text(head))
+            draft.replace(self.folder / HEAD)
+        except OSError:
+            with contextlib.suppress(OSError):
+                draft.unlink(missing_ok=True)
+            raise
+        self.head, self._head_bytes = head, len(_text(head))
 
     @classmethod
     def found(cls, folder: Path, longest_s: float) -> Run:
@@ -130,15 +162,110 @@ class Run:
         for path in sorted((folder / "objects").glob("*.m3u8")):
             if path.stem.isdecimal():
                 run.object(int(path.stem)).read()
-        for path in sorted((folder / "index").glob("*.jsonl")):
-            if path.stem.isdecimal():
-                first = int(path.stem)
-                size = sum(it.stat().st_size for it in run.files(first) if it.exists())
-                run.segments.append(Segment(first, size, path.stat().st_mtime))
+        run.segments = [Segment(first, 0, 0.0) for first in sorted(run._firsts)]
+        run.recount()
         firsts = {segment.first for segment in run.segments}
         for playlist in run._playlists:  # the files may be gone, and the playlist not written since
             playlist.drop({it.file for it in playlist.tape.all} - firsts)
+        with contextlib.suppress(OSError):  # what a process that was killed had begun
+            for draft in (*folder.rglob("*.new"), folder / f".{HEAD}"):
+                draft.unlink(missing_ok=True)
         return run
+
+    @property
+    def _firsts(self) -> set[int]:
+        """The first pulses that files of pictures, sound and choices are named by."""
+        media = (*self.folder.glob("cameras/*/*.mp4"), *self.folder.glob(f"{SOUND}/*.mp4"))
+        names = [it.stem for it in (*media, *self.folder.glob("index/*.jsonl"))]
+        return {int(it) for it in names if it.isdecimal()}
+
+    @property
+    def end(self) -> int:
+        """The pulse after the last that is known of; 0 where nothing is."""
+        ends = [it.tape.all[-1].end for it in (*self.cameras.values(), self.sound) if it.tape.all]
+        return max([*ends, *(it.first for it in self.segments[-1:])], default=0)
+
+    def stamp(self, now: float) -> None:
+        """Say when segments were written, by when their pulses were; nothing was after ``now``."""
+        ends = [*(it.first for it in self.segments[1:]), self.end]
+        for segment, end in zip(self.segments, ends, strict=True):
+            segment.written = min(now, self.head.clock0 + end / self.head.fps)
+
+    @property
+    def begun(self) -> float:
+        """When what is left of it begins, by the recording's own clock."""
+        first = self.segments[0].first if self.segments else self.end
+        return self.head.clock0 + first / self.head.fps
+
+    def put_off(self, seconds: float) -> None:
+        """Say that all of it was so much later by the recording's clock, if the disk takes that."""
+        for segment in self.segments:
+            segment.written += seconds
+        with contextlib.suppress(OSError):
+            self.date(self.head.clock, self.head.clock0 + seconds)
+
+    @property
+    def is_in_place(self) -> bool:
+        """Whether its folder is the one it was: it may be removed, or its disk be another one."""
+        return self._identity is not None and identity_of(self.folder) == self._identity
+
+    @property
+    def is_there(self) -> bool:
+        """Whether it is in place, and whoever begins will find it."""
+        try:
+            return self.is_in_place and (self.folder / HEAD).stat().st_size == self._head_bytes
+        except MISSING:
+            return False
+        except OSError:
+            return True  # nobody can tell
+
+    def recount(self) -> None:
+        """Say again what segments take, and let go of those of which nothing is left."""
+        for segment in self.segments:
+            segment.bytes = sum(file_size(it) for it in self.files(segment.first))
+        self.segments = [it for it in self.segments if not all(map(is_gone, self.files(it.first)))]
+
+    def restore_head(self) -> None:
+        """Write again what holds for the whole run: without it nobody finds what is left of it.
+
+        Raises:
+            OSError: the disk does not take it.
+        """
+        self._write_head(self.head)
+
+    def holds(self, stretch: Stretch) -> bool:
+        """Tell whether a camera's frames that are referred to are on the disk, as far as lengths say.
+
+        Raises:
+            OSError: nobody can tell: it may not be read, or the disk fails.
+        """
+        try:
+            with self.camera_file(stretch.camera, stretch.file).open("rb") as file:
+                return os.fstat(file.fileno()).st_size >= stretch.offset + stretch.length
+        except MISSING:
+            return False
+
+    def forget_missing(self) -> None:
+        """Forget references to what is not on the disk any more; any thread may do so.
+
+        Segments are as they were: their files may be there again, and are to be taken away some day.
+
+        Raises:
+            OSError: nobody can tell what there is.
+        """
+        told = [
+            (it, it.tape.all) for it in self._playlists
+        ]  # before the disk is asked: it may grow meanwhile
+        cameras = {camera: media_sizes(self.folder / "cameras" / camera) for camera in self.head.cameras}
+        sound = {SOUND: media_sizes(self.folder / SOUND)}
+        for playlist, stretches in told:
+            there = sound if playlist is self.sound else cameras
+            gone = {
+                (it.camera, it.file)
+                for it in stretches
+                if there.get(it.camera, {}).get(it.file, -1) < it.offset + it.length
+            }
+            playlist.drop_pieces(gone)
 
     @property
     def size(self) -> int:
@@ -200,11 +327,14 @@ class Run:
         for first in sorted(files):
             try:
                 for path in self.files(first):
-                    path.unlink(missing_ok=True)
+                    with contextlib.suppress(*MISSING):
+                        path.unlink()
             except OSError as error:
                 kept.add(first)
                 failed = error
         self.segments = [it for it in self.segments if it.first not in files or it.first in kept]
+        for segment in self.segments:
+            segment.is_stuck = segment.first in kept or segment.is_stuck
         self.tidy()
         if failed is not None:
             raise failed
@@ -216,6 +346,11 @@ class Run:
                 with contextlib.suppress(OSError):
                     playlist.tidy()
         self.objects = {number: it for number, it in self.objects.items() if it.tape.all or it.stale}
+
+    def remove(self) -> None:
+        """Take away the folder if it is in place, but not what somebody else has put into it."""
+        if self.is_in_place:
+            clear(self.folder)
 
     def _playlist(self, path: Path, cameras: str = "", header: str = _HEADER) -> Playlist:
         return Playlist(path, cameras, header, self.head.fps, self.head.pulse0, self._longest_s)

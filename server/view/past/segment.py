@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import errno
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -9,12 +11,13 @@ from pathlib import Path
 import msgspec
 
 from server.view.media.heard import Heard
-from server.view.past.media import CameraFile, Gop, write_at
+from server.view.past.media import CameraFile, Gop, is_at, write_at
 from server.view.past.playlist import Playlist
 from server.view.past.run import Headers, Run, Segment
 from server.view.past.sounds import NAME as SOUND
 from server.view.past.stretch import Stretch
 from server.wire.messages import GopChoices
+from server.wire.private_files import open_private
 
 
 class OpenSegment:
@@ -29,9 +32,8 @@ class OpenSegment:
         self._run, self._headers = run, headers
         self._files: dict[Path, CameraFile] = {}
         self._grown: dict[str, Playlist] = {}
-        path = run.index_file(segment.first)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        self._index = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
+        self._index_path = run.index_file(segment.first)
+        self._index = open_private(self._index_path, os.O_WRONLY | os.O_CREAT | os.O_EXCL)
         self._index_bytes = 0
 
     @property
@@ -39,12 +41,18 @@ class OpenSegment:
         """The playlists that refer to this segment."""
         return list(self._grown.values())
 
+    @property
+    def is_empty(self) -> bool:
+        """Whether nothing is in it that could be found again."""
+        return not self._index_bytes and all(file.is_empty for file in self._files.values())
+
     def write(self, choices: GopChoices, cameras: Mapping[str, Gop], heard: Heard | None, now: float) -> None:
         """Write a GOP: pictures and sound first, then what is said about them, then people's references.
 
         Raises:
             OSError: the disk does not take it.
         """
+        self._check_that_it_is_there()
         self.segment.written = now
         if heard is not None and heard.frames:
             self._write_sound(heard, choices)
@@ -60,10 +68,29 @@ class OpenSegment:
                 self._refer(self._run.object(number), whole[camera])
 
     def close(self) -> None:
-        """Close the files."""
-        for file in self._files.values():
-            file.close()
-        os.close(self._index)
+        """Close the files; nothing stays of a segment that is empty.
+
+        Raises:
+            OSError: the disk did not take all of it; they are closed all the same.
+        """
+        with contextlib.ExitStack() as closing:
+            if self.is_empty:
+                closing.callback(self._remove_index)
+            closing.callback(os.close, self._index)
+            for file in self._files.values():
+                closing.callback(file.close)
+
+    def _remove_index(self) -> None:
+        with contextlib.suppress(OSError):  # its folder may be gone, or closed
+            self._index_path.unlink(missing_ok=True)
+
+    def _check_that_it_is_there(self) -> None:
+        """See that the files were not removed under our hands: what is written to them would be lost."""
+        paths = [path for path, file in self._files.items() if not file.is_there]
+        if not is_at(self._index, self._index_path):
+            paths.append(self._index_path)
+        if paths:
+            raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(paths[0]))
 
     def _write_camera(self, camera: str, gop: Gop) -> Stretch:
         path = self._run.camera_file(camera, self.segment.first)

@@ -80,6 +80,13 @@ class Tape:
             self._stretches = [it for it in self._stretches if it.file not in files]
             return len(self._stretches) < before
 
+    def drop_pieces(self, gone: Collection[tuple[str, int]]) -> bool:
+        """Take away what is in these cameras' files, of a camera and by first pulse; tell likewise."""
+        with self._lock:
+            before = len(self._stretches)
+            self._stretches = [it for it in self._stretches if (it.camera, it.file) not in gone]
+            return len(self._stretches) < before
+
     def at_or_after(self, pulse: int) -> Stretch | None:
         """Give the stretch that holds a pulse, or the next one; None where nothing follows."""
         with self._lock:

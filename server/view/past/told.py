@@ -33,7 +33,7 @@ def _lines(path: Path, start: int, end: int) -> list[tuple[bytes, GopChoices]]:
     found = []
     try:
         data = path.read_bytes()
-    except FileNotFoundError:  # retention has just taken it away
+    except OSError:  # retention has just taken it away, or it cannot be read
         return []
     for line in data.splitlines(keepends=True):
         try:

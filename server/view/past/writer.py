@@ -14,6 +14,8 @@ from server.view.past.store import Piece
 log = logging.getLogger(__name__)
 
 _RETRY_S = 10.0
+_SILENT_S = 10.0
+"""A disk that takes longer for one GOP does not answer."""
 _PATIENCE_S = 1.0
 """How long the end of the service waits for the disk."""
 
@@ -22,6 +24,7 @@ class Writer:
     """Hands pieces to ``write`` in a thread of its own; at most ``most`` wait, further ones are left out.
 
     When ``write`` fails, ``abandon`` is called once, nothing is written for a while, then it is tried again.
+    ``where`` is named in the log.
     """
 
     def __init__(
@@ -31,9 +34,13 @@ class Writer:
         close: Callable[[], None],
         most: int,
         retry_s: float = _RETRY_S,
+        where: str = "",
     ) -> None:
         self._write, self._abandon, self._close = write, abandon, close
         self._most, self._retry_s = most, retry_s
+        self._where = where and f" ({where})"
+        self._since: float | None = None
+        """When what is being written now was begun."""
         self._waiting: deque[Piece] = deque()
         self._changed = threading.Condition()
         self._closing = False
@@ -45,6 +52,14 @@ class Writer:
         """GOPs that were not recorded."""
         self.trouble = ""
         """Why nothing is being recorded; empty when all is well."""
+
+    @property
+    def stands(self) -> str:
+        """Why nothing is being recorded now, also where the disk does not say; empty when all is well."""
+        since = self._since  # another thread sets it
+        if not self.trouble and since is not None and (silent := time.monotonic() - since) > _SILENT_S:
+            return f"the disk has not answered for {silent:.0f} s"
+        return self.trouble
 
     @property
     def waiting(self) -> int:
@@ -91,15 +106,17 @@ class Writer:
             return self._waiting.popleft() if self._waiting else None
 
     def _try(self, piece: Piece) -> bool:
+        self._since = time.monotonic()
         try:
             self._write(piece)
         except OSError as error:
             self.trouble = error.strerror or str(error)
             if (more := self._failing.happened(self.trouble)) is not None:
                 log.error(  # noqa: TRY400 — says all there is
-                    "recording: cannot write: %s%s; nothing is recorded until it can be written again, "
+                    "recording: cannot write: %s%s%s; nothing is recorded until it can be written again, "
                     "which is tried every %.0f s; the streams go on",
                     self.trouble,
+                    self._where,
                     more,
                     self._retry_s,
                 )
@@ -111,6 +128,8 @@ class Writer:
             self.trouble = "a mistake in MyView"
             self._give_up()
             return False
+        finally:
+            self._since = None
         self.trouble = ""
         if ended := self._failing.over():
             log.info("recording: goes on, after %.0f s", ended.seconds)
@@ -121,8 +140,8 @@ class Writer:
         self._lose()
         try:
             self._abandon()
-        except OSError as error:
-            log.debug("recording: cannot tidy up: %s", error)
+        except Exception as error:  # noqa: BLE001 — whatever it is, it is tried again
+            log.debug("recording: cannot tidy up: %r", error)
 
     def _lose(self) -> None:
         with self._changed:

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import re
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 
 from aiohttp import web
 
+from server.view.past.disk import from_disk
+from server.view.past.gone import forget_gone
 from server.view.past.hearing import Hearing
 from server.view.past.kept import kept_from
 from server.view.past.moment import MomentError
@@ -42,7 +45,7 @@ class Stream:
         return self.reel is not None or kept_from(self.source, 0) is not None
 
 
-def playlist_of_the_past(request: web.Request, stream: Stream) -> web.Response:
+async def playlist_of_the_past(request: web.Request, stream: Stream) -> web.Response:
     """List the segments from one pulse to another, or on and on; of other wishes, name that playlist.
 
     A playlist is fetched again and again, and must go on where it began: so its address must not say how long
@@ -53,7 +56,7 @@ def playlist_of_the_past(request: web.Request, stream: Stream) -> web.Response:
         wish = wish_of(request, service, stream.source.end, endless=_LIVE)
     except MomentError as error:
         return problem(400, str(error))
-    missing = nothing_kept(stream.source, wish, stream.what)
+    missing = await nothing_kept(stream.source, wish, stream.what)
     if missing is not None:
         return missing
     rewound, plan = _rewound(service, stream), service.splicer.plan
@@ -76,7 +79,10 @@ def playlist_of_the_past(request: web.Request, stream: Stream) -> web.Response:
 
 async def segment_of_the_past(request: web.Request, stream: Stream, number: int) -> Segment | None:
     """Give a segment that is not in the newest playlist any more; None where it is not kept."""
-    return await _rewound(request.app[SERVICE], stream).segment(number)
+    rewound, frames = _rewound(request.app[SERVICE], stream), request.app[SERVICE].splicer.plan.frames
+    with suppress(OSError):  # what cannot be read is a hole
+        await from_disk(forget_gone, stream.source, number * frames, (number + 1) * frames)
+    return await rewound.segment(number)
 
 
 def _rewound(service: BestViewService, stream: Stream) -> Rewound:

@@ -65,7 +65,7 @@ def _counted(awaits: str | None = None) -> Callable[[_OfStream], _Handler]:
 async def get_playlist(request: web.Request, stream: Stream) -> web.Response:
     """List the newest segments of a stream (HLS), or from a moment on."""
     if asks_for_the_past(request):
-        return with_token(request, playlist_of_the_past(request, stream))
+        return with_token(request, await playlist_of_the_past(request, stream))
     if stream.reel is None:
         return _nobody(request)
     return with_token(request, await newest(request, stream.reel, request.app[SERVICE].pulse0))

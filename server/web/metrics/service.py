@@ -72,7 +72,7 @@ class ServiceCollector(Collector):
     def _recording(self) -> Iterable[Metric]:
         past = self._service.past
         size, writer = past.store.bytes if past.store else 0, past.writer
-        well = writer is not None and not writer.trouble
+        well = writer is not None and not writer.stands
         yield GaugeMetricFamily("myview_recording", "What is streamed is being recorded.", value=float(well))
         yield GaugeMetricFamily("myview_recorded_bytes", "Recorded, on the disk.", value=size)
         yield CounterMetricFamily(

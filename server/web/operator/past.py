@@ -13,7 +13,7 @@ from server.view.service import BestViewService
 from server.web.access.grant import OPERATING
 from server.web.api import problem
 from server.web.keys import SERVICE
-from server.web.past import wish_of
+from server.web.past import led_by, nothing_said, wish_of
 from server.web.streams import send_bytes
 from server.wire.messages import GopChoices
 
@@ -55,13 +55,20 @@ async def _send(request: web.Request, what: str, head: str, rows: Rows) -> web.S
     span = range(wish.start, end if wish.end is None else wish.end)
     name = f"{service.config.site.name}-{what}-p{span.start}-p{span.stop - 1}.csv"
     headers = {"Content-Type": "text/csv", "Content-Disposition": f'attachment; filename="{name}"'}
-    return await send_bytes(request, _lines(service, span, rows), f"{head}\n".encode(), headers)
+    kept = told(service.past, span.start, span.stop)
+    first = await anext(kept, None)
+    if first is None and (missing := nothing_said(service, wish)) is not None:
+        return missing
+    lines = _lines(service, led_by(first, kept), span, rows)
+    return await send_bytes(request, lines, f"{head}\n".encode(), headers)
 
 
-async def _lines(service: BestViewService, span: range, rows: Rows) -> AsyncIterator[bytes]:
+async def _lines(
+    service: BestViewService, told_lines: AsyncIterator[bytes], span: range, rows: Rows
+) -> AsyncIterator[bytes]:
     fps, pulse0 = service.config.site.fps, service.pulse0
     decoder = msgspec.json.Decoder(Told)
-    async for line in told(service.past, span.start, span.stop):
+    async for line in told_lines:
         gop = decoder.decode(line)
         inside = range(max(gop.first, span.start), min(gop.first + gop.frames, span.stop))
         yield "".join(rows(gop, inside, lambda pulse: moment_of(pulse, fps, pulse0) or "")).encode()

@@ -1,0 +1,19 @@
+"""Whether somebody keeps this machine's clock right."""
+
+from __future__ import annotations
+
+import ctypes
+
+_TIME_ERROR = 5
+"""What adjtimex(2) returns where nobody keeps the clock: also after somebody has set it by hand."""
+_TIMEX_BYTES = 512
+"""More than struct timex has."""
+
+
+def clock_is_kept() -> bool | None:
+    """Tell whether NTP keeps this machine's clock, as the system has it; None: the system does not say."""
+    try:
+        state: int = ctypes.CDLL(None).adjtimex(ctypes.create_string_buffer(_TIMEX_BYTES))
+    except (OSError, AttributeError):
+        return None
+    return None if state < 0 else state != _TIME_ERROR

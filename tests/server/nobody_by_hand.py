@@ -1,0 +1,31 @@
+"""Being somebody whom the rights of files bind, also where the tests run as root."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+_NOBODY = 65534
+
+
+@contextlib.contextmanager
+def nobodys_folder() -> Iterator[Path]:
+    """Give a folder, and be its owner and not root meanwhile."""
+    folder = Path(tempfile.mkdtemp(prefix="myview-nobody-"))
+    root = os.geteuid() == 0
+    try:
+        if root:
+            os.chown(folder, _NOBODY, _NOBODY)
+            os.seteuid(_NOBODY)
+        yield folder
+    finally:
+        if root:
+            os.seteuid(0)
+        for inside, folders, _ in os.walk(folder):
+            for name in folders:
+                Path(inside, name).chmod(0o700)
+        shutil.rmtree(folder)
