@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import logging
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -181,5 +182,7 @@ def _packets(opened: Opened, *, again: bool) -> Iterator[av.Packet[VideoStream]]
                 again = True  # once is enough
             yield packet
     except av.error.FFmpegError as error:
+        if error.errno == errno.EINTR:
+            raise  # a signal has cut a read short: the file is not over
         if not again:
             log.warning("%s: cannot be read any further: %s", opened.container.name, error.strerror)
