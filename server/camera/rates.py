@@ -33,4 +33,4 @@ def place_of(seconds: float, fps: float) -> int:
 
 def length_of(seconds: float, rate: float, fps: float) -> int:
     """Return the frames of a clock that a recording lasts whose last picture is at ``seconds``."""
-    return max(place_of(seconds, fps) + 1, round((seconds + 1 / rate) * fps))
+    return max(1, place_of(seconds + 1 / rate, fps))

@@ -223,9 +223,8 @@ def test_interlaced_pictures_are_said_to_be(tmp_path: Path, caplog: pytest.LogCa
 
     path = write_timed(tmp_path / "tape.mp4", [n / 25 for n in range(4)], prepare=interlaced)
     Recording(str(path)).close()
-    assert caplog.messages == [
-        f"{path}: it is interlaced: two moments are in one picture; people are found better if it is progressive"
-    ]
+    (line,) = caplog.messages
+    assert line.startswith(f"{path}: it is interlaced")
 
 
 @pytest.mark.parametrize("suffix", ["jpg", "png", "tif", "webp"])

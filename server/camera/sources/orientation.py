@@ -18,7 +18,7 @@ _MATRIX_NAME = "DISPLAYMATRIX"
 _MATRIX = struct.Struct("=9i")
 _MOST_STRETCHED = 4.0
 """Pixels that are said to be further from square than that are damage."""
-INTERLACED = "it is interlaced: two moments are in one picture; people are found better if it is progressive"
+INTERLACED = "it is interlaced, so two moments are in one picture: deinterlaced, people are found better"
 """What is said of pictures whose lines are of two moments; they are taken as they are."""
 _SQUARE = 0.01
 """Part by which pixels may be off square without being stretched: encoders round."""
