@@ -1,4 +1,4 @@
-"""`myview watch --out` on a full disk: what was recorded is whole and kept, and nothing empty is left."""
+"""A full disk: nothing empty or half-written is left; of what is recorded live, what came before is kept."""
 
 from __future__ import annotations
 
@@ -7,13 +7,17 @@ from pathlib import Path
 
 import pytest
 from cameras_by_hand import CAMERAS, LARGE, SMALL
+from command_line import Run, myview
 from halls import Hall, opened
 from recorded_by_hand import A, B, pictures
 from small_disk import files_of_at_most
+from videos_by_hand import write_video
 
 import client
 from server.run.watch import run_watch
 from server.wire.errors import UserError
+
+__all__ = ["myview"]
 
 FRAMES = 30
 
@@ -88,3 +92,32 @@ async def test_a_film_without_room_for_its_boxes_is_kept_without_them(hall: Hall
     (tmp_path / "one.ass").rmdir()
     assert [it.name for it in tmp_path.iterdir()] == ["one.mp4"]
     assert [place for place, _ in pictures(out)] == list(range(FRAMES))
+
+
+@pytest.mark.parametrize("most", [0, 1000])
+@pytest.mark.parametrize(
+    "command",
+    [
+        "scene room --cameras 1 --objects 1 --seconds 0.4 --size 64x48",
+        "render {video}",
+        "track --det {det}",
+        "calibrate {points}",
+    ],
+)
+def test_a_command_that_finds_no_room_says_so_in_one_line_and_leaves_nothing(
+    tmp_path: Path, myview: Run, command: str, most: int
+) -> None:
+    (tmp_path / "given").mkdir()
+    video = write_video(tmp_path / "given" / "c0.mp4", 12)
+    det = tmp_path / "given" / "det.txt"
+    det.write_text("".join(f"{n},-1,10,5,20,30,1\n" for n in range(1, 200)), encoding="ascii")
+    points = tmp_path / "given" / "points.csv"
+    corners = [(0, 0), (100, 0), (100, 90), (0, 80)]
+    pairs = "".join(f"c0,{x},{y},{x / 10},{-y / 10}\n" for x, y in corners)
+    points.write_text(f"camera,image_x,image_y,floor_x,floor_y\n{pairs}", encoding="ascii")
+    words = command.format(video=video, det=det, points=points).split()
+    with files_of_at_most(most):
+        done = myview(*words, "--out", tmp_path / "out")
+    assert done.code == 2
+    assert [line.rpartition(": ")[2] for line in done.err.splitlines()] == ["File too large"]
+    assert [it.name for it in tmp_path.iterdir()] == ["given"]
