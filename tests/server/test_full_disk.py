@@ -112,8 +112,7 @@ def test_a_command_that_finds_no_room_says_so_in_one_line_and_leaves_nothing(
     det = tmp_path / "given" / "det.txt"
     det.write_text("".join(f"{n},-1,10,5,20,30,1\n" for n in range(1, 200)), encoding="ascii")
     points = tmp_path / "given" / "points.csv"
-    corners = [(0, 0), (100, 0), (100, 90), (0, 80)]
-    pairs = "".join(f"c0,{x},{y},{x / 10},{-y / 10}\n" for x, y in corners)
+    pairs = "c0,212,300,0,0\nc0,430,296,2.5,0\nc0,390,200,2.5,4\nc0,250,202,0,4\n"
     points.write_text(f"camera,image_x,image_y,floor_x,floor_y\n{pairs}", encoding="ascii")
     words = command.format(video=video, det=det, points=points).split()
     with files_of_at_most(most):
