@@ -9,6 +9,7 @@ from typing import Any
 from benchmarks.surroundings import CannotRunError
 from server.camera.scene import Scene, write_recording
 from server.camera.sources.opening import open_video
+from server.run.recorded import look_at
 
 ROOM = "room"
 _ROOM_CAMERAS, _ROOM_PEOPLE, _ROOM_SEED = 3, 4, 1
@@ -37,9 +38,8 @@ class Views:
     @property
     def site(self) -> dict[str, Any]:
         """The configuration's site: rate and size of the first view."""
-        opened = open_video(str(self.videos[0]))
-        opened.container.close()
-        return {"name": "bench", "fps": opened.fps, "width": opened.size[0], "height": opened.size[1]}
+        first = look_at(self.videos[0])
+        return {"name": "bench", "fps": first.fps, "width": first.size[0], "height": first.size[1]}
 
     @property
     def frames(self) -> int:

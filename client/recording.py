@@ -5,13 +5,13 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from io import BufferedWriter
 from pathlib import Path
 
 from client.fmp4 import MAX_BOX, Mp4Box, Mp4Error, decode_time, sound_track, timescale, track_of
 from client.plain import write_plain
 from client.webm import WebmError
 from client.webm_recording import WebmRecording, write_indexed
+from client.whole_writer import Sink, WholeWriter
 
 _log = logging.getLogger(__name__)
 
@@ -26,7 +26,7 @@ class Recording:
     The header of the first connection serves all; a later one must be equal to it.
     """
 
-    def __init__(self, out: BufferedWriter | None, seconds: float | None) -> None:
+    def __init__(self, out: Sink | None, seconds: float | None) -> None:
         self._out = out
         self._limit = seconds
         self._header = b""  # ftyp and moov, as in the file
@@ -125,13 +125,12 @@ class Recording:
         if self._is_sound:
             self._take_sound(time, fragment)
             return
-        if self._first is None:
-            self._first = time
-        elif time <= self._last:
+        if self._first is not None and time <= self._last:
             return  # sent again after a reconnection
+        self._write(fragment)
+        self._first = time if self._first is None else self._first
         self._last = time
         self.fragments += 1
-        self._write(fragment)
 
     def _take_sound(self, time: int, fragment: bytes) -> None:
         """Write sound, which comes before its pictures, unless it is sent again after a reconnection."""
@@ -141,9 +140,9 @@ class Recording:
         self._write(fragment)
 
     def _write(self, data: bytes) -> None:
-        self.bytes += len(data)
         if self._out is not None:
             self._out.write(data)
+        self.bytes += len(data)
 
 
 @contextmanager
@@ -152,7 +151,8 @@ def recording(
 ) -> Iterator[Recording | WebmRecording]:
     """Record into ``out.part``, which is made into ``out`` at the end, however it ends, if it has any media.
 
-    An interrupted recording is whole up to its last fragment, hence kept; an empty one leaves nothing.
+    An interrupted recording is whole up to its last fragment, hence kept, also on a full disk; an empty one
+    leaves nothing.
     ``out`` is a plain MP4 file, or a WebM with an index; where the disk has no room for both, it is the
     fragments as they came.
 
@@ -166,8 +166,8 @@ def recording(
     part = out.with_name(out.name + ".part")
     kept = None
     try:
-        with part.open("wb") as file:
-            kept = made(file, seconds)
+        with part.open("wb", buffering=0) as file:
+            kept = made(WholeWriter(file), seconds)
             yield kept
     finally:
         if kept is not None and kept.fragments:

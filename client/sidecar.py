@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from contextlib import ExitStack, suppress
 from pathlib import Path
 
 import msgspec
@@ -40,10 +41,22 @@ def write_sidecars(film: Path, frames: Iterable[Frame], first: int, number: int,
     Frame by frame, as they are taken from ``frames``: a film may be of a day.
 
     Raises:
-        OSError: they cannot be written.
+        OSError: they cannot be written; then neither is there, nor one of before.
     """
-    vtt, ass = (path.open("w", encoding="utf-8", newline="\n") for path in sidecars(film))
-    with vtt, ass:
+    try:
+        _write(film, frames, first, number, site)
+    except OSError:
+        for path in sidecars(film):
+            with suppress(OSError):
+                path.unlink(missing_ok=True)
+        raise
+
+
+def _write(film: Path, frames: Iterable[Frame], first: int, number: int, site: Site) -> None:
+    with ExitStack() as files:
+        vtt, ass = (
+            files.enter_context(path.open("w", encoding="utf-8", newline="\n")) for path in sidecars(film)
+        )
         vtt.write(_vtt_head(number, site))
         ass.write(_ASS_HEAD.format(width=site.width, height=site.height, size=max(8, site.height // 24)))
         between = ""

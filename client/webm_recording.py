@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterator
-from io import BufferedWriter
 from pathlib import Path
 from typing import BinaryIO
 
@@ -23,6 +22,7 @@ from client.webm import (
     made,
     number,
 )
+from client.whole_writer import Sink
 
 _DURATION = 0x4489
 _CUES, _CUE_POINT, _CUE_TIME, _CUE_PLACES = 0x1C53BB6B, 0xBB, 0xB3, 0xB7
@@ -40,7 +40,7 @@ class WebmRecording:
     The head of the first connection serves all; a later one must be equal to it.
     """
 
-    def __init__(self, out: BufferedWriter | None, seconds: float | None) -> None:
+    def __init__(self, out: Sink | None, seconds: float | None) -> None:
         self._out, self._limit = out, seconds
         self._head = b""
         self._arriving = b""
@@ -82,15 +82,14 @@ class WebmRecording:
             return True
         self._begin()
         time = cluster_time(element)
-        if self._first is None:
-            self._first = time
-        elif time <= self._last:
+        first = time if self._first is None else self._first
+        if self._first is not None and time <= self._last:
             return True  # sent again after a reconnection
-        elif self._limit is not None and time - self._first >= self._limit * TICKS:
+        if self._first is not None and self._limit is not None and time - first >= self._limit * TICKS:
             return False
-        self._last = time
+        self._write(at_time(element, time - first))
+        self._first, self._last = first, time
         self.fragments += 1
-        self._write(at_time(element, time - self._first))
         return True
 
     def _begin(self) -> None:
@@ -105,9 +104,9 @@ class WebmRecording:
             self._write(head)
 
     def _write(self, data: bytes) -> None:
-        self.bytes += len(data)
         if self._out is not None:
             self._out.write(data)
+        self.bytes += len(data)
 
 
 def write_indexed(part: Path, out: Path) -> None:

@@ -105,23 +105,23 @@ def film(folder: Path, tempo: Tempo) -> Filmed:
         scene = Scene("room", len(CAMERAS), _PEOPLE, seed, WIDTH, HEIGHT, NOMINAL)
         write_recording(scene, parts[-1], _PART_S)
     for camera in CAMERAS:
-        _join([it / f"{camera}.mp4" for it in parts], folder / f"{camera}.mp4")
+        _join([it / f"{camera}.mp4" for it in parts], folder / f"{camera}.mp4", tempo.fps)
     (folder / "ground.json").write_bytes((parts[0] / "ground.json").read_bytes())
     return Filmed(folder, tempo)
 
 
-def _join(parts: list[Path], path: Path) -> None:
-    """Write the pictures of some films into one."""
+def _join(parts: list[Path], path: Path, fps: float) -> None:
+    """Write the pictures of some films into one, one for each pulse of a site in a hurry."""
     with av.open(str(path), "w") as out:
         stream = out.add_stream(
-            "libx264", rate=Fraction(NOMINAL), options={"crf": "18", "preset": "veryfast"}
+            "libx264", rate=Fraction(fps).limit_denominator(1001), options={"crf": "18", "preset": "veryfast"}
         )
         stream.width, stream.height, stream.pix_fmt = WIDTH, HEIGHT, "yuv420p"
         number = 0
         for part in parts:
             with av.open(str(part)) as film:
                 for frame in film.decode(video=0):
-                    frame.pts, frame.time_base = round(number / NOMINAL / _TIME_BASE), _TIME_BASE
+                    frame.pts, frame.time_base = round(number / fps / _TIME_BASE), _TIME_BASE
                     out.mux(stream.encode(frame))
                     number += 1
         out.mux(stream.encode(None))

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from server.camera.observe import Observer, make_detector
-from server.camera.sources import Source
+from server.camera.observe import FittedDetections, Observer, make_detector
+from server.camera.sources import Recording, Source
 from server.wire.config import Config
 from server.wire.fit import Fit
 from server.wire.sections import Camera
@@ -19,6 +19,8 @@ def ready_detector(config: Config, camera: Camera, source: Source, fit: Fit) -> 
         UserError: the detector's files or the recording cannot be read.
     """
     detector, settings = make_detector(config, camera, fit), config.detect
+    if isinstance(detector, FittedDetections) and isinstance(source, Recording):
+        detector.count_by(source.counted)
     if isinstance(detector, BackgroundDetector):
         places = range(0, settings.ahead_frames, settings.ahead_every)
         detector.prepare((fit.image(image) for image in source.ahead(places)), settings.ahead_every)

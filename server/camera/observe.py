@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import Protocol
@@ -131,6 +131,11 @@ class FittedDetections:
     def __init__(self, file: MotFileDetector, fit: Fit, settings: DetectSettings) -> None:
         self._file, self._fit = file, fit
         self._looks = Looks(settings.looks, settings.bins)
+        self._counted: Callable[[int], int] = int
+
+    def count_by(self, counted: Callable[[int], int]) -> None:
+        """Take the file's frames to be a recording's pictures one by one, whatever pulse each is shown at."""
+        self._counted = counted
 
     @property
     def bins(self) -> int:
@@ -139,6 +144,6 @@ class FittedDetections:
 
     def detect(self, image: Image, frame: int | None = None) -> Detections:
         """Give the detections of a frame, with the appearance that the site's picture shows."""
-        own = self._file.detect(_NO_PICTURE, frame)
+        own = self._file.detect(_NO_PICTURE, None if frame is None else self._counted(frame))
         boxes = self._fit.boxes_to_site(own.boxes)
         return Detections(boxes, own.scores, self._looks.rows(image, boxes))

@@ -85,8 +85,11 @@ def walks_from_videos(
     _check_names(names)
     # All that can be wrong is found out before the first of them is tracked, which takes a while.
     seen = [look_at(video) for video in videos]
-    offsets = [loaded_for(video, None, config).cameras[0].offset for video in videos]
-    fps = picture.fps or _rate({name: it.fps for name, it in zip(names, seen, strict=True) if it.fps})
+    loaded = [loaded_for(video, None, config) for video in videos]
+    # Tracks are counted by the site's rate, which is a video's own where the configuration has none.
+    told = {name: one.site.fps for name, one, it in zip(names, loaded, seen, strict=True) if it.fps}
+    fps = picture.fps or _rate(told)
+    offsets = [it.cameras[0].offset for it in loaded]
     walks = []
     with TemporaryDirectory() as folder:
         for name, video, it, offset in zip(names, videos, seen, offsets, strict=True):

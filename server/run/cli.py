@@ -74,6 +74,22 @@ _BAD_INPUT = UserError.code
 _INTERRUPTED = 130
 _NO_WAY = {errno.EACCES, errno.EPERM, errno.ENAMETOOLONG, errno.ELOOP}
 _TERMINATED = 143
+_told: list[int] = []
+"""SIGTERM, once it has come."""
+
+
+def _end(number: int, _: object) -> None:
+    _told.append(number)
+    sys.exit(_TERMINATED)
+
+
+def _was_cut_short(error: BaseException | None) -> bool:
+    """Tell whether an error comes of a call that a signal has cut short: it is no other than that signal."""
+    while error is not None:
+        if isinstance(error, OSError) and error.errno == errno.EINTR:
+            return True
+        error = error.__cause__ or error.__context__
+    return False
 
 
 def main() -> None:
@@ -88,22 +104,30 @@ def main() -> None:
     if signal.getsignal(signal.SIGINT) == signal.SIG_DFL:
         signal.signal(signal.SIGINT, signal.default_int_handler)
     if signal.getsignal(signal.SIGTERM) == signal.SIG_DFL:
-        signal.signal(signal.SIGTERM, lambda *_: sys.exit(_TERMINATED))
+        signal.signal(signal.SIGTERM, _end)
     try:
         app(args=one_value_per_flag(sys.argv[1:], file_commands.SEVERAL))
-    except UserError as error:
-        say_failure(str(error))
-        sys.exit(error.code)
-    except BrokenPipeError:  # whoever read our output has gone, as by `… | head`
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        sys.exit(0)
-    except OSError as error:  # of a path that leads nowhere, wherever it is first looked into
-        if error.filename is None or error.errno not in _NO_WAY:
-            raise
-        say_failure(f"{shown(str(error.filename))}: {error.strerror}")
-        sys.exit(_BAD_INPUT)
     except KeyboardInterrupt:
         sys.exit(_INTERRUPTED)
+    except Exception as error:  # noqa: BLE001 — said, or raised again
+        if _was_cut_short(error):
+            sys.exit(_TERMINATED if _told else _INTERRUPTED)
+        _fail(error)
+
+
+def _fail(error: Exception) -> None:
+    """Say in one line what is wrong, and end; what is a mistake here is raised again."""
+    if isinstance(error, UserError):
+        say_failure(str(error))
+        sys.exit(error.code)
+    if isinstance(error, BrokenPipeError):  # whoever read our output has gone, as by `… | head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(0)
+    if isinstance(error, OSError) and error.filename is not None and error.errno in _NO_WAY:
+        # Of a path that leads nowhere, wherever it is first looked into.
+        say_failure(f"{shown(str(error.filename))}: {error.strerror}")
+        sys.exit(_BAD_INPUT)
+    raise error
 
 
 if __name__ == "__main__":

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
+import threading
 from collections.abc import AsyncIterator, Callable, Sequence
+from functools import partial
 from pathlib import Path
+from typing import TypeVar
 
 import msgspec
 import typer
@@ -32,6 +36,8 @@ from server.wire.config import Config
 from server.wire.descriptors import limit
 from server.wire.errors import UserError
 from server.wire.loading import load_config
+
+T = TypeVar("T")
 
 _LONGEST = "record.most_mb"
 """The longest name of a check, but for those that have a camera's in it."""
@@ -99,9 +105,28 @@ async def checked(config: Config, seconds: float) -> AsyncIterator[Finding]:
         yield it
     found = []
     with kept_apart("cameras", found):
-        probes = await asyncio.to_thread(probe_all, config, seconds)
+        probes = await _let_go_of(lambda: probe_all(config, seconds))
     for it in found + _last(config, probes, runs=runs):
         yield it
+
+
+async def _let_go_of(work: Callable[[], T]) -> T:
+    """Run in a thread that nobody waits for where the doctor is told to end: it may hang in a driver."""
+    loop = asyncio.get_running_loop()
+    result: asyncio.Future[T] = loop.create_future()
+
+    def run() -> None:
+        try:
+            value = work()
+        except Exception as error:  # noqa: BLE001 — goes to whoever waits
+            done = partial(result.set_exception, error)
+        else:
+            done = partial(result.set_result, value)
+        with contextlib.suppress(RuntimeError):  # the loop may be over
+            loop.call_soon_threadsafe(lambda: None if result.cancelled() else done())
+
+    threading.Thread(target=run, daemon=True).start()
+    return await result
 
 
 def _last(config: Config, probes: dict[str, Probe], *, runs: bool) -> list[Finding]:

@@ -18,7 +18,7 @@ from server.wire.sources import SourceKind, is_device, kind_of
 _GRACE_S = 3.0
 """What a busy machine takes longer than a camera was given."""
 _SAME_SPEED = 0.01
-"""Part by which a recording may be played faster or slower: 29.97 for 30."""
+"""Part by which a recording's rate may be off the site's without a word: 29.97 for 30."""
 _SAME_RATE = 0.1
 """Part by which a camera's rate may be off the site's without a word."""
 
@@ -130,11 +130,13 @@ def _doubts(config: Config, check: str, found: Probe) -> list[Finding]:
         )
     recorded = found.recorded_fps
     if recorded is not None and abs(recorded / site.fps - 1) > _SAME_SPEED:
+        some = "left out" if recorded > site.fps else "shown twice"
         doubts.append(
             warning(
                 check,
-                f"was recorded at {recorded:g} pictures a second, and is played at {site.fps:g}",
-                "set site.fps to that, or all but its speed is right",
+                f"was recorded at {recorded:g} pictures a second, the site takes {site.fps:g}: "
+                f"some are {some}",
+                "set site.fps to that of most of the recordings",
             )
         )
     if found.sent is not None and found.sent.damaged:

@@ -45,6 +45,8 @@ def site_facts(
 ) -> SiteFacts:
     """Give the facts; options go before videos, and these before the file that a rendering has of itself.
 
+    The rate is the rendering's before it is the videos': that is what its frames are counted by.
+
     Raises:
         UserError: the rate or a size is not known, or makes no sense.
     """
@@ -54,7 +56,7 @@ def site_facts(
     fps = told.fps if told else None
     for camera, path in videos.items():
         seen = look_at(path)
-        sizes[camera], fps = seen.size, seen.fps or fps
+        sizes[camera], fps = seen.size, fps or seen.fps
     if options.size is not None:
         sizes = dict.fromkeys(cameras, parse_size(options.size))
     fps = options.fps or fps

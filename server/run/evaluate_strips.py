@@ -15,7 +15,6 @@ from server.camera.sources import open_source
 from server.run.evaluate_truth import Truth
 from server.run.evaluate_views import Judged
 from server.run.plots import new_figure, save_figure
-from server.run.recorded import Size
 from server.run.site_file import SiteFacts
 from server.run.track import pictures
 from server.wire.sections import Camera, Site
@@ -61,7 +60,7 @@ def plot_strips(
     images: dict[_Shown, Image] = {}
     for index, camera in enumerate(truth.cameras):
         numbers = sorted(shown.frame for shown in wanted if shown.camera == index)
-        read = _read(videos[camera], facts.sizes[camera], numbers)
+        read = _read(videos[camera], facts, camera, numbers)
         images |= {_Shown(index, number): image for number, image in read.items()}
     for row, found in strips.items():
         if found:
@@ -78,16 +77,16 @@ def _strips(views: NDArray[np.int64], fps: float) -> list[_Strip]:
     return strips
 
 
-def _read(video: Path, size: Size, numbers: Sequence[int]) -> dict[int, Image]:
-    """Give frames of a recording by number, in its own size."""
+def _read(video: Path, facts: SiteFacts, camera: str, numbers: Sequence[int]) -> dict[int, Image]:
+    """Give frames of a camera's recording by number, in its own size."""
     found: dict[int, Image] = {}
     if not numbers:
         return found
-    source = open_source(Camera(id="view", source=str(video.absolute())), Site())
+    source = open_source(Camera(id=camera, source=str(video.absolute())), Site(fps=facts.fps))
     wanted = set(numbers)
     for number, image in pictures(source):
         if number in wanted and image is not None:
-            found[number] = np.asarray(cv2.resize(image, size), dtype=np.uint8)
+            found[number] = np.asarray(cv2.resize(image, facts.sizes[camera]), dtype=np.uint8)
         if number >= numbers[-1]:
             break
     source.close()

@@ -47,7 +47,7 @@ def render(
         detections=det or [],
     )
     with whole_folder(out) as folder, bar("frames") as progress:
-        task = progress.add_task("rendering", total=total_frames(videos))
+        task = progress.add_task("rendering", total=total_frames(videos, loaded.site.fps))
         numbers = render_views(loaded, folder, lambda done: progress.update(task, completed=done))
     who = ", ".join(map(str, numbers)) if numbers else "nobody"
     typer.echo(f"{out}: best views of {len(numbers)} people ({who}), tracks, choices.csv and plots")

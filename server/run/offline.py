@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import multiprocessing
 import queue
 import signal
@@ -20,6 +21,8 @@ from server.run.pipes import Others, Pipes, Piping
 from server.wire.config import Config
 from server.wire.errors import UserError
 from server.wire.messages import CameraTracks, Found
+
+log = logging.getLogger(__name__)
 
 _AHEAD = 8
 """Batches a camera may be ahead of the others: bounds memory however long the recording is."""
@@ -112,6 +115,8 @@ def _work(config: Config, camera: str, outbox: Outbox, others: Pipes) -> None:
     end_at_once_again()
     try:
         pipeline = CameraPipeline(config, camera)
+        if pipeline.why_encoded:
+            log.warning("camera %s is encoded: its own H.264: %s", camera, pipeline.why_encoded)
         for batch in run_camera(pipeline, camera, others):
             outbox.put(batch)
     except UserError as error:

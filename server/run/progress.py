@@ -12,8 +12,11 @@ from server.wire.addresses import shown
 from server.wire.errors import UserError
 
 
-def total_frames(videos: list[Path]) -> int | None:
-    """Count the frames of all views as their files say it; None where one does not."""
+def total_frames(videos: list[Path], fps: float | None = None) -> int | None:
+    """Count the frames of all views as their files say it; None where one does not.
+
+    ``fps``: how many are taken a second; None: as many as there are.
+    """
     total = 0
     for video in videos:
         if video.is_dir():
@@ -24,7 +27,7 @@ def total_frames(videos: list[Path]) -> int | None:
         opened.container.close()
         if not opened.frames:
             return None
-        total += opened.frames
+        total += opened.frames if fps is None else round(opened.frames * fps / opened.fps)
     return total
 
 

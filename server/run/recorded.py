@@ -5,11 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from server.camera.sources import open_source
-from server.camera.sources.opening import open_video
-from server.run.setup import camera_name
+from server.camera.sources import Folder, Recording
 from server.wire.errors import UserError
-from server.wire.sections import Camera, Site
 
 Size = tuple[int, int]
 """Width and height of a picture, pixels."""
@@ -20,7 +17,7 @@ class Recorded:
     """A recorded view's pictures.
 
     Attributes:
-        size: of each.
+        size: of each as it is shown: upright, with square pixels.
         fps: frames a second; None of a folder of images, which does not say.
     """
 
@@ -32,15 +29,13 @@ def look_at(view: Path) -> Recorded:
     """Look at a video or a folder of images.
 
     Raises:
-        UserError: it cannot be opened.
+        UserError: it cannot be opened, or there is not one picture in it.
     """
     if view.is_dir():
-        source = open_source(Camera(id=camera_name(view), source=str(view.absolute())), Site())
-        source.close()
-        return Recorded(source.size, None)
-    opened = open_video(str(view))
-    opened.container.close()
-    return Recorded(opened.size, opened.fps)
+        return Recorded(Folder(str(view), 0, "stop").size, None)
+    recording = Recording(str(view), quiet=True)
+    recording.close()
+    return Recorded(recording.size, recording.fps)
 
 
 def parse_size(text: str) -> Size:

@@ -10,7 +10,7 @@ from typing import Any
 
 import yaml
 
-from server.camera.sources.opening import open_video
+from server.run.recorded import look_at
 from server.wire.addresses import shown
 from server.wire.config import Config
 from server.wire.errors import UserError
@@ -41,7 +41,8 @@ def config_for_videos(
     """Give a configuration for recorded views, named after their files; each is played once.
 
     ``base`` is the content of a configuration file (in ``folder``): its settings hold, and those of its
-    cameras with the same names. Without a site in it, rate and size are the first view's.
+    cameras with the same names. Without a site in it, the size is the first view's, and the rate that of the
+    first that has one: a folder of images has none.
 
     Raises:
         UserError: a view cannot be opened or never ends, two have one name, or something in the configuration
@@ -56,7 +57,7 @@ def config_for_videos(
     for video in videos:
         _check_recorded(video)
     if "site" not in content:
-        content["site"] = _site_like(videos[0])
+        content["site"] = _site_like(videos)
     cameras = []
     for number, video in enumerate(videos):
         name = camera_name(video)
@@ -90,14 +91,14 @@ def _cameras_of(content: Mapping[str, Any], where: str) -> list[dict[str, Any]]:
     return cameras
 
 
-def _site_like(video: Path) -> dict[str, Any]:
-    """Take rate and size from a view; a size that H.264 cannot store is rounded down by a pixel."""
-    if kind_of(str(video)) is not SourceKind.FILE:
-        return {}
-    opened = open_video(str(video))
-    opened.container.close()
-    width, height = opened.size
-    return {"fps": opened.fps, "width": width - width % 2, "height": height - height % 2}
+def _site_like(videos: Sequence[Path]) -> dict[str, Any]:
+    """Take rate and size from views; a size that H.264 cannot store is rounded down by a pixel."""
+    first = look_at(videos[0])
+    width, height = first.size
+    rates = (first.fps, *(look_at(it).fps for it in videos[1:])) if first.fps is None else (first.fps,)
+    rate = next((fps for fps in rates if fps is not None), None)
+    said = {} if rate is None else {"fps": rate}
+    return {**said, "width": width - width % 2, "height": height - height % 2}
 
 
 def demo_config(folder: Path, port: int, fps: float) -> tuple[Path, Config]:

@@ -37,23 +37,28 @@ async def run_watch(
         raise UserError("watch: --out, --seconds, --from and --to are about somebody: say whom by --object")
     if out is not None:
         check_new_file(out)
-    settings = HttpSettings(token=token)
+    settings, before = HttpSettings(token=token), _file_at(out)
     try:
         if number is None:
             await _list(url, settings)
             return
-        teller = _Teller()
-        watched = await watch(url, number, out, seconds, teller, start=start, end=end, settings=settings)
+        watched = await watch(url, number, out, seconds, _Teller(), start=start, end=end, settings=settings)
     except ServerAway as error:
         raise AwayError(f"watch: {error}") from error
     except (ClientError, ValueError) as error:
         raise UserError(f"watch: {error}") from error
     except OSError as error:
-        raise UserError(f"{out}: cannot write there: {error.strerror}") from error
+        kept = "; what was recorded before that is kept" if _file_at(out) != before else ""
+        raise UserError(f"{out}: cannot write there: {error.strerror}{kept}") from error
     where = f" in {out}" if out else ""
     typer.echo(f"object {number}: {watched.seconds:.1f} s, {watched.cuts} cuts{where}")
     if not watched.complete:
         raise AwayError("watch: the server went away before the end")
+
+
+def _file_at(out: Path | None) -> int | None:
+    """Return what the disk knows a file by; None where there is none."""
+    return out.stat().st_ino if out is not None and out.exists() else None
 
 
 async def _list(url: str, settings: HttpSettings) -> None:

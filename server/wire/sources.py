@@ -19,7 +19,7 @@ class SourceKind(Enum):
     FOLDER = "folder"
     """A folder of images, in the order of their names."""
     FILE = "file"
-    """A recording: frame n - offset at pulse n, however busy the machine is."""
+    """A recording: its moment (n - offset) / fps at pulse n, however busy the machine is."""
     STREAM = "stream"
     """A camera: its newest picture at every pulse."""
 

@@ -172,3 +172,55 @@ def until_true(condition: Callable[[], bool]) -> None:
     while not condition():
         assert time.monotonic() < end
         time.sleep(0.01)
+
+
+def waits_for_a_file(pid: int) -> bool:
+    """Tell whether a thread of a process is held up in the system call that opens a file."""
+    opening = {"2", "257", "56"}  # open and openat, as Linux counts them on x86 and ARM
+    try:
+        calls = [it.read_text(encoding="ascii") for it in Path(f"/proc/{pid}/task").glob("*/syscall")]
+    except OSError:
+        return False
+    return any(call.split()[0] in opening for call in calls)
+
+
+@pytest.mark.skipif(not Path("/proc/self/syscall").exists(), reason="needs to see what a process waits for")
+@pytest.mark.parametrize(
+    ("command", "number", "code"),
+    [
+        ("track pipe --out tracks.txt", signal.SIGINT, 130),
+        ("track pipe --out tracks.txt", signal.SIGTERM, 143),
+        ("track --det pipe --out tracks.txt", signal.SIGINT, 130),
+        ("render pipe --out out", signal.SIGINT, 130),
+        ("render pipe --out out --config site.yaml", signal.SIGINT, 130),
+        ("calibrate pipe --out ground.json", signal.SIGINT, 130),
+        ("doctor site.yaml", signal.SIGINT, 130),
+    ],
+)
+def test_what_waits_for_a_pipe_ends_without_a_word_when_it_is_told_to(
+    tmp_path: Path, command: str, number: signal.Signals, code: int
+) -> None:
+    """FFmpeg gives up with an error of its own, which is nobody's mistake."""
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "site.yaml").write_text("cameras: [{id: c0, source: pipe}]", encoding="ascii")
+    before = sorted(tmp_path.iterdir())
+    environment = os.environ | {"PYTHONPATH": str(Path(__file__).resolve().parents[2])}
+    arguments = [sys.executable, "-m", "server.run.cli", *command.split()]
+    with subprocess.Popen(
+        arguments, cwd=tmp_path, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        try:
+            held = 0
+            end = time.monotonic() + PATIENCE
+            while held < 10:  # other files are opened in no time
+                held = held + 1 if waits_for_a_file(process.pid) else 0
+                assert process.poll() is None
+                assert time.monotonic() < end
+                time.sleep(0.01)
+            process.send_signal(number)
+            out, err = process.communicate(timeout=PATIENCE)
+        finally:
+            process.kill()
+    assert (process.returncode, err) == (code, "")
+    assert "pipe" not in out
+    assert sorted(tmp_path.iterdir()) == before

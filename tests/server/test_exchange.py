@@ -30,6 +30,7 @@ from server.wire.messages import FOUND_MOST, Found, Keys
 from tracking import Detections
 
 FRAMES = 60
+FPS = 50.0
 WAIT = 1.0  # seconds that two cameras wait for each other, and for a third one that never comes
 
 
@@ -37,7 +38,7 @@ WAIT = 1.0  # seconds that two cameras wait for each other, and for a third one 
 def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Three views of a room with people in it, small and short."""
     out = tmp_path_factory.mktemp("recordings") / "room"
-    write_recording(Scene("room", 3, 4, 4, 192, 108, 25.0), out, FRAMES / 25)
+    write_recording(Scene("room", 3, 4, 4, 192, 108, FPS), out, FRAMES / FPS)
     return out
 
 
@@ -56,7 +57,7 @@ def config_of(
         {"id": f"c{n}", "source": f"c{n}.mp4", "offset": offsets.get(f"c{n}", 0)} for n in range(views)
     ]
     content: dict[str, Any] = {
-        "site": {"name": "hall", "fps": 50, "width": 192, "height": 108},
+        "site": {"name": "hall", "fps": FPS, "width": 192, "height": 108},
         "sync": {"port": free_port(), "start_timeout_s": PATIENCE},
         "zenoh": {"connect": bus, "listen": bus},
         "cameras": cameras,

@@ -117,9 +117,7 @@ def test_a_damaged_recording_that_repeats_is_told_of_once(caplog: pytest.LogCapt
         raise av.error.InvalidDataError(1, "damaged")
 
     container = SimpleNamespace(name="hall.mp4", demux=demux)
-    opened: Any = SimpleNamespace(
-        container=container, stream=SimpleNamespace(average_rate=None, time_base=None)
-    )
+    opened: Any = SimpleNamespace(container=container, stream=SimpleNamespace(time_base=None), fps=25.0)
     assert not list(pictures(opened))
     for _ in range(5):
         assert not list(pictures(opened, again=True))

@@ -51,7 +51,7 @@ def site(folder: Path, **cameras: str) -> Config:
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("recordings") / "room"
-    write_recording(Scene("room", 2, 2, 4, 128, 72, 25.0), out, FRAMES / 25)
+    write_recording(Scene("room", 2, 2, 4, 128, 72, FPS), out, FRAMES / FPS)
     return out
 
 

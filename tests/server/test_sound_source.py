@@ -7,6 +7,7 @@ import wave
 from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
+from typing import Literal
 
 import av
 import cv2
@@ -164,10 +165,21 @@ def test_sound_that_cannot_be_converted_is_silence_and_said_once(
     assert line.startswith("sound of 9 channels at 48000 Hz cannot be converted: ")
 
 
-def test_what_cannot_be_in_step_or_has_no_sound_is_refused(tmp_path: Path) -> None:
+@pytest.mark.parametrize("fps", [12.5, 30.0])
+@pytest.mark.parametrize("at_end", ["stop", "loop"])
+def test_sound_is_in_step_with_pictures_of_another_rate_than_the_site_s(
+    tmp_path: Path, fps: float, at_end: Literal["stop", "loop"]
+) -> None:
+    path = write_flashes(tmp_path / "own.mkv", FRAMES)
+    passes = 2 if at_end == "loop" else 1
+    sound = RecordedSound(str(path), STEREO, fps, 0, at_end)
+    frames = all_until(sound, round(passes * FRAMES / FPS * fps))
+    expected = [(m * FRAMES + n) / FPS for m in range(passes) for n in range(EVERY, FRAMES, EVERY)]
+    assert beeps(as_adts(frames, FORM), "aac") == pytest.approx(expected, abs=0.03)
+
+
+def test_what_has_no_sound_is_refused(tmp_path: Path) -> None:
     path = write_flashes(tmp_path / "own.mp4", FRAMES)
-    with pytest.raises(UserError, match=r"25 pictures a second, but site.fps is 30"):
-        RecordedSound(str(path), STEREO, 30, 0, "stop")
     cameras = [{"id": "c0", "source": str(path)}, {"id": "c1", "source": "scene:room"}]
 
     def opened(camera: str, source: str) -> RecordedSound | LiveSound | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from pathlib import Path
 
@@ -36,6 +37,40 @@ def write_video(path: Path, frames: int, *, codec: str = "libx264", b_frames: in
             container.mux(stream.encode(frame))
         container.mux(stream.encode(None))
     return path
+
+
+def write_timed(
+    path: Path,
+    times: Sequence[float],
+    *,
+    fps: int = 25,
+    pictures: Sequence[np.ndarray[tuple[int, ...], np.dtype[np.uint8]]] | None = None,
+    codec: str = "libx264",
+    prepare: Callable[[VideoStream], None] = lambda _: None,
+) -> Path:
+    """Write a video whose frame n has the grey STEP * (n % 25), or those pictures, at times in seconds."""
+    unit = Fraction(1, 90_000)
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream(codec, rate=fps)
+        assert isinstance(stream, VideoStream)
+        first = pictures[0] if pictures else np.zeros((HEIGHT, WIDTH, 3))
+        stream.width, stream.height = first.shape[1], first.shape[0]
+        stream.pix_fmt = "yuv420p" if codec == "libx264" else "yuvj420p"
+        stream.time_base = stream.codec_context.time_base = unit
+        if codec == "libx264":
+            stream.options = {"preset": "veryfast", "crf": "8", "bf": "0"}
+        prepare(stream)
+        for number, time in enumerate(times):
+            picture = pictures[number] if pictures else _grey(number)
+            frame = av.VideoFrame.from_ndarray(picture, format="bgr24")
+            frame.pts, frame.time_base = round(time / unit), unit
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode(None))
+    return path
+
+
+def _grey(number: int) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]]:
+    return np.full((HEIGHT, WIDTH, 3), STEP * (number % 25), dtype=np.uint8)
 
 
 def damage(path: Path, packets: list[int]) -> Path:

@@ -8,7 +8,9 @@ import numpy as np
 
 from server.camera.encode import Encoder
 from server.camera.own.annexb import is_key
+from server.camera.rates import place_of
 from server.camera.sources.opening import Opened
+from server.camera.sources.orientation import Orientation
 from server.wire.config import Config
 from server.wire.h264 import ParameterSets, nal_units, parameter_sets
 
@@ -66,6 +68,27 @@ class Fitting:
         rate = opened.stream.average_rate
         if rate and abs(float(rate) / wanted.fps - 1) > _SAME_RATE:
             raise MisfitError(f"it has {float(rate):g} pictures a second, the site {wanted.fps:g} (site.fps)")
+
+    def lies(self, orientation: Orientation) -> None:
+        """Look at how its pictures are shown.
+
+        Raises:
+            MisfitError: not as they are stored, and nothing in a site's streams says so.
+        """
+        if orientation.words:
+            raise MisfitError(f"its pictures are shown {orientation.words}")
+
+    def at(self, frame: int, seconds: float) -> None:
+        """Look at when a frame of a recording is shown, after its first one.
+
+        Raises:
+            MisfitError: at another pulse than the one that it would be passed on at.
+        """
+        if (place := place_of(seconds, self._wanted.fps)) != frame:
+            raise MisfitError(
+                f"frame {frame} is shown at {seconds:.2f} s, which is frame {place} at the site's "
+                f"{self._wanted.fps:g} pictures a second (site.fps)"
+            )
 
     def unit(self, frame: int, pulse: int, data: bytes, shown: int | None, decoded: int | None) -> None:
         """Look at the next access unit; ``shown`` and ``decoded`` are its times, where it has any.

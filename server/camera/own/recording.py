@@ -14,7 +14,8 @@ from server.camera.own.fitting import Fitting, MisfitError, Wanted
 from server.camera.own.passing import Unit
 from server.camera.sources.base import Image, SourceEnded
 from server.camera.sources.opening import Opened, open_video
-from server.camera.sources.recording import frames_at
+from server.camera.sources.orientation import Orientation, orientation_of
+from server.camera.sources.recording import Recording, frames_at
 from server.wire.addresses import ffmpeg_reason, shown
 from server.wire.colours import bgr
 from server.wire.errors import UserError
@@ -35,6 +36,7 @@ class OwnRecording:
         if is_missing(path):
             raise UserError(f"{shown(path)}: no such file or folder")
         self._path, self._offset, self._loop = path, offset, at_end == "loop"
+        self._fps = wanted.fps
         self._length = _checked(path, offset, wanted)
         if self._loop and self._length % wanted.gop:
             raise MisfitError(f"its {self._length} frames are not whole GOPs: it cannot begin again (at_end)")
@@ -60,7 +62,7 @@ class OwnRecording:
 
     def ahead(self, places: Sequence[int]) -> Iterator[Image]:
         """Decode the frames at some places, from the file opened once more."""
-        return frames_at(self._path, places)
+        return frames_at(self._path, places, self._fps)
 
     def close(self) -> None:
         """Close the file."""
@@ -84,12 +86,17 @@ class OwnRecording:
 
 
 def decoded(packet: av.Packet[VideoStream]) -> Image | None:
-    """Give the picture of an access unit; None where it cannot be decoded, or not yet."""
+    """Return the picture of an access unit; None where it cannot be decoded (yet), or is to be turned."""
+    pictures = pictures_of(packet)
+    return bgr(pictures[-1]) if pictures and not orientation_of(pictures[-1]).turned else None
+
+
+def pictures_of(packet: av.Packet[VideoStream]) -> list[VideoFrame]:
+    """Decode an access unit; nothing comes of one that is damaged, or waits for others."""
     try:
-        pictures = [picture for picture in packet.decode() if isinstance(picture, VideoFrame)]
+        return [picture for picture in packet.decode() if isinstance(picture, VideoFrame)]
     except av.error.FFmpegError:
-        return None
-    return bgr(pictures[-1]) if pictures else None
+        return []
 
 
 def at_once(opened: Opened) -> None:
@@ -105,15 +112,26 @@ def packets(opened: Opened) -> Iterator[av.Packet[VideoStream]]:
             yield packet
 
 
+def _orientation(path: str) -> Orientation:
+    recording = Recording(path, quiet=True)
+    recording.close()
+    return recording.orientation
+
+
 def _checked(path: str, offset: int, wanted: Wanted) -> int:
     """Look at all of it; give the number of its frames."""
     opened, fitting, frame = open_video(path), Fitting(wanted), -1
+    unit, first = float(opened.stream.time_base or 1), None
     try:
         fitting.opened(opened)
+        fitting.lies(_orientation(path))
         packing = packing_of(opened.stream.codec_context.extradata)
         for frame, packet in enumerate(packets(opened)):
             data = packing.annex_b(bytes(packet))
             fitting.unit(frame, frame + offset, data, packet.pts, packet.dts)
+            if packet.pts is not None:
+                first = packet.pts if first is None else first
+                fitting.at(frame, (packet.pts - first) * unit)
     except (av.error.FFmpegError, ValueError) as error:
         why = ffmpeg_reason(error) if isinstance(error, av.error.FFmpegError) else str(error)
         raise MisfitError(f"it cannot be read: {why}") from None

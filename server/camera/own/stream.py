@@ -12,11 +12,12 @@ from av.video.stream import VideoStream
 from server.camera.own.annexb import is_key, packing_of
 from server.camera.own.fitting import Fitting, MisfitError, Wanted
 from server.camera.own.passing import Unit
-from server.camera.own.recording import at_once, decoded, packets
+from server.camera.own.recording import at_once, decoded, packets, pictures_of
 from server.camera.own.waiting import Waiting
 from server.camera.sound import LiveSound
 from server.camera.sources.base import Image
 from server.camera.sources.opening import Opened, no_answer, open_video
+from server.camera.sources.orientation import orientation_of, pixel_aspect_of
 from server.camera.sources.stream import OPEN_S, READ_S, Stream
 from server.wire.addresses import ffmpeg_reason, shown
 from server.wire.errors import UserError
@@ -77,6 +78,7 @@ class OwnStream(Stream):
         except ValueError:
             data = b""
         key, image = is_key(data), decoded(packet)
+        self._sized.set()  # how it lies was looked at, and it may not change
         if image is not None and image.shape[1::-1] != self._wanted.size:
             image = None  # it has changed since the connection began, which it may not
         self._unbroken = image is not None and bool(data) and (self._unbroken or key)
@@ -99,9 +101,12 @@ def _check(url: str, options: Mapping[str, str], wanted: Wanted) -> None:
     opened, fitting = open_video(url, options, (OPEN_S, READ_S)), Fitting(wanted)
     try:
         fitting.opened(opened)
+        aspect = pixel_aspect_of(opened.stream)
         packing, begun = packing_of(opened.stream.codec_context.extradata), -1
         for frame, packet in enumerate(packets(opened)):
             data = packing.annex_b(bytes(packet))
+            for picture in pictures_of(packet):
+                fitting.lies(orientation_of(picture, aspect))
             if begun < 0 and is_key(data):
                 begun = frame
             if begun >= 0:

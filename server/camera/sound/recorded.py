@@ -13,6 +13,7 @@ from av.container import InputContainer
 from av.stream import Disposition
 from av.video.stream import VideoStream
 
+from server.camera.rates import length_of, rate_of
 from server.camera.sound.frames import Frame, Packet, Way
 from server.camera.sound.ways import way_for
 from server.wire.addresses import ffmpeg_reason, shown
@@ -26,17 +27,15 @@ _WARM_S = 1
 """What is decoded of a recording before the moment at which it is first asked for."""
 _AHEAD_S = Fraction(1, 5)
 _FAR_S = 5
-_SPEED_OFF = 0.002
-"""Pictures may be shown this much faster or slower than they were taken: the sound follows in small jumps."""
 
 
 class RecordedSound:
-    """Sounds at pulse *n* as the recording does with its picture ``n - offset``.
+    """Sounds at pulse ``offset + n`` as the recording does ``n / fps`` seconds after its first picture.
 
     What is of the site's format is passed on; all else is encoded.
 
     Raises:
-        UserError: it cannot be opened, there is no sound in it, or its pictures have another rate.
+        UserError: it cannot be opened, or there is no sound in it.
     """
 
     def __init__(
@@ -50,7 +49,7 @@ class RecordedSound:
         self._begin = offset / self._fps
         container, stream = _open(path)
         try:
-            self._start, self._speed = self._of_pictures(container)
+            self._start = _first_picture(container)
             self._way: Way = way_for(stream, form, settings.kbps)
             self._lasts = self._length(container, stream) if at_end == "loop" else None
         finally:
@@ -105,7 +104,7 @@ class RecordedSound:
         container, stream = _open(self._path)
         try:
             for time, packet in _in_order(container.demux(stream)):
-                yield (time - self._start) * self._speed, packet
+                yield time - self._start, packet
         except av.error.FFmpegError as error:
             if not self._told:  # it may be read over and over
                 log.warning("%s: its sound cannot be read any further: %s", shown(self._path), error.strerror)
@@ -113,31 +112,37 @@ class RecordedSound:
         finally:
             container.close()
 
-    def _of_pictures(self, container: InputContainer) -> tuple[Fraction, Fraction]:
-        """Give when the first picture is shown, and how much longer one is shown here than it was there."""
-        video = _pictures(container)
-        if video is None:
-            return Fraction(0), Fraction(1)
-        rate = video.average_rate
-        start = Fraction(0) if video.start_time is None else video.start_time * (video.time_base or 0)
-        speed = Fraction(1) if rate is None else Fraction(rate) / self._fps
-        if abs(speed - 1) > _SPEED_OFF:
-            raise UserError(
-                f"{shown(self._path)}: has {float(speed * self._fps):g} pictures a second, but site.fps is "
-                f"{float(self._fps):g}: its sound cannot be in step"
-            )
-        return Fraction(start), speed
-
     def _length(self, container: InputContainer, sound: AudioStream) -> Fraction:
-        """Give the seconds after which it begins again: that of its pictures, or without any of its sound."""
+        """Return the seconds after which it begins again: its pictures', or without any its sound's."""
         if (video := _pictures(container)) is not None:
-            return sum(bool(it.size) for it in container.demux(video)) / self._fps
+            return _lasts(container, video, self._fps)
         ends = [
             (it.pts + (it.duration or 0)) * it.time_base
             for it in container.demux(sound)
             if it.pts is not None and it.time_base is not None
         ]
         return Fraction(max(ends, default=Fraction(1)))
+
+
+def _first_picture(container: InputContainer) -> Fraction:
+    """Return when the first picture is shown, in seconds of the file."""
+    video = _pictures(container)
+    if video is None or video.start_time is None:
+        return Fraction(0)
+    return Fraction(video.start_time * (video.time_base or 0))
+
+
+def _lasts(container: InputContainer, video: VideoStream, fps: Fraction) -> Fraction:
+    """Return the seconds that the pictures last, which are whole pulses: what plays them rounds likewise."""
+    unit = video.time_base or Fraction(0)
+    times, count = list[int](), 0
+    for packet in container.demux(video):
+        count += bool(packet.size)
+        if packet.pts is not None:
+            times.append(packet.pts)
+    if not times:
+        return count / fps
+    return length_of(float((max(times) - min(times)) * unit), rate_of(video), float(fps)) / fps
 
 
 def _in_order(packets: Iterable[Packet]) -> Iterator[tuple[Fraction, Packet]]:

@@ -12,7 +12,7 @@ from server.wire.errors import AwayError, UserError
 from server.wire.sections import Camera, Site
 from server.wire.sources import SourceKind, kind_of
 
-__all__ = ["Image", "Recording", "Source", "SourceEnded", "open_source"]
+__all__ = ["Folder", "Image", "Recording", "Source", "SourceEnded", "open_source"]
 
 
 def open_source(
@@ -36,7 +36,7 @@ def open_source(
             case SourceKind.FOLDER:
                 return Folder(camera.source, camera.offset, camera.at_end)
             case SourceKind.FILE:
-                return Recording(camera.source, camera.offset, camera.at_end)
+                return Recording(camera.source, camera.offset, camera.at_end, site.fps)
     except UserError as error:
         # A network camera may only be switched off; a file that is not there will not come by itself.
         away = kind_of(camera.source) is SourceKind.STREAM

@@ -10,27 +10,38 @@ from urllib.parse import urlsplit
 
 import av
 from av.container import InputContainer
+from av.stream import Disposition
 from av.video.codeccontext import VideoCodecContext
 from av.video.stream import VideoStream
 
+from server.camera.rates import rate_of
 from server.wire.addresses import ffmpeg_reason, shown
 from server.wire.errors import UserError
 from server.wire.sources import is_device
 
-_DEFAULT_FPS = 25.0
 _TEXT = "tty"
 """The format of which FFmpeg takes any text to be: it would play it as letters."""
 
 
 @dataclass(frozen=True, slots=True)
 class Opened:
-    """An open video."""
+    """An open video.
+
+    Attributes:
+        container: the file or connection.
+        stream: its first video.
+        size: width and height as pictures are stored; how they are shown is known from the first of them.
+        fps: pictures a second, as it says.
+        frames: how many there are, as it says; 0: it does not.
+        videos: how many videos are in it, without pictures of a cover.
+    """
 
     container: InputContainer
     stream: VideoStream
     size: tuple[int, int]
     fps: float
     frames: int
+    videos: int = 1
 
 
 def open_video(
@@ -58,10 +69,11 @@ def open_video(
             f"{name}: this is text, and no video; detections are named with --det, or with `detections` "
             "beside a camera's source"
         )
-    if not container.streams.video:
+    videos = [it for it in container.streams.video if not it.disposition & Disposition.attached_pic]
+    if not videos:
         container.close()
         raise UserError(f"{name}: there is no video in this file")
-    stream = container.streams.video[0]
+    stream = videos[0]
     context: VideoCodecContext | None = (
         stream.codec_context
     )  # PyAV's types do not know that it may be missing
@@ -69,8 +81,8 @@ def open_video(
         container.close()
         raise UserError(f"{name}: cannot decode this video: no picture size in it; is the file whole?")
     context.thread_count = 1  # one process per camera already uses the cores
-    fps = float(stream.average_rate) if stream.average_rate else _DEFAULT_FPS
-    return Opened(container, stream, (context.width, context.height), fps, stream.frames)
+    size = (context.width, context.height)
+    return Opened(container, stream, size, rate_of(stream), stream.frames, len(videos))
 
 
 def no_answer(error: Exception, seconds: float) -> str | None:

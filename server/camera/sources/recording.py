@@ -1,25 +1,48 @@
-"""A recorded video, replayed frame by frame on the pulses."""
+"""A recorded video, replayed on the pulses by the times of its pictures."""
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator, Sequence
 from typing import Literal
 
 from av.video.frame import VideoFrame
 
+from server.camera.rates import length_of, place_of
 from server.camera.sources.base import Image, SourceEnded
+from server.camera.sources.gaps import Gaps
 from server.camera.sources.opening import open_video
-from server.camera.sources.pictures import pictures
+from server.camera.sources.orientation import INTERLACED, orientation_of, pixel_aspect_of
+from server.camera.sources.pictures import TimedPicture, pictures
 from server.wire.addresses import shown
-from server.wire.colours import bgr
 from server.wire.errors import UserError
+from server.wire.fit import Fit
 from server.wire.sources import is_missing
+
+log = logging.getLogger(__name__)
+
+SAME_RATE = 0.001
+"""Part by which a rate may be off another one and nobody has to be told: 29.97 is 30 in round numbers."""
+_MOST_COUNTED = 10_000
+"""Pulses whose pictures' own numbers are remembered: tracking is not that far behind."""
 
 
 class Recording:
-    """Shows its frame ``pulse - offset``: recorded views stay aligned however busy the machine is.
+    """Shows at pulse ``offset + n`` what it shows ``n / fps`` seconds after its first picture.
 
-    A damaged packet shows as the picture before it, so that what follows keeps its place.
+    That is the newest picture that is due then, give or take half a frame. So recorded views stay aligned
+    whatever their rates are and however busy the machine is. Where pictures come one for each pulse that is
+    picture ``n``.
+
+    A picture that is damaged or missing shows as the one before it, so that what follows keeps its place; at
+    the end that is said. Pictures are upright, their pixels square, and all of the first one's size.
+
+    Args:
+        path: the file.
+        offset: pulses by which it begins later.
+        at_end: whether it begins again.
+        fps: pulses a second; None: as many as it has pictures.
+        quiet: nothing is said of what is odd about it: somebody else does.
 
     Raises:
         UserError: there is no such file, no video in it, or not one picture that can be decoded.
@@ -27,84 +50,181 @@ class Recording:
 
     recorded = True
 
-    def __init__(self, path: str, offset: int, at_end: Literal["stop", "loop"]) -> None:
+    def __init__(
+        self,
+        path: str,
+        offset: int = 0,
+        at_end: Literal["stop", "loop"] = "stop",
+        fps: float | None = None,
+        *,
+        quiet: bool = False,
+    ) -> None:
         if is_missing(path):
             raise UserError(f"{shown(path)}: no such file or folder")
         self._path, self._offset, self._loop = path, offset, at_end == "loop"
+        self._quiet = quiet
         self._opened = open_video(path)
-        self.size = self._opened.size
+        self._aspect = pixel_aspect_of(self._opened.stream)
         self.fps = self._opened.fps
+        """Pictures a second, as the file says."""
         self.frames = self._opened.frames
-        """How many frames the file says it has; 0 where it does not say."""
-        self._pictures = pictures(self._opened)
-        self._next = 0
+        """How many pictures the file says it has; 0 where it does not say."""
+        self._site_fps = fps or self.fps
+        self._same_rate = abs(self.fps / self._site_fps - 1) <= SAME_RATE
+        self._gaps: Gaps | None = None if quiet else Gaps(path)
         self._length: int | None = None
-        self._newest: VideoFrame | None = None
+        """Pulses that it lasts; None: not known before its end."""
+        self._moved: dict[int, int] = {}
+        """By pulse, how many pictures further the one shown is than if they were counted, where not none."""
+        self._begin()
         try:
-            self._forward(0)  # a broken file is refused now, not at its first pulse
+            first = self._forward(0)  # a broken file is refused now, not at its first pulse
         except SourceEnded:
+            self._gaps = None  # all of it is damaged
             self.close()
             raise UserError(
                 f"{shown(path)}: there is not one picture in this video; is the file whole?"
             ) from None
+        self.orientation = orientation_of(first, self._aspect)
+        """How its first picture is turned, mirrored and stretched."""
+        self.size = self.orientation.size((first.width, first.height))
+        self._resized = quiet
+        """That its pictures have another size since has been said."""
+        if not quiet:
+            self._say_what_is_odd(first)
 
     def take(self, pulse: int) -> Image | None:
-        """Give frame ``pulse - offset``; None before the recording begins."""
+        """Return what is shown at a pulse; None before the recording begins."""
         index = pulse - self._offset
         if index < 0:
             return None
-        if self._length is not None:
-            index = self._place(index)
         try:
-            return self._forward(index)
+            place = self._place(index)
+            picture = self._forward(place)
         except SourceEnded:
+            self._say_gaps()
             if not self._loop or not self._length:
                 raise
-            return self._forward(self._place(index))
+            place = self._place(index)
+            picture = self._forward(place)
+        self._note_number(pulse, place)
+        return self._shown(picture)
+
+    def counted(self, pulse: int) -> int:
+        """Return the pulse at which the picture that was shown at this one stands if pictures are counted."""
+        return pulse + self._moved.get(pulse, 0)
 
     def ahead(self, places: Sequence[int]) -> Iterator[Image]:
         """Decode the frames at some places, from the file opened once more."""
-        return frames_at(self._path, places)
-
-    def _place(self, index: int) -> int:
-        """Give the frame that stands at ``index`` of a recording that repeats, rewound if need be."""
-        if not self._loop or not self._length:
-            raise SourceEnded(self._path)
-        index %= self._length
-        if index < self._next - 1:
-            self._rewind()
-        return index
-
-    def _rewind(self) -> None:
-        self._opened.container.close()
-        self._opened = open_video(self._path)
-        self._pictures, self._next, self._newest = pictures(self._opened, again=True), 0, None
-
-    def _forward(self, index: int) -> Image:
-        """Decode up to frame ``index``."""
-        # Damaged from the start: what comes before the first good picture shows as that one.
-        while self._next <= index or self._newest is None:
-            try:
-                picture = next(self._pictures)
-            except StopIteration:
-                self._length = self._next
-                raise SourceEnded(self._path) from None
-            self._newest = picture or self._newest
-            self._next += 1
-        return bgr(self._newest)
+        return frames_at(self._path, places, self._site_fps)
 
     def close(self) -> None:
         """Close the file."""
+        self._say_gaps()
         self._opened.container.close()
 
+    def _begin(self) -> None:
+        again = self._quiet or self._length is not None
+        self._pictures = pictures(self._opened, again=again)
+        self._coming: TimedPicture | None = None
+        self._newest: VideoFrame | None = None
+        self._at = self._number = self._asked = -1
+        """The newest picture's place, its number, and the place that was asked for last."""
+        self._seconds = 0.0
 
-def frames_at(path: str, places: Sequence[int]) -> Iterator[Image]:
-    """Give the frames at some places of a file, by rising place; fewer where it is shorter.
+    def _place(self, index: int) -> int:
+        """Return the place that stands at ``index`` of a recording that repeats, rewound if need be."""
+        if self._length is None:
+            return index
+        if index >= self._length and not self._loop:
+            raise SourceEnded(self._path)
+        index %= self._length
+        if index < self._asked:
+            self._opened.container.close()
+            self._opened = open_video(self._path)
+            self._begin()
+        return index
+
+    def _forward(self, place: int) -> VideoFrame:
+        """Decode up to what is shown at a place."""
+        self._asked = place
+        while (coming := self._coming or next(self._pictures, None)) is not None:
+            at = place_of(coming.seconds, self._site_fps)
+            # Damaged from the start: what comes before the first good picture shows as that one.
+            if at > place and self._newest is not None:
+                self._coming = coming
+                break
+            self._coming = None
+            self._take_in(at, coming)
+        else:
+            self._end()
+        if self._newest is None or (self._length is not None and place >= self._length):
+            raise SourceEnded(self._path)
+        return self._newest
+
+    def _take_in(self, at: int, coming: TimedPicture) -> None:
+        """Go on to the next picture of the file, which stands at a place."""
+        self._number += 1
+        self._seconds = max(self._seconds, coming.seconds)
+        noted = self._gaps if self._length is None else None
+        if noted is not None and coming.picture is None:
+            noted.damaged(at)
+        if noted is not None and self._same_rate:
+            noted.missing(range(self._at + 1, at))
+        self._at = max(self._at, at)
+        self._newest = coming.picture or self._newest
+
+    def _end(self) -> None:
+        if self._length is None and self._newest is not None:
+            self._length = length_of(self._seconds, self.fps, self._site_fps)
+
+    def _note_number(self, pulse: int, place: int) -> None:
+        moved = self._number - place if self._at <= place else 0
+        if moved:
+            self._moved[pulse] = moved
+            if len(self._moved) > _MOST_COUNTED:
+                del self._moved[next(iter(self._moved))]
+
+    def _shown(self, picture: VideoFrame) -> Image:
+        image = orientation_of(picture, self._aspect).image(picture)
+        size = image.shape[1], image.shape[0]
+        if size == self.size:
+            return image
+        if not self._resized:
+            self._resized = True
+            log.warning(
+                "%s: its pictures are %dx%d from frame %d on, they were %dx%d: they are fitted into that",
+                *(shown(self._path), *size, self._asked + 1, *self.size),
+            )
+        return Fit(size, self.size).image(image)
+
+    def _say_what_is_odd(self, first: VideoFrame) -> None:
+        if self._opened.videos > 1:
+            log.warning(
+                "%s: there are %d videos in it: the first is taken", shown(self._path), self._opened.videos
+            )
+        if first.interlaced_frame:
+            log.warning("%s: %s", shown(self._path), INTERLACED)
+        if not self._same_rate:
+            some = "left out" if self.fps > self._site_fps else "shown twice"
+            log.warning(
+                "%s: it has %.4g pictures a second, %.4g are taken: each is shown at its time, some are %s",
+                *(shown(self._path), self.fps, self._site_fps, some),
+            )
+
+    def _say_gaps(self) -> None:
+        if self._gaps is not None:
+            length = self._at + 1
+            self._gaps.say(length, self._number / self._seconds if self._seconds else self.fps)
+
+
+def frames_at(path: str, places: Sequence[int], fps: float | None = None) -> Iterator[Image]:
+    """Decode the frames at some places of a file, by rising place; fewer where it is shorter.
 
     Raises:
         UserError: it cannot be opened.
     """
-    recording = Recording(path, offset=0, at_end="stop")
+    recording = Recording(path, fps=fps, quiet=True)
     try:
         for place in places:
             image = recording.take(place)

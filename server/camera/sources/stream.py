@@ -6,6 +6,7 @@ import logging
 import threading
 import time
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import cast
 
 import av
@@ -17,8 +18,8 @@ from camsync import Spell
 from server.camera.sound import LiveSound
 from server.camera.sources.base import Image
 from server.camera.sources.opening import Opened, no_answer, open_video
+from server.camera.sources.orientation import INTERLACED, Orientation, orientation_of, pixel_aspect_of
 from server.wire.addresses import ffmpeg_reason, shown
-from server.wire.colours import bgr
 from server.wire.errors import AwayError, UserError
 
 log = logging.getLogger(__name__)
@@ -27,6 +28,8 @@ OPEN_S, READ_S = 10.0, 5.0
 """Seconds in which a camera must answer, and send something."""
 _RETRY_FIRST_S, _RETRY_MAX_S = 0.5, 10.0
 _LET_GO_S = 0.5
+_FIRST_S = 2.0
+"""Seconds that are waited for the first picture, which says how all lie."""
 _STALE_S = 1.5
 """A picture older than this is not shown again: the camera counts as away, and others have half a second
 to take over within the two that are promised."""
@@ -43,7 +46,11 @@ class Stream:
     def __init__(self, url: str, options: Mapping[str, str], listener: LiveSound | None = None) -> None:
         self._url, self._options, self._listener = url, options, listener
         opened = open_video(url, options, (OPEN_S, READ_S))
-        self.size = opened.size
+        self._stored = opened.size
+        self._orientation = Orientation(pixel_aspect=pixel_aspect_of(opened.stream))
+        self.size = self._orientation.size(self._stored)
+        self._sized = threading.Event()
+        """The first picture has come, and with it the size is known for good."""
         self._resized: tuple[int, int] | None = None
         """The size of its pictures, where it is another one since."""
         self._lock = threading.Lock()
@@ -54,6 +61,8 @@ class Stream:
         self._away = Spell(calm=0.0)
         self._thread = threading.Thread(target=self._run, args=(opened,), name="source", daemon=True)
         self._thread.start()
+        self._sized.wait(_FIRST_S)
+        self._sized.set()
 
     def take(self, pulse: int) -> Image | None:
         """Give the newest picture; None while the camera is away.
@@ -67,7 +76,7 @@ class Stream:
             raise AwayError(f"{shown(self._url)}: {self._other_size(self._resized)}")
         with self._lock:
             picture = self._newest if time.monotonic() - self._newest_at < _STALE_S else None
-        return None if picture is None else bgr(picture)
+        return None if picture is None else self._oriented(picture).image(picture)
 
     def ahead(self, places: Sequence[int]) -> Iterator[Image]:  # noqa: ARG002 — Source
         """Give nothing: what a camera will show nobody knows."""
@@ -94,8 +103,10 @@ class Stream:
 
     def _read(self, opened: Opened) -> bool:
         """Read until the connection ends; tell whether any picture came."""
-        if opened.size != self.size:
-            self._resized = opened.size
+        aspect = pixel_aspect_of(opened.stream)
+        size = replace(self._orientation, pixel_aspect=aspect).size(opened.size)
+        if size != self.size:
+            self._resized = size
             opened.container.close()
             return False
         any_picture, why = False, "the connection has ended"
@@ -155,8 +166,11 @@ class Stream:
             pictures = [picture for picture in packet.decode() if isinstance(picture, VideoFrame)]
         except av.error.FFmpegError:  # damage; that nothing can be read any more is no matter of decoding
             return False
-        if any((it.width, it.height) != self.size for it in pictures):
-            raise _OddSizeError(self._other_size((pictures[-1].width, pictures[-1].height)))
+        if pictures and not self._sized.is_set():
+            self._lies_as(pictures[0])
+        for size in map(self._size_of, pictures):
+            if size != self.size:
+                raise _OddSizeError(self._other_size(size))
         if pictures and not old:
             with self._lock:
                 self._newest, self._newest_at = pictures[-1], time.monotonic()
@@ -164,6 +178,21 @@ class Stream:
             if self._listener is not None and newest.pts is not None and newest.time_base is not None:
                 self._listener.picture(newest.pts * newest.time_base)
         return bool(pictures)
+
+    def _lies_as(self, first: VideoFrame) -> None:
+        """Learn from the first picture how all are turned, before anybody is told their size."""
+        if (first.width, first.height) == self._stored:
+            self._orientation = self._oriented(first)
+            self.size = self._size_of(first)
+        if first.interlaced_frame:
+            log.warning("%s: %s", shown(self._url), INTERLACED)
+        self._sized.set()
+
+    def _oriented(self, picture: VideoFrame) -> Orientation:
+        return orientation_of(picture, self._orientation.pixel_aspect)
+
+    def _size_of(self, picture: VideoFrame) -> tuple[int, int]:
+        return self._oriented(picture).size((picture.width, picture.height))
 
 
 class _OddSizeError(Exception):

@@ -28,7 +28,7 @@ class Camera(Section):
     kind: Literal["upright", "overhead"] = "upright"
     """People stand upright in its picture, or it looks straight down on them."""
     offset: int = 0
-    """A recording shows its frame n - offset at pulse n."""
+    """A recording shows at pulse n its moment (n - offset) / fps."""
     at_end: Literal["stop", "loop"] = "stop"
     """What a recording does after its last frame."""
     h264: Literal["encode", "auto", "pass"] = "encode"

@@ -1,0 +1,113 @@
+"""How a stored picture is turned, mirrored and stretched to be shown: phones are held upright."""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from av.sidedata.sidedata import SideData
+from av.video.frame import VideoFrame
+from av.video.stream import VideoStream
+
+from server.camera.sources.base import Image
+from server.wire.colours import bgr
+
+_MATRIX_NAME = "DISPLAYMATRIX"
+_MATRIX = struct.Struct("=9i")
+_MOST_STRETCHED = 4.0
+"""Pixels that are said to be further from square than that are damage."""
+INTERLACED = "it is interlaced, so two moments are in one picture: deinterlaced, people are found better"
+"""What is said of pictures whose lines are of two moments; they are taken as they are."""
+_SQUARE = 0.01
+"""Part by which pixels may be off square without being stretched: encoders round."""
+
+
+@dataclass(frozen=True, slots=True)
+class Orientation:
+    """From a stored picture to the one that is shown.
+
+    Attributes:
+        transposed: rows become columns, before anything is mirrored.
+        mirrored_x: left and right change places.
+        mirrored_y: top and bottom do.
+        pixel_aspect: how wide a stored pixel is, in heights of it.
+    """
+
+    transposed: bool = False
+    mirrored_x: bool = False
+    mirrored_y: bool = False
+    pixel_aspect: float = 1.0
+
+    @property
+    def words(self) -> str:
+        """How stored pictures are turned and stretched, in words; empty: they are shown as they are."""
+        if self.turned:
+            return "turned or mirrored (display matrix)"
+        if self.pixel_aspect != 1.0:
+            return f"stretched (its pixels are {self.pixel_aspect:.3g} times as wide as high)"
+        return ""
+
+    @property
+    def turned(self) -> bool:
+        """Whether the picture is shown turned or mirrored."""
+        return self.transposed or self.mirrored_x or self.mirrored_y
+
+    def size(self, stored: tuple[int, int]) -> tuple[int, int]:
+        """Return the width and height of what is shown of a picture of such a size."""
+        width, height = max(1, round(stored[0] * self.pixel_aspect)), stored[1]
+        return (height, width) if self.transposed else (width, height)
+
+    def image(self, picture: VideoFrame) -> Image:
+        """Return the picture as it is shown, ``(height, width, 3)`` BGR."""
+        image = bgr(picture)
+        if self.pixel_aspect != 1.0:
+            upright = replace(self, transposed=False).size((image.shape[1], image.shape[0]))
+            how = cv2.INTER_AREA if self.pixel_aspect < 1.0 else cv2.INTER_LINEAR
+            image = np.asarray(cv2.resize(image, upright, interpolation=how), dtype=np.uint8)
+        if not self.turned:
+            return image
+        if self.transposed:
+            image = image.transpose(1, 0, 2)
+        if self.mirrored_x:
+            image = image[:, ::-1]
+        if self.mirrored_y:
+            image = image[::-1]
+        return np.ascontiguousarray(image)
+
+
+_QUARTERS = (
+    Orientation(),
+    Orientation(transposed=True, mirrored_y=True),
+    Orientation(mirrored_x=True, mirrored_y=True),
+    Orientation(transposed=True, mirrored_x=True),
+)
+"""By quarter turns to the left."""
+
+
+def orientation_of(picture: VideoFrame, pixel_aspect: float = 1.0) -> Orientation:
+    """Parse a picture's display matrix (ISO/IEC 14496-12, 6.2.2; an EXIF orientation becomes one, too).
+
+    What is between two quarter turns is taken for the nearer one. Of a photo's EXIF only the turn is known.
+    """
+    try:
+        found = picture.side_data.get(_MATRIX_NAME)
+    except ValueError:  # beside it is what PyAV has no name for, such as all of a photo's EXIF
+        return replace(_QUARTERS[round(picture.rotation / 90) % 4], pixel_aspect=pixel_aspect)
+    data = bytes(found) if isinstance(found, SideData) else b""
+    if len(data) != _MATRIX.size:
+        return Orientation(pixel_aspect=pixel_aspect)
+    # A point (x, y) is shown at (a x + c y, b x + d y).
+    a, b, _, c, d, *_ = _MATRIX.unpack(data)
+    if abs(a) + abs(d) >= abs(b) + abs(c):
+        return Orientation(mirrored_x=a < 0, mirrored_y=d < 0, pixel_aspect=pixel_aspect)
+    return Orientation(transposed=True, mirrored_x=c < 0, mirrored_y=b < 0, pixel_aspect=pixel_aspect)
+
+
+def pixel_aspect_of(stream: VideoStream) -> float:
+    """Return how wide a stored pixel is, in heights of it; 1 where nothing else is sensibly said."""
+    said = stream.sample_aspect_ratio
+    aspect = float(said) if said else 1.0
+    sensible = 1.0 / _MOST_STRETCHED <= aspect <= _MOST_STRETCHED
+    return aspect if sensible and abs(aspect - 1.0) > _SQUARE else 1.0
