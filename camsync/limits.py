@@ -19,9 +19,13 @@ class ServerLimits:
     cut_off: float = 10.0
     """Seconds a client may stay behind, or not acknowledge what was sent, before it is cut off."""
     clients: int = 256
-    """Connections at once; more are refused."""
+    """Connections at once, beside one for each name that is expected or a user's; more take the places of the
+    oldest ones of the address, or of the login, that has the most."""
+    login_places: int = 8
+    """Connections of one login at once, beside the one that has said HELLO: those that ask who is there."""
     strangers: int = 256
-    """Connections to a closed server that have not proven who they are; more take the oldest ones' places."""
+    """Connections to a closed server that have not proven who they are; more take the places of the oldest
+    ones of the address that has the most."""
     prove_within: float = 5.0
     """Seconds that they have for it."""
     line_burst: float = 100.0

@@ -69,7 +69,8 @@ class PulseServer:
         self._limits = limits or ServerLimits()
         self._clock = clock or steady_unix_clock()
         self._door = None if users is None else Door(users, self._limits, self._clock)
-        self._hub = Hub(self._clock, self._limits, self._greet, self._heard, self._changed, self._door)
+        kept = self._expect.union(users or ())
+        self._hub = Hub(self._clock, self._limits, self._greet, self._heard, self._changed, self._door, kept)
         self._server: asyncio.Server | None = None
         self._timer: asyncio.TimerHandle | None = None
         self._axis: PulseAxis | None = None
