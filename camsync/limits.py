@@ -14,6 +14,11 @@ class ServerLimits:
     adopt_for: float = 30.0
     """Seconds after the first pulse in which clients that have counted further may move the axis forward:
     the expected ones, or all where nobody is expected. A server long running follows nobody."""
+    claims_for: float = 2.5
+    """Seconds from when enough clients have said how far they have counted until the axis goes on there, so
+    that the others can say it, too: all come back within two seconds. They count on meanwhile."""
+    counted_for: float = 10 * 365.25 * 86400.0
+    """Seconds that a client can have counted for: ten years. What claims more is not believed."""
     backlog: int = 4096
     """Bytes waiting for one client before pulses are dropped for it (a pulse has about 30)."""
     cut_off: float = 10.0

@@ -20,7 +20,7 @@ async def _close(writer: asyncio.StreamWriter) -> None:
 async def by_hand() -> AsyncIterator[Connect]:
     """Give a function that connects to a port.
 
-    It takes ``receive`` bytes of kernel buffer, and the address ``source`` to come from, where they are given.
+    It takes ``receive`` bytes of kernel buffer, and ``source``, the address to come from, where given.
     """
     async with AsyncExitStack() as stack:
 

@@ -53,8 +53,8 @@ async def test_one_login_that_comes_again_and_again_keeps_nobody_else_out(by_han
         for _ in range(40):
             await proven(by_hand, server.port, "c0")
         assert len(server.clients()) == 3
-        for user in USERS:
-            await first_pulses(server.port, user, Login(user, USERS[user]))
+        for user, password in USERS.items():
+            await first_pulses(server.port, user, Login(user, password))
 
 
 async def test_one_login_with_more_connections_than_there_are_places_keeps_nobody_out(
@@ -80,7 +80,7 @@ async def test_who_follows_under_a_login_stays_when_it_comes_again_to_ask(by_han
         while not isinstance(parse_server_line(proof.opened((await follows.line()).rstrip())), Pong):
             pass
         others = await clients_of(HERE, server.port, PATIENCE, Login("c0", USERS["c0"]))
-        assert [it.name for it in others][0] == "c0"
+        assert others[0].name == "c0"
 
 
 async def test_a_second_of_a_login_that_follows_takes_the_place_of_the_first(by_hand: Connect) -> None:
