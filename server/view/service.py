@@ -89,6 +89,8 @@ class BestViewService:
         self.walking = Walking(config)
         self.past = Past(config, self.shelves, self.agreement, frames, self.sound)
         self.pulse = -1
+        self._decided_to = -1
+        """The last pulse that anything was heard of; a frame that is said to be of a later one shows nobody."""
         self.pulse0: float | None = None
         """When pulse 0 was due, unix seconds; None before the first pulse."""
         self._pulsed_at: float | None = None
@@ -154,7 +156,7 @@ class BestViewService:
                     await follow  # raises what ended it
                 if (self.pulse >= 0 or self._without_pulses) and not self.remembering.waits:
                     await self.decide_by_turns()
-            last = max(shelf.newest for shelf in self.shelves.values())
+            last = min(self._decided_to, max(shelf.newest for shelf in self.shelves.values()))
             for decision in self.decider.finish(last):
                 self._publish(decision)
             log.info("every camera's recording is over")
@@ -266,6 +268,7 @@ class BestViewService:
         self._changed.set()
 
     def _step(self, epoch: Epoch) -> None:
+        self._decided_to = epoch.last
         self.lacking.epoch(epoch)
         self.walking.take(epoch)
         self.remembering.begin(epoch.last)

@@ -243,6 +243,57 @@ async def test_a_busy_loop_loses_the_oldest_and_counts_them() -> None:
     assert inbox.lost == 15
 
 
+async def test_who_sends_very_much_takes_neither_the_places_nor_the_turns_of_others() -> None:
+    got: list[str] = []
+    inbox = Inbox(got.append, pending_max=10, whose=lambda it: it[:2])
+    for number in range(1000):
+        inbox.put(f"c0 {number}")
+        if number < 5:
+            inbox.put(f"c1 {number}")
+    await asyncio.sleep(0)
+    assert [it for it in got if it.startswith("c1")] == [f"c1 {number}" for number in range(5)]
+    assert [it for it in got if it.startswith("c0")] == [f"c0 {number}" for number in range(990, 1000)]
+    assert got[:4] == ["c0 990", "c1 0", "c0 991", "c1 1"]
+    assert (inbox.lost, inbox.waiting) == (990, 0)
+
+
+async def test_who_sends_without_end_lets_the_event_loop_have_its_turn() -> None:
+    got: list[int] = []
+
+    def handle(number: int) -> None:
+        got.append(number)
+        if len(got) < 100_000:
+            inbox.put(number + 1)
+
+    inbox = Inbox(handle)
+    inbox.put(0)
+    await asyncio.sleep(0)
+    await asyncio.sleep(0)
+    assert 0 < len(got) < 1000
+    inbox._handler = got.append
+
+
+async def test_what_waits_of_one_sender_has_so_many_bytes_at_most() -> None:
+    got: list[bytes] = []
+    inbox = Inbox(got.append, size=lambda _: 1 << 24)
+    for number in range(10):
+        inbox.put(b"%d" % number)
+    await asyncio.sleep(0)
+    assert got == [b"6", b"7", b"8", b"9"]
+    assert inbox.lost == 6
+
+
+async def test_senders_without_end_are_taken_for_few() -> None:
+    got: list[int] = []
+    inbox = Inbox(got.append, pending_max=10, whose=str)
+    for number in range(5000):
+        inbox.put(number)
+    assert inbox.waiting <= 1024 + 10
+    while inbox.waiting:
+        await asyncio.sleep(0)
+    assert got[:3] == [0, 1, 2]
+
+
 async def test_one_item_that_cannot_be_handled_keeps_back_no_other(caplog: pytest.LogCaptureFixture) -> None:
     got: list[float] = []
     inbox: Inbox[int] = Inbox(lambda number: got.append(1 / number))
