@@ -30,5 +30,5 @@ def makes_sense(message: CameraTracks, stride: int) -> bool:
 
 
 def _is_short(pulses: Sequence[int], end: int) -> bool:
-    """Tell whether these can be frames of an epoch that ends with a pulse: later ones would be kept for ever."""
+    """Tell whether these can be frames of an epoch that ends with a pulse; later ones would be kept."""
     return len(pulses) <= _WINDOW_MAX and max(pulses, default=-1) <= end

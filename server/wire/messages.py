@@ -62,12 +62,16 @@ class FrameHead(msgspec.Struct, frozen=True, kw_only=True):
     encoded: Time
 
 
+BINS_MOST = 1024
+"""Bins of a histogram; more would tell nobody apart better."""
+
+
 class Glimpse(msgspec.Struct, frozen=True, kw_only=True):
     """How a person looks in consecutive frames in which nobody else is in the box."""
 
     first: Pulse
     last: Pulse
-    histogram: list[float]
+    histogram: Annotated[list[Annotated[float, msgspec.Meta(le=1e6)]], msgspec.Meta(max_length=BINS_MOST)]
     """The mean of these frames' histograms."""
 
 

@@ -9,6 +9,7 @@ import threading
 from collections import deque
 
 import pytest
+import zenoh
 from pydantic import ValidationError
 
 from server.run.setup import free_port
@@ -66,6 +67,21 @@ async def test_a_message_comes_with_its_key_and_attachment(settings: Zenoh) -> N
     assert await heard.next() == Message("myview/hall/c0/video", b"picture", b"head")
     client.publish("myview/hall/c0/video", b"picture")
     assert (await heard.next()).attachment == b""
+    client.close()
+    router.close()
+
+
+async def test_a_message_larger_than_any_is_dropped_and_all_others_come(settings: Zenoh) -> None:
+    router, client = Bus.router(settings), Bus.client(settings)
+    heard, there = Heard(), Presence()
+    router.subscribe("myview/hall/camera/*/video", heard.queue.put_nowait)
+    client.watch_alive("router", there.note)
+    router.declare_alive("router")
+    await there.until("router")
+    key, wait = "myview/hall/camera/c0/video", zenoh.CongestionControl.BLOCK  # whoever sends it may wait
+    for payload in (bytes(40_000_000), b"picture"):
+        await asyncio.to_thread(client._session.put, key, payload, congestion_control=wait)
+    assert (await heard.next()).payload == b"picture"
     client.close()
     router.close()
 
@@ -289,7 +305,7 @@ async def test_senders_without_end_are_taken_for_few() -> None:
     for number in range(5000):
         inbox.put(number)
     assert inbox.waiting <= 1024 + 10
-    while inbox.waiting:
+    while inbox.waiting:  # noqa: ASYNC110
         await asyncio.sleep(0)
     assert got[:3] == [0, 1, 2]
 
