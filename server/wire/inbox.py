@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import threading
+import time
 from collections import Counter, OrderedDict, deque
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -20,8 +21,8 @@ _BYTES_MAX = 1 << 26
 """Bytes of one sender that are held for it."""
 _SENDERS_MAX = 1024
 """Senders that are told apart; more of them are taken for one."""
-_AT_ONCE = 64
-"""Items that are handled before everything else on the event loop has its turn."""
+TURN_S = 0.02
+"""How long items are handled at a time, but for the last of them: then others have their turn of the loop."""
 
 Item = TypeVar("Item")
 
@@ -40,18 +41,21 @@ class Inbox(Generic[Item]):
 
     When the loop is too slow the oldest of a sender are lost and counted in ``lost``: memory never grows, no
     sender waits, and none who sends very much takes the places or the turns of others. A sender's own items
-    stay in order. ``whose`` says who sent an item, ``size`` how many bytes it has.
+    stay in order. However many come, no more are handled in one turn of the loop than ``turn_s`` seconds take.
+
+    ``whose`` says who sent an item, ``size`` how many bytes it has.
     """
 
     def __init__(
         self,
         handler: Callable[[Item], None],
         pending_max: int = PENDING_MAX,
+        turn_s: float = TURN_S,
         *,
         whose: Callable[[Item], str] = lambda _: "",
         size: Callable[[Item], int] = lambda _: 0,
     ) -> None:
-        self._handler, self._pending_max = handler, pending_max
+        self._handler, self._pending_max, self._turn_s = handler, pending_max, turn_s
         self._whose, self._size = whose, size
         self._loop = asyncio.get_running_loop()
         self._lock = threading.Lock()
@@ -105,13 +109,13 @@ class Inbox(Generic[Item]):
             return item
 
     def _drain(self) -> None:
-        for _ in range(_AT_ONCE):
-            item = self._take()
-            if item is None:
-                return
+        until = time.perf_counter() + self._turn_s
+        while (item := self._take()) is not None:
             try:
                 self._handler(item)
             except Exception as error:  # one bad item must not keep back those behind it
                 if (more := self._failing.happened(repr(error))) is not None:
                     log.exception("handling what came failed%s", more)
-        self._loop.call_soon(self._drain)
+            if time.perf_counter() >= until:
+                self._loop.call_soon(self._drain)
+                return
