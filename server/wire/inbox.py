@@ -41,7 +41,7 @@ class Inbox(Generic[Item]):
 
     When the loop is too slow the oldest of a sender are lost and counted in ``lost``: memory never grows, no
     sender waits, and none who sends very much takes the places or the turns of others. A sender's own items
-    stay in order. However many come, no more are handled in one turn of the loop than ``turn_s`` seconds take.
+    stay in order. In one turn of the loop no more are handled than ``turn_s`` seconds take.
 
     ``whose`` says who sent an item, ``size`` how many bytes it has.
     """
