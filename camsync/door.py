@@ -12,6 +12,7 @@ from typing import Protocol
 from camsync.clock import Clock
 from camsync.limits import ServerLimits
 from camsync.messages import Challenge, Prove
+from camsync.places import who_makes_room
 from camsync.protocol import ProtocolError, encode, parse_client_line
 from camsync.seal import SealError, Seals, new_nonce
 from camsync.spell import Spell
@@ -25,7 +26,11 @@ class Visitor(Protocol):
 
     @property
     def address(self) -> str:
-        """Where it comes from."""
+        """Where it comes from: ``host:port``."""
+
+    @property
+    def origin(self) -> str:
+        """The host that it comes from."""
 
     def say(self, line: bytes) -> bool:
         """Send a line; say whether it was sent."""
@@ -44,8 +49,8 @@ class _Waiting:
 class Door:
     """Lets in who knows the password of a user; ``users`` has them by name.
 
-    A name that is not known is refused as a wrong password is. Of very many who wait, the oldest makes way:
-    who knows a password needs no longer than an answer takes.
+    A name that is not known is refused as a wrong password is. Of very many who wait, the oldest of the
+    address that has the most makes way: who knows a password needs no longer than an answer takes.
     """
 
     def __init__(self, users: Mapping[str, str], limits: ServerLimits, clock: Clock) -> None:
@@ -65,8 +70,8 @@ class Door:
     def knock(self, visitor: Visitor) -> None:
         """Ask a new connection who it is."""
         if len(self._waiting) >= self._limits.strangers:
-            oldest = next(iter(self._waiting.values())).visitor
-            self._refuse(oldest, "too many others have come, and no proof")
+            crowded_out = who_makes_room([it.visitor for it in self._waiting.values()])
+            self._refuse(crowded_out, "too many others have come, and no proof")
         nonce = new_nonce()
         timer = asyncio.get_running_loop().call_later(
             self._limits.prove_within, self._refuse, visitor, "no proof has come"

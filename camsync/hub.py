@@ -3,20 +3,26 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections import defaultdict
+from collections.abc import Callable, Collection
 
 from camsync.clock import Clock
 from camsync.door import Door
 from camsync.limits import ServerLimits
 from camsync.messages import Hello
 from camsync.peer import ClientInfo, Peer
+from camsync.places import who_makes_room
 from camsync.protocol import ProtocolError
+from camsync.spell import Spell
 
 _log = logging.getLogger(__name__)
 
 
 class Hub:
     """The connected clients.
+
+    A place is kept for each name of ``kept``. All other connections share ``limits.clients`` places, those of
+    one login no more than ``limits.login_places`` of them.
 
     ``door`` lets them in, where the server is closed; ``greet`` gives the lines a new client is met with;
     ``heard`` is told every HELLO that was accepted; ``changed`` is called when somebody came, got a name or
@@ -31,8 +37,10 @@ class Hub:
         heard: Callable[[Hello], None],
         changed: Callable[[], None],
         door: Door | None = None,
+        kept: Collection[str] = (),
     ) -> None:
         self._door = door
+        self._kept = frozenset(kept)
         self._clock = clock
         self._limits = limits
         self._greet = greet
@@ -40,6 +48,8 @@ class Hub:
         self._changed = changed
         self._peers: dict[int, Peer] = {}  # by id(), in the order of joining
         self._closed = False
+        self._arrivals: dict[str, Spell] = defaultdict(lambda: Spell(clock))  # of the names that are kept
+        self._others, self._crowds = Spell(clock), Spell(clock)
 
     def new_peer(self) -> Peer:
         """Make the protocol object of a new connection (asyncio's factory)."""
@@ -72,13 +82,11 @@ class Hub:
             peer.end("stopped", "the server stops")
 
     def joined(self, peer: Peer) -> None:
-        """Meet a new connection, or refuse it when there are too many."""
+        """Meet a new connection; when there are too many, others of the same origin make room for it."""
         if self._closed:
             peer.end("stopped", "the server stops")
             return
-        if len(self._peers) >= self._limits.clients:
-            peer.end("full", f"the server has {self._limits.clients} clients already")
-            return
+        self._make_room(peer)
         self._peers[id(peer)] = peer
         peer.say(self._greet())
 
@@ -93,12 +101,41 @@ class Hub:
             raise ProtocolError("name", f"this connection is for {peer.user} alone")
         if peer.name not in {None, hello.name}:
             raise ProtocolError("malformed", f"this connection is {peer.name} already")
+        self._tell_of(peer, hello.name)
         older = [other for other in self._peers.values() if other.name == hello.name and other is not peer]
         for other in older:
             other.name = None
             other.end("replaced", f"another {hello.name} has come")
-        if peer.name is None:  # it may say so again and again
-            _log.info("%s is here", hello.name)
         peer.name = hello.name
         self._heard(hello)
         self._changed()
+
+    def _make_room(self, newcomer: Peer) -> None:
+        guests = [it for it in self._peers.values() if it.name not in self._kept]
+        theirs = [it for it in guests if it.origin == newcomer.origin]
+        if newcomer.user is not None and len(theirs) >= self._limits.login_places:
+            guests = theirs
+        elif len(guests) < self._limits.clients:
+            return
+        crowded_out = who_makes_room(guests)
+        if (more := self._crowds.happened(crowded_out.origin)) is not None:
+            told = "%s has %d connections: the oldest makes room%s"
+            count = sum(it.origin == crowded_out.origin for it in guests)
+            _log.warning(told, crowded_out.origin, count, more)
+        self.left(crowded_out)
+        crowded_out.end("full", f"more connections of {crowded_out.origin} have come than there are places")
+
+    def _tell_of(self, peer: Peer, name: str) -> None:
+        """Tell the log who has come; two of one name may make way for each other for ever."""
+        if peer.name is not None:  # it may say so again and again
+            return
+        before = next((it for it in self._peers.values() if it.name == name), None)
+        what = "replaced" if before is not None else ""
+        seldom, why = (self._arrivals[name], what) if name in self._kept else (self._others, name)
+        more = seldom.happened(why)
+        if more is None:
+            return
+        if before is None:
+            _log.info("%s is here%s", name, more)
+        else:
+            _log.warning("another %s is here, from %s: the one before makes way%s", name, peer.address, more)

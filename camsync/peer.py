@@ -75,10 +75,15 @@ class Peer(asyncio.Protocol):
         self._kept_up = self._joined  # when a pulse last went out to it
         self._transport: asyncio.Transport | None = None
         self._sent = self._dropped = self._behind = self._errors = 0
-        self.address = "?"
+        self.address = self._host = "?"
         self.name: str | None = None
         self.user: str | None = None
         """Who it has proven to be; None: it was not asked."""
+
+    @property
+    def origin(self) -> str:
+        """Whose connection it is: the user's that it has proven to be, or else its host's."""
+        return self.user or self._host
 
     def info(self) -> ClientInfo:
         """Give what is known of this client now."""
@@ -89,8 +94,8 @@ class Peer(asyncio.Protocol):
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Start serving the client (called by asyncio)."""
         self._transport = cast("asyncio.Transport", transport)
-        host, port, *_ = transport.get_extra_info("peername") or ("?", 0)
-        self.address = f"{host}:{port}"
+        self._host, port, *_ = transport.get_extra_info("peername") or ("?", 0)
+        self.address = f"{self._host}:{port}"
         _tune(transport.get_extra_info("socket"), self._limits.cut_off)
         if self._door is None:
             self._hub.joined(self)
@@ -159,10 +164,11 @@ class Peer(asyncio.Protocol):
         transport = self._transport
         if transport is None or transport.is_closing():
             return
+        if not transport.get_write_buffer_size():
+            self._write(transport, encode(Refusal(code, text)))
         if transport.get_write_buffer_size():
             transport.abort()  # it does not read: a polite close would wait for it
         else:
-            self._write(transport, encode(Refusal(code, text)))
             transport.close()
 
     @property

@@ -54,7 +54,9 @@ MAX_LINE = 256  # bytes, without the line end
 MAX_SERVER_LINE = 32768  # bytes: WAIT and CLIENTS name every camera of a site
 _GREETING = "MYVIEW-SYNC"
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
-_NUMBER = re.compile(r"\d{1,13}")  # pulses: enough for centuries at any rate
+LAST_PULSE = 2**40
+"""Enough for centuries at any camera's rate; times in ticks of a clock stay within 64 bits, numbers exact."""
+_NUMBER = re.compile(r"\d{1,13}")
 _TIME = re.compile(r"-?\d{1,12}(\.\d{1,20})?")  # seconds
 _NONCE = re.compile(r"[0-9a-f]{32}")
 _CODE = re.compile(r"[a-z]{1,20}")
@@ -240,7 +242,10 @@ def _match(pattern: re.Pattern[str], text: str, what: str) -> str:
 
 
 def _number(text: str) -> int:
-    return int(_match(_NUMBER, text, "pulse number"))
+    number = int(_match(_NUMBER, text, "pulse number"))
+    if number > LAST_PULSE:
+        raise ProtocolError("malformed", f"{number} is beyond the last pulse, {LAST_PULSE}")
+    return number
 
 
 def _time(text: str) -> float:

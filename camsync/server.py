@@ -9,6 +9,7 @@ from types import TracebackType
 from typing import Self
 
 from camsync.axis import PulseAxis
+from camsync.claims import INEXACT, Claims
 from camsync.clock import Clock, steady_unix_clock
 from camsync.door import Door
 from camsync.hub import Hub
@@ -19,7 +20,6 @@ from camsync.protocol import MAX_FPS, MIN_FPS, VERSION, encode, is_name
 from camsync.spell import Spell
 
 _log = logging.getLogger(__name__)
-_FARTHEST = 2**39  # pulses that a client may claim to have counted: centuries at any camera's rate
 
 
 class PulseServer:
@@ -29,8 +29,9 @@ class PulseServer:
     ``start()`` (0, or nobody expected: at once). Who joins later gets the current pulse next.
 
     The numbers only rise. They skip when the machine slept or stalled for more than ``limits.catch_up``
-    (no burst of old pulses), and when a client that has counted further returns to a restarted server:
-    the first such client ends the wait, and the axis goes on where the clients' own count has got to.
+    (no burst of old pulses), and when clients that have counted further return to a restarted server: when
+    enough have, that ends the wait, and the axis goes on where their own count has got to. No client decides
+    that alone (``claims``).
 
     With ``users``, passwords by name, the server is closed: who comes has to prove that they know one, before
     they are told anything, and can say HELLO under that name alone. What is said then is sealed (``seal``).
@@ -69,15 +70,18 @@ class PulseServer:
         self._limits = limits or ServerLimits()
         self._clock = clock or steady_unix_clock()
         self._door = None if users is None else Door(users, self._limits, self._clock)
-        self._hub = Hub(self._clock, self._limits, self._greet, self._heard, self._changed, self._door)
+        kept = self._expect.union(users or ())
+        self._hub = Hub(self._clock, self._limits, self._greet, self._heard, self._changed, self._door, kept)
+        self._claims = Claims(fps, self._expect, self._limits, self._clock)
         self._server: asyncio.Server | None = None
         self._timer: asyncio.TimerHandle | None = None
+        self._settling: asyncio.TimerHandle | None = None
         self._axis: PulseAxis | None = None
         self._begun_at = 0.0
         self._next = 0
         self._pulse: int | None = None
         self._skipped = 0
-        self._stalls, self._boasts = Spell(self._clock), Spell(self._clock)
+        self._stalls = Spell(self._clock)
         self._begun = asyncio.Event()
         self._ended = asyncio.Event()
 
@@ -137,11 +141,12 @@ class PulseServer:
         if self._expect and self._start_timeout > 0.0:
             self._timer = loop.call_later(self._start_timeout, self._begin_without)
         else:
-            self._begin(PulseAxis(self._clock(), self._fps), 0)
+            self._begin()
 
     async def stop(self) -> None:
         """Stop sending, end all connections, free the port."""
         self._cancel_timer()
+        self._cancel_settling()
         self._ended.set()
         if self._server is None:
             return
@@ -176,25 +181,35 @@ class PulseServer:
         return encode(Wait(missing)) if missing else b""
 
     def _heard(self, hello: Hello) -> None:
-        """Go on with the axis that a client brings from before this server was started."""
-        if hello.known is None or (self._expect and hello.name not in self._expect):
+        """Go on with the axis that clients bring from before this server was started."""
+        if not self._claims.note(hello):
             return
+        self._claims.keep(self._hub.names())
+        if self._axis is not None:
+            self._move_forward(self._axis)
+        elif self._settling is None and self._claims.agreed() is not None:
+            loop = asyncio.get_running_loop()
+            self._settling = loop.call_later(self._limits.claims_for, self._settle)
+
+    def _move_forward(self, before: PulseAxis) -> None:
         now = self._clock()
-        axis = PulseAxis.through(hello.known.number, now - hello.known.ago, self._fps)
+        if now - self._begun_at > self._limits.adopt_for:
+            return
+        axis = self._claims.agreed(before) or before
         first = axis.number_at(now) + 1
-        if first > _FARTHEST:
-            # Pulses from there on would soon be numbers that no line and no message can carry.
-            if (more := self._boasts.happened()) is not None:
-                _log.warning("%s claims to have counted to %d%s: not believed", hello.name, first - 1, more)
-        elif self._axis is None:
-            _log.info("%s has counted to %d: going on from there", hello.name, hello.known.number)
-            self._begin(axis, first)
-        # One pulse ahead is the error of measurement, not another axis.
-        elif now - self._begun_at <= self._limits.adopt_for and first > self._axis.number_at(now) + 2:
-            _log.warning("%s has counted to %d: moving forward to it", hello.name, hello.known.number)
+        if first > before.number_at(now) + INEXACT:
+            _log.warning("clients have counted to %d: moving forward to it", first - 1)
             self._skipped += max(0, first - self._next)
             self._axis, self._next = axis, first
             self._schedule()
+        self._claims.tell_of_others(self._axis or before)
+
+    def _settle(self) -> None:
+        """Go on where the clients have got to, if they are still here."""
+        self._settling = None
+        self._claims.keep(self._hub.names())
+        if self._claims.agreed() is not None:
+            self._begin()
 
     def _changed(self) -> None:
         """Begin if nobody is missing any more, or say who is."""
@@ -204,18 +219,30 @@ class PulseServer:
         if line:
             self._hub.tell(line)
         else:
-            self._begin(PulseAxis(self._clock(), self._fps), 0)
+            self._begin()
 
     def _begin_without(self) -> None:
         _log.warning("beginning without %s", ", ".join(self.missing()))
-        self._begin(PulseAxis(self._clock(), self._fps), 0)
+        self._begin()
 
-    def _begin(self, axis: PulseAxis, first: int) -> None:
-        self._axis = axis
-        self._next = first
-        self._begun_at = self._clock()
+    def _begin(self) -> None:
+        """Begin with pulse 0, or where the clients have got to."""
+        self._cancel_settling()
+        self._begun_at = now = self._clock()
+        self._claims.keep(self._hub.names())
+        agreed = self._claims.agreed()
+        self._axis = agreed or PulseAxis(now, self._fps)
+        if agreed is not None:
+            self._next = agreed.number_at(now) + 1
+            _log.info("clients have counted to %d: going on from there", self._next - 1)
+        self._claims.tell_of_others(self._axis)
         self._begun.set()
         self._schedule()
+
+    def _cancel_settling(self) -> None:
+        if self._settling is not None:
+            self._settling.cancel()
+            self._settling = None
 
     def _cancel_timer(self) -> None:
         if self._timer is not None:

@@ -10,6 +10,8 @@ _NEAR_EDGE = 0.03
 """Share of the box's height from an edge at which it counts as clear of it."""
 _CUT = 0.05
 """What a box loses that ends at the upper or lower edge: nobody can say how much is beyond it."""
+_LEAST = 1e-6
+"""Pixels; a box without any height has this much room, so that none is divided by nothing."""
 _SLIM = 0.37
 """Width over height of a box at an upright person: one at a side edge that is slimmer is a part of them."""
 
@@ -42,5 +44,5 @@ def whole(boxes: Floats, pictures: Floats) -> Floats:
 
 def _nearness(gap: Floats, tall: Floats) -> Floats:
     """Say how near (...) boxes are to an edge that is `gap` away: 1 at it or beyond, 0 clear of it."""
-    room = np.maximum(_NEAR_EDGE * tall, np.finfo(np.float64).tiny)
+    room = np.maximum(_NEAR_EDGE * tall, _LEAST)
     return np.asarray(1.0 - np.clip(gap / room, 0.0, 1.0))

@@ -27,7 +27,7 @@ from server.camera.thumbs import thumbnails
 from server.wire.addresses import shown_endpoint
 from server.wire.bus import Bus
 from server.wire.config import Config
-from server.wire.messages import CameraStatus, CameraTracks, FrameHead, Keys, SoundHead, ThumbHead
+from server.wire.messages import CameraStatus, CameraTracks, CameraWord, FrameHead, Keys, SoundHead, ThumbHead
 from server.wire.pulse_users import pulse_login
 
 log = logging.getLogger(__name__)
@@ -91,7 +91,7 @@ class CameraProcess:
         self._exchange = Exchange(config, camera_id, self._pipeline.witness, self._backlog.maxsize)
         self._pointed = Pointed(camera_id, self._boot)
         self._meter = Meter(fps)
-        self._state = "starting"
+        self._state: CameraWord = "starting"
         self._end = 0
         """The first pulse that the recording has no frame for, once it is over."""
         self._bus: Bus | None = None

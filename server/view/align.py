@@ -146,6 +146,8 @@ class Aligner:
             self._heard = now
         if (missing or not any_word) and now <= self._patience(end):
             return None
+        if self._far is not None and 0 <= now < end - self._grace:
+            return None  # who speaks of what is to come does not take the others' word from them
         late = tuple(missing)
         for name in late:
             self._places[name].trusted = False

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import logging
+import time
+from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import msgspec
 
 from camsync import Spell
+from camsync.lines import RateLimit
 from server.view.align import Aligner
 from server.view.gauge import Gauge
 from server.view.media.agreement import ParameterMismatchError
@@ -29,8 +32,12 @@ from server.wire.messages import (
 
 log = logging.getLogger(__name__)
 
-_THUMBNAILS_MOST = 1000
-"""Small pictures that are kept; there are as many as tracks were seen lately."""
+_THUMBNAILS_MOST = 300
+"""Small pictures of one camera that are kept; there are as many as tracks were seen lately."""
+_TOLD_MOST, _TOLD_RATE = 10, 1 / 30
+"""Lines of the log that say that a camera has come or gone: at once, and a second. It may do so for ever."""
+_THUMBNAIL_BYTES = 1 << 17
+"""More than one of 160 lines has."""
 
 
 @dataclass(slots=True)
@@ -110,9 +117,12 @@ class Intake:
         self._shelves, self._aligner, self._on_frame = shelves, aligner, on_frame
         self._sound, self._sounding = sound, sounding
         self._unknown = Spell()
+        self._told = {camera: RateLimit(_TOLD_MOST, _TOLD_RATE, time.monotonic()) for camera in shelves}
         self.states = {camera: CameraState() for camera in shelves}
-        self.thumbnails: dict[tuple[str, int, int], Thumbnail] = {}
-        """By camera, boot and track."""
+        self._thumbnails: dict[str, OrderedDict[tuple[int, int], Thumbnail]] = {
+            camera: OrderedDict() for camera in shelves
+        }
+        """By camera, boot and track; the newest is the last."""
         self._frame_head = msgspec.json.Decoder(FrameHead)
         self._tracks = msgspec.json.Decoder(CameraTracks)
         self._status = msgspec.json.Decoder(CameraStatus)
@@ -136,8 +146,9 @@ class Intake:
         else:
             state.gauge.trouble("its process was gone")
             self._aligner.gone(camera)
-            self._drop_thumbnails(camera)
-        log.info("camera %s %s", camera, "is there" if there else "is gone")
+            self._thumbnails[camera].clear()
+        if self._told[camera].take(time.monotonic()):
+            log.info("camera %s %s", camera, "is there" if there else "is gone")
 
     def video(self, message: Message) -> None:
         """Shelve a frame."""
@@ -224,18 +235,27 @@ class Intake:
         except UNREADABLE as error:
             state.bad(error)
             return
+        if len(message.payload) > _THUMBNAIL_BYTES:
+            state.bad(f"a small picture of {len(message.payload)} bytes")
+            return
         if self._is_far_ahead(state, head.pulse):
             return
-        key = camera, head.boot, head.track
-        self.thumbnails.pop(key, None)  # what comes anew is the newest
-        self.thumbnails[key] = Thumbnail(message.payload, head.pulse)
-        if len(self.thumbnails) > _THUMBNAILS_MOST:
-            del self.thumbnails[next(iter(self.thumbnails))]
+        theirs = self._thumbnails[camera]
+        theirs[head.boot, head.track] = Thumbnail(message.payload, head.pulse)
+        theirs.move_to_end((head.boot, head.track))
+        if len(theirs) > _THUMBNAILS_MOST:
+            theirs.popitem(last=False)
+
+    @property
+    def thumbnails(self) -> dict[tuple[str, int, int], Thumbnail]:
+        """Return all small pictures, by camera, boot and track."""
+        return {(camera, *it): kept for camera, of in self._thumbnails.items() for it, kept in of.items()}
 
     def forget_thumbnails_before(self, pulse: int) -> None:
         """Let go of the small pictures of tracks that were not seen since."""
-        for key in [key for key, thumbnail in self.thumbnails.items() if thumbnail.pulse < pulse]:
-            del self.thumbnails[key]
+        for theirs in self._thumbnails.values():
+            for key in [key for key, thumbnail in theirs.items() if thumbnail.pulse < pulse]:
+                del theirs[key]
 
     def _is_far_ahead(self, state: CameraState, pulse: int) -> bool:
         """Tell whether a pulse is one that nobody can have counted to, and count that."""
@@ -248,7 +268,3 @@ class Intake:
     def _state_of(self, message: Message) -> tuple[CameraState | None, str]:
         camera = camera_of(message.key)
         return self.states.get(camera), camera
-
-    def _drop_thumbnails(self, camera: str) -> None:
-        for key in [key for key in self.thumbnails if key[0] == camera]:
-            del self.thumbnails[key]

@@ -96,6 +96,8 @@ class BestViewService:
         self.walking = Walking(config)
         self.past = Past(config, self.shelves, self.agreement, frames, self.sound)
         self.pulse = -1
+        self._decided_to = -1
+        """The last pulse of the last epoch; a frame that is said to be of a later one shows nobody."""
         self.pulse0: float | None = None
         """When pulse 0 was due, unix seconds; None before the first pulse."""
         self._pulsed_at: float | None = None
@@ -161,14 +163,18 @@ class BestViewService:
                     await follow  # raises what ended it
                 if (self.pulse >= 0 or self._without_pulses) and not self.remembering.waits:
                     await self.decide_by_turns()
-            last = max(shelf.newest for shelf in self.shelves.values())
-            for decision in self.decider.finish(last):
+            for decision in self.what_is_left():
                 self._publish(decision)
             log.info("every camera's recording is over")
         finally:
             patience.cancel()
             follow.cancel()
             await asyncio.gather(follow, return_exceptions=True)
+
+    def what_is_left(self) -> list[GopDecision]:
+        """Decide what is left when every recording is over."""
+        newest = max(shelf.newest for shelf in self.shelves.values())
+        return self.decider.finish(min(newest, self._decided_to))
 
     def _go_without_pulses(self) -> None:
         self._without_pulses = True
@@ -290,6 +296,7 @@ class BestViewService:
         self._changed.set()
 
     def _step(self, epoch: Epoch) -> None:
+        self._decided_to = epoch.last
         self.lacking.epoch(epoch)
         self.walking.take(epoch)
         self.remembering.begin(epoch.last)

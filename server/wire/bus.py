@@ -12,6 +12,7 @@ from server.wire.addresses import shown_endpoint
 from server.wire.bus_users import SETTING
 from server.wire.errors import UserError
 from server.wire.inbox import Inbox, Message
+from server.wire.messages import camera_of
 from server.wire.sections import Zenoh
 from server.wire.users import password_of
 
@@ -19,6 +20,8 @@ _DROP_AFTER_US = 20_000
 """zenoh drops a message after 1 ms in a full queue by default: too soon for an I picture's burst."""
 
 _OPEN_WITHIN_MS = 5_000
+_MESSAGE_MAX = 1 << 25
+"""Bytes of one message; a picture of 4K that is decoded by no other has some millions."""
 _PUBLISHERS = 64
 """Keys for which something is prepared: of more, those not sent to for longest are prepared anew."""
 
@@ -135,7 +138,7 @@ class Bus:
 
     def subscribe(self, key: str, handler: Callable[[Message], None]) -> Inbox[Message]:
         """Call ``handler`` on the event loop for every message under ``key`` (a key expression)."""
-        inbox = Inbox(handler)
+        inbox = Inbox(handler, whose=_sender, size=_size)
 
         def receive(sample: zenoh.Sample) -> None:
             attachment = sample.attachment.to_bytes() if sample.attachment is not None else b""
@@ -166,7 +169,7 @@ class Bus:
         def unpack(message: Message) -> None:
             handler(message.key, message.payload == b"1")
 
-        inbox = Inbox(unpack)
+        inbox = Inbox(unpack, whose=_sender, size=_size)
 
         def receive(sample: zenoh.Sample) -> None:
             there = sample.kind == zenoh.SampleKind.PUT
@@ -184,6 +187,15 @@ class Bus:
         self._session.close()  # type: ignore[no-untyped-call]
 
 
+def _sender(message: Message) -> str:
+    """Return whose a message is: one camera's are no other's."""
+    return camera_of(message.key)
+
+
+def _size(message: Message) -> int:
+    return len(message.payload) + len(message.attachment)
+
+
 def _config(settings: Zenoh, mode: str, user: str | None) -> zenoh.Config:
     config = zenoh.Config()
     for key, value in {
@@ -193,6 +205,7 @@ def _config(settings: Zenoh, mode: str, user: str | None) -> zenoh.Config:
         "transport/link/tx/lease": int(settings.lease_s * 1000),
         "transport/link/tx/queue/congestion_control/drop/wait_before_drop": _DROP_AFTER_US,
         "transport/link/tx/queue/size/data": 16,
+        "transport/link/rx/max_message_size": _MESSAGE_MAX,
         "transport/shared_memory/enabled": False,
     }.items():
         config.insert_json5(key, json.dumps(value))

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 import msgspec
 
-from server.wire.numbers import Coordinate, Number, Pulse
+from server.wire.numbers import Coordinate, Cost, Number, Pulse
 
 TROUBLES_MOST = 32
 """Troubles that a camera tells of one window at most; the riskiest ones."""
@@ -24,7 +24,7 @@ class Trouble(msgspec.Struct, frozen=True, kw_only=True):
     """Whom it is about, first whom to point at; none: the window."""
     pulse: Pulse
     """When that is expected."""
-    margin: float
+    margin: Cost
     """By how much the solution that is taken costs less than the other one: the smaller the less sure."""
     risk: Annotated[float, msgspec.Meta(ge=0, le=1)]
     """How likely it is to go wrong unless somebody helps."""

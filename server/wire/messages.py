@@ -28,12 +28,12 @@ key                                       payload                               
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Literal
 
 import msgspec
 
 from server.wire.help import TROUBLES_MOST, Trouble
-from server.wire.numbers import Coordinate, Duration, Number, Pixels, Pulse
+from server.wire.numbers import LAST_PULSE, Coordinate, Cost, Duration, Number, Pixels, Pulse, Time
 
 UNREADABLE = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
 """What a decoder raises: it is no JSON or other JSON, it is no text, it is nested without end."""
@@ -55,11 +55,15 @@ class FrameHead(msgspec.Struct, frozen=True, kw_only=True):
     """Which run of the camera process: a restarted camera has another one."""
     after: Pulse | None = None
     """The pulse of the access unit before it, which it is decoded by; null where it is not known."""
-    due: float
+    due: Time
     """When the pulse was due."""
-    taken: float
+    taken: Time
     """When the picture was there."""
-    encoded: float
+    encoded: Time
+
+
+BINS_MOST = 1024
+"""Bins of a histogram; more would tell nobody apart better."""
 
 
 class Glimpse(msgspec.Struct, frozen=True, kw_only=True):
@@ -67,8 +71,12 @@ class Glimpse(msgspec.Struct, frozen=True, kw_only=True):
 
     first: Pulse
     last: Pulse
-    histogram: list[float]
+    histogram: Annotated[list[Annotated[float, msgspec.Meta(le=1e6)]], msgspec.Meta(max_length=BINS_MOST)]
     """The mean of these frames' histograms."""
+
+
+SOUND_MOST = 16_384
+"""Frames of sound in one message at most: those of some minutes, whatever a frame lasts."""
 
 
 class SoundHead(msgspec.Struct, frozen=True, kw_only=True):
@@ -76,7 +84,7 @@ class SoundHead(msgspec.Struct, frozen=True, kw_only=True):
 
     first: Number
     """The number of the first: a frame has 1024 samples of AAC, 960 of Opus, counted from pulse 0."""
-    sizes: list[Annotated[int, msgspec.Meta(ge=1, le=8184)]]
+    sizes: Annotated[list[Annotated[int, msgspec.Meta(ge=1, le=8184)]], msgspec.Meta(max_length=SOUND_MOST)]
     """Bytes of each; a transport stream can say no more than 8191 with its head."""
 
 
@@ -87,7 +95,7 @@ class Track(msgspec.Struct, frozen=True, kw_only=True):
     """The tracker's own number: one per person, camera and boot."""
     boxes: list[Box | None]
     """One per frame of the window; null where the person is hidden."""
-    confidence: float
+    confidence: Cost
     looks: list[Glimpse] = []
     """Where nobody else was in the boxes, in the frames up to ``final_to``; in their order."""
     sharpness: Annotated[float, msgspec.Meta(ge=0, le=1)] | None = None
@@ -97,11 +105,15 @@ class Track(msgspec.Struct, frozen=True, kw_only=True):
 class Solve(msgspec.Struct, frozen=True, kw_only=True):
     """How well the window's program was solved."""
 
-    objective: float
-    bound: float
-    gap: float
+    objective: Cost
+    bound: Cost
+    gap: Cost
     integral: bool
-    rounds: int
+    rounds: Number
+
+
+TRACKS_MOST = 1000
+"""People that a camera follows in one window at most: more than any picture has room for."""
 
 
 class CameraTracks(msgspec.Struct, frozen=True, kw_only=True):
@@ -115,9 +127,9 @@ class CameraTracks(msgspec.Struct, frozen=True, kw_only=True):
     """Which of the site's windows: it ends with pulse (epoch + 1) · stride - 1, or with the recording."""
     first: Pulse
     """First frame (pulse number) of the window."""
-    last: Annotated[int, msgspec.Meta(ge=-1, le=2**40)]
+    last: Annotated[int, msgspec.Meta(ge=-1, le=LAST_PULSE)]
     """Last frame; -1 or before ``first`` where there was none."""
-    final_to: int
+    final_to: Annotated[int, msgspec.Meta(ge=-LAST_PULSE, le=LAST_PULSE)]
     """Every frame up to this one never changes again."""
     ended: bool
     """The recording is over: nothing follows."""
@@ -128,9 +140,9 @@ class CameraTracks(msgspec.Struct, frozen=True, kw_only=True):
     recording begins or while the detector does not know its background yet."""
     alone: list[Pulse] = []
     """Frames in which people were followed without what some other camera found: its word was not there."""
-    tracks: list[Track]
+    tracks: Annotated[list[Track], msgspec.Meta(max_length=TRACKS_MOST)]
     solve: Solve | None
-    solved_at: float = 0.0
+    solved_at: Time = 0.0
     """When the window was solved, unix seconds by the camera's clock; 0 offline."""
     search_s: Duration | None = None
     """Seconds that it took to look for people in a frame, the mean of this epoch's; null offline."""
@@ -163,15 +175,18 @@ class Found(msgspec.Struct, frozen=True, kw_only=True):
     """The recording has no frame for this pulse: nothing follows."""
 
 
+CameraWord = Literal["starting", "live", "away", "ended"]
+"""How a camera is; away: its source gives no pictures now."""
+
+
 class CameraStatus(msgspec.Struct, frozen=True, kw_only=True):
     """How a camera is, once a second."""
 
     camera: str
     boot: Number
-    state: str
-    """starting, live, away (the source gives no pictures now) or ended."""
-    pulse: int
-    fps: float
+    state: CameraWord
+    pulse: Annotated[int, msgspec.Meta(ge=-1, le=LAST_PULSE)]
+    fps: Duration
     """Frames taken in the last second or so."""
     missed: Number
     """Pulses without a frame since the start."""
@@ -189,9 +204,9 @@ class CameraStatus(msgspec.Struct, frozen=True, kw_only=True):
     """Messages to the camera that it could not understand, since the start."""
     in_step: bool
     """Pulses come from the server; otherwise the camera goes on at its own rate."""
-    clock_offset: float
+    clock_offset: Time
     """Server's clock minus the camera's, seconds."""
-    round_trip: float
+    round_trip: Time
 
 
 class ThumbHead(msgspec.Struct, frozen=True, kw_only=True):

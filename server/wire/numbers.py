@@ -16,6 +16,12 @@ Pixels = Annotated[int, msgspec.Meta(ge=1, le=2**16)]
 
 Number = Annotated[int, msgspec.Meta(ge=0, le=2**62)]
 
+Time = Annotated[float, msgspec.Meta(ge=-1e12, le=1e12)]
+"""Unix seconds, or a difference of such: sums and differences of them are still numbers."""
+
+Cost = Annotated[float, msgspec.Meta(ge=-1e12, le=1e12)]
+"""What a solution costs, likewise."""
+
 Duration = Annotated[float, msgspec.Meta(ge=0, le=1e6)]
 """Seconds."""
 

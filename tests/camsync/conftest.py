@@ -18,11 +18,16 @@ async def _close(writer: asyncio.StreamWriter) -> None:
 
 @pytest.fixture
 async def by_hand() -> AsyncIterator[Connect]:
-    """Give a function that connects to a port; ``receive`` bytes of kernel buffer if given."""
+    """Give a function that connects to a port.
+
+    It takes ``receive`` bytes of kernel buffer, and ``source``, the address to come from, where given.
+    """
     async with AsyncExitStack() as stack:
 
-        async def connect(port: int, receive: int | None = None) -> ByHand:
+        async def connect(port: int, receive: int | None = None, source: str | None = None) -> ByHand:
             connection = socket.socket()
+            if source is not None:
+                connection.bind((source, 0))
             if receive is not None:
                 connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive)
             connection.settimeout(0.0)

@@ -56,7 +56,7 @@ async def test_who_claims_too_much_again_and_again_is_told_of_once(
 ) -> None:
     async with PulseServer(FPS) as server:
         liar = await by_hand(server.port)
-        liar.say(b"HELLO 1 c0 last=9999999999999\n" * 10 + b"PING 1\n")
+        liar.say(b"HELLO 1 c0 last=500000000000\n" * 10 + b"PING 1\n")
         while not isinstance(await liar.message(), Pong):
             pass
     assert len(caplog.messages) == 1

@@ -245,3 +245,19 @@ def test_what_cannot_be_decided_in_time_is_left_out_up_to_the_newest_word_of_now
     assert found is not None
     assert (found.number, found.skipped, set(found.tracks)) == (4, 3, set(CAMERAS))
     assert aligner.leave_out(now) == 0
+
+
+def test_who_speaks_of_what_is_to_come_takes_nobody_elses_word_from_them() -> None:
+    aligner = Aligner(CAMERAS, STRIDE, GRACE, far=FAR)
+    for camera in ("c0", "c1"):
+        aligner.frame(camera, 1, 0)
+    for epoch in range(30):
+        aligner.tracks(word("c0", epoch))
+    late = STRIDE - 1 + GRACE + 1
+    assert aligner.ready(now=0) == []
+    epochs = aligner.ready(now=late)
+    assert (epochs[0].number, epochs[0].late) == (0, ("c1",)), "it was waited for"
+    aligner.tracks(word("c1", 8))
+    taken_out = [it for now in range(late, 9 * STRIDE) for it in aligner.ready(now)]
+    assert "c1" in next(it.tracks for it in taken_out if it.number == 8)
+    assert aligner.late_messages["c1"] == 0

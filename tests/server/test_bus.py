@@ -9,6 +9,7 @@ import threading
 from collections import deque
 
 import pytest
+import zenoh
 from patience import PATIENCE
 from pydantic import ValidationError
 
@@ -65,6 +66,21 @@ async def test_a_message_comes_with_its_key_and_attachment(settings: Zenoh) -> N
     assert await heard.next() == Message("myview/hall/c0/video", b"picture", b"head")
     client.publish("myview/hall/c0/video", b"picture")
     assert (await heard.next()).attachment == b""
+    client.close()
+    router.close()
+
+
+async def test_a_message_larger_than_any_is_dropped_and_all_others_come(settings: Zenoh) -> None:
+    router, client = Bus.router(settings), Bus.client(settings)
+    heard, there = Heard(), Presence()
+    router.subscribe("myview/hall/camera/*/video", heard.queue.put_nowait)
+    client.watch_alive("router", there.note)
+    router.declare_alive("router")
+    await there.until("router")
+    key, wait = "myview/hall/camera/c0/video", zenoh.CongestionControl.BLOCK  # whoever sends it may wait
+    for payload in (bytes(40_000_000), b"picture"):
+        await asyncio.to_thread(client._session.put, key, payload, congestion_control=wait)
+    assert (await heard.next()).payload == b"picture"
     client.close()
     router.close()
 
@@ -264,6 +280,41 @@ async def test_a_busy_loop_loses_the_oldest_and_counts_them() -> None:
     await asyncio.sleep(0)
     assert got == list(range(15, 25))
     assert inbox.lost == 15
+
+
+async def test_who_sends_very_much_takes_neither_the_places_nor_the_turns_of_others() -> None:
+    got: list[str] = []
+    inbox = Inbox(got.append, pending_max=10, turn_s=PATIENCE, whose=lambda it: it[:2])
+    for number in range(1000):
+        inbox.put(f"c0 {number}")
+        if number < 5:
+            inbox.put(f"c1 {number}")
+    await asyncio.sleep(0)
+    assert [it for it in got if it.startswith("c1")] == [f"c1 {number}" for number in range(5)]
+    assert [it for it in got if it.startswith("c0")] == [f"c0 {number}" for number in range(990, 1000)]
+    assert got[:4] == ["c0 990", "c1 0", "c0 991", "c1 1"]
+    assert (inbox.lost, inbox.waiting) == (990, 0)
+
+
+async def test_what_waits_of_one_sender_has_so_many_bytes_at_most() -> None:
+    got: list[bytes] = []
+    inbox = Inbox(got.append, turn_s=PATIENCE, size=lambda _: 1 << 24)
+    for number in range(10):
+        inbox.put(b"%d" % number)
+    await asyncio.sleep(0)
+    assert got == [b"6", b"7", b"8", b"9"]
+    assert inbox.lost == 6
+
+
+async def test_senders_without_end_are_taken_for_few() -> None:
+    got: list[int] = []
+    inbox = Inbox(got.append, pending_max=10, whose=str)
+    for number in range(5000):
+        inbox.put(number)
+    assert inbox.waiting <= 1024 + 10
+    while inbox.waiting:  # noqa: ASYNC110
+        await asyncio.sleep(0)
+    assert got[:3] == [0, 1, 2]
 
 
 async def test_one_item_that_cannot_be_handled_keeps_back_no_other(caplog: pytest.LogCaptureFixture) -> None:

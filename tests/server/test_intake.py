@@ -258,12 +258,32 @@ def test_what_is_of_pulses_that_nobody_can_have_counted_to_is_counted_and_droppe
     assert [epoch.number for epoch in hall.aligner.ready(now=4)] == [0]
 
 
-def test_small_pictures_are_so_many_at_most() -> None:
+def test_small_pictures_of_a_camera_are_so_many_at_most_and_take_no_other_cameras_place() -> None:
     hall = Hall()
+    hall.intake.thumbnail(thumbnail("c1", 7, b"jpeg"))
     for track in range(1200):
         hall.intake.thumbnail(thumbnail("c0", track, b"jpeg"))
-    assert len(hall.intake.thumbnails) == 1000
+    assert len(hall.intake.thumbnails) == 301
     assert ("c0", 1, 1199) in hall.intake.thumbnails
+    assert ("c1", 1, 7) in hall.intake.thumbnails
+
+
+def test_a_small_picture_that_is_none_is_counted_and_dropped() -> None:
+    hall = Hall()
+    hall.intake.thumbnail(thumbnail("c0", 1, bytes(1 << 18)))
+    assert hall.bad() == 1
+    assert not hall.intake.thumbnails
+
+
+def test_a_camera_that_comes_and_goes_without_end_is_few_lines_of_the_log(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    caplog.set_level("INFO")
+    hall = Hall()
+    caplog.clear()
+    for there in (False, True) * 50:
+        hall.intake.alive(KEYS.camera("c0", "alive"), there=there)
+    assert caplog.messages == ["camera c0 is gone", "camera c0 is there"] * 4 + ["camera c0 is gone"]
 
 
 def test_a_status_is_kept() -> None:

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from server.camera.keeping import Keeping
 from server.view.who.remembering import PATIENCE_S, Remembering
-from server.view.who.returning import LONGEST_S
+from server.view.who.returning import ALONE_MOST, LONGEST_S, Returning, believed
 from server.web.app import make_app
 from server.wire.epochs import end_of_epoch
 from server.wire.inbox import Message
@@ -387,3 +387,78 @@ def test_whatever_cameras_remember_the_service_goes_on(one: Remembered, other: R
     people = site.service.decider.people
     assert people.known
     assert set(people.roll.merged).isdisjoint(people.roll.everybody)
+
+
+def lying(site: Site, camera: str, **changes: object) -> None:
+    """Let a camera remember something else than what it was told."""
+    said = msgspec.json.decode(site.cameras[camera]._kept, type=Remembered)
+    site.cameras[camera].put(Message("", msgspec.json.encode(msgspec.structs.replace(said, **changes)), b""))
+
+
+@pytest.mark.parametrize(
+    "lie",
+    [
+        {"next": NUMBER_MOST + 1},
+        {"people": [Known(number=NUMBER_MOST, tracks=[3])]},
+        {"people": [Known(number=5, tracks=[3], also=[NUMBER_MOST])]},
+    ],
+)
+@pytest.mark.parametrize("again", [False, True])
+def test_no_camera_alone_moves_everybodys_numbers_far_ahead(lie: dict[str, object], again: bool) -> None:
+    site = told()
+    ann = site.whose(A, 2, 5)
+    if not again:
+        lying(site, B, **lie)
+    site.start()
+    site.tell(range(7, 9))
+    lying(site, B, **lie)
+    for _ in range(3):
+        site.cameras[B].service(there=True)
+    site.tell(range(9, 12), {A: {1: SMALL, 2: LARGE, 9: SMALL}, B: {3: LARGE}})
+    people = site.service.decider.people
+    assert people.next_number <= ALONE_MOST + 10
+    assert site.whose(A, 2, 11) == ann
+    assert people.roll.names == {ann: "Ann"}
+
+
+def test_large_numbers_that_two_cameras_remember_go_on() -> None:
+    site = told()
+    for camera in CAMERAS:
+        lying(site, camera, next=50_000_000 + len(camera))
+    site.start()
+    site.tell(range(7, 9))
+    assert site.service.decider.people.next_number >= 50_000_000
+
+
+@given(st.lists(st.integers(1, NUMBER_MOST), max_size=6), st.integers(1, NUMBER_MOST))
+def test_whatever_one_camera_says_the_others_say_how_far_it_is_believed(others: list[int], lie: int) -> None:
+    most = max([believed(others), ALONE_MOST])
+    assert believed([*others, lie]) <= max(most, max(others, default=0) + 10_000)
+
+
+def remembers(since: float, pulse: int = 90) -> Remembered:
+    return Remembered(pulse=pulse, boot=1, next=5, since=since, people=[])
+
+
+@pytest.mark.parametrize("lie", [0.0, 1e12])
+def test_no_camera_alone_says_since_when_numbers_mean_what_they_do(lie: float) -> None:
+    said = {"c0": remembers(lie), "c1": remembers(1000.0), "c2": remembers(1000.0)}
+    assert Returning(said, 100, 50).since == 1000.0
+
+
+def test_of_two_words_on_when_numbers_began_the_later_counts() -> None:
+    assert Returning({"c0": remembers(900.0), "c1": remembers(1000.0)}, 100, 50).since == 1000.0
+    long_ago = {"c0": remembers(900.0, pulse=1), "c1": remembers(900.0, pulse=1)}
+    assert Returning({**long_ago, "c2": remembers(1000.0)}, 100, 50).since == 1000.0
+    assert Returning(long_ago, 100, 50).since == 900.0
+    assert Returning({}, 100, 50).since == float("inf")
+
+
+def test_a_camera_that_comes_and_goes_and_never_says_what_it_remembers_is_waited_for_once() -> None:
+    clock, service = Clock(), FedService(small_config())
+    it = Remembering(service.decider.people, CAMERAS, FPS, lambda *_: None, clock=clock)
+    for _ in range(4):
+        it.alive(KEYS.camera(B, "alive"), there=False)
+        it.alive(KEYS.camera(B, "alive"), there=True)
+        clock.now += PATIENCE_S / 2
+    assert not it.waits

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import OrderedDict
+
 from server.view.media.heard import Heard
 from server.view.streams.timeline import LONGEST_S
 from server.wire.messages import SoundHead
@@ -20,7 +22,7 @@ class SoundShelf:
         self.format = form
         self.fps = fps
         self._most = round(seconds * form.rate / form.samples)
-        self._frames: dict[int, bytes] = {}
+        self._frames: OrderedDict[int, bytes] = OrderedDict()
         self._silence = form.silence
 
     def put(self, head: SoundHead, payload: bytes) -> None:
@@ -37,7 +39,7 @@ class SoundShelf:
             self._frames[number] = payload[at : at + size]
             at += size
         while len(self._frames) > self._most:
-            del self._frames[next(iter(self._frames))]
+            self._frames.popitem(last=False)
 
     def between(self, first: int, until: int) -> Heard:
         """Give the sound of the pulses ``first … until - 1``: from the frame on that sounds at ``first``."""

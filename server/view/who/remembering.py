@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 import msgspec
 
 from server.view.who.people import People
-from server.view.who.returning import LONGEST_S, Returning, remembered_by
+from server.view.who.returning import LONGEST_S, Returning, believed, first_free, remembered_by
 from server.wire.inbox import Message
 from server.wire.messages import camera_of
 from server.wire.remembered import REMEMBERED_MOST, Remembered
@@ -52,8 +52,11 @@ class Remembering:
         self._people, self._cameras, self._fps = people, cameras, fps
         self._send, self._tells, self._clock = send, tells, clock
         self._came: dict[str, float] = {}
-        """When each camera came that has not said yet what it remembers."""
+        """When each camera came first that has not said yet what it remembers; it may come again."""
+        self._there: set[str] = set()
         self._said: dict[str, Remembered] = {}
+        self._firsts: dict[str, int] = {}
+        """The first free number by what each camera said last."""
         self._returning: list[Returning] = []
         """First of all who had come when this began, then a camera each that came later."""
         self._anybody = False
@@ -70,10 +73,11 @@ class Remembering:
         camera = camera_of(key)
         if camera in self._cameras and there:
             self._anybody = True
+            self._there.add(camera)
             if camera not in self._heard:  # its token may come after its word
-                self._came[camera] = self._clock()
+                self._came.setdefault(camera, self._clock())
         else:
-            self._came.pop(camera, None)
+            self._there.discard(camera)
 
     def heard(self, message: Message) -> None:
         """A camera says what it remembers.
@@ -93,8 +97,9 @@ class Remembering:
         if not message.payload:
             return
         said = msgspec.json.decode(message.payload, type=Remembered)
+        self._firsts[camera] = first_free(said)
         if again:
-            self._people.begin_at(said.next)
+            self._people.begin_at(min(said.next, believed(self._firsts.values())))
         else:
             self._said[camera] = said
 
@@ -104,7 +109,7 @@ class Remembering:
         if self._began_at is not None:
             return False
         now = self._clock()
-        return any(now < came + PATIENCE_S for came in self._came.values())
+        return any(now < came + PATIENCE_S for camera, came in self._came.items() if camera in self._there)
 
     def awaits(self, number: int) -> bool:
         """Tell whether somebody of this number may be found again, or is and only nothing is decided yet."""
@@ -125,6 +130,10 @@ class Remembering:
         """
         if not self._anybody or (self._began_at is not None and not self._said):
             return
+        most = believed(self._firsts.values())
+        for camera in [camera for camera, it in self._said.items() if first_free(it) > most]:
+            log.warning("camera %s alone remembers numbers beyond %d: it is not believed", camera, most)
+            del self._said[camera]
         said = {camera: _below(self._free, it) for camera, it in self._said.items()}
         self._said = {}
         returning = Returning(said, pulse, round(LONGEST_S * self._fps))
@@ -132,7 +141,7 @@ class Remembering:
         self._returning.append(returning)
         if self._began_at is None:
             self._began_at, self._free = self._clock(), self._people.next_number
-            self._since = min(self._since, max((it.since for it in said.values()), default=self._since))
+            self._since = min(self._since, returning.since)
         if said:
             log.info("%s: remembered %d people", ", ".join(sorted(said)), len(returning.numbers))
 

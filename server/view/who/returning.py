@@ -5,11 +5,16 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from itertools import chain
+from math import inf
 
 from server.view.who.locals import Followed
 from server.view.who.people import People
 from server.wire.remembered import ALSO_MOST, NUMBER_MOST, Known, Remembered
 
+ALONE_MOST = 1_000_000
+"""The first free number that is believed of one camera alone: larger ones another must say, too."""
+_SLACK = 10_000
+"""Numbers by which the newest word may be ahead of the one before: nobody gives so many in a second."""
 LONGEST_S = 30.0
 """Seconds that the service may be away: in a longer time a track may have gone over to somebody else."""
 
@@ -79,9 +84,13 @@ class Returning:
         self._awaited: list[_Awaited] = []
         self._found: dict[Followed, int] = {}
         """The pulse at which each track was first heard of again."""
-        self.next_number = max((_first_free(it) for it in said.values()), default=1)
+        self.next_number = max((first_free(it) for it in said.values()), default=1)
         """No number below it is given any more, however long ago that was."""
         lately = {camera: it for camera, it in said.items() if it.pulse < pulse <= it.pulse + longest}
+        # All that were told of lately were told the same: one that says otherwise does not decide.
+        since = sorted(it.since for it in lately.values())
+        self.since = since[len(since) // 2] if since else max((it.since for it in said.values()), default=inf)
+        """When numbers began, unix seconds; infinite: nobody remembers."""
         if lately:
             self._until = max(it.pulse for it in lately.values()) + longest
             self._awaited = _awaited(lately)
@@ -132,9 +141,19 @@ class Returning:
         return None if first is None else people.whose(track.camera, track.boot, track.track, first)
 
 
-def _first_free(said: Remembered) -> int:
+def first_free(said: Remembered) -> int:
     """Give the first number that nobody has or had; what a camera says may contradict itself."""
     return max([said.next, *(number + 1 for it in said.people for number in (it.number, *it.also))])
+
+
+def believed(firsts: Iterable[int]) -> int:
+    """Return up to which first free number cameras are believed: no camera alone moves all to come far ahead.
+
+    >>> believed([7, 5]), believed([900_000_000, 5]), believed([2_000_007, 2_000_005])
+    (1000000, 1000000, 2010005)
+    """
+    _, other, *_ = [*sorted(firsts, reverse=True), 1, 1]
+    return max(other + _SLACK, ALONE_MOST)
 
 
 def _awaited(said: dict[str, Remembered]) -> list[_Awaited]:

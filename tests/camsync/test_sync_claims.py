@@ -1,0 +1,201 @@
+"""What one client says that it has counted to moves nobody's count where others are there."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Sequence
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pulses_by_hand import BUSY, PATIENCE, ByHand, Connect
+
+from camsync import ClientSettings, Login, PulseClient, PulseServer, ServerLimits, SyncError
+from camsync.axis import PulseAxis
+from camsync.claims import Claims
+from camsync.messages import Hello, Known, Pong
+from camsync.proof import Proof
+from camsync.protocol import LAST_PULSE, ProtocolError, parse_client_line, parse_server_line
+from server.wire import numbers
+
+FPS = 200.0
+HERE = "127.0.0.1"
+NAMES = ("bestview", "c0", "c1", "c2")
+USERS = {name: f"{name:x<32}" for name in NAMES}
+FAR = 10**9
+"""Two months at 200 a second: nothing but the others tells that it is a lie."""
+SOON = ServerLimits(claims_for=0.1)
+QUICK = ClientSettings(backoff_first=0.01, backoff_most=0.05, queue=100_000)
+
+
+class Liar:
+    """A user that says anything."""
+
+    def __init__(self, connection: ByHand, proof: Proof) -> None:
+        self._connection, self._proof = connection, proof
+
+    async def says(self, line: str) -> None:
+        """Say a line, and wait until it was heard."""
+        self._connection.say(self._proof.sealed(f"{line}\nPING 1\n".encode()))
+        while not isinstance(await self._message(), Pong):
+            pass
+
+    async def _message(self) -> object:
+        return parse_server_line(self._proof.opened((await self._connection.line()).rstrip()))
+
+
+async def come(connect: Connect, port: int, user: str) -> Liar:
+    connection = await connect(port)
+    proof = Proof(Login(user, USERS[user]))
+    connection.say(proof.proven(await connection.message()))
+    return Liar(connection, proof)
+
+
+def client_of(port: int, name: str) -> PulseClient:
+    return PulseClient(HERE, port, name, settings=QUICK, login=Login(name, USERS[name]))
+
+
+async def counted(client: PulseClient, count: int) -> list[int]:
+    async with asyncio.timeout(PATIENCE):
+        return [(await anext(client)).number for _ in range(count)]
+
+
+@pytest.mark.parametrize("claim", ["last=500000000000", f"last={FAR} ago=0.1"])
+async def test_no_camera_says_alone_where_counting_begins(by_hand: Connect, claim: str) -> None:
+    async with PulseServer(FPS, expect=NAMES, start_timeout=1000.0, users=USERS, limits=SOON) as server:
+        liar = await come(by_hand, server.port, "c0")
+        await liar.says(f"HELLO 1 c0 {claim}")
+        clients = [client_of(server.port, name) for name in NAMES if name != "c0"]
+        for client in clients:
+            client.start()
+        assert [await counted(it, 3) for it in clients] == [[0, 1, 2]] * 3
+        for client in clients:
+            await client.close()
+
+
+@pytest.mark.parametrize("names", [NAMES, NAMES[:2]])
+@pytest.mark.parametrize("claim", ["last=500000000000", f"last={FAR} ago=0.1"])
+async def test_no_camera_says_alone_where_counting_goes_on(
+    by_hand: Connect, claim: str, names: tuple[str, ...]
+) -> None:
+    async with PulseServer(FPS, expect=names, start_timeout=0.0, users=USERS) as server:
+        async with client_of(server.port, "bestview") as client:
+            before = await counted(client, 3)
+            liar = await come(by_hand, server.port, "c0")
+            for _ in range(3):
+                await liar.says(f"HELLO 1 c0 {claim}")
+            after = await counted(client, 20)
+        assert server.skipped < PATIENCE * FPS
+        assert after[-1] < before[0] + PATIENCE * FPS
+
+
+async def test_a_restarted_server_goes_on_where_all_but_one_are(by_hand: Connect) -> None:
+    names = [name for name in NAMES if name != "c0"]
+    async with PulseServer(FPS, expect=names, users=USERS) as server:
+        port = server.port
+        clients = [client_of(port, name) for name in names]
+        for client in clients:
+            client.start()
+        for client in clients:
+            await counted(client, 40)
+        epoch = server.epoch
+    assert epoch is not None
+    async with PulseServer(
+        FPS, port=port, expect=NAMES, start_timeout=1000.0, users=USERS, limits=SOON
+    ) as again:
+        liar = await come(by_hand, port, "c0")
+        await liar.says(f"HELLO 1 c0 last={FAR}")
+        await again.wait_begun()
+        assert again.epoch == pytest.approx(epoch, abs=BUSY)
+        await liar.says(f"HELLO 1 c0 last={FAR}")
+        assert again.epoch == pytest.approx(epoch, abs=BUSY)
+    for client in clients:
+        await client.close()
+
+
+async def test_a_camera_that_says_it_has_counted_little_holds_nobody_back(by_hand: Connect) -> None:
+    async with PulseServer(FPS, expect=NAMES, start_timeout=1000.0, users=USERS, limits=SOON) as server:
+        liar = await come(by_hand, server.port, "c0")
+        await liar.says("HELLO 1 c0 last=1")
+        for name in ("c1", "c2"):
+            await (await come(by_hand, server.port, name)).says(f"HELLO 1 {name} last=50000")
+        async with client_of(server.port, "bestview") as client:
+            assert (await counted(client, 1))[0] >= 50_000
+
+
+async def test_one_who_alone_remembers_a_count_begins_anew_with_the_others() -> None:
+    """Whether it lies nobody knows; it is told so, and can start anew."""
+    settings = ClientSettings(backoff_first=0.01, backoff_most=0.05, ahead_most=0.1, settle=0.05)
+    alone = PulseClient(HERE, 1, "c0", settings=settings, login=Login("c0", USERS["c0"]))
+    alone._follower.heard(10**6, alone.now())
+    async with PulseServer(FPS, expect=NAMES, start_timeout=0.0, users=USERS) as server:
+        alone._port = server.port
+        with pytest.raises(SyncError, match="the server is at pulse"):
+            await counted(alone, 10**6)
+        assert server.skipped < 10**6
+        await alone.close()
+
+
+def agreed(counts: Sequence[int | None], expect: int, *, at: int | None = None) -> int | None:
+    """Return where claims lead, by name c0, c1, …: None claims nothing; a server ``at`` a pulse has begun."""
+    names = [f"c{number}" for number in range(len(counts))]
+    claims = Claims(1.0, [f"c{number}" for number in range(expect)], ServerLimits(), lambda: 0.0)
+    for name, count in zip(names, counts, strict=True):
+        claims.note(Hello(name, None if count is None else Known(count, 0.0)))
+    claims.keep(names)
+    axis = claims.agreed(None if at is None else PulseAxis.through(at, 0.0, 1.0))
+    return None if axis is None else axis.number_at(0.0)
+
+
+@pytest.mark.parametrize(
+    ("counts", "expect", "at", "leads_to"),
+    [
+        ([70], 0, None, 70),
+        ([70], 1, None, 70),
+        ([70], 2, None, 70),
+        ([70, None], 2, None, 70),
+        ([70, 10], 2, None, 10),
+        ([70], 3, None, None),
+        ([70, None, None], 3, None, None),
+        ([70, 10, None], 3, None, 10),
+        ([70, 10, 10], 3, None, 10),
+        ([1, 10, 10], 3, None, 10),
+        ([70, 70, 10, 10], 4, None, 10),
+        ([70, None], 2, 10, 10),
+        ([70, 70, None], 3, 10, 70),
+        ([70, 70, None, None], 4, 10, 10),
+        ([70], 2, 10, 70),
+        ([None], 1, 10, None),
+    ],
+)
+def test_the_lower_median_of_what_is_claimed_counts(
+    counts: list[int | None], expect: int, at: int | None, leads_to: int | None
+) -> None:
+    assert agreed(counts, expect, at=at) == leads_to
+
+
+@settings(deadline=None, max_examples=100)
+@given(
+    st.lists(st.integers(0, 10**8), max_size=6),
+    st.integers(0, 10**6),
+    st.integers(0, 10),
+    st.randoms(use_true_random=False),
+)
+def test_fewer_than_half_move_nobody_whatever_they_claim(
+    lies: list[int], true: int, more: int, random: object
+) -> None:
+    counts = [*lies, *[true] * (len(lies) + 2 + more)]
+    random.shuffle(counts)  # type: ignore[attr-defined]
+    assert agreed(counts, len(counts)) == true
+
+
+@pytest.mark.parametrize("number", [LAST_PULSE + 1, 2**53, 10**18])
+def test_a_number_beyond_the_last_pulse_is_no_pulse(number: int) -> None:
+    for parse, line in ((parse_client_line, "HELLO 1 c0 last={}"), (parse_server_line, "PULSE {} 1")):
+        assert parse(line.format(LAST_PULSE).encode()) is not None
+        with pytest.raises(ProtocolError):
+            parse(line.format(number).encode())
+
+
+def test_the_last_pulse_is_the_same_on_the_bus() -> None:
+    assert numbers.LAST_PULSE == LAST_PULSE < 2**53
