@@ -5,6 +5,7 @@ from __future__ import annotations
 from aiohttp import web
 
 from server.view.streams.channel import Channel
+from server.web.access.access import sees_one_person
 from server.web.api import no_camera, no_object, not_now
 from server.web.forms import MP4, TS, WEBM, Form
 from server.web.keys import READERS, SERVICE
@@ -61,19 +62,21 @@ async def _best(request: web.Request, form: Form) -> web.StreamResponse:
     service = request.app[SERVICE]
     number = int(request.match_info["object"])
     person = service.board.resolve(number)
-    channel = service.splicer.objects.get(person)
+    scoped, splicer = sees_one_person(request), service.splicer
+    channel = (splicer.scoped if scoped else splicer.objects).get(person)
     if channel is None:
         return no_object(service, number)
     held, preferred = request.query.get("camera"), request.query.get("prefer")
     for camera in (held, preferred):
         if camera is not None and camera not in service.shelves:
             return no_camera(service, camera)
-    watching = channel.viewers + request.app[READERS].of(of_person(person))
+    watching = splicer.watched(person) + request.app[READERS].of(of_person(person))
     if held is not None:
-        channel = service.splicer.decided[held]
+        channel = splicer.decided[held]
         watching = channel.viewers + request.app[READERS].of(of_camera(held))
     elif preferred is not None:
-        channel = service.splicer.preferring.channel(person, preferred)
+        preferring = splicer.preferring_scoped if scoped else splicer.preferring
+        channel = preferring.channel(person, preferred)
         watching = channel.viewers
     return await _send(request, channel, watching, form)
 

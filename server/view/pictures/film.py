@@ -38,11 +38,15 @@ class Film:
         self.begun = asyncio.Event()
         """There is a head, or there will never be one."""
 
-    def put(self, units: Sequence[Unit]) -> None:
-        """Pass on encoded frames of one request, after what bridges a hole before them."""
+    def put(self, units: Sequence[Unit], *, silent: bool = False) -> None:
+        """Pass on encoded frames of one request, after what bridges a hole before them.
+
+        Where they are ``silent``, the site's sound is not heard meanwhile.
+        """
         pictures = [shown for unit in units for shown in self._time.take(self._picture(unit))]
         for gop in _gops(pictures):
             heard = None if self._sound is None else self._sound.beside(gop[0].pulse, gop[-1].until)
+            heard = heard.silenced if silent and heard is not None else heard
             self.channel.publish(self._tally.footage(gop, heard))
 
     def interrupted(self) -> None:

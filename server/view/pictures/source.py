@@ -13,7 +13,8 @@ from server.view.pictures.film import Film
 from server.view.pictures.process import DrawProcess, ProcessDiedError
 from server.view.pictures.series import AllSeries
 from server.view.pictures.stills import Stills
-from server.view.streams.channel import Channel, Viewer
+from server.view.streams.channel import Channel, Piece, Viewer
+from server.view.streams.footage import Footage
 from server.view.streams.sound import SoundShelf
 from server.wire.drawing import Canvas, Draw, Jpeg, Still
 
@@ -170,8 +171,8 @@ class Source:
             await self._used.wait()
             viewer = self._viewer = self._stream.join()
             try:
-                async for fragments in viewer:
-                    await self._draw(process, fragments)
+                async for piece in viewer.pieces():
+                    await self._draw(process, piece)
                     if not self.users:
                         break
                 else:
@@ -180,7 +181,8 @@ class Source:
                 self._stream.leave(viewer)
                 self._lost, self._viewer = self.lost, None
 
-    async def _draw(self, process: DrawProcess, fragments: bytes) -> None:
+    async def _draw(self, process: DrawProcess, piece: Piece) -> None:
+        fragments = piece.data
         told = self._told(fragments)
         drawn = await process.ask(
             Draw(
@@ -194,7 +196,7 @@ class Source:
             )
         )
         self.newest, self._answered = drawn.newest, True
-        self.film.put(drawn.film)
+        self.film.put(drawn.film, silent=isinstance(piece, Footage) and piece.silent)
         self.series.put(drawn, asyncio.get_running_loop().time())
         self._shown.set()
         self._stills.asked.set()

@@ -8,6 +8,7 @@ from functools import wraps
 from aiohttp import web
 
 from server.view.past.play import CameraPast
+from server.web.access.access import sees_one_person
 from server.web.api import no_camera, no_object, not_now, problem
 from server.web.forms import mp4_head
 from server.web.hls.live import coming_part, newest
@@ -121,8 +122,8 @@ def _stream(request: web.Request) -> Stream | None:
         reel = service.splicer.camera_reel(camera)
         return None if reel is None else Stream(f"camera {camera}", reel, CameraPast(service.past, camera))
     number = int(request.match_info["object"])
-    reel = service.splicer.reel(service.board.resolve(number))
-    stream = Stream(f"object {number}", reel, object_past(service, number))
+    reel = service.splicer.reel(service.board.resolve(number), scoped=sees_one_person(request))
+    stream = Stream(f"object {number}", reel, object_past(request, number))
     return stream if stream.exists else None
 
 
@@ -141,8 +142,7 @@ def _connected(request: web.Request) -> int:
     service, names = request.app[SERVICE], request.match_info
     if "camera" in names:
         return service.splicer.cameras[names["camera"]].viewers
-    channel = service.splicer.objects.get(service.board.resolve(int(names["object"])))
-    return 0 if channel is None else channel.viewers
+    return service.splicer.watched(service.board.resolve(int(names["object"])))
 
 
 def _nobody(request: web.Request) -> web.Response:
