@@ -109,11 +109,8 @@ def equal(shown: dict[int, Picture], right: dict[int, Picture]) -> None:
 
 def chosen(told: list[GopChoices], codec: Codec = "h264") -> dict[int, Picture]:
     """Say what everybody else sees."""
-    return {
-        pulse: own(it.choices[1], codec)[pulse]
-        for it in told
-        for pulse in range(it.first, it.first + it.frames)
-    }
+    cameras = {pulse: it.choices[1] for it in told for pulse in range(it.first, it.first + it.frames)}
+    return {pulse: own(camera, codec)[pulse] for pulse, camera in cameras.items()}
 
 
 def is_grey(picture: Picture) -> bool:

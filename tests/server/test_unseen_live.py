@@ -94,9 +94,7 @@ async def test_segments_and_their_parts_are_grey_too_and_everybody_elses_are_not
         narrow, full = [decoded(await listed(hall, pattern, who)) for who in ("family", "desk")]
     until = max(full) + 1
     right = expected(told)
-    for pulse in range(
-        min(narrow), until
-    ):  # where a picture stands in a segment of its own, it is one that lasts
+    for pulse in range(min(narrow), until):  # what stands all segment long lasts
         standing = narrow[max(it for it in narrow if it <= pulse)]
         np.testing.assert_array_equal(standing, right[pulse], str(pulse))
     equal(full, {pulse: picture for pulse, picture in chosen(told).items() if pulse < until})
