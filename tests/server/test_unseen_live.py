@@ -24,8 +24,10 @@ from leaving_by_hand import (
     own,
     to_the_end,
 )
+from played_in_chromium import PLAY, needs_chromium, seen_in_chromium
 from sounds_by_hand import FRAMES as SOUNDING
 from sounds_by_hand import beeps, sends, write_flashes
+from tokens_by_hand import token_of
 
 from server.view.streams.channel import Piece
 
@@ -111,6 +113,23 @@ async def test_the_room_is_not_heard_without_the_person(tmp_path: Path) -> None:
         narrow, full = await to_the_end(hall, *answers)
     assert [round(it * FPS) for it in beeps(full)] == [20, 40, 60, 80, 100]
     assert [round(it * FPS) for it in beeps(narrow)] == [20, 80, 100]
+
+
+@needs_chromium
+@pytest.mark.parametrize("form", ["mp4", "webm"])
+async def test_a_browser_plays_on_through_what_stands_and_what_is_grey(tmp_path: Path, form: str) -> None:
+    codec = "vp8" if form == "webm" else "h264"
+    async with left(tmp_path, encode={"codec": codec}) as hall:
+        go_on(hall, range(3))
+        kind = f'video/{form}; codecs="{hall.service.agreement.codec}"'
+        path = f"/objects/1/best.{form}?token={token_of('family')}"
+        told = await seen_in_chromium(
+            *(hall.port, hall.service.splicer, EPOCHS - 2, lambda gop: go_on(hall, range(gop + 2, gop + 3))),
+            *(PLAY, path, kind, 4),
+        )
+    assert told["error"] == ""
+    assert told["ranges"] == 1
+    assert told["range"][1] == pytest.approx((EPOCHS - 1) * GOP / FPS, abs=1e-3)
 
 
 async def test_grey_is_written_once_for_all_who_are_shown_it(tmp_path: Path) -> None:
