@@ -140,6 +140,7 @@ def test_in_a_format_that_cannot_be_written_there_is_none() -> None:
     assert agreement.blank(None, 0, 5, FPS) == []
 
 
+@settings(deadline=None)  # some say that they are very large
 @given(st.binary(min_size=4, max_size=30), st.binary(min_size=1, max_size=10), st.integers(0, 1))
 def test_parameter_sets_of_any_bytes_are_written_for_or_unfit(sps: bytes, pps: bytes, number: int) -> None:
     with contextlib.suppress(UnfitError):

@@ -101,6 +101,20 @@ def test_a_film_is_silent_where_its_pictures_are() -> None:
     assert told == [{b"not quiet"}, {form.silence}, {b"not quiet"}]
 
 
+@pytest.mark.parametrize("silent", [False, True])
+def test_the_holes_of_a_film_are_silent_where_nobody_knows_what_was_in_them(*, silent: bool) -> None:
+    form = SoundFormat(48_000, 2)
+    shelf = SoundShelf(form, FPS, 60.0)
+    shelf.put(SoundHead(first=0, sizes=[9] * 30), b"not quiet" * 30)
+    film = Film(CANVAS, 8, shelf, silent_holes=silent)
+    viewer = film.channel.join()
+    film.put(units(0, GOP))
+    film.put(units(2 * GOP, GOP))
+    pieces = [piece for piece in viewer._queue if isinstance(piece, Footage)]
+    told = [set(it.heard.frames) for it in pieces if it.heard is not None]
+    assert told == [{b"not quiet"}, {form.silence if silent else b"not quiet"}, {b"not quiet"}]
+
+
 def test_whoever_comes_to_a_film_begins_with_its_newest_gop() -> None:
     film = Film(CANVAS, 8)
     film.put(units(0, 2 * GOP))

@@ -190,6 +190,7 @@ class Pictures:
             live=live,
             queue_gops=self._queue,
             sound=self._service.sound,
+            silent_holes=isinstance(subject, PersonView) and subject.scoped,  # what was there is not known
         )
 
     def _end(self, subject: Subject, running: _Running) -> None:

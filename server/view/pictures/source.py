@@ -33,7 +33,8 @@ class Source:
     """Decodes one stream while somebody uses it; what is made of it outlives the process that makes it.
 
     A slow process is a slow viewer: it loses whole GOPs, and nobody waits for it. ``told`` gives the boxes of
-    fragments. ``live`` pictures are shown as they come, others in pace. ``sound`` goes under the film.
+    fragments. ``live`` pictures are shown as they come, others in pace. ``sound`` goes under the film, with
+    ``silent_holes`` only where there are pictures.
     """
 
     def __init__(
@@ -46,9 +47,11 @@ class Source:
         live: bool,
         queue_gops: int,
         sound: SoundShelf | None = None,
+        silent_holes: bool = False,
     ) -> None:
         self._name, self._stream, self._told, self._canvas = name, stream, told, canvas
         self._live, self._queue_gops, self._sound = live, queue_gops, sound
+        self._silent_holes = silent_holes
         self._begin()
         self._stills = Stills()
         self._used = asyncio.Event()
@@ -145,7 +148,7 @@ class Source:
 
     def _begin(self) -> None:
         """Begin anew what is made of it: whoever comes must not be shown what others saw before."""
-        self.film = Film(self._canvas, self._queue_gops, self._sound)
+        self.film = Film(self._canvas, self._queue_gops, self._sound, silent_holes=self._silent_holes)
         self.series = AllSeries(self._canvas, live=self._live)
 
     async def _run_process(self) -> None:
