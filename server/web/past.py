@@ -14,12 +14,13 @@ from server.view.past.hearing import Hearing
 from server.view.past.kept import kept_from, known, shown
 from server.view.past.moment import MomentError, moment_of, pulse_at
 from server.view.past.play import CameraPast, ObjectPast, Source, sounds
+from server.view.past.presence import PastPresence
 from server.view.past.stream import PastStream, Wish
 from server.view.past.told import told
 from server.view.service import BestViewService
 from server.view.streams.channel import Channel
 from server.view.streams.timeline import Timeline
-from server.web.access.access import ACCESS
+from server.web.access.access import ACCESS, sees_one_person
 from server.web.api import answer, no_camera, no_object, not_now, problem
 from server.web.forms import Form
 from server.web.keys import SERVICE
@@ -41,10 +42,12 @@ async def best_of_the_past(request: web.Request, form: Form) -> web.StreamRespon
     """Stream the best view of a person from a moment on."""
     service = request.app[SERVICE]
     number = int(request.match_info["object"])
-    source = object_past(service, number)
+    source = object_past(request, number)
+    splicer = service.splicer
+    channels = splicer.scoped if sees_one_person(request) else splicer.objects
 
     def live() -> Channel | None:
-        return service.splicer.objects.get(service.board.resolve(number))
+        return channels.get(service.board.resolve(number))
 
     if live() is None:
         if (unread := await unreadable(source, 0)) is not None:
@@ -75,9 +78,8 @@ async def camera_of_the_past(request: web.Request, form: Form) -> web.StreamResp
 @routes.get("/api/objects/{object:[0-9]{1,9}}/past")
 async def getobject_past(request: web.Request) -> web.Response:
     """Say from when to when a person's best view can be seen again; from= and to= say of which time."""
-    service = request.app[SERVICE]
     number = int(request.match_info["object"])
-    source = object_past(service, number)
+    source = object_past(request, number)
     if (unread := await unreadable(source, 0)) is not None:
         return unread
     if kept_from(source, 0) is None:
@@ -117,10 +119,15 @@ async def get_told(request: web.Request) -> web.StreamResponse:
         return await send_bytes(request, lines, b"", {"Content-Type": "application/x-ndjson"})
 
 
-def object_past(service: BestViewService, number: int) -> ObjectPast:
-    """Give the past of whoever has a number, or had it."""
+def object_past(request: web.Request, number: int) -> ObjectPast:
+    """Give the past of whoever has a number, or had it, as far as whoever asks may see it."""
+    service = request.app[SERVICE]
     now = service.board.resolve(number)
-    return ObjectPast(service.past, (number,) if number == now else (now, number))
+    numbers = (number,) if number == now else (now, number)
+    if not sees_one_person(request):
+        return ObjectPast(service.past, numbers)
+    fps, unseen_s = service.config.site.fps, service.config.access.unseen_s
+    return ObjectPast(service.past, numbers, PastPresence(service.past, numbers, round(unseen_s * fps), fps))
 
 
 def wish_of(

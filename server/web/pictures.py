@@ -17,6 +17,7 @@ from server.view.pictures import (
     Subject,
 )
 from server.view.pictures.multipart import BEGIN, CONTENT_TYPE, PULSE, part
+from server.web.access.access import sees_one_person
 from server.web.api import no_camera, no_object, not_now, problem
 from server.web.forms import MP4
 from server.web.keys import PICTURES, SERVICE
@@ -132,10 +133,10 @@ def _subject(request: web.Request) -> Subject:
 
 def _person(request: web.Request) -> Subject:
     service, number = request.app[SERVICE], int(request.match_info["object"])
-    known = service.board.resolve(number)
-    if known not in service.splicer.objects:
+    known, scoped = service.board.resolve(number), sees_one_person(request)
+    if known not in (service.splicer.scoped if scoped else service.splicer.objects):
         raise _RefusedError(no_object(service, number))
-    return PersonView(known)
+    return PersonView(known, scoped)
 
 
 def _camera(request: web.Request) -> Subject:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from aiohttp import web
 
 from server.view.streams.channel import Channel
+from server.web.access.access import sees_one_person
 from server.web.api import no_camera, no_object, not_now
 from server.web.forms import MP4, TS, WEBM, Form
 from server.web.keys import READERS, SERVICE
@@ -61,22 +62,24 @@ async def _best(request: web.Request, form: Form) -> web.StreamResponse:
     service = request.app[SERVICE]
     number = int(request.match_info["object"])
     person = service.board.resolve(number)
-    channel = service.splicer.objects.get(person)
+    scoped, splicer = sees_one_person(request), service.splicer
+    channel = (splicer.scoped if scoped else splicer.objects).get(person)
     if channel is None:
         return no_object(service, number)
     held, preferred = request.query.get("camera"), request.query.get("prefer")
     for camera in (held, preferred):
         if camera is not None and camera not in service.shelves:
             return no_camera(service, camera)
-    by_channel = of_person(person)
+    by_channel, beside = of_person(person), splicer.watched(person) - channel.viewers
     fetched: str | None = by_channel
     if held is not None:
-        channel = service.splicer.decided[held]
-        by_channel, fetched = of_decided(held), of_camera(held)
+        channel = splicer.decided[held]
+        by_channel, fetched, beside = of_decided(held), of_camera(held), 0
     elif preferred is not None:
-        channel = service.splicer.preferring.channel(person, preferred)
-        by_channel, fetched = f"object {person} preferring {preferred}", None
-    return await _send(request, channel, by_channel, fetched, form)
+        preferring = splicer.preferring_scoped if scoped else splicer.preferring
+        channel = preferring.channel(person, preferred)
+        by_channel, fetched, beside = f"object {person} preferring {preferred}", None, 0
+    return await _send(request, channel, by_channel, fetched, form, beside)
 
 
 async def _live(request: web.Request, form: Form) -> web.StreamResponse:
@@ -91,14 +94,17 @@ async def _live(request: web.Request, form: Form) -> web.StreamResponse:
 
 
 async def _send(
-    request: web.Request, channel: Channel, stream: str, fetched: str | None, form: Form
+    request: web.Request, channel: Channel, stream: str, fetched: str | None, form: Form, beside: int = 0
 ) -> web.StreamResponse:
-    """Send a channel, whose viewers hold places by one name, and who fetches the same (HLS) by another."""
+    """Send a channel, whose viewers hold places by one name, and who fetches the same (HLS) by another.
+
+    ``beside`` is how many watch the same by another channel.
+    """
     head = form.head(request.app[SERVICE])
     if head is None:
         return not_now("no camera has delivered a picture yet")
     readers = 0 if fetched is None else request.app[READERS].of(fetched)
-    full = no_place(request, channel.viewers + readers, (stream, fetched or stream))
+    full = no_place(request, channel.viewers + beside + readers, (stream, fetched or stream))
     if full is not None:
         return full
     with watching(request, stream):

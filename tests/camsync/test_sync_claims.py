@@ -8,7 +8,8 @@ from collections.abc import Sequence
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from pulses_by_hand import BUSY, PATIENCE, ByHand, Connect
+from patience import PATIENCE
+from pulses_by_hand import BUSY, ByHand, Connect
 
 from camsync import ClientSettings, Login, PulseClient, PulseServer, ServerLimits, SyncError
 from camsync.axis import PulseAxis

@@ -7,7 +7,8 @@ import logging
 import socket
 
 import pytest
-from pulses_by_hand import PATIENCE, ByHand, Connect
+from patience import PATIENCE
+from pulses_by_hand import ByHand, Connect
 
 from camsync import ClientSettings, Login, PulseClient, PulseServer, ServerLimits, clients_of
 from camsync.messages import Challenge, Greeting, Pong

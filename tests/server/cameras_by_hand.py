@@ -152,6 +152,9 @@ class TrackNumbers:
 class FedService(BestViewService):
     """The best-view service without a bus: a test hands it what cameras would send."""
 
+    frames = 40
+    """As many pictures as each camera has."""
+
     def come(self, *cameras: str) -> None:
         """Let cameras be there, which remember nobody."""
         for camera in cameras:
@@ -164,7 +167,7 @@ class FedService(BestViewService):
         for seed, camera in enumerate(self.config.camera_ids):
             if camera not in seen:
                 continue
-            units = encoded(seed, codec=self.config.encode.codec)
+            units = encoded(seed, self.frames, codec=self.config.encode.codec)
             for unit in units[epoch * STRIDE : (epoch + 1) * STRIDE]:
                 self.intake.video(video(camera, unit))
             self.intake.tracks(tracks(word(camera, epoch, seen[camera])))

@@ -100,6 +100,16 @@ async def test_what_a_token_may_no_longer_see_ends_too(
     await ended(answer)
 
 
+@pytest.mark.parametrize("path", ["/objects/1/best.mp4", "/objects/1/best.mjpeg"])
+async def test_a_persons_stream_ends_when_its_token_becomes_one_for_that_person_alone(
+    site: Hall, tmp_path: Path, path: str
+) -> None:
+    """It would go on with the room when the person has left."""
+    answer = await stream(site, path, **bearer("desk"))
+    write_tokens(tmp_path / "tokens.yaml", line_of("desk", role="watch", object=1, made=LATER))
+    await ended(answer)
+
+
 async def test_what_it_may_see_as_before_goes_on(site: Hall, tmp_path: Path) -> None:
     camera = await stream(site, "/cameras/c0/live.mp4", **bearer("desk"))
     events = await stream(site, "/api/events", **bearer("desk"))

@@ -14,8 +14,9 @@ from typing import Any
 import pytest
 from cameras_by_hand import small_config
 from command_line import Run
-from few_descriptors import FEW, MYVIEW, PATIENCE, awaited, connected, running, written
+from few_descriptors import FEW, MYVIEW, awaited, connected, running, written
 from free_port import free
+from patience import PATIENCE
 
 from server.run.doctor_findings import Level
 from server.run.doctor_machine import descriptor_findings

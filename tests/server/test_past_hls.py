@@ -119,8 +119,9 @@ async def test_a_segment_has_the_bytes_that_it_had_when_it_was_new(hall: Hall, s
                 new[number] = await fetch(hall, f"{stream}/hls/{number}.m4s")
     await until_written(hall, GOPS)
     forget(hall)
-    hall.service.splicer._people[1].reel._segments.clear()
-    hall.service.splicer._decided["c0"].reel._segments.clear()
+    for reel in (hall.service.splicer.reel(1), hall.service.splicer.camera_reel("c0")):
+        assert reel is not None
+        reel._segments.clear()
     assert len(new) > 15
     for number, data in new.items():
         assert await fetch(hall, f"{stream}/hls/{number}.m4s") == data, number
@@ -193,7 +194,7 @@ async def test_what_was_somebodys_can_be_fetched_when_they_are_forgotten(hall: H
     shows(hall, range(21))
     await until_written(hall, 21)
     hall.service.splicer.forget([], [])
-    hall.service.splicer._gone.clear()
+    hall.service.splicer._people._gone.clear()
     listed = await text(hall, "/objects/1/hls/index.m3u8?from=p0&to=live")
     assert numbers(listed) == list(range(11))
     assert listed.endswith("#EXT-X-ENDLIST\n")

@@ -50,7 +50,9 @@ async def fetch(hall: Hall, *paths: str) -> bytes:
 
 @pytest.mark.parametrize("form", ["mp4", "ts", "hls"])
 async def test_the_past_is_what_was_live(hall: Hall, form: str) -> None:
-    hall.service.splicer._people[1].reel._segments.clear()
+    reel = hall.service.splicer.reel(1)
+    assert reel is not None
+    reel._segments.clear()
     if form == "hls":
         names = ["init.mp4", *(f"{number}.m4s" for number in range(GOPS // 2))]
         data = await fetch(hall, *(f"/objects/1/hls/{name}" for name in names))

@@ -273,6 +273,8 @@ async def test_who_watches_the_past_takes_a_viewers_place_and_gives_it_back(reco
 class OnDisk:
     """A source with nothing in memory."""
 
+    presence = None
+
     def __init__(self, *recorded: Recorded, end: int) -> None:
         self.recorded, self.end = recorded, end
 

@@ -21,8 +21,11 @@ from server.view.pictures.pace import Pace
 from server.view.pictures.series import AllSeries, Series
 from server.view.pictures.stills import Stills
 from server.view.streams.channel import Viewer
+from server.view.streams.footage import Footage
+from server.view.streams.sound import SoundShelf
 from server.wire.drawing import Drawn, Jpeg, Unit
-from server.wire.messages import GopChoices
+from server.wire.messages import GopChoices, SoundHead
+from server.wire.sound import SoundFormat
 
 EVERY = Series(FPS, boxed=False)
 
@@ -83,6 +86,33 @@ def test_a_film_that_goes_on_with_another_process_has_no_hole_and_never_goes_bac
         repeated = 2 * GOP <= pulse < 3 * GOP
         same = shown(0)[2 * GOP - 1 if repeated else pulse]
         np.testing.assert_array_equal(picture.to_ndarray(format="bgr24"), same)
+
+
+def test_a_film_is_silent_where_its_pictures_are() -> None:
+    form = SoundFormat(48_000, 2)
+    shelf = SoundShelf(form, FPS, 60.0)
+    shelf.put(SoundHead(first=0, sizes=[9] * 30), b"not quiet" * 30)
+    film = Film(CANVAS, 8, shelf)
+    viewer = film.channel.join()
+    for gop in range(3):
+        film.put(units(gop * GOP, GOP), silent=gop == 1)
+    pieces = [piece for piece in viewer._queue if isinstance(piece, Footage)]
+    told = [set(it.heard.frames) for it in pieces if it.heard is not None]
+    assert told == [{b"not quiet"}, {form.silence}, {b"not quiet"}]
+
+
+@pytest.mark.parametrize("silent", [False, True])
+def test_the_holes_of_a_film_are_silent_where_nobody_knows_what_was_in_them(*, silent: bool) -> None:
+    form = SoundFormat(48_000, 2)
+    shelf = SoundShelf(form, FPS, 60.0)
+    shelf.put(SoundHead(first=0, sizes=[9] * 30), b"not quiet" * 30)
+    film = Film(CANVAS, 8, shelf, silent_holes=silent)
+    viewer = film.channel.join()
+    film.put(units(0, GOP))
+    film.put(units(2 * GOP, GOP))
+    pieces = [piece for piece in viewer._queue if isinstance(piece, Footage)]
+    told = [set(it.heard.frames) for it in pieces if it.heard is not None]
+    assert told == [{b"not quiet"}, {form.silence if silent else b"not quiet"}, {b"not quiet"}]
 
 
 def test_whoever_comes_to_a_film_begins_with_its_newest_gop() -> None:

@@ -45,5 +45,6 @@ def write_tokens(path: Path, *lines: dict[str, Any]) -> Path:
 async def locked(folder: Path, *names: str, **changes: Any) -> AsyncIterator[Hall]:
     """Serve a site that takes tokens: everybody's, or some; they are in `tokens.yaml` in the folder."""
     path = write_tokens(folder / "tokens.yaml", *map(line_of, names or EVERYBODY))
-    async with aclosing(opened(access={"tokens": str(path)}, **changes)) as halls:
+    access = {"tokens": str(path), **changes.pop("access", {})}
+    async with aclosing(opened(access=access, **changes)) as halls:
         yield await anext(halls)

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Literal
 
-from server.view.media.bridge import Bridge, H264Bridge
+from server.view.media.bridge import NO_CAMERAS, Bridge, H264Bridge
 from server.view.media.fmp4 import Sample, fragment, init_segment, rebased, sample_of, ticks
+from server.view.media.grey import grey_picture
 from server.view.media.picture import Picture
 from server.view.media.skip import UnfitError, continuing
 from server.wire.h264 import ParameterSets, nal_units, parameter_sets, sample, units_of
@@ -88,6 +89,38 @@ class Agreement:
         del newest
         return None if self.parameters is None else bridge_by(self.parameters, fps)
 
+    def blank(self, newest: Picture | None, first: int, frames: int, fps: float) -> list[Picture]:
+        """Return a GOP of grey pictures that fits after a picture; nothing where it is not known how.
+
+        Where its last picture cannot be repeated, the grey one lasts for all of it.
+        """
+        del newest
+        return self._blank(self.parameters, None, first, frames, fps)
+
+    def _blank(
+        self,
+        written_by: ParameterSets | None,
+        decoded_by: ParameterSets | None,
+        first: int,
+        frames: int,
+        fps: float,
+    ) -> list[Picture]:
+        """Return that GOP by some parameter sets; ``decoded_by`` is what its pictures say of themselves."""
+        if written_by is None:
+            return []
+        try:
+            grey = grey_picture(written_by, first // frames % 2)
+        except UnfitError:
+            return []
+        bridge = bridge_by(written_by, fps)
+        lasts = frames if bridge is None else 1
+        made = fragment([Sample(grey, key=True, lasts=lasts)], first, fps)
+        key = Picture(first, key=True, fragment=made, boot=NO_CAMERAS, lasts=lasts, parameters=decoded_by)
+        if bridge is None:
+            return [key]
+        bridge = replace(bridge, parameters=decoded_by)
+        return [key, *bridge.after(key, [(pulse, 1) for pulse in range(first + 1, first + frames)])]
+
 
 class OwnParameters(Agreement):
     """The same, but cameras may have parameter sets of their own, which their key frames carry."""
@@ -115,6 +148,11 @@ class OwnParameters(Agreement):
             return None
         bridge = bridge_by(newest.parameters, fps)
         return None if bridge is None else replace(bridge, parameters=newest.parameters)
+
+    def blank(self, newest: Picture | None, first: int, frames: int, fps: float) -> list[Picture]:
+        """Return a GOP of grey pictures by the parameter sets of a picture; they are in it, as at any cut."""
+        known = self.parameters if newest is None or newest.parameters is None else newest.parameters
+        return self._blank(known, known, first, frames, fps)
 
 
 def bridge_by(parameters: ParameterSets, fps: float) -> H264Bridge | None:

@@ -17,6 +17,11 @@ class Heard:
     frames: tuple[bytes, ...]
     format: SoundFormat
 
+    @property
+    def silenced(self) -> Heard:
+        """As many frames of silence."""
+        return Heard(self.first, (self.format.silence,) * len(self.frames), self.format)
+
     @cached_property
     def fragment(self) -> bytes:
         """The frames as a fragment of MP4; nothing where there are none."""

@@ -20,11 +20,12 @@ _SLICE_P = 5
 """slice_type of a picture all of whose slices are P."""
 _REFERENCE = 0x40 | NAL_SLICE
 """NAL head with nal_ref_idc 2."""
-_ORDER_BY_DECODING = 2
-"""pic_order_cnt_type of an encoder without B pictures."""
+_ORDER_BY_NUMBERS, _ORDER_BY_DECODING = 0, 2
+"""pic_order_cnt_type: each picture says its place, or, of an encoder without B pictures, need not."""
 _MOST_MACROBLOCKS = 139_264
 """Of a picture at the highest level there is (table A-1); writing a picture takes time for each."""
 _MOST_FRAME_NUM_BITS = 16
+"""Also of pic_order_cnt_lsb."""
 
 
 class UnfitError(Exception):
@@ -33,16 +34,30 @@ class UnfitError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Continuing:
-    """What the parameter sets say about the head of a slice."""
+    """What the parameter sets say about the head of a slice.
+
+    Attributes:
+        width, height: of a picture, in macroblocks.
+        order_bits: of pic_order_cnt_lsb; 0: pictures are shown in the order in which they are decoded.
+        order_of_fields: the second field's place is said as well.
+    """
 
     pps_id: int
     frame_num_bits: int
-    macroblocks: int
+    width: int
+    height: int
+    order_bits: int
+    order_of_fields: bool
     cabac: bool
     weighted: bool
     init_qp: int
     deblocking_control: bool
     redundant: bool
+
+    @property
+    def macroblocks(self) -> int:
+        """How many macroblocks a picture has."""
+        return self.width * self.height
 
     def frame_num(self, sample: bytes) -> int:
         """Give frame_num of a picture, length-prefixed NAL units.
@@ -102,22 +117,43 @@ class Continuing:
         return len(unit).to_bytes(_LENGTH_BYTES, "big") + unit
 
 
-@lru_cache(maxsize=4)
 def continuing(parameters: ParameterSets) -> Continuing:
-    """Read the parameter sets.
+    """Read the parameter sets of streams whose last picture can be repeated.
 
     Raises:
         UnfitError: they are damaged, or use what x264 without B pictures does not.
     """
+    found = slice_heads(parameters)
+    if found.order_bits:
+        raise UnfitError("pictures may be shown in another order than they are decoded in")
+    return found
+
+
+@lru_cache(maxsize=8)
+def slice_heads(parameters: ParameterSets) -> Continuing:
+    """Read the parameter sets.
+
+    Raises:
+        UnfitError: they are damaged, or use what hardly any camera does.
+    """
     try:
-        frame_num_bits, macroblocks = _read_sps(BitReader(payload_of(parameters.sps)))
-        return _read_pps(BitReader(payload_of(parameters.pps)), frame_num_bits, macroblocks)
+        sps = _read_sps(BitReader(payload_of(parameters.sps)))
+        return _read_pps(BitReader(payload_of(parameters.pps)), sps)
     except ValueError as error:
         raise UnfitError(str(error)) from error
 
 
-def _read_sps(bits: BitReader) -> tuple[int, int]:
-    """Give the bits of frame_num and the macroblocks of a picture."""
+@dataclass(frozen=True, slots=True)
+class _Sequence:
+    """What the sequence parameter set says; as in :class:`Continuing`."""
+
+    frame_num_bits: int
+    width: int
+    height: int
+    order_bits: int
+
+
+def _read_sps(bits: BitReader) -> _Sequence:
     profile = bits.u(8)
     bits.u(16)
     bits.ue()
@@ -129,23 +165,25 @@ def _read_sps(bits: BitReader) -> tuple[int, int]:
         if bits.u(1):
             raise ValueError("with scaling lists")
     frame_num_bits = bits.ue() + 4
-    if bits.ue() != _ORDER_BY_DECODING:
-        raise ValueError("pictures may be shown in another order than they are decoded in")
+    order = bits.ue()
+    if order not in (_ORDER_BY_NUMBERS, _ORDER_BY_DECODING):
+        raise ValueError("pictures are put in order by a rule")
+    order_bits = bits.ue() + 4 if order == _ORDER_BY_NUMBERS else 0
     bits.ue()
     bits.u(1)
-    macroblocks = (bits.ue() + 1) * (bits.ue() + 1)
+    width, height = bits.ue() + 1, bits.ue() + 1
     if not bits.u(1):
         raise ValueError("interlaced")
-    if macroblocks > _MOST_MACROBLOCKS or frame_num_bits > _MOST_FRAME_NUM_BITS:
+    if width * height > _MOST_MACROBLOCKS or max(frame_num_bits, order_bits) > _MOST_FRAME_NUM_BITS:
         raise ValueError("beyond every level")
-    return frame_num_bits, macroblocks
+    return _Sequence(frame_num_bits, width, height, order_bits)
 
 
-def _read_pps(bits: BitReader, frame_num_bits: int, macroblocks: int) -> Continuing:
+def _read_pps(bits: BitReader, sps: _Sequence) -> Continuing:
     pps_id = bits.ue()
     bits.ue()
     arithmetic = bool(bits.u(1))
-    bits.u(1)
+    order_of_fields = bool(bits.u(1))
     if bits.ue():
         raise ValueError("with slice groups")
     bits.ue()
@@ -159,5 +197,15 @@ def _read_pps(bits: BitReader, frame_num_bits: int, macroblocks: int) -> Continu
     bits.u(1)
     redundant = bool(bits.u(1))
     return Continuing(
-        pps_id, frame_num_bits, macroblocks, arithmetic, weighted, init_qp, deblocking_control, redundant
+        pps_id=pps_id,
+        frame_num_bits=sps.frame_num_bits,
+        width=sps.width,
+        height=sps.height,
+        order_bits=sps.order_bits,
+        order_of_fields=order_of_fields,
+        cabac=arithmetic,
+        weighted=weighted,
+        init_qp=init_qp,
+        deblocking_control=deblocking_control,
+        redundant=redundant,
     )

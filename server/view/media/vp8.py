@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from server.view.media.agreement import Agreement, Container, ParameterMismatchError
 from server.view.media.bridge import NO_CAMERAS, Bridge, Span
 from server.view.media.picture import Picture
+from server.view.media.vp8_grey import grey_frame
 from server.view.media.vp8_skip import repeat
 from server.view.media.webm import cluster, header, rebased, ticks
 from server.wire.sections import Site
@@ -60,6 +61,14 @@ class Vp8Agreement(Agreement):
         """Give what bridges holes, whatever is before them."""
         del newest
         return Vp8Bridge(repeat(*self._size), fps)
+
+    def blank(self, newest: Picture | None, first: int, frames: int, fps: float) -> list[Picture]:
+        """Return a GOP of grey pictures."""
+        del newest
+        made = cluster(grey_frame(*self._size), first, fps, key=True)
+        key = Picture(first, key=True, fragment=made, boot=NO_CAMERAS)
+        spans = [(pulse, 1) for pulse in range(first + 1, first + frames)]
+        return [key, *Vp8Bridge(repeat(*self._size), fps).after(key, spans)]
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ from functools import lru_cache
 
 from server.view.media.vp8_bits import BoolWriter
 
-_BLOCK = 16
+BLOCK = 16
 """Pixels of a macroblock's side."""
 _HEADER_BITS = (
     (1, 0),  # segmentation_enabled
@@ -28,11 +28,11 @@ _HEADER_BITS = (
     (1, 0),  # refresh_last
 )
 """Number of bits and their value, up to the token probabilities (9.3 to 9.8)."""
-_SELDOM, _OFTEN = 1, 255
+SELDOM, OFTEN = 1, 255
 """Probabilities, out of 256, that a bit is 0."""
 _ZERO_MV = {0: 7, 2: 135, 5: 234}
 """By how many neighbours have no motion, the nearer ones counted twice: that this block has none (8.3.3)."""
-_NO_TOKENS = bytes(4)
+NO_TOKENS = bytes(4)
 """The second partition, from which no bit is read: some decoders want it not to be empty."""
 
 # Of each token probability, that it is not updated (13.4): a line for a plane's band, of its three contexts
@@ -85,27 +85,28 @@ def repeat(width: int, height: int) -> bytes:
     bits = BoolWriter()
     for count, value in _HEADER_BITS:
         bits.number(count, value)
-    for probability in _coefficient_updates():
+    for probability in coefficient_updates():
         bits.put(0, probability)
     bits.number(1, 1)  # mb_no_skip_coeff
-    for probability in (_SELDOM, _SELDOM, _OFTEN, _OFTEN):  # prob_skip_false, _intra, _last, _gf
+    for probability in (SELDOM, SELDOM, OFTEN, OFTEN):  # prob_skip_false, _intra, _last, _gf
         bits.number(8, probability)
     bits.number(2, 0)  # the probabilities of intra modes stay
     for probability in _MOTION_UPDATES:
         bits.put(0, probability)
-    for row in range(-(-height // _BLOCK)):
-        for column in range(-(-width // _BLOCK)):
-            bits.put(1, _SELDOM)  # mb_skip_coeff
-            bits.put(1, _SELDOM)  # is_inter_mb
-            bits.put(0, _OFTEN)  # mb_ref_frame_sel1: the last frame
+    for row in range(-(-height // BLOCK)):
+        for column in range(-(-width // BLOCK)):
+            bits.put(1, SELDOM)  # mb_skip_coeff
+            bits.put(1, SELDOM)  # is_inter_mb
+            bits.put(0, OFTEN)  # mb_ref_frame_sel1: the last frame
             near = 2 * (row > 0) + 2 * (column > 0) + (row > 0 and column > 0)
             bits.put(0, _ZERO_MV[near])
     first = bits.done()
     # Not a key frame, version 0, shown; then the size of the first partition (9.1).
-    return (1 | 1 << 4 | len(first) << 5).to_bytes(3, "little") + first + _NO_TOKENS
+    return (1 | 1 << 4 | len(first) << 5).to_bytes(3, "little") + first + NO_TOKENS
 
 
-def _coefficient_updates() -> list[int]:
+def coefficient_updates() -> list[int]:
+    """Return of each token probability, in order, that it is not updated."""
     lines = _COEFFICIENT_UPDATES.strip().splitlines()
     contexts = [context.split() for line in lines for context in line.split(",")]
     return [int(it) for some in contexts for it in (some + ["255"] * _PER_CONTEXT)[:_PER_CONTEXT]]

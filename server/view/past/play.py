@@ -11,6 +11,7 @@ from typing import Protocol
 from server.view.past.disk import from_disk
 from server.view.past.media import Gop, gops
 from server.view.past.past import Past
+from server.view.past.presence import PastPresence
 from server.view.past.run import Run
 from server.view.past.stretch import Stretch, Tape, View
 
@@ -28,6 +29,10 @@ class Recorded:
 
 class Source(Protocol):
     """One stream's past."""
+
+    @property
+    def presence(self) -> PastPresence | None:
+        """What it is shown by to who may see one person alone; None: all of it is shown."""
 
     @property
     def recorded(self) -> Sequence[Recorded]:
@@ -54,6 +59,8 @@ class ObjectPast:
 
     past: Past
     numbers: tuple[int, ...]
+    presence: PastPresence | None = None
+    """As of :class:`Source`."""
 
     @property
     def recorded(self) -> Sequence[Recorded]:
@@ -98,6 +105,7 @@ class CameraPast:
 
     past: Past
     camera: str
+    presence: None = None
 
     @property
     def recorded(self) -> Sequence[Recorded]:

@@ -14,8 +14,8 @@ from server.view.media.picture import Picture
 from server.view.media.ts import Counters
 from server.view.past.hearing import Hearing
 from server.view.past.kept import kept_from, kept_until
-from server.view.past.media import pictures_of
 from server.view.past.play import Source, last_before, play
+from server.view.past.presence import shown_of
 from server.view.streams.footage import Footage
 from server.view.streams.reel import Plan, Segment
 from server.view.streams.timeline import Timeline
@@ -92,10 +92,10 @@ class Rewound:
         lead = await last_before(self._source, first)
         timeline, hearing = self._timeline(), self._hearing()
         agreement = timeline.agreement
-        led = [] if lead is None else pictures_of(lead, agreement)
+        led = [] if lead is None else (await shown_of(lead, self._source, agreement, self._plan.fps)).pictures
         if led:  # as if it had been shown just now: what repeats it does not say how old it is
             timeline.pass_by(replace(led[-1], pulse=first - 1))
-        came = await self._came(first, until, agreement)
+        came, heard_from = await self._came(first, until, agreement)
         footage: list[Footage] = []
         for begin in range(first, until, self._gop):
             end = min(begin + self._gop, until)
@@ -103,6 +103,8 @@ class Rewound:
             pictures += timeline.fill(end)
             if pictures:
                 heard = None if hearing is None else await hearing.beside(begin, end)
+                if heard is not None and self._source.presence is not None and begin not in heard_from:
+                    heard = heard.silenced
                 footage.append(Footage(pictures, self._plan.fps, Counters(), heard=heard))
         if not footage:
             return None
@@ -112,12 +114,18 @@ class Rewound:
             segment.add(it)
         return segment
 
-    async def _came(self, first: int, until: int, agreement: Agreement) -> list[Picture]:
-        """Give the pictures that there are of some pulses."""
+    async def _came(
+        self, first: int, until: int, agreement: Agreement
+    ) -> tuple[list[Picture], frozenset[int]]:
+        """Give the pictures that there are of some pulses, and the first pulses of GOPs that may be heard."""
         came: list[Picture] = []
+        heard_from: set[int] = set()
         async with aclosing(play(self._source, first)) as gops:
             async for gop in gops:
                 if gop.first >= until:
                     break
-                came += pictures_of(gop, agreement)
-        return came
+                shown = await shown_of(gop, self._source, agreement, self._plan.fps)
+                came += shown.pictures
+                if not shown.silent:
+                    heard_from.add(gop.first)
+        return came, frozenset(heard_from)

@@ -7,10 +7,11 @@ from collections.abc import AsyncGenerator, Callable, Iterator
 from contextlib import aclosing
 from dataclasses import dataclass
 
+from server.view.media.heard import Heard
 from server.view.media.picture import Picture
 from server.view.past.hearing import Hearing
-from server.view.past.media import pictures_of
 from server.view.past.play import Source, play
+from server.view.past.presence import Shown, shown_of
 from server.view.streams.channel import Channel
 from server.view.streams.footage import Footage
 from server.view.streams.tally import Tally
@@ -58,9 +59,9 @@ class PastStream:
             async for gop in gops:
                 if wish.end is not None and gop.first >= wish.end:
                     return
-                came = pictures_of(gop, self._timeline.agreement)
-                pictures = [it for it in came if wish.end is None or it.pulse < wish.end]
-                for shown in self._shown(pictures):
+                came = await shown_of(gop, self._source, self._timeline.agreement, self._fps)
+                pictures = [it for it in came.pictures if wish.end is None or it.pulse < wish.end]
+                for shown in self._shown(Shown(pictures, came.silent)):
                     footage = await self._recalled(shown)
                     if wish.end is None:
                         await pace.wait((footage.until - footage.first) / self._fps)
@@ -90,37 +91,45 @@ class PastStream:
                         yield await self._recalled(shown)
                     begun = True
                 if pictures:
-                    yield self._present(pictures)
+                    yield self._present(pictures, silent=isinstance(piece, Footage) and piece.silent)
                 if over:
                     return
         finally:
             channel.leave(viewer)
 
-    def _shown(self, pictures: list[Picture]) -> Iterator[list[Picture]]:
+    def _shown(self, gop: Shown) -> Iterator[Shown]:
         """Give a GOP's pictures as they can be shown, behind what repeats the picture before them."""
-        yield from self._bridged(pictures[0].pulse)
-        shown = [it for picture in pictures for it in self._timeline.take(picture)]
+        if not gop.pictures:
+            return
+        yield from self._bridged(gop.pictures[0].pulse)
+        shown = [it for picture in gop.pictures for it in self._timeline.take(picture)]
         if shown:
-            yield shown
+            yield Shown(shown, gop.silent)
 
-    def _bridged(self, until: int) -> Iterator[list[Picture]]:
-        """Repeat the last picture up to a pulse, a few seconds at a time: sound goes on meanwhile."""
+    def _bridged(self, until: int) -> Iterator[Shown]:
+        """Repeat the last picture up to a pulse, a few seconds at a time: sound goes on meanwhile.
+
+        Not for who may see one person alone, of whom nothing was kept then.
+        """
         most = round(_BRIDGED_S * self._fps)
         while (at := self._timeline.until) is not None and at < until <= at + LONGEST_S * self._fps:
             shown = self._timeline.fill(min(until, at + most))
             if not shown:
                 return
-            yield shown
+            yield Shown(shown, silent=self._source.presence is not None)
 
-    async def _recalled(self, pictures: list[Picture]) -> Footage:
-        hearing, first, until = self._hearing, pictures[0].pulse, pictures[-1].until
+    async def _recalled(self, shown: Shown) -> Footage:
+        hearing, first, until = self._hearing, shown.pictures[0].pulse, shown.pictures[-1].until
         heard = None if hearing is None else await hearing.beside(first, until)
-        return self._tally.footage(pictures, heard)
+        return self._footage(shown.pictures, heard, silent=shown.silent)
 
-    def _present(self, pictures: list[Picture]) -> Footage:
+    def _present(self, pictures: list[Picture], *, silent: bool) -> Footage:
         hearing, first, until = self._hearing, pictures[0].pulse, pictures[-1].until
         heard = None if hearing is None else hearing.live(first, until)
-        return self._tally.footage(pictures, heard)
+        return self._footage(pictures, heard, silent=silent)
+
+    def _footage(self, pictures: list[Picture], heard: Heard | None, *, silent: bool) -> Footage:
+        return self._tally.footage(pictures, heard.silenced if silent and heard is not None else heard)
 
 
 class _Pace:

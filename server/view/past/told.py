@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import AsyncIterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import msgspec
@@ -12,20 +13,41 @@ from server.view.past.past import Past
 from server.wire.messages import UNREADABLE, GopChoices
 
 
+@dataclass(frozen=True, slots=True)
+class Said:
+    """What was said about one GOP."""
+
+    choices: GopChoices
+    is_numbered: bool = True
+    """Whether people's numbers in it are the same people's as now."""
+    line: bytes | None = None
+    """As it is told; None: it is not on the disk yet."""
+
+
+async def said(past: Past, start: int, end: int) -> AsyncIterator[Said]:
+    """Return what was said about pulses ``start … end - 1``, in order."""
+    at, numbered = start, past.numbered
+    for run in past.runs:
+        name = run.folder.name.encode()
+        for path in run.index_of(at, end):
+            for line, choices in await from_disk(_lines, path, at, end):
+                if run in numbered:
+                    yield Said(choices, line=line)
+                else:
+                    yield Said(choices, is_numbered=False, line=b'{"run":"%b",' % name + line[1:])
+                at = choices.first + choices.frames
+    for choices in past.recent.choices(at):
+        if choices.first < end:
+            yield Said(choices)
+
+
 async def told(past: Past, start: int, end: int) -> AsyncIterator[bytes]:
     """Give the choices about pulses ``start … end - 1`` in order, each as a line of JSON (event ``gop``).
 
     What an earlier run has said has that run's name in it, where its numbers are other people's.
     """
-    at, numbered = start, past.numbered
-    for run in past.runs:
-        for path in run.index_of(at, end):
-            for line, choices in await from_disk(_lines, path, at, end):
-                yield line if run in numbered else b'{"run":"%b",' % run.folder.name.encode() + line[1:]
-                at = choices.first + choices.frames
-    for choices in past.recent.choices(at):
-        if choices.first < end:
-            yield msgspec.json.encode(choices) + b"\n"
+    async for it in said(past, start, end):
+        yield msgspec.json.encode(it.choices) + b"\n" if it.line is None else it.line
 
 
 def _lines(path: Path, start: int, end: int) -> list[tuple[bytes, GopChoices]]:

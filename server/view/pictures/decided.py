@@ -56,14 +56,23 @@ class Decided:
         choices = self._of(fragments)
         return NOTHING if choices is None else Told(choices.first, choices.boxes.get(camera, []))
 
-    def of_person(self, number: int, fragments: bytes) -> Told:
-        """Give everybody's boxes in a GOP of a person's stream, and the number that the person has there."""
+    def of_person(self, number: int, fragments: bytes, *, alone: bool = False) -> Told:
+        """Give everybody's boxes in a GOP of a person's stream, and the number that the person has there.
+
+        ``alone``: give no box but theirs, by any of their numbers.
+        """
         choices = self._of(fragments)
         if choices is None:
             return NOTHING
         there = number if number in choices.choices else self._resolve(number)
         camera = choices.choices.get(there)
-        return NOTHING if camera is None else Told(choices.first, choices.boxes.get(camera, []), there)
+        if camera is None:
+            return NOTHING
+        boxes = choices.boxes.get(camera, [])
+        if alone:
+            person = self._resolve(number)
+            boxes = [[box for box in frame if self._resolve(box[0]) == person] for frame in boxes]
+        return Told(choices.first, boxes, there)
 
     def _of(self, fragments: bytes) -> GopChoices | None:
         pulse = first_pulse(fragments, self._fps)

@@ -20,13 +20,21 @@ from server.wire.h264 import nal_units, parameter_sets, sample
 class Film:
     """Takes frames as they are encoded. Processes come and go: its time has no hole and never goes back.
 
-    ``sound`` is None at a site without.
+    ``sound`` is None at a site without; ``silent_holes``: it is not heard while a hole is bridged.
     """
 
-    def __init__(self, canvas: Canvas, queue_gops: int, sound: SoundShelf | None = None) -> None:
+    def __init__(
+        self,
+        canvas: Canvas,
+        queue_gops: int,
+        sound: SoundShelf | None = None,
+        *,
+        silent_holes: bool = False,
+    ) -> None:
         self._canvas, self._tally = canvas, Tally(canvas.fps)
         self._format = None if sound is None else sound.format
         self._sound = None if sound is None else Following(sound)
+        self._silent_holes = silent_holes
         self._agreement = Agreement()
         self._time = Timeline(self._agreement, canvas.fps, canvas.gop)
         self._process = 0
@@ -38,11 +46,17 @@ class Film:
         self.begun = asyncio.Event()
         """There is a head, or there will never be one."""
 
-    def put(self, units: Sequence[Unit]) -> None:
-        """Pass on encoded frames of one request, after what bridges a hole before them."""
+    def put(self, units: Sequence[Unit], *, silent: bool = False) -> None:
+        """Pass on encoded frames of one request, after what bridges a hole before them.
+
+        Where they are ``silent``, the site's sound is not heard meanwhile.
+        """
         pictures = [shown for unit in units for shown in self._time.take(self._picture(unit))]
         for gop in _gops(pictures):
             heard = None if self._sound is None else self._sound.beside(gop[0].pulse, gop[-1].until)
+            bridged = gop[0].pulse < units[0].pulse
+            if heard is not None and (silent or (self._silent_holes and bridged)):
+                heard = heard.silenced
             self.channel.publish(self._tally.footage(gop, heard))
 
     def interrupted(self) -> None:

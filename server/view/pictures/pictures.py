@@ -29,12 +29,13 @@ class FullError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class PersonView:
-    """The best view of somebody."""
+    """The best view of somebody; or, scoped, what of it somebody is shown who may see nobody else."""
 
     number: int
+    scoped: bool = False
 
     def __str__(self) -> str:
-        return f"object {self.number}"
+        return f"object {self.number}{' alone' * self.scoped}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,8 +174,9 @@ class Pictures:
         splicer, decided = self._service.splicer, self._decided
         told: Callable[[bytes], Told]
         match subject:
-            case PersonView(number):
-                stream, told = splicer.objects[number], partial(decided.of_person, number)
+            case PersonView(number, scoped):
+                stream = (splicer.scoped if scoped else splicer.objects)[number]
+                told = partial(decided.of_person, number, alone=scoped)
             case CameraView(camera, decided=True):
                 stream, told = splicer.decided[camera], partial(decided.of_camera, camera)
             case CameraView(camera):
@@ -188,6 +190,7 @@ class Pictures:
             live=live,
             queue_gops=self._queue,
             sound=self._service.sound,
+            silent_holes=isinstance(subject, PersonView) and subject.scoped,  # what was there is not known
         )
 
     def _end(self, subject: Subject, running: _Running) -> None:

@@ -13,7 +13,8 @@ from server.view.pictures.film import Film
 from server.view.pictures.process import DrawProcess, ProcessDiedError
 from server.view.pictures.series import AllSeries
 from server.view.pictures.stills import Stills
-from server.view.streams.channel import Channel, Viewer
+from server.view.streams.channel import Channel, Piece, Viewer
+from server.view.streams.footage import Footage
 from server.view.streams.sound import SoundShelf
 from server.wire.drawing import Canvas, Draw, Jpeg, Still
 
@@ -32,7 +33,8 @@ class Source:
     """Decodes one stream while somebody uses it; what is made of it outlives the process that makes it.
 
     A slow process is a slow viewer: it loses whole GOPs, and nobody waits for it. ``told`` gives the boxes of
-    fragments. ``live`` pictures are shown as they come, others in pace. ``sound`` goes under the film.
+    fragments. ``live`` pictures are shown as they come, others in pace. ``sound`` goes under the film, with
+    ``silent_holes`` only where there are pictures.
     """
 
     def __init__(
@@ -45,9 +47,11 @@ class Source:
         live: bool,
         queue_gops: int,
         sound: SoundShelf | None = None,
+        silent_holes: bool = False,
     ) -> None:
         self._name, self._stream, self._told, self._canvas = name, stream, told, canvas
         self._live, self._queue_gops, self._sound = live, queue_gops, sound
+        self._silent_holes = silent_holes
         self._begin()
         self._stills = Stills()
         self._used = asyncio.Event()
@@ -144,7 +148,7 @@ class Source:
 
     def _begin(self) -> None:
         """Begin anew what is made of it: whoever comes must not be shown what others saw before."""
-        self.film = Film(self._canvas, self._queue_gops, self._sound)
+        self.film = Film(self._canvas, self._queue_gops, self._sound, silent_holes=self._silent_holes)
         self.series = AllSeries(self._canvas, live=self._live)
 
     async def _run_process(self) -> None:
@@ -170,8 +174,8 @@ class Source:
             await self._used.wait()
             viewer = self._viewer = self._stream.join()
             try:
-                async for fragments in viewer:
-                    await self._draw(process, fragments)
+                async for piece in viewer.pieces():
+                    await self._draw(process, piece)
                     if not self.users:
                         break
                 else:
@@ -180,7 +184,8 @@ class Source:
                 self._stream.leave(viewer)
                 self._lost, self._viewer = self.lost, None
 
-    async def _draw(self, process: DrawProcess, fragments: bytes) -> None:
+    async def _draw(self, process: DrawProcess, piece: Piece) -> None:
+        fragments = piece.data
         told = self._told(fragments)
         drawn = await process.ask(
             Draw(
@@ -194,7 +199,7 @@ class Source:
             )
         )
         self.newest, self._answered = drawn.newest, True
-        self.film.put(drawn.film)
+        self.film.put(drawn.film, silent=isinstance(piece, Footage) and piece.silent)
         self.series.put(drawn, asyncio.get_running_loop().time())
         self._shown.set()
         self._stills.asked.set()

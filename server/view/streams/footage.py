@@ -24,6 +24,7 @@ class Footage:
         *,
         fills: bool = False,
         heard: Heard | None = None,
+        silent: bool = False,
     ) -> None:
         self.pictures = tuple(pictures)
         self._fps, self._counters = fps, counters
@@ -31,6 +32,8 @@ class Footage:
         self.fills = fills
         self.heard = heard
         """What is to be heard meanwhile; None at a site without sound."""
+        self.silent = silent
+        """Whether nothing may be heard meanwhile, by who joins it with sound of their own."""
 
     @property
     def first(self) -> int:

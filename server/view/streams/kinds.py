@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from server.view.media.agreement import Agreement
 from server.view.media.picture import Picture
 from server.view.media.ts import Counters
 from server.view.streams.channel import Channel
 from server.view.streams.footage import Footage
+from server.view.streams.presence import Presence
 from server.view.streams.reel import Reel
 from server.view.streams.shelf import Shelf
 from server.view.streams.sound import Following, SoundShelf
 from server.view.streams.tally import Tally
 from server.view.streams.timeline import Timeline
+from server.wire.h264 import ParameterSets
 
 
 class LiveStream:
@@ -60,6 +63,24 @@ class Showing:
         pictures += self._time.fill(gop.until)
         return [*shown, gop.footage(pictures)] if pictures else shown
 
+    def hold(self, gop: Gop) -> list[Footage]:
+        """Return what repeats the last picture for a GOP; a grey GOP where it cannot be repeated."""
+        self._camera = None  # whatever comes of it late is not for this stream any more
+        before, held = self._time.fill(gop.first), self._time.fill(gop.until)
+        shown = [gop.footage(it, silent=True) for it in (before, held) if it]
+        return shown if held else [*shown, *self.blank(gop)]
+
+    def blank(self, gop: Gop) -> list[Footage]:
+        """Return a grey GOP, after what bridges a hole before it."""
+        self._camera = None
+        before = self._time.fill(gop.first)
+        shown = [gop.footage(before, silent=True)] if before else []
+        grey = gop.blank(self._time.agreement, self._time.newest)
+        if grey is None:
+            return shown
+        self._time.pass_by(grey.pictures[-1])
+        return [*shown, grey]
+
 
 class DecidedStream:
     """A stream of whole GOPs, each of one camera; those that many streams show are put together once.
@@ -71,9 +92,19 @@ class DecidedStream:
         self.channel, self.reel = channel, reel
         self._showing = Showing(time)
 
-    def show(self, camera: str | None, gop: Gop) -> None:
-        """Send a camera's GOP, or what bridges it where it is not whole or there is none."""
-        for footage in self._showing.show(camera, gop):
+    def show(self, camera: str | None, gop: Gop, presence: Presence = Presence.PRESENT) -> None:
+        """Send a camera's GOP, or what bridges it where it is not whole or there is none.
+
+        Who is not present is not shown: the last picture stands, or grey.
+        """
+        match presence:
+            case Presence.PRESENT:
+                shown = self._showing.show(camera, gop)
+            case Presence.HELD:
+                shown = self._showing.hold(gop)
+            case Presence.ABSENT:
+                shown = self._showing.blank(gop)
+        for footage in shown:
             self.reel.put(footage)
             self.channel.publish(footage)
 
@@ -100,6 +131,7 @@ class Gop:
         self.first, self.until = first, first + frames
         self._shelves, self._fps, self._tables = shelves, fps, tables
         self._whole: dict[str, Footage | None] = {}
+        self._grey: dict[ParameterSets | None, Footage | None] = {}
 
     def pictures(self, camera: str) -> list[Picture]:
         """Give the pictures that have come."""
@@ -113,10 +145,21 @@ class Gop:
             self._whole[camera] = self.footage(pictures) if is_whole else None
         return self._whole[camera]
 
-    def footage(self, pictures: list[Picture]) -> Footage:
-        """Put pictures of these frames together."""
+    def blank(self, agreement: Agreement, newest: Picture | None) -> Footage | None:
+        """Return a grey GOP that fits after a picture, the same to all of one format; None: there is none."""
+        form = None if newest is None else newest.parameters
+        if form not in self._grey:
+            pictures = agreement.blank(newest, self.first, self.until - self.first, self._fps)
+            self._grey[form] = self.footage(pictures, silent=True) if pictures else None
+        return self._grey[form]
+
+    def footage(self, pictures: list[Picture], *, silent: bool = False) -> Footage:
+        """Put pictures of these frames together; where they are ``silent``, without the site's sound."""
         first, until = pictures[0].pulse, pictures[-1].until
         heard = self._heard  # of all its frames, shared by all who show them
         if self._sound is not None and (first, until) != (self.first, self.until):
             heard = self._sound.between(first, until)
-        return Footage(pictures, self._fps, Counters(self._tables), fills=not pictures[0].key, heard=heard)
+        if silent and heard is not None:
+            heard = heard.silenced
+        fills, counters = not pictures[0].key, Counters(self._tables)
+        return Footage(pictures, self._fps, counters, fills=fills, heard=heard, silent=silent)

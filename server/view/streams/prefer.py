@@ -7,22 +7,23 @@ not worth two cuts.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection
 
 from server.view.choice.decide import GopDecision
 from server.view.streams.channel import Channel
 from server.view.streams.kinds import DecidedStream, Gop
-from server.wire.messages import NumberedBox
-
-Boxes = Mapping[str, Sequence[Sequence[NumberedBox]]]
-"""Per camera and frame: everybody's boxes."""
+from server.view.streams.people import OfPerson, always_present
+from server.view.streams.presence import Boxes
 
 
 class Preferring:
-    """The streams that prefer a camera, each from the first viewer to the last."""
+    """The streams that prefer a camera, each from the first viewer to the last.
 
-    def __init__(self, new_stream: Callable[[], DecidedStream]) -> None:
-        self._new_stream = new_stream
+    ``presence`` says whether a person is shown.
+    """
+
+    def __init__(self, new_stream: Callable[[], DecidedStream], presence: OfPerson = always_present) -> None:
+        self._new_stream, self._presence = new_stream, presence
         self._streams: dict[tuple[int, str], DecidedStream] = {}
         self._before: Boxes | None = None
         self._now: tuple[GopDecision, Gop] | None = None
@@ -69,7 +70,7 @@ class Preferring:
         steady = _sees(decision.boxes, camera, seen) and (
             self._before is None or _sees(self._before, camera, seen)
         )
-        stream.show(camera if steady else best, gop)
+        stream.show(camera if steady else best, gop, self._presence(person))
 
 
 def _sees(boxes: Boxes, camera: str, numbers: Collection[int]) -> bool:

@@ -9,7 +9,9 @@ from server.view.media.agreement import Agreement
 from server.view.media.picture import Picture
 from server.view.streams.channel import Channel
 from server.view.streams.kinds import DecidedStream, Gop, LiveStream
+from server.view.streams.people import PeopleStreams
 from server.view.streams.prefer import Preferring
+from server.view.streams.presence import PresenceLog
 from server.view.streams.reel import Reel, plan
 from server.view.streams.shelf import Shelf
 from server.view.streams.sound import SoundShelf
@@ -21,7 +23,11 @@ _SILENT_S = 2
 
 
 class Splicer:
-    """Cuts from camera to camera by passing on other bytes: nothing is decoded or encoded here."""
+    """Cuts from camera to camera by passing on other bytes: nothing is decoded or encoded here.
+
+    Who may see one person alone watches streams of their own (``scoped``): there the person's picture gives
+    way to grey while nobody has seen them for long. Only a site with tokens has any.
+    """
 
     def __init__(
         self,
@@ -39,12 +45,15 @@ class Splicer:
         }
         self._decided = {camera: self._stream() for camera in shelves}
         """Each camera as if it were always chosen."""
-        self._people: dict[int, DecidedStream] = {}
-        self._gone: dict[int, DecidedStream] = {}
-        """Those whose stream has ended a moment ago: players still fetch its end."""
+        self._presence = PresenceLog(round(config.access.unseen_s * site.fps))
+        self._is_scoped = config.access.tokens is not None
+        self._people = PeopleStreams(self._stream)
+        self._scoped = PeopleStreams(self._stream, self._presence.of)
         self.preferring = Preferring(self._stream)
+        self.preferring_scoped = Preferring(self._stream, self._presence.of)
         self._gops = 0
-        self.objects: dict[int, Channel] = {}
+        self.objects = self._people.channels
+        self.scoped = self._scoped.channels
         self.cameras = {camera: stream.channel for camera, stream in self._live.items()}
         self.decided = {camera: stream.channel for camera, stream in self._decided.items()}
 
@@ -58,48 +67,44 @@ class Splicer:
         gop = Gop(self._shelves, decision.first, decision.frames, fps, self._gops, self._sound)
         self._gops += 1
         cameras = {choice.number: choice.camera for choice in decision.choices}
-        for number, camera in cameras.items():
-            if number not in self._people:
-                stream = self._people[number] = self._stream()
-                self.objects[number] = stream.channel
-            self._people[number].show(camera, gop)
-        # The streams of numbers that turned out to be another's go on with that person.
-        for lost, kept in decision.merged.items():
-            if lost in self._people and kept in cameras and lost not in cameras:
-                self._people[lost].show(cameras[kept], gop)
+        self._people.show(cameras, decision.merged, gop)
+        if self._is_scoped:
+            self._presence.take(decision)
+            self._scoped.show(cameras, decision.merged, gop)
         for camera, decided in self._decided.items():
             decided.show(camera, gop)
         self.preferring.show(decision, gop)
+        self.preferring_scoped.show(decision, gop)
         for live in self._live.values():
             live.fill(decision.first - round(_SILENT_S * fps))
-        self._forget_gone(decision.first)
+        ended = decision.first - 2 * self.plan.listed * self.plan.frames
+        for streams in (self._people, self._scoped):
+            streams.forget_ended_before(ended)
 
     def forget(self, known: Collection[int], merged: Collection[int]) -> None:
         """End the streams of those whom nobody remembers any more, and of numbers that are another's now.
 
         The latter last as long as anybody watches them: who comes later is given that person's.
         """
-        watched = {it for it in merged if it in self.objects and self.objects[it].viewers}
-        for number in [it for it in self.objects if it not in known and it not in watched]:
-            del self.objects[number]
-            self._gone[number] = self._people.pop(number)
-            self._gone[number].close()
-        self.preferring.forget({*known, *merged})
+        watched = {it for it in merged if self.watched(it)}
+        for streams in (self._people, self._scoped):
+            streams.forget({*known, *watched})
+        self._presence.forget({*known, *watched})
+        for preferring in (self.preferring, self.preferring_scoped):
+            preferring.forget({*known, *merged})
 
-    def reel(self, number: int) -> Reel | None:
+    def watched(self, number: int) -> int:
+        """Return how many watch an object's stream."""
+        return self._people.watched(number) + self._scoped.watched(number)
+
+    def reel(self, number: int, *, scoped: bool = False) -> Reel | None:
         """Give the newest segments of an object's stream, for a while even when it has ended."""
-        stream = self._people.get(number) or self._gone.get(number)
-        return None if stream is None else stream.reel
+        return (self._scoped if scoped else self._people).reel(number)
 
     def camera_reel(self, camera: str) -> Reel | None:
         """Give the newest segments of a camera."""
         stream = self._decided.get(camera)
         return None if stream is None else stream.reel
-
-    def _forget_gone(self, pulse: int) -> None:
-        kept = 2 * self.plan.listed * self.plan.frames
-        for number in [it for it, stream in self._gone.items() if stream.reel.until < pulse - kept]:
-            del self._gone[number]
 
     def _channel(self) -> Channel:
         return Channel(queue_starts=self._config.http.viewer_queue_gops)
@@ -111,15 +116,27 @@ class Splicer:
         return DecidedStream(self._channel(), self._time(), Reel(self.plan))
 
     @property
+    def viewers_of_objects(self) -> int:
+        """How many streams of objects are being watched, but those in which a camera is preferred."""
+        return self._people.viewers + self._scoped.viewers
+
+    @property
+    def viewers_who_prefer(self) -> int:
+        """How many streams are being watched in which a camera is preferred."""
+        return self.preferring.viewers + self.preferring_scoped.viewers
+
+    @property
     def viewers(self) -> int:
         """How many streams are being watched."""
-        channels = [*self.objects.values(), *self.cameras.values(), *self.decided.values()]
-        return sum(channel.viewers for channel in channels) + self.preferring.viewers
+        channels = [*self.cameras.values(), *self.decided.values()]
+        watched = sum(channel.viewers for channel in channels)
+        return watched + self.viewers_of_objects + self.viewers_who_prefer
 
     def close(self) -> None:
         """End all streams."""
-        for stream in [*self._people.values(), *self._decided.values()]:
+        for streams in (self._people, self._scoped, self.preferring, self.preferring_scoped):
+            streams.close()
+        for stream in self._decided.values():
             stream.close()
-        self.preferring.close()
         for channel in self.cameras.values():
             channel.close()

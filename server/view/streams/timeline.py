@@ -34,6 +34,11 @@ class Timeline:
         """A picture is missing that the next ones are decoded by, up to a key picture."""
 
     @property
+    def newest(self) -> Picture | None:
+        """The picture that was shown last; None before the first."""
+        return self._newest
+
+    @property
     def until(self) -> int | None:
         """The first pulse that is not filled yet; None before the first picture."""
         return None if self._newest is None else self._until

@@ -36,6 +36,8 @@ HOW = (
     "`myview token NAME --operate` prints a token and the line for the file that access.tokens names"
 )
 _LOOK_EVERY_S = 0.5
+_AS_SEEN_THEN = (Need.TOKEN, Need.OBJECT)
+"""Of these, what is sent is what a token could see when it was asked for."""
 _RIGHT = 4096
 """Tokens that were right, with the address they came from: they do not wait for others' wrong ones."""
 
@@ -196,7 +198,7 @@ class Access:
             if (
                 isinstance(held, Grant)
                 and held.allows(it.need, it.request, self._resolve)
-                and (it.need is not Need.TOKEN or held == it.grant)  # what is told is what it saw then
+                and (it.need not in _AS_SEEN_THEN or held == it.grant)
             ):
                 continue
             if it.request.transport is not None:
@@ -231,6 +233,11 @@ class Access:
 
 
 ACCESS = web.AppKey("access", Access)
+
+
+def sees_one_person(request: web.Request) -> bool:
+    """Tell whether whoever asks may see one person alone: what they watch is of that person, or grey."""
+    return request.app[ACCESS].grant(request).sees.object is not None
 
 
 def _unknown(need: Need) -> web.Response:

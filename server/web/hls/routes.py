@@ -8,7 +8,7 @@ from functools import wraps
 from aiohttp import web
 
 from server.view.past.play import CameraPast
-from server.web.access.access import ACCESS
+from server.web.access.access import ACCESS, sees_one_person
 from server.web.api import no_camera, no_object, not_now, problem
 from server.web.forms import mp4_head
 from server.web.hls.live import coming_part, newest
@@ -124,8 +124,8 @@ def _stream(request: web.Request) -> Stream | None:
         reel = service.splicer.camera_reel(camera)
         return None if reel is None else Stream(f"camera {camera}", reel, CameraPast(service.past, camera))
     number = int(request.match_info["object"])
-    reel = service.splicer.reel(service.board.resolve(number))
-    stream = Stream(f"object {number}", reel, object_past(service, number))
+    reel = service.splicer.reel(service.board.resolve(number), scoped=sees_one_person(request))
+    stream = Stream(f"object {number}", reel, object_past(request, number))
     return stream if stream.exists else None
 
 
@@ -146,8 +146,7 @@ def _connected(request: web.Request) -> tuple[str, int]:
     if "camera" in names:
         return of_live(names["camera"]), service.splicer.cameras[names["camera"]].viewers
     number = service.board.resolve(int(names["object"]))
-    channel = service.splicer.objects.get(number)
-    return of_person(number), 0 if channel is None else channel.viewers
+    return of_person(number), service.splicer.watched(number)
 
 
 def _nobody(request: web.Request) -> web.Response:

@@ -66,9 +66,9 @@ class ServiceStages(Collector):
         service = self._app[SERVICE]
         splicer = service.splicer
         kinds = {
-            "object": sum(it.viewers for it in splicer.objects.values()),
+            "object": splicer.viewers_of_objects,
             "camera": sum(it.viewers for it in (*splicer.cameras.values(), *splicer.decided.values())),
-            "preferred": splicer.preferring.viewers,
+            "preferred": splicer.viewers_who_prefer,
             "hls": self._app[READERS].all,
             "past": service.past.viewers,
             "pictures": self._app[PICTURES].viewers,
