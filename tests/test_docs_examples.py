@@ -34,6 +34,7 @@ URL = "http://localhost:8080"
 _BLOCK = re.compile(
     r"^```python runnable\n(.*?)^```\n(?:\n```text output\n(.*?)^```\n)?", re.DOTALL | re.MULTILINE
 )
+_TEST = re.compile(r"`((?:tests/\w+/)?test_\w+\.py)(?:::(test_\w+))?`")
 
 
 @dataclass(frozen=True)
@@ -171,3 +172,16 @@ async def test_every_metric_is_described(by_hand: Any) -> None:
     names = [f"{it.name}_total" if it.type == "counter" else it.name for it in metrics.collect()]
     for name in [name for name in names if name.startswith("myview_")]:
         assert f"`{name}`" in OPERATING, name
+
+
+def test_every_test_that_a_document_names_is_there() -> None:
+    """`test_x.py::test_y` is in tests/server where no folder is named."""
+    named = [
+        (path.name, file if "/" in file else f"tests/server/{file}", test)
+        for path in DOCS
+        for file, test in _TEST.findall(path.read_text(encoding="utf-8"))
+    ]
+    assert named
+    for document, file, test in named:
+        assert (ROOT / file).is_file(), f"{document}: {file}"
+        assert not test or f"def {test}(" in (ROOT / file).read_text(encoding="utf-8"), f"{document}: {test}"
