@@ -150,16 +150,16 @@ def make_smaller(path: Path, out: Path) -> Path:
     return out
 
 
-def write_film(pictures: Sequence[NDArray[np.uint8]], path: Path) -> None:
-    """Encode pictures with a key picture every ten."""
+def write_film(pictures: Sequence[NDArray[np.uint8]], path: Path, fps: int = FPS) -> None:
+    """Encode pictures, so many a second, with a key picture every ten."""
     with av.open(str(path), "w") as container:
-        stream = container.add_stream("libx264", rate=FPS, options={"crf": "18", "preset": "ultrafast"})
+        stream = container.add_stream("libx264", rate=fps, options={"crf": "18", "preset": "ultrafast"})
         stream.height, stream.width = pictures[0].shape[:2]
         stream.pix_fmt, stream.gop_size, stream.codec_context.max_b_frames = "yuv420p", 10, 0
         stream.codec_context.thread_count = 1
         for number, picture in enumerate(pictures):
             frame = VideoFrame.from_ndarray(picture, format="bgr24")
-            frame.pts, frame.time_base = round(number / FPS / _TIME_BASE), _TIME_BASE
+            frame.pts, frame.time_base = round(number / fps / _TIME_BASE), _TIME_BASE
             container.mux(stream.encode(frame))
         container.mux(stream.encode(None))
 

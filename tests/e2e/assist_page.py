@@ -11,6 +11,7 @@ import yaml
 from patience import PATIENCE_MS
 from playwright.async_api import Page
 from running_site import PATIENT_CAMERAS, RunningSite, running
+from spliced import FPS
 
 from benchmarks.browser import chromium
 from server.run.setup import DEMO, free_port
@@ -35,7 +36,7 @@ async def helped(
     content = {
         **DEMO,
         "cameras": list(cameras),
-        "site": {"name": "demo", "fps": 10, "width": 320, "height": 180, "niceness": 1},
+        "site": {"name": "demo", "fps": FPS, "width": 320, "height": 180, "niceness": 1},
         "sync": {"port": free_port(), "start_timeout_s": 60},
         "zenoh": {"connect": bus, "listen": bus},
         "http": {"port": free_port()},

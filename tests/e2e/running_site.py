@@ -8,6 +8,7 @@ import os
 import re
 import signal
 import sys
+from collections import defaultdict
 from collections.abc import AsyncIterator, Awaitable, Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -58,7 +59,8 @@ class RunningSite:
     config: dict[str, Any]
     lines: list[str] = field(default_factory=list)
     gops: list[Gop] = field(default_factory=list)
-    cameras: Cameras | None = None
+    states: dict[str, list[str]] = field(default_factory=lambda: defaultdict(list))
+    """Of each camera, as the events said them, the newest last."""
     objects: Objects | None = None
     heard: asyncio.Condition = field(default_factory=asyncio.Condition)
 
@@ -85,8 +87,7 @@ class RunningSite:
 
     def state(self, camera: str) -> str | None:
         """Give a camera's state as the events said it last."""
-        known = self.cameras.cameras if self.cameras else ()
-        return next((it.state for it in known if it.camera == camera), None)
+        return self.states[camera][-1] if self.states[camera] else None
 
     async def until(self, condition: Callable[[], bool], what: str) -> None:
         """Wait until what the events say fulfils a condition."""
@@ -109,7 +110,8 @@ class RunningSite:
                     case Gop():
                         self.gops.append(event)
                     case Cameras():
-                        self.cameras = event
+                        for it in event.cameras:
+                            self.states[it.camera].append(it.state)
                     case Objects():
                         self.objects = event
                 self.heard.notify_all()

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from spliced import FPS
 
 from benchmarks.faults.film import write_film
 
@@ -32,7 +33,7 @@ def camera(name: str, folder: Path) -> dict[str, Any]:
     film, found = folder / f"{name}.mp4", folder / f"{name}.txt"
     sides = [_sides(pulse) for pulse in range(FRAMES)]
     drawn = {it: _picture(it) for it in set(sides)}
-    write_film([drawn[it] for it in sides], film)
+    write_film([drawn[it] for it in sides], film, FPS)
     lines = [
         f"{pulse + 1},-1,{left},{_TOP},{_WIDE},{_TALL},1,-1,-1,-1"
         for pulse, both in enumerate(sides)
