@@ -5,9 +5,14 @@ from __future__ import annotations
 import os
 import signal
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, settings
+from xdist.scheduler import LoadFileScheduling
+
+ON_ONE_SITE = {"tests/e2e/test_page_on_site.py", "tests/e2e/test_up.py"}
+"""They share the site of tests/e2e/conftest.py: it is started once."""
 
 # How long an example takes is the machine's doing: a test that hangs is ended by its own bound in time.
 settings.register_profile("any machine", deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -18,12 +23,17 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-@pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Keep a file's tests on one worker, as they share fixtures; a group of several files says so itself."""
-    for item in items:
-        if item.get_closest_marker("xdist_group") is None:
-            item.add_marker(pytest.mark.xdist_group(item.location[0]))
+class _FilesOrSites(LoadFileScheduling):
+    """Keeps a file's tests on one worker, as they share fixtures, and so files that share a running site."""
+
+    def _split_scope(self, nodeid: str) -> str:
+        file: str = super()._split_scope(nodeid)
+        return "a running site" if file in ON_ONE_SITE else file
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> _FilesOrSites:
+    return _FilesOrSites(config, log)
 
 
 @pytest.fixture(scope="session")

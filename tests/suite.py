@@ -28,7 +28,7 @@ _FETCHED = ROOT / "node_modules/.installed"
 """Made when npm has fetched the compiler."""
 _SITES = ("tests/client", "tests/e2e")
 """What runs in real time: browsers, and whole sites of processes."""
-_FAST = ("-m", "not slow", "-n", "3", "--dist", "loadgroup")
+_FAST = ("-m", "not slow", "-n", "3", "--dist", "loadfile")
 """Three workers for two processors: tests wait a third of the time, for a disk, a browser or a frame."""
 _SLOW = ("-m", "slow", "--timeout", "1800")
 _NO_TESTS = 5

@@ -28,7 +28,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
 async def site(recording: Path, tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[RunningSite]:
     """A site with sound whose recordings begin again at their end, with people in sight.
 
-    All tests of the group ``site`` share it, also those that kill a process of it: it comes back.
+    All tests of the files in ``ON_ONE_SITE`` share it, also those that kill a process of it: it comes back.
     """
     folder = tmp_path_factory.mktemp("site")
     sound = {"source": str(write_beeps(folder / "beeps.wav")), "at_end": "loop"}

@@ -21,8 +21,8 @@ from spliced import FPS
 from client import Cameras, Gop, HttpSettings, Objects, events
 from server.run.setup import free_port
 
-PATIENT_CAMERAS = {"backlog_s": 60, "witness_wait_s": 60}
-"""For sites that leave nothing out, however late: how busy the machine is decides nothing."""
+PATIENT_CAMERAS = {"backlog_s": 60}
+"""For sites that leave nothing out, however late they are: how busy the machine is decides nothing."""
 MYVIEW = [sys.executable, "-m", "server.run.cli"]
 CAMERAS = ("c0", "c1", "c2")
 
@@ -37,7 +37,7 @@ def configuration(folder: Path, recording: Path, **sections: Any) -> Path:
         "zenoh": {"connect": bus, "listen": bus},
         "http": {"port": free_port()},
         "track": PATIENT_CAMERAS,
-        "view": {"switch_cost_s": 0.1, "late_after_s": 60},  # a short recording has cuts enough
+        "view": {"switch_cost_s": 0.1, "late_after_s": 10},  # a short recording has cuts enough
         "ground": str(recording / "ground.json"),
         "cameras": [{"id": name, "source": str(recording / f"{name}.mp4")} for name in CAMERAS],
     }

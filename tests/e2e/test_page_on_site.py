@@ -23,7 +23,6 @@ from benchmarks.browser import chromium
 
 pytestmark = [
     pytest.mark.live,
-    pytest.mark.xdist_group("site"),
     pytest.mark.asyncio(loop_scope="session"),
     needs_chromium,
 ]

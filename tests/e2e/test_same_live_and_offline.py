@@ -28,7 +28,13 @@ async def rendered(config: Path, recording: Path, out: Path) -> None:
 
 async def test_live_equals_offline_to_the_byte(recording: Path, tmp_path: Path) -> None:
     # However busy this machine is, no frame may be left out: that is what the comparison is about.
-    config = configuration(tmp_path, recording, zenoh={"lease_s": 60})
+    config = configuration(
+        tmp_path,
+        recording,
+        track={"witness_wait_s": 60},
+        view={"late_after_s": 60},
+        zenoh={"lease_s": 60},
+    )
     await rendered(config, recording, tmp_path / "offline")
     async with running(config, "--out", str(tmp_path / "live"), listen=False) as site:
         assert await site.ended() == 0, "\n".join(site.lines)

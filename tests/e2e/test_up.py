@@ -22,7 +22,6 @@ from spliced import pictures, record, shown_from_to
 
 pytestmark = [
     pytest.mark.live,
-    pytest.mark.xdist_group("site"),
     pytest.mark.asyncio(loop_scope="session"),
 ]
 
