@@ -31,6 +31,7 @@ _SITES = ("tests/client", "tests/e2e")
 _FAST = ("-m", "not slow", "-n", "3", "--dist", "loadfile")
 """Three workers for two processors: tests wait a third of the time, for a disk, a browser or a frame."""
 _SLOW = ("-m", "slow", "--timeout", "1800")
+_OTHER_EXAMPLES = ("-m", "hypothesis and not slow", "-n", "3", "--hypothesis-profile", "others")
 _NO_TESTS = 5
 """How pytest says that there was nothing to run."""
 _INTERRUPTED = 130
@@ -91,8 +92,11 @@ def run_fast(may_skip: str | None = None) -> list[Outcome]:
 
 
 def run_slow(may_skip: str | None = None) -> list[Outcome]:
-    """Run the tests that take minutes."""
-    return [run_pytest("slow tests", _SLOW, may_skip)]
+    """Run the tests that take minutes, and the property tests with examples that were not tried before."""
+    return [
+        run_pytest("slow tests", _SLOW, may_skip),
+        run_pytest("property tests, other examples", _OTHER_EXAMPLES, may_skip),
+    ]
 
 
 def check_page_types(*, may_be_left_out: bool) -> Outcome:
