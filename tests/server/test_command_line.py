@@ -37,7 +37,8 @@ def written(folder: Path) -> set[str]:
 
 def site(folder: Path, **changes: Any) -> Path:
     content = {
-        "site": {"width": 64, "height": 48},
+        # In this process, which is to stay as it is.
+        "site": {"width": 64, "height": 48, "niceness": 0},
         "cameras": [{"id": "c0", "source": "c0.mp4"}],
         **{f: {"port": free()} for f in ("sync", "http")},
         "zenoh": dict.fromkeys(("connect", "listen"), f"tcp/127.0.0.1:{free()}"),
