@@ -5,14 +5,9 @@ from __future__ import annotations
 import os
 import signal
 from pathlib import Path
-from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, settings
-from xdist.scheduler import LoadFileScheduling
-
-ON_ONE_SITE = {"tests/e2e/test_page_on_site.py", "tests/e2e/test_up.py"}
-"""They share the site of tests/e2e/conftest.py: it is started once."""
 
 # How long an example takes is the machine's doing: a test that hangs is ended by its own bound in time.
 # Each run tries the same examples, so that no run fails by chance; `make test-slow` looks for others.
@@ -27,17 +22,10 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-class _FilesOrSites(LoadFileScheduling):
-    """Keeps a file's tests on one worker, as they share fixtures, and so files that share a running site."""
-
-    def _split_scope(self, nodeid: str) -> str:
-        file: str = super()._split_scope(nodeid)
-        return "a running site" if file in ON_ONE_SITE else file
-
-
-@pytest.hookimpl(optionalhook=True)
-def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> _FilesOrSites:
-    return _FilesOrSites(config, log)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Begin with what takes longest and waits most, so that it does not run alone in the end."""
+    first = ["tests/e2e/", "tests/client/"]
+    items.sort(key=lambda item: [not item.nodeid.startswith(folder) for folder in first])
 
 
 @pytest.fixture(scope="session")

@@ -26,10 +26,8 @@ _NODE = Path(sys.executable).parent / "node"
 _TSC = ROOT / "node_modules/typescript/bin/tsc"
 _FETCHED = ROOT / "node_modules/.installed"
 """Made when npm has fetched the compiler."""
-_SITES = ("tests/client", "tests/e2e")
-"""What runs in real time: browsers, and whole sites of processes."""
-_FAST = ("-m", "not slow", "-n", "3", "--dist", "loadfile")
-"""Three workers for two processors: tests wait a third of the time, for a disk, a browser or a frame."""
+_FAST = ("-m", "not slow", "-n", "4", "--dist", "loadfile", "--no-loadscope-reorder")
+"""Four workers for two processors: whole sites and browsers wait half the time, for the next frame."""
 _SLOW = ("-m", "slow", "--timeout", "1800")
 _OTHER_EXAMPLES = ("-m", "hypothesis and not slow", "-n", "3", "--hypothesis-profile", "others")
 _NO_TESTS = 5
@@ -82,12 +80,10 @@ def _arguments() -> argparse.Namespace:
 
 
 def run_fast(may_skip: str | None = None) -> list[Outcome]:
-    """Run everything that takes no minutes: the libraries first, then what runs in real time."""
-    others = [f"--ignore={folder}" for folder in _SITES]
+    """Run everything that takes no minutes."""
     return [
         check_page_types(may_be_left_out=may_skip is None),
-        run_pytest("libraries and services", [*_FAST, *others], may_skip),
-        run_pytest("browsers and whole sites", [*_FAST, *_SITES], may_skip),
+        run_pytest("tests", _FAST, may_skip),
     ]
 
 
@@ -122,6 +118,7 @@ def run_pytest(
             sys.executable,
             "-m",
             "pytest",
+            "--continue-on-collection-errors",
             *arguments,
             f"--junit-xml={report}",
             "-o",

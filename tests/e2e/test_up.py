@@ -1,4 +1,4 @@
-"""A running site of three cameras: what it is made of, what it sends, and how it heals."""
+"""A running site of three cameras: what it is made of, what it sends, the page on it, and how it heals."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import json
 import os
 import shutil
 import signal
+from collections.abc import AsyncIterator
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -14,18 +15,65 @@ from typing import Any
 import aiohttp
 import numpy as np
 import pytest
+import pytest_asyncio
 import zenoh
+from beeps import heard, write_beeps
 from monitoring_files import ASKED, OF_PROMETHEUS
+from patience import PATIENCE
+from playwright.async_api import Browser, Page
+from programs import needs_chromium
 from promql_series import Printed, given, selectors
-from running_site import CAMERAS, RunningSite, bounded
-from spliced import pictures, record, shown_from_to
+from running_site import CAMERAS, RunningSite, bounded, configuration, running
+from spliced import FPS, pictures, record, shown_from_to
+
+from benchmarks.browser import chromium
 
 pytestmark = [
     pytest.mark.live,
-    pytest.mark.asyncio(loop_scope="session"),
+    pytest.mark.asyncio(loop_scope="module"),
 ]
 
 LOOKAHEAD, GOP = 25, 10  # frames
+PLAYED_ACROSS_A_CUT = f"""(() => {{
+  const shown = myview.delays.map((it) => it.pulse);
+  return myview.cuts.some(({{ pulse: cut }}) => {{
+    const [from, to] = [cut - {FPS}, cut + {FPS}];
+    const around = [from, ...shown.filter((it) => from < it && it < to), to];
+    const steps = around.slice(1).map((it, k) => it - around[k]);
+    return shown.at(-1) >= to && steps.every((step) => 0 <= step && step < {FPS // 2});
+  }});
+}})()"""
+
+
+@pytest_asyncio.fixture(scope="module", loop_scope="module")
+async def site(recording: Path, tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[RunningSite]:
+    """A site with sound whose recordings begin again at their end, with people in sight."""
+    folder = tmp_path_factory.mktemp("site")
+    sound = {"source": str(write_beeps(folder / "beeps.wav")), "at_end": "loop"}
+    config = configuration(folder, recording, camera={"at_end": "loop"}, sound=sound)
+    async with running(config) as site:
+        await site.until(lambda: bool(site.gops and site.gops[-1].choices), "somebody is shown")
+        yield site
+
+
+@pytest_asyncio.fixture(scope="module", loop_scope="module")
+async def browser() -> AsyncIterator[Browser]:
+    async with chromium() as running:
+        yield running
+
+
+@pytest_asyncio.fixture(loop_scope="module")
+async def page(site: RunningSite, browser: Browser) -> AsyncIterator[Page]:
+    """The page, opened; an error in it fails the test."""
+    errors: list[str] = []
+    # Waiting for a condition in the page evaluates it as a string, which the page's policy forbids.
+    page = await browser.new_page(bypass_csp=True)
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    page.set_default_timeout(1000 * PATIENCE)
+    await page.goto(site.url)
+    yield page
+    await page.close()
+    assert errors == []
 
 
 async def test_it_is_five_processes(site: RunningSite) -> None:
@@ -219,3 +267,59 @@ async def test_it_answers_where_machines_ask(site: RunningSite) -> None:
         for path in ("healthz", "readyz", "metrics", "api/openapi.json", "api", ""):
             async with session.get(site.url + path) as answer:
                 assert answer.status == 200, path
+
+
+@needs_chromium
+async def test_the_best_view_plays_across_a_cut_and_the_frames_go_on(page: Page) -> None:
+    await page.wait_for_function("myview.state === 'playing'")
+    # Whoever has left for good is never cut to again: then somebody in view is chosen.
+    somebody = "document.querySelector('#people button.person:not(.away)')?.click()"
+    # A slow core leaves frames out, and now and then the page jumps to live; it never stops at each cut.
+    await page.wait_for_function(f"{PLAYED_ACROSS_A_CUT} || (myview.state === 'away' && {somebody}, false)")
+
+
+@pytest.mark.slow
+@needs_chromium
+async def test_the_sound_goes_on_across_cuts_and_choices_in_step(
+    page: Page, site: RunningSite, tmp_path: Path
+) -> None:
+    await page.wait_for_function("myview.state === 'playing'")
+    video = "document.querySelector('video')"
+    assert await page.evaluate(f"{video}.muted"), "or it would not play by itself"
+    await page.get_by_role("button", name="Sound").click()
+    assert not await page.evaluate(f"{video}.muted")
+    before = await page.evaluate(f"{video}.webkitAudioDecodedByteCount")
+    await page.locator("#people button.person:not(.away)[aria-current=false]").first.click()
+    more = f"{video}.webkitAudioDecodedByteCount > {before} + 5000"
+    await page.wait_for_function(f"myview.state === 'playing' && {more}")
+    number = await page.evaluate("myview.object")
+    async with aiohttp.ClientSession() as session:
+        url = f"{site.url}objects/{number}/best.mp4"
+        film = await bounded(record(session, url, site.pulse + 4 * FPS, tmp_path / "film"))
+    times, begins = await asyncio.to_thread(heard, film)
+    assert np.diff(times) == pytest.approx(1 / 48_000, abs=1e-4), "without a hole"
+    assert len(begins) >= 3
+    assert [begin - round(begin) for begin in begins] == pytest.approx([0] * len(begins), abs=0.04)
+
+
+@needs_chromium
+async def test_choosing_somebody_else_shows_them_without_another_player(page: Page) -> None:
+    await page.wait_for_function("myview.state === 'playing'")
+    await page.evaluate("document.querySelector('video').dataset.same = 'yes'")
+    first = await page.evaluate("myview.object")
+    in_view = page.locator("#people button.person:not(.away)[aria-current=false]")
+    await in_view.first.click()
+    await page.wait_for_function(f"myview.object !== {first} && myview.state === 'playing'")
+    assert await page.evaluate("document.querySelector('video').dataset.same") == "yes"
+
+
+@needs_chromium
+async def test_the_page_plays_again_after_the_best_view_process_was_killed(
+    page: Page, site: RunningSite
+) -> None:
+    await page.wait_for_function("myview.state === 'playing'")
+    os.kill(site.children()["bestview"], signal.SIGKILL)
+    await page.wait_for_function("myview.state !== 'playing'")
+    await page.wait_for_function("myview.state === 'playing'")
+    pulse = await page.evaluate("myview.pulse")
+    await page.wait_for_function(f"myview.pulse > {pulse} + 10")
