@@ -5,9 +5,14 @@ from __future__ import annotations
 import os
 import signal
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, settings
+from xdist.scheduler import LoadFileScheduling
+
+_ONE_BY_ONE = ("tests/e2e/", "tests/client/")
+"""Folders whose tests run in real time, and do not run beside each other."""
 
 # How long an example takes is the machine's doing: a test that hangs is ended by its own bound in time.
 # Each run tries the same examples, so that no run fails by chance; `make test-slow` looks for others.
@@ -23,9 +28,21 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with what takes longest and waits most, so that it does not run alone in the end."""
-    first = ["tests/e2e/", "tests/client/"]
-    items.sort(key=lambda item: [not item.nodeid.startswith(folder) for folder in first])
+    """Begin with sites and browsers, which take longest, so that they do not run alone in the end."""
+    items.sort(key=lambda item: [not item.nodeid.startswith(folder) for folder in _ONE_BY_ONE])
+
+
+class _OneSiteAtATime(LoadFileScheduling):
+    """Keeps a file's tests on one worker, as they share fixtures, and so all sites, and so all browsers."""
+
+    def _split_scope(self, nodeid: str) -> str:
+        file: str = super()._split_scope(nodeid)
+        return next((folder for folder in _ONE_BY_ONE if file.startswith(folder)), file)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> _OneSiteAtATime:
+    return _OneSiteAtATime(config, log)
 
 
 @pytest.fixture(scope="session")

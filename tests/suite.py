@@ -26,8 +26,8 @@ _NODE = Path(sys.executable).parent / "node"
 _TSC = ROOT / "node_modules/typescript/bin/tsc"
 _FETCHED = ROOT / "node_modules/.installed"
 """Made when npm has fetched the compiler."""
-_FAST = ("-m", "not slow", "-n", "4", "--dist", "loadfile", "--no-loadscope-reorder")
-"""Four workers for two processors: whole sites and browsers wait half the time, for the next frame."""
+_FAST = ("-m", "not slow", "-n", "3", "--dist", "loadfile", "--no-loadscope-reorder")
+"""Three workers for two processors: sites and browsers wait a part of the time, for the next frame."""
 _SLOW = ("-m", "slow", "--timeout", "1800")
 _OTHER_EXAMPLES = ("-m", "hypothesis and not slow", "-n", "3", "--hypothesis-profile", "others")
 _NO_TESTS = 5

@@ -50,10 +50,11 @@ async def point(site: RunningSite, page: Page) -> None:
     await page.keyboard.press("h")
     await page.wait_for_function(f"myview.pointing.object === {who}")
     # They stand: the hand, too, stays where the one who came from the left is, whatever number is there.
-    await page.mouse.move(*await page.evaluate(PLACE, other))
-    await page.wait_for_function(
-        "myview.pointing.taken >= 1"
-    )  # an answered flag ends it sooner than the hand
+    taken = "myview.pointing.taken >= 1"  # an answered flag ends it sooner than the hand
+    while not await page.evaluate(taken):
+        pulse = await page.evaluate("myview.pulse")
+        await page.mouse.move(*await page.evaluate(PLACE, other))
+        await page.wait_for_function(f"myview.pulse !== {pulse} || {taken}")
     exchanged = {Split(who, other, ALIKE), Split(other, who, ALIKE)}
     async with asyncio.timeout(PATIENCE_MS / 1000):
         await site.until(lambda: any(exchanged <= {*it.split} for it in gops), "the camera solves anew")
