@@ -53,7 +53,9 @@ async def point(site: RunningSite, page: Page) -> None:
     taken = "myview.pointing.taken >= 1"  # an answered flag ends it sooner than the hand
     while not await page.evaluate(taken):
         pulse = await page.evaluate("myview.pulse")
-        await page.mouse.move(*await page.evaluate(PLACE, other))
+        place = await page.evaluate(PLACE, other)
+        if place is not None:
+            await page.mouse.move(*place)
         await page.wait_for_function(f"myview.pulse !== {pulse} || {taken}")
     exchanged = {Split(who, other, ALIKE), Split(other, who, ALIKE)}
     async with asyncio.timeout(PATIENCE_MS / 1000):
