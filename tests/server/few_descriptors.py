@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import socket
 import subprocess
 import sys
@@ -15,7 +16,7 @@ from free_port import free
 from patience import PATIENCE
 
 FEW = 64  # descriptors: hardly more than a process needs for itself
-MYVIEW = f"{sys.executable} -m server.run.cli"
+MYVIEW = f"{shlex.quote(sys.executable)} -m server.run.cli"
 
 
 def written(folder: Path, port: int) -> Path:
