@@ -218,7 +218,7 @@ def test_old_recordings_that_cannot_be_taken_away_keep_nobody_from_recording(
         closed = [it for it in tmp_path.rglob("*") if it.is_dir()]
         for it in closed:
             it.chmod(0o500)
-        store = Store(tmp_path, Bounds(1e-3, 1e6, 1.0))
+        store = Store(tmp_path, Bounds(1e-9, 1e6, 1.0))
         store.open()
         records(store, range(20, 24))
         for it in closed:

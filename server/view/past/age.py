@@ -54,7 +54,7 @@ def _steady() -> float:
 def _boot() -> str:
     """Return the id of the machine's boot; empty where the system does not say."""
     try:
-        return _BOOT_ID.read_text(encoding="ascii").strip()
+        return _BOOT_ID.read_text(encoding="utf-8").strip()
     except (OSError, ValueError):
         return ""
 
