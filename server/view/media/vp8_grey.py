@@ -9,8 +9,7 @@ from __future__ import annotations
 import struct
 from functools import lru_cache
 
-from server.view.media.vp8_bits import BoolWriter
-from server.view.media.vp8_skip import BLOCK, NO_TOKENS, SELDOM, coefficient_updates
+from server.view.media.vp8_skip import BLOCK, NO_TOKENS, SELDOM, frame_header
 
 _HEADER_BITS = (
     (1, 0),  # color_space
@@ -36,12 +35,7 @@ _START = b"\x9d\x01\x2a"
 @lru_cache(maxsize=4)
 def grey_frame(width: int, height: int) -> bytes:
     """Return a grey key frame of this size in pixels."""
-    bits = BoolWriter()
-    for count, value in _HEADER_BITS:
-        bits.number(count, value)
-    for probability in coefficient_updates():
-        bits.put(0, probability)
-    bits.number(1, 1)  # mb_no_skip_coeff
+    bits = frame_header(_HEADER_BITS)
     bits.number(8, SELDOM)  # prob_skip_false
     for _ in range(-(-width // BLOCK) * -(-height // BLOCK)):
         bits.put(1, SELDOM)  # mb_skip_coeff

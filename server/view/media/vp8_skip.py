@@ -6,6 +6,7 @@ It is an inter frame in which every macroblock is the last frame's, at the same 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 
 from server.view.media.vp8_bits import BoolWriter
@@ -82,12 +83,7 @@ _MOTION_UPDATES = (
 @lru_cache(maxsize=4)
 def repeat(width: int, height: int) -> bytes:
     """Give a frame of this size in pixels that shows the one before it again."""
-    bits = BoolWriter()
-    for count, value in _HEADER_BITS:
-        bits.number(count, value)
-    for probability in coefficient_updates():
-        bits.put(0, probability)
-    bits.number(1, 1)  # mb_no_skip_coeff
+    bits = frame_header(_HEADER_BITS)
     for probability in (SELDOM, SELDOM, OFTEN, OFTEN):  # prob_skip_false, _intra, _last, _gf
         bits.number(8, probability)
     bits.number(2, 0)  # the probabilities of intra modes stay
@@ -105,7 +101,21 @@ def repeat(width: int, height: int) -> bytes:
     return (1 | 1 << 4 | len(first) << 5).to_bytes(3, "little") + first + NO_TOKENS
 
 
-def coefficient_updates() -> list[int]:
+def frame_header(fields: Sequence[tuple[int, int]]) -> BoolWriter:
+    """Write a frame's header up to the token probabilities, which stay, and that macroblocks may be skipped.
+
+    ``fields`` are the number of bits and the value of each.
+    """
+    bits = BoolWriter()
+    for count, value in fields:
+        bits.number(count, value)
+    for probability in _coefficient_updates():
+        bits.put(0, probability)
+    bits.number(1, 1)  # mb_no_skip_coeff
+    return bits
+
+
+def _coefficient_updates() -> list[int]:
     """Return of each token probability, in order, that it is not updated."""
     lines = _COEFFICIENT_UPDATES.strip().splitlines()
     contexts = [context.split() for line in lines for context in line.split(",")]
