@@ -135,10 +135,10 @@ def run_pytest(
     refused = {reason: n for reason, n in skipped.items() if may_skip is not None and may_skip not in reason}
     for reason, n in refused.items():
         print(f"{n} skipped that may not be here: {reason}")
+    passed = len(cases) - failed - skipped.total()
     if not reported or code not in {0, 1, _NO_TESTS} or (code == 1 and not failed):
         print(f"pytest ended with exit code {code}")
         failed += 1
-    passed = len(cases) - failed - skipped.total()
     return Outcome(
         name,
         time.monotonic() - began,
