@@ -11,7 +11,9 @@ TESTED := $(sort $(dir $(wildcard tests/*.py tests/*/*.py)))
 install = UV_SYSTEM_CERTS=1 $(BIN)/uv pip install --quiet --python $(BIN)/python --constraint requirements/lock.txt --editable $(1) \
 	|| $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint requirements/lock.txt --editable $(1)
 
-.PHONY: demo test test-slow test-loaded lint format bench lock clean node_modules
+DOCS_STAMP := $(VENV)/.docs
+
+.PHONY: demo test test-slow test-loaded lint format bench docs lock clean node_modules
 
 demo: $(RUNTIME)
 	$(BIN)/myview demo
@@ -43,10 +45,14 @@ format: $(STAMP)
 bench: $(STAMP)
 	$(BIN)/python -m benchmarks
 
+# The documents as a site, in build/site.
+docs: $(DOCS_STAMP)
+	NO_MKDOCS_2_WARNING=1 DISABLE_MKDOCS_2_WARNING=true $(BIN)/mkdocs build --quiet --strict
+
 # The pins in requirements/lock.txt, made anew from the ranges in pyproject.toml.
 lock: $(STAMP)
 	$(BIN)/uv pip compile --quiet --universal --no-emit-index-url --no-emit-find-links --no-header \
-		--extra dev --output-file requirements/lock.txt pyproject.toml
+		--extra dev --extra docs --output-file requirements/lock.txt pyproject.toml
 
 # What runs MyView, and no more: the demo starts soon.
 $(RUNTIME): pyproject.toml requirements/lock.txt
@@ -61,6 +67,11 @@ $(RUNTIME): pyproject.toml requirements/lock.txt
 # What tests, lint and benchmarks need beside it.
 $(STAMP): $(RUNTIME)
 	$(call install,'.[dev]')
+	@touch $@
+
+# What builds the documents.
+$(DOCS_STAMP): $(STAMP)
+	$(call install,'.[docs]')
 	@touch $@
 
 # What checks the page's JavaScript, where npm answers: the page itself needs nothing of it.
