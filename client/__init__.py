@@ -2,28 +2,8 @@
 
 from client.api import cameras, choice, objects, past, site, spans
 from client.events import events
-from client.http import (
-    AwayError,
-    ClientError,
-    ContractError,
-    HttpSettings,
-    NotFoundError,
-    RefusedError,
-)
-from client.model import (
-    Box,
-    Camera,
-    Cameras,
-    Choice,
-    Cut,
-    Event,
-    Flag,
-    Gop,
-    Objects,
-    SeenObject,
-    Site,
-    Span,
-)
+from client.http import AwayError, ClientError, ContractError, HttpSettings, NotFoundError, RefusedError
+from client.model import Box, Camera, Cameras, Choice, Cut, Event, Flag, Gop, Objects, SeenObject, Site, Span
 from client.player import Watched, record, watch
 from client.session import Progress
 from client.status_asking import status

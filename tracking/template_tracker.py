@@ -5,15 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from tracking.boxes import BOX_SIDES, Floats
-from tracking.costs import CostSettings
-from tracking.detections import Detections
 from tracking.detectors.base import Image
 from tracking.detectors.template import TemplateDetector, TemplateSettings
-from tracking.network import build_network_per_object
+from tracking.model.network import build_network_per_object
+from tracking.model.object_state import Template
+from tracking.model.settings import CostSettings
 from tracking.solvers.base import Solver, SolveReport
-from tracking.states import boxes_of, confidence_of
-from tracking.template import Template
-from tracking.window import WindowResult, WindowSettings, WindowTrack
+from tracking.types import Detections
+from tracking.window import WindowResult, WindowSettings, WindowTrack, boxes_of, confidence_of
 
 
 class TemplateTracker:

@@ -8,20 +8,19 @@ import numpy as np
 import numpy.typing as npt
 
 from tracking.appearance import appearance_distance
-from tracking.births import Birth, find_births
+from tracking.appearance_samples import with_glimpses
 from tracking.boxes import Floats, iou
-from tracking.bridges import bridged
-from tracking.detections import Detections
 from tracking.detectors.base import Image
-from tracking.ends import ended
-from tracking.glimpses import with_glimpses
-from tracking.network import CostSettings, Network, build_network
-from tracking.reach import reachable, within_reach
+from tracking.interpolation import bridged
+from tracking.lifecycle.gating import reachable, within_reach
+from tracking.lifecycle.initiation import Birth, find_births
+from tracking.lifecycle.termination import ended
+from tracking.model.network import CostSettings, Network, build_network
+from tracking.model.object_state import RememberedObject, Sighting
 from tracking.solvers.base import OCCLUDED, Solver, SolveReport, solver_named
-from tracking.states import boxes_of, confidence_of
-from tracking.templates import RememberedObject, Sighting
-from tracking.told import Told
-from tracking.window import WindowResult, WindowSettings, WindowTrack, joined
+from tracking.solvers.warm_start import Told
+from tracking.types import Detections
+from tracking.window import WindowResult, WindowSettings, WindowTrack, boxes_of, confidence_of, joined
 
 # Two boxes that overlap (IoU) by this much hold parts of each other's object.
 _CROWDED = 0.15

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 
 from tracking.boxes import BOX_SIDES, Floats
-from tracking.solvers.base import SolveReport
-from tracking.troubles import Trouble
+from tracking.solvers.base import OCCLUDED, SolveReport
+from tracking.types import Detections, Trouble
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,3 +142,18 @@ def joined(results: list[WindowResult]) -> WindowResult | None:
             tracks[track.id] = replace(track, boxes=boxes, bridged=bridges, looks=looks)
     seen = [tracks[id_] for id_ in sorted(tracks) if not np.isnan(tracks[id_].boxes).all()]
     return replace(newest, first=first, tracks=tuple(seen))
+
+
+def boxes_of(states: npt.NDArray[np.int64], frames: Sequence[Detections]) -> Floats:
+    """Give the boxes of states `(F,)`, `(F, 4)` pixels, NaN where the object is hidden."""
+    boxes = np.full((len(frames), BOX_SIDES), np.nan)
+    for m, state in enumerate(states):
+        if state != OCCLUDED:
+            boxes[m] = frames[m].boxes[state]
+    return boxes
+
+
+def confidence_of(states: npt.NDArray[np.int64], frames: Sequence[Detections]) -> float:
+    """Give the mean score of the boxes of states `(F,)`, 0 where the object is hidden; in [0, 1]."""
+    scores = [float(frames[m].scores[state]) for m, state in enumerate(states) if state != OCCLUDED]
+    return sum(scores) / len(frames)

@@ -11,7 +11,7 @@ from benchmarks.experiments.labels import named
 from benchmarks.experiments.scene import Scene
 from tracking import CostSettings, Detections, OnlineTracker, SolveReport, Template, WindowSettings
 from tracking.boxes import BOX_SIDES, Floats
-from tracking.network import Network, build_network, build_network_per_object
+from tracking.model.network import Network, build_network, build_network_per_object
 from tracking.solvers.base import OCCLUDED, Solver
 
 

@@ -22,16 +22,7 @@ from benchmarks.solvers.growth import (
     plot_table1,
     table1,
 )
-from benchmarks.solvers.times import (
-    CASES,
-    EXACT_CASES,
-    GATE,
-    Case,
-    against_arcs,
-    live,
-    timed,
-    warm_up,
-)
+from benchmarks.solvers.times import CASES, EXACT_CASES, GATE, Case, against_arcs, live, timed, warm_up
 from benchmarks.solvers.windows import Size
 from benchmarks.surroundings import parser
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from benchmarks.solvers.times import REPEATS, seconds
 from benchmarks.solvers.windows import Size, random_window
-from tracking.presets import PAPER_COSTS
+from tracking.model.settings import PAPER_COSTS
 
 SOLVERS = ("arcs", "columns")
 TABLE1_SOLVERS = ("extended-dp", "arcs", "exact", "columns", "greedy-dp", "separate-dp")

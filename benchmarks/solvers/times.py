@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from benchmarks.solvers.windows import Size, moving_windows, random_window, walking_window
-from tracking.network import CostSettings, Network, build_network
-from tracking.presets import PAPER_COSTS
+from tracking.model.network import CostSettings, Network, build_network
+from tracking.model.settings import PAPER_COSTS
 from tracking.solvers import Solution, solver_named
 
 GATE = 60.0

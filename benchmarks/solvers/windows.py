@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tracking.detections import Detections
-from tracking.network import CostSettings, Network, Template, build_network
+from tracking.model.network import CostSettings, Network, Template, build_network
+from tracking.types import Detections
 
 BINS = 64
 PERSON = np.array([40.0, 100.0])

@@ -12,7 +12,7 @@ from server.wire.epochs import closing_epoch, epoch_of_window
 from server.wire.help import TROUBLES_MOST, Trouble
 from server.wire.messages import Box, CameraTracks, Glimpse, Solve, Track
 from server.wire.numbers import FARTHEST
-from tracking import SolveReport, WindowResult, WindowTrack, troubles
+from tracking import SolveReport, WindowResult, WindowTrack, types
 
 _LOOK_DIGITS = 5
 """Of a share of the pixels: more would only make messages longer."""
@@ -101,7 +101,7 @@ def _track(track: WindowTrack) -> Track:
     )
 
 
-def _trouble(trouble: troubles.Trouble) -> Trouble:
+def _trouble(trouble: types.Trouble) -> Trouble:
     return Trouble(
         reason=trouble.reason,
         tracks=list(trouble.objects),

@@ -8,13 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bestview.calibrate import (
-    CalibrationError,
-    MarkedPoints,
-    PointFit,
-    WalkSettings,
-    fit_cameras,
-)
+from bestview.calibrate import CalibrationError, MarkedPoints, PointFit, WalkSettings, fit_cameras
 from server.run.calibrate_points import read_points
 from server.view.calibrate.file import ground_file
 from server.view.calibrate.outcome import worked_out

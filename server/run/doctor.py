@@ -17,16 +17,7 @@ from rich.console import Console
 from server.run.doctor_cameras import camera_findings, probe_all, sound_findings
 from server.run.doctor_disk import disk_findings
 from server.run.doctor_files import file_findings
-from server.run.doctor_findings import (
-    Finding,
-    Findings,
-    all_of,
-    bad,
-    kept_apart,
-    ok,
-    show,
-    show_counts,
-)
+from server.run.doctor_findings import Finding, Findings, all_of, bad, kept_apart, ok, show, show_counts
 from server.run.doctor_machine import clock_findings, descriptor_findings, machine_findings
 from server.run.doctor_ports import port_findings
 from server.run.doctor_probe import Probe

@@ -8,13 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from server.run.evaluate import (
-    content_of,
-    evaluate_recordings,
-    print_table,
-    read_recordings,
-    rows_of,
-)
+from server.run.evaluate import content_of, evaluate_recordings, print_table, read_recordings, rows_of
 from server.run.evaluate_choices import read_choices
 from server.run.evaluate_plots import plot_views
 from server.run.evaluate_site import SiteOptions, site_facts, videos_by_camera

@@ -8,14 +8,7 @@ from functools import wraps
 
 from aiohttp import web
 
-from server.view.pictures import (
-    CameraView,
-    FullError,
-    NoPictureError,
-    PersonView,
-    Series,
-    Subject,
-)
+from server.view.pictures import CameraView, FullError, NoPictureError, PersonView, Series, Subject
 from server.view.pictures.multipart import BEGIN, CONTENT_TYPE, PULSE, part
 from server.web.access.access import sees_one_person
 from server.web.api import no_camera, no_object, not_now, problem

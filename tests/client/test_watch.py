@@ -10,19 +10,7 @@ from aiohttp import web
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from patience import PATIENCE
-from site_by_hand import (
-    FPS,
-    GOP,
-    SITE,
-    HandMadeSite,
-    Play,
-    box,
-    fragment,
-    gop,
-    header,
-    nothing_more,
-    sent,
-)
+from site_by_hand import FPS, GOP, SITE, HandMadeSite, Play, box, fragment, gop, header, nothing_more, sent
 
 import client
 from client.fmp4 import BoxReader, Mp4Error

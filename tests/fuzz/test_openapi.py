@@ -18,11 +18,7 @@ from hypothesis import strategies as st
 from hypothesis.errors import Unsatisfiable
 from patience import PATIENCE
 from schemathesis import GenerationMode
-from schemathesis.checks import (
-    content_type_conformance,
-    response_schema_conformance,
-    status_code_conformance,
-)
+from schemathesis.checks import content_type_conformance, response_schema_conformance, status_code_conformance
 
 from benchmarks.fuzz.http_site import Served
 

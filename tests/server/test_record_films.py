@@ -8,18 +8,7 @@ from typing import Literal
 import av
 import numpy as np
 import pytest
-from cameras_by_hand import (
-    CAMERAS,
-    FPS,
-    GOP,
-    HEIGHT,
-    LARGE,
-    NO_REASON,
-    SMALL,
-    WIDTH,
-    encoded,
-    small_config,
-)
+from cameras_by_hand import CAMERAS, FPS, GOP, HEIGHT, LARGE, NO_REASON, SMALL, WIDTH, encoded, small_config
 from sounds_by_hand import BEEPS, STEP, beeps, flashes, flashing, heard, write_flashes
 from sounds_by_hand import FRAMES as SOUNDING
 from test_splice import choice

@@ -11,14 +11,7 @@ import msgspec
 import pytest
 from aiohttp import web
 from aiohttp.test_utils import TestServer
-from cameras_by_hand import (
-    CAMERAS,
-    FPS,
-    small_config,
-    status,
-    tracks,
-    word,
-)
+from cameras_by_hand import CAMERAS, FPS, small_config, status, tracks, word
 from command_line import Run
 from halls import A, B, Hall, see
 from patience import PATIENCE

@@ -9,8 +9,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from tracking.detections import Detections
 from tracking.detectors import BackgroundDetector
+from tracking.types import Detections
 
 HEIGHT, WIDTH = 288, 360
 Picture = npt.NDArray[np.uint8]

@@ -8,10 +8,10 @@ from itertools import product
 import numpy as np
 from hypothesis import strategies as st
 
-from tracking.detections import Detections
-from tracking.network import CostSettings, Network, Template, build_network, build_network_per_object
-from tracking.presets import PAPER_COSTS
+from tracking.model.network import CostSettings, Network, Template, build_network, build_network_per_object
+from tracking.model.settings import PAPER_COSTS
 from tracking.solvers.objective import conflict_count, objective
+from tracking.types import Detections
 
 BINS = 4
 SETTINGS = PAPER_COSTS

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tracking.costs import CostSettings
-from tracking.detections import Detections
+from tracking.model.settings import CostSettings
 from tracking.solvers.base import solver_named
 from tracking.tracker import OnlineTracker
+from tracking.types import Detections
 from tracking.window import WindowResult, WindowSettings
 
 BINS = 8

@@ -9,11 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from random_networks import Case, cases, network_of
 
-from tracking.conflicts import clique_rows, connected
-from tracking.detections import Detections
-from tracking.network import CostSettings, Network, Template, build_network
-from tracking.presets import PAPER_COSTS
-from tracking.solvers.conflict_finder import ConflictFinder
+from tracking.model.conflicts import clique_rows, connected
+from tracking.model.network import CostSettings, Network, Template, build_network
+from tracking.model.settings import PAPER_COSTS
+from tracking.solvers.cutting_planes import ConflictFinder
+from tracking.types import Detections
 
 PERSON = np.array([0.0, 0.0, 20.0, 50.0])
 CORNERS = replace(PAPER_COSTS, conflict_distance=60.0)

@@ -10,9 +10,9 @@ import pytest
 
 from server.camera.scene import Scene
 from tracking.boxes import iou
-from tracking.detections import Detections
 from tracking.detectors import HogDetector, HogSettings, Looks, LooksSettings
 from tracking.detectors.suppress import best_apart
+from tracking.types import Detections
 
 SETTINGS = HogSettings(least_height=0.25)
 WHERE_SOMEBODY_IS = 110

@@ -9,17 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tracking.boxes import iou
-from tracking.detections import Detections
 from tracking.detectors import BackgroundDetector, BackgroundSettings, LooksSettings
 from tracking.detectors.anew import SeenAnew
-from tracking.detectors.heightline import (
-    Floor,
-    HeightLineLearner,
-    HeightLineSettings,
-    fit_line,
-    prior_of,
-)
+from tracking.detectors.heightline import Floor, HeightLineLearner, HeightLineSettings, fit_line, prior_of
 from tracking.detectors.isolated import Alone
+from tracking.types import Detections
 
 SURE = 0.4
 WALKER = Figure(10, 200, speed=2.0, begin=40)

@@ -9,15 +9,14 @@ import pytest
 from hypothesis import given, settings
 from random_networks import Case, best_by_trying, cases, network_of
 
-from tracking.detections import Detections
-from tracking.network import Template, build_network
-from tracking.presets import PAPER_COSTS
-from tracking.solvers import joint_search, solver_named
-from tracking.solvers.columns import relaxation_by_columns
-from tracking.solvers.exact import by_branching
-from tracking.solvers.finish import whole_nodes
-from tracking.solvers.joint_search import JointSearch
+from tracking.model.network import Template, build_network
+from tracking.model.settings import PAPER_COSTS
+from tracking.solvers import exact, solver_named
+from tracking.solvers.column_generation import relaxation_by_columns
+from tracking.solvers.exact import JointSearch, by_branching
 from tracking.solvers.objective import conflict_count, objective
+from tracking.solvers.solution_builder import whole_nodes
+from tracking.types import Detections
 
 CLOSE = 1e-9
 PERSON = np.array([20.0, 50.0])
@@ -76,8 +75,8 @@ def test_where_joint_states_are_too_many_branching_finds_the_optimum(monkeypatch
     case = Case(3, 4, 4, shared=True, settings=replace(PAPER_COSTS, layout=0.002), seed=1)
     network = network_of(case)
     expected = solver_named("extended-dp").solve(network).report.objective
-    monkeypatch.setattr(joint_search, "_MOST_STATES", 1)
-    monkeypatch.setattr(joint_search, "_MOST_STEPS", 1)
+    monkeypatch.setattr(exact, "_MOST_STATES", 1)
+    monkeypatch.setattr(exact, "_MOST_STEPS", 1)
     assert solver_named("exact").solve(network).report.objective == pytest.approx(expected, rel=CLOSE)
 
 

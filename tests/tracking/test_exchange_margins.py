@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from random_networks import SETTINGS, Case, cases, network_of
 
 from tracking.assist import exchange_margins, exchanges
-from tracking.network import Network
+from tracking.model.network import Network
 from tracking.solvers.base import OCCLUDED, solver_named
 from tracking.solvers.objective import conflict_count, nodes_of, objective
 

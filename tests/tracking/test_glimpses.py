@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tracking import Detections, Glimpse, WindowTrack
-from tracking.glimpses import with_glimpses
+from tracking.appearance_samples import with_glimpses
 
 HERE, THERE, BESIDE = (0.0, 0.0, 10.0, 20.0), (200.0, 0.0, 210.0, 20.0), (3.0, 0.0, 13.0, 20.0)
 

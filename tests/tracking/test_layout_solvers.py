@@ -10,11 +10,11 @@ import pytest
 from hypothesis import example, given, settings
 from random_networks import SETTINGS, Case, cases, network_of
 
-from tracking.detections import Detections
-from tracking.network import Network, Template, build_network
-from tracking.presets import PAPER_COSTS
+from tracking.model.network import Network, Template, build_network
+from tracking.model.settings import PAPER_COSTS
 from tracking.solvers import solver_named
 from tracking.solvers.objective import conflict_count, layout_cost, objective
+from tracking.types import Detections
 
 SQUARE = 2
 PERSON = np.array([0.0, 0.0, 20.0, 50.0])

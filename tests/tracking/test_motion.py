@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tracking.bridges import bridged
-from tracking.costs import CostSettings
-from tracking.detections import Detections
-from tracking.motion import Motion
-from tracking.network import Network, build_network
-from tracking.template import Template
+from tracking.interpolation import bridged
+from tracking.model.motion import Motion
+from tracking.model.network import Network, build_network
+from tracking.model.object_state import Template
+from tracking.model.settings import CostSettings
+from tracking.types import Detections
 
 BOX = np.array([100.0, 100.0, 140.0, 200.0])
 RIGHT = np.array([5.0, 0.0, 5.0, 0.0])

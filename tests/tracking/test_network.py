@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from tracking.appearance import appearance_distance
-from tracking.detections import Detections
-from tracking.network import Template, build_network, build_network_per_object
-from tracking.presets import PAPER_COSTS
+from tracking.model.network import Template, build_network, build_network_per_object
+from tracking.model.settings import PAPER_COSTS
+from tracking.types import Detections
 
 SETTINGS = replace(PAPER_COSTS, appearance=0.5, displacement=0.01, change=0.3, occlusion=0.5)
 LEFT, RIGHT = np.array([0.0, 0.0, 20.0, 50.0]), np.array([100.0, 0.0, 120.0, 50.0])

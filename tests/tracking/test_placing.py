@@ -9,8 +9,8 @@ from random_networks import SETTINGS, Case, network_of
 
 from tracking.assist import Pointing
 from tracking.assist.placing import is_found, place_of, with_place, with_places
-from tracking.detections import Detections
 from tracking.solvers.base import OCCLUDED, solver_named
+from tracking.types import Detections
 
 SIZE = np.array([20.0, 40.0])
 

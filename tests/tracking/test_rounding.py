@@ -8,13 +8,12 @@ import numpy as np
 from hypothesis import given, settings
 from random_networks import Case, cases, network_of
 
-from tracking.detections import Detections
-from tracking.network import Network, Template, build_network
-from tracking.presets import PAPER_COSTS
-from tracking.solvers.greedy_dp import greedy_paths
-from tracking.solvers.improve import Improver
+from tracking.model.network import Network, Template, build_network
+from tracking.model.settings import PAPER_COSTS
+from tracking.solvers.dynamic_programming import greedy_paths
 from tracking.solvers.objective import conflict_count, objective
-from tracking.solvers.rounding import is_integral, rounded
+from tracking.solvers.rounding import Improver, is_integral, rounded
+from tracking.types import Detections
 
 many = settings(deadline=None, max_examples=60)
 

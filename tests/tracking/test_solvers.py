@@ -10,11 +10,11 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from random_networks import SETTINGS, Case, best_by_trying, cases, network_of
 
-from tracking.detections import Detections
-from tracking.network import Template, build_network
-from tracking.presets import PAPER_COSTS
+from tracking.model.network import Template, build_network
+from tracking.model.settings import PAPER_COSTS
 from tracking.solvers import OCCLUDED, Solution, solver_named
 from tracking.solvers.objective import conflict_count, nodes_of, objective
+from tracking.types import Detections
 
 CLOSE = 1e-9
 RELAXING = ("arcs", "columns")

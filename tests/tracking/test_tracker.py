@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from strolls import Stroll, final_boxes, follow, seen_at, tracker
 
 from tracking.boxes import iou
-from tracking.detections import Detections
+from tracking.types import Detections
 from tracking.window import WindowResult, WindowSettings
 
 

@@ -10,11 +10,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from random_networks import Case, cases, network_of
 
-from tracking.detections import Detections
-from tracking.network import CostSettings, Network, Template, build_network
-from tracking.presets import PAPER_COSTS
+from tracking.model.network import CostSettings, Network, Template, build_network
+from tracking.model.settings import PAPER_COSTS
 from tracking.solvers import UNKNOWN, Hint, PricedRow, solver_named
 from tracking.solvers.objective import conflict_count, nodes_of
+from tracking.types import Detections
 
 CLOSE = 1e-9
 PERSON = np.array([0.0, 0.0, 20.0, 50.0])

@@ -6,7 +6,7 @@ from tracking.assist.pointing import Pointing
 from tracking.assist.risk import Signs
 from tracking.assist.settings import AssistSettings
 from tracking.assist.tracker import AssistedTracker
-from tracking.troubles import Reason, Trouble
+from tracking.types import Reason, Trouble
 
 __all__ = [
     "AssistSettings",

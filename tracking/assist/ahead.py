@@ -9,11 +9,11 @@ import numpy as np
 from tracking.assist.exchange import exchanges
 from tracking.assist.solved import Solved
 from tracking.boxes import Floats, overlap
-from tracking.costs import CostSettings
-from tracking.detections import Detections
-from tracking.motion import Motion
-from tracking.network import build_network
-from tracking.template import Template
+from tracking.model.motion import Motion
+from tracking.model.network import build_network
+from tracking.model.object_state import Template
+from tracking.model.settings import CostSettings
+from tracking.types import Detections
 
 _TOUCH = 0.25
 """Shared over average area from which two boxes are in each other's way."""

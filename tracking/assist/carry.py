@@ -11,11 +11,11 @@ from tracking.assist.exchange import exchanges
 from tracking.assist.memory import Memory
 from tracking.assist.pointing import Pointing, farness
 from tracking.boxes import Floats, heights, strides
-from tracking.costs import CostSettings
-from tracking.detections import Detections
-from tracking.network import build_network
+from tracking.model.network import build_network
+from tracking.model.object_state import Template
+from tracking.model.settings import CostSettings
 from tracking.solvers.base import OCCLUDED
-from tracking.template import Template
+from tracking.types import Detections
 
 _SURE = 0.5
 """How far (`farness`) a track may be from the point to be the one that is pointed at."""

@@ -11,8 +11,8 @@ from tracking.assist.risk import Signs, risk_of
 from tracking.assist.settings import AssistSettings
 from tracking.assist.solved import Solved
 from tracking.boxes import Floats, overlap
-from tracking.costs import CostSettings
-from tracking.troubles import Reason, Trouble
+from tracking.model.settings import CostSettings
+from tracking.types import Reason, Trouble
 
 _TOUCH = 0.25
 """Shared over average area from which somebody covers somebody else."""

@@ -13,10 +13,10 @@ from tracking.assist.placing import is_found, place_of, with_place
 from tracking.assist.pointing import Pointing, farness
 from tracking.assist.settings import AssistSettings
 from tracking.boxes import BOX_SIDES, Floats, iou
-from tracking.detections import Detections
+from tracking.model.object_state import RememberedObject
 from tracking.solvers.base import OCCLUDED
-from tracking.templates import RememberedObject
-from tracking.told import Told
+from tracking.solvers.warm_start import Told
+from tracking.types import Detections
 
 _SAME_PLACE = 0.5
 """Overlap (IoU) from which somebody new is the one who began in that frame before."""

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from tracking.assist.pointing import Pointing, pointed_at
 from tracking.boxes import Floats, areas
-from tracking.detections import Detections
-from tracking.network import Network
+from tracking.model.network import Network
+from tracking.types import Detections
 
 _ALIKE = 1.6
 """Factor between the areas of somebody and a box that is still theirs; two bodies side by side have more."""

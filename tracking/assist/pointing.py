@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tracking.assist.settings import AssistSettings
 from tracking.boxes import Floats
-from tracking.network import Network
+from tracking.model.network import Network
 
 
 @dataclass(frozen=True, slots=True)

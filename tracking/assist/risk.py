@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from tracking.troubles import Reason
+from tracking.types import Reason
 
 _MUCH = 10.0
 """A margin from which more of it tells nothing."""

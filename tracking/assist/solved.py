@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracking.boxes import Floats
-from tracking.detections import Detections
-from tracking.network import Network
+from tracking.model.network import Network
 from tracking.solvers.base import OCCLUDED, SolveReport
+from tracking.types import Detections
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -15,15 +15,15 @@ from tracking.assist.placing import with_places
 from tracking.assist.pointing import Pointing, pointed_at, with_pointings
 from tracking.assist.settings import AssistSettings
 from tracking.assist.solved import Solved
-from tracking.births import Birth
 from tracking.boxes import BOX_SIDES
-from tracking.costs import CostSettings
-from tracking.detections import Detections
 from tracking.detectors.base import Image
-from tracking.network import Network
+from tracking.lifecycle.initiation import Birth
+from tracking.model.network import Network
+from tracking.model.object_state import RememberedObject
+from tracking.model.settings import CostSettings
 from tracking.solvers.base import Solver, SolveReport
-from tracking.templates import RememberedObject
 from tracking.tracker import OnlineTracker
+from tracking.types import Detections
 from tracking.window import WindowResult, WindowSettings, joined
 
 _DOUBT = 0.25

@@ -11,7 +11,6 @@ import numpy as np
 import numpy.typing as npt
 
 from tracking.appearance import GREY_LEVELS
-from tracking.detections import Detections
 from tracking.detectors.base import Image, Mask
 from tracking.detectors.boxfilter import Band, BoxFilter, BoxFilterSettings
 from tracking.detectors.checked import at_least_one, checked_image
@@ -19,17 +18,13 @@ from tracking.detectors.explain import ExplainSettings, Explanation, explain
 from tracking.detectors.fit import shrink
 from tracking.detectors.ghosts import GhostSettings
 from tracking.detectors.grid import Grid
-from tracking.detectors.heightline import (
-    Floor,
-    HeightLine,
-    HeightLineLearner,
-    HeightLineSettings,
-)
+from tracking.detectors.heightline import Floor, HeightLine, HeightLineLearner, HeightLineSettings
 from tracking.detectors.looks import Looks, LooksSettings
 from tracking.detectors.median import MedianBackground, MedianSettings
 from tracking.detectors.mog2 import Mog2Background, Mog2Settings
 from tracking.detectors.shadow import ShadowSettings
 from tracking.detectors.split import Split
+from tracking.types import Detections
 
 # Pixels of the working picture per cell of the box filter, on each axis.
 CELL = 2

@@ -7,7 +7,7 @@ from typing import Protocol, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from tracking.detections import Detections
+from tracking.types import Detections
 
 Image: TypeAlias = npt.NDArray[np.uint8]
 """A picture, `(H, W, 3)`, blue green red."""

@@ -8,12 +8,12 @@ import cv2
 import numpy as np
 
 from tracking.boxes import Floats
-from tracking.detections import Detections
 from tracking.detectors.base import Image
 from tracking.detectors.checked import checked_image
 from tracking.detectors.ignore import Ignored, Polygons
 from tracking.detectors.looks import Looks
 from tracking.detectors.suppress import best_apart
+from tracking.types import Detections
 
 # The detector's window is 64x128 pixels, the person in its middle is 96 tall, with 16 above and below.
 _PERSON_ROWS = 96

@@ -11,9 +11,9 @@ import numpy as np
 
 from tracking.appearance import histograms
 from tracking.boxes import BOX_SIDES, iou
-from tracking.detections import Detections
 from tracking.detectors.base import Image
 from tracking.motchallenge import MotRow, read_rows
+from tracking.types import Detections
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,13 +11,13 @@ import numpy as np
 import numpy.typing as npt
 
 from tracking.boxes import Floats
-from tracking.detections import Detections
 from tracking.detectors.base import Image
 from tracking.detectors.checked import checked_image
 from tracking.detectors.ignore import Ignored, Polygons
 from tracking.detectors.looks import Looks
 from tracking.detectors.suppress import best_apart
 from tracking.detectors.yolo import Layout, decoded
+from tracking.types import Detections
 
 _INPUTS: dict[str, type[np.floating]] = {"tensor(float)": np.float32, "tensor(float16)": np.float16}
 _DIMENSIONS = 4

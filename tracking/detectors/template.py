@@ -10,11 +10,11 @@ import numpy as np
 import numpy.typing as npt
 
 from tracking.boxes import Floats
-from tracking.detections import Detections
 from tracking.detectors.base import Image
 from tracking.detectors.checked import checked_image
 from tracking.detectors.looks import Looks, LooksSettings
 from tracking.detectors.subimage import SubimageSettings, subimages
+from tracking.types import Detections
 
 _LEAST_SIDE = 4
 """Pixels: a smaller template matches everywhere."""

@@ -11,7 +11,7 @@ from tracking.solvers.base import (
     solver_named,
     solver_names,
 )
-from tracking.solvers.hint import UNKNOWN, Hint, PricedRow
+from tracking.solvers.warm_start import UNKNOWN, Hint, PricedRow
 
 __all__ = [
     "DEFAULT_SOLVER",

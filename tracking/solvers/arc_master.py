@@ -8,12 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from tracking.boxes import BOX_SIDES, Floats
-from tracking.conflicts import Bools
-from tracking.network import Network
-from tracking.solvers.conflict_finder import ConflictRow
-from tracking.solvers.highs import optimum, quiet_highs
+from tracking.model.conflicts import Bools
+from tracking.model.network import Network
+from tracking.solvers.cutting_planes import ConflictRow
 from tracking.solvers.layout_rows import LayoutRows
+from tracking.solvers.linear_program import optimum, quiet_highs
 from tracking.solvers.objective import Ints
+from tracking.solvers.viterbi import Marginals, Packed, Trellis
 
 _NO_ROW = -1
 
@@ -209,3 +210,25 @@ class ArcMaster:
         arcs = self._arcs
         np.add.at(usage, (arcs.owner, arcs.frame, arcs.target), self._values)
         return usage
+
+
+def arcs_through(trellis: Trellis, passes: Marginals, worths: Floats, most: int) -> tuple[ArcSet, Floats]:
+    """Give the arcs (A,) whose best path costs less than `worths` (n,) of its object, and that cost (A,).
+
+    Only arcs between the `most` cheapest states of each frame and object are looked at.
+    """
+    through = passes.through
+    width = int((through < worths[:, None, None]).sum(axis=2).max(initial=0))
+    packed = Packed.cheapest(through, max(min(width, most), 1))
+    n, j = np.nonzero(packed.states(through, np.inf)[:, 0] < worths[:, None])
+    zero = np.zeros(len(n), dtype=np.int64)
+    begin = ArcSet(n, zero, zero, packed.index[n, 0, j])
+    begin_costs = through[n, 0, begin.target]
+
+    ahead, behind = (np.swapaxes(passed, 0, 1) for passed in (passes.ahead, passes.behind))
+    costs = packed.pairs(trellis.pair)
+    costs += packed.states(ahead, np.inf)[:, :-1, :, None]
+    costs += packed.states(behind + trellis.node, np.inf)[:, 1:, None, :]
+    n, m, i, j = np.nonzero(costs < worths[:, None, None, None])
+    between = ArcSet(n, m + 1, packed.index[n, m, i], packed.index[n, m + 1, j])
+    return begin.and_also(between), np.concatenate([begin_costs, costs[n, m, i, j]])

@@ -2,28 +2,30 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import time
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field, replace
 from importlib import import_module
-from typing import Protocol, cast
+from typing import ClassVar, Protocol, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tracking.network import Network
-from tracking.solvers.hint import Hint, PricedRow
+from tracking.model.network import Network
+from tracking.solvers.warm_start import Hint, PricedRow
 
 OCCLUDED = -1
 """The state of an object that is on no observation of a frame."""
 
 # Modules are imported when asked for: a tracker with a dynamic program need not load the LP solver.
 _SOLVERS = {
-    "arcs": ("tracking.solvers.arcs", "Arcs"),
-    "columns": ("tracking.solvers.columns", "Columns"),
+    "arcs": ("tracking.solvers.arc_program", "Arcs"),
+    "columns": ("tracking.solvers.column_generation", "Columns"),
     "exact": ("tracking.solvers.exact", "Exact"),
     "extended-dp": ("tracking.solvers.extended_dp", "ExtendedDp"),
-    "greedy-dp": ("tracking.solvers.greedy_dp", "GreedyDp"),
-    "l2": ("tracking.solvers.l2", "L2"),
-    "separate-dp": ("tracking.solvers.separate_dp", "SeparateDp"),
+    "greedy-dp": ("tracking.solvers.dynamic_programming", "GreedyDp"),
+    "l2": ("tracking.solvers.column_generation", "L2"),
+    "separate-dp": ("tracking.solvers.dynamic_programming", "SeparateDp"),
 }
 
 DEFAULT_SOLVER = "columns"
@@ -109,3 +111,20 @@ def solver_named(name: str) -> Solver:
         raise ValueError(f"no solver is called {name!r}; there are {', '.join(solver_names())}")
     module, factory = _SOLVERS[name]
     return cast("Solver", getattr(import_module(module), factory)())
+
+
+class TimedSolver(ABC):
+    """Puts the time of the solve into its report."""
+
+    name: ClassVar[str]
+
+    def solve(self, network: Network, hint: Hint | None = None) -> Solution:
+        """Give the states of all objects in all frames; a hint only makes it quicker."""
+        start = time.perf_counter()
+        solution = self._answer(network, hint)
+        seconds = time.perf_counter() - start
+        return replace(solution, report=replace(solution.report, seconds=seconds))
+
+    @abstractmethod
+    def _answer(self, network: Network, _hint: Hint | None) -> Solution:
+        """Solve the network, which may be one without objects."""

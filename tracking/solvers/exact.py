@@ -1,28 +1,163 @@
-"""`exact`: the integer optimum of paper II.C, certified (their branch and bound, IV.A.4)."""
+"""Dynamic programming over the joint states that a proof leaves: the layout term's integer optimum.
+
+The extended dynamic program (I.A) has S^n joint states a frame. The duals of the relaxation say what
+the rest of the window costs at least from each of them, and most joint states cost more with that than an
+answer already known.
+"""
 
 from __future__ import annotations
 
 from contextlib import suppress
+from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial.distance import cdist
 
-from tracking.boxes import Floats
-from tracking.conflicts import Bools
-from tracking.network import Network
+from tracking.boxes import BOX_SIDES, Floats
+from tracking.model.conflicts import Bools
+from tracking.model.network import Network
 from tracking.solvers.arc_program import arc_program
-from tracking.solvers.base import Solution
-from tracking.solvers.columns import relaxation_by_columns
-from tracking.solvers.finish import Proof, answered, nothing, whole_nodes
-from tracking.solvers.highs import solve_program
-from tracking.solvers.hint import Hint
-from tracking.solvers.joint_search import JointSearch, TooManyStatesError
+from tracking.solvers.base import Solution, TimedSolver
+from tracking.solvers.column_generation import relaxation_by_columns
+from tracking.solvers.linear_program import solve_program
 from tracking.solvers.objective import Ints, objective
-from tracking.solvers.relaxed import Relaxed
+from tracking.solvers.relaxation import Relaxed
 from tracking.solvers.rounding import is_integral
-from tracking.solvers.timed import TimedSolver
-from tracking.solvers.viterbi import Trellis, backward, forward
+from tracking.solvers.solution_builder import Proof, answered, nothing, whole_nodes
+from tracking.solvers.viterbi import Marginals, Trellis, backward, forward
+from tracking.solvers.warm_start import Hint
+
+_MOST_STATES = 150_000
+"""Joint states of a frame."""
+
+_MOST_STEPS = 2_000_000_000
+"""Pairs of joint states of two frames, over the whole window: about half a minute."""
+
+_AT_ONCE = 2_000_000
+"""Numbers held at once, 16 MB."""
 
 _SLACK = 1e-9
+"""Relative: bounds are sums of some tens of costs, each with its rounding error."""
+
+
+class TooManyStatesError(Exception):
+    """The proof leaves more than can be tried."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Frontier:
+    """Joint states of a frame: `nodes` (J, n), the `costs` (J,) to get there, and from which, `origin`."""
+
+    nodes: Ints
+    costs: Floats
+    origin: Ints
+
+
+class JointSearch:
+    """Searches a network with layout term whose relaxation is solved, its duals known."""
+
+    def __init__(self, network: Network, found: Relaxed) -> None:
+        self._network = network
+        self._bound = found.bound
+        self._exclusions = network.exclusions()
+        passes = Marginals.of(Trellis.of(network).with_node(found.priced))
+        self._excess = passes.through - passes.least[:, None, None]
+        self._where = network.locations[network.sets]
+        # What the way from a state on costs at least: the part of a pull that acts at the cut is undone.
+        self._rest = np.swapaxes(passes.behind, 0, 1).copy()
+        self._rest[:, :-1] += np.einsum("nml,nmsl->nms", found.pulls, self._where[:, :-1])
+        self._charges = np.append(np.cumsum(found.charges[::-1])[::-1][1:], 0.0)
+
+    def cheaper_than(self, cost: float) -> Ints | None:
+        """Give the cheapest nodes (n, M) if they cost less than `cost`; None: nothing does.
+
+        Raises:
+            TooManyStatesError: finding out would take too long.
+        """
+        limit = cost + _SLACK * max(1.0, abs(cost))
+        network = self._network
+        nodes = self._candidates(0, limit)
+        costs = (network.source + network.node[:, 0])[np.arange(network.objects), nodes].sum(axis=1)
+        frontiers = [self._hopeful(0, _Frontier(nodes, costs, np.zeros(len(nodes), np.int64)), limit)]
+        steps = 0
+        for m in range(1, network.frames):
+            nodes = self._candidates(m, limit)
+            steps += len(nodes) * len(frontiers[-1].nodes)
+            if steps > _MOST_STEPS:
+                raise TooManyStatesError
+            frontiers.append(self._hopeful(m, self._arrived(m, frontiers[-1], nodes), limit))
+        return self._traced(frontiers, cost)
+
+    def _candidates(self, frame: int, limit: float) -> Ints:
+        """Give the joint states (J, n) without conflicts that the bound leaves possible."""
+        network = self._network
+        joint, excess = np.empty((1, 0), dtype=np.int64), np.zeros(1)
+        for n in range(network.objects):
+            own = np.flatnonzero(self._excess[n, frame] <= limit - self._bound)
+            total = excess[:, None] + self._excess[n, frame, own]
+            fits = total <= limit - self._bound
+            for other in range(n):
+                fits &= ~self._barred(frame, (other, n))[np.ix_(joint[:, other], own)]
+            first, second = np.nonzero(fits)
+            if len(first) > _MOST_STATES:
+                raise TooManyStatesError
+            joint = np.column_stack([joint[first], own[second]])
+            excess = total[first, second]
+        return joint
+
+    def _barred(self, frame: int, pair: tuple[int, int]) -> Bools:
+        """Say which states of two objects conflict, (S, S)."""
+        places, sets = self._network.places, self._network.sets
+        barred = np.zeros((places + 1, places + 1), dtype=np.bool_)
+        first, second = (slice(sets[n] * places, (sets[n] + 1) * places) for n in pair)
+        barred[:places, :places] = self._exclusions[frame, first, second]
+        return barred
+
+    def _hopeful(self, frame: int, frontier: _Frontier, limit: float) -> _Frontier:
+        """Leave out joint states from which no answer is as cheap as the limit."""
+        each = np.arange(self._network.objects)
+        rest = self._rest[each, frame, frontier.nodes].sum(axis=1) - self._charges[frame]
+        kept = frontier.costs + rest <= limit
+        return _Frontier(frontier.nodes[kept], frontier.costs[kept], frontier.origin[kept])
+
+    def _arrived(self, frame: int, before: _Frontier, nodes: Ints) -> _Frontier:
+        """Give the cheapest way into each of the joint states `nodes` (J, n) of a frame."""
+        network = self._network
+        best, origin = np.full(len(nodes), np.inf), np.zeros(len(nodes), dtype=np.int64)
+        leaving, entering = self._apart(frame - 1, before.nodes), self._apart(frame, nodes)
+        size = max(1, _AT_ONCE // max(1, len(nodes)))
+        for first in range(0, len(before.nodes), size):
+            part = slice(first, first + size)
+            ways = network.layout * cdist(leaving[part], entering, "cityblock")
+            ways += before.costs[part, None]
+            for n, p in enumerate(network.pair_sets):
+                ways += network.pair[p, frame - 1][before.nodes[part, n][:, None], nodes[:, n]]
+            least = ways.argmin(axis=0)
+            costs = ways[least, np.arange(len(nodes))]
+            better = costs < best
+            best[better], origin[better] = costs[better], least[better] + first
+        own = network.node[np.arange(network.objects), frame, nodes].sum(axis=1)
+        return _Frontier(nodes, best + own, origin)
+
+    def _apart(self, frame: int, nodes: Ints) -> Floats:
+        """Give the differences of the locations of all pairs of objects, (J, pairs * 4)."""
+        where = self._where[np.arange(self._network.objects), frame, nodes]
+        first, second = np.triu_indices(self._network.objects, 1)
+        return np.asarray((where[:, first] - where[:, second]).reshape(len(nodes), len(first) * BOX_SIDES))
+
+    def _traced(self, frontiers: list[_Frontier], cost: float) -> Ints | None:
+        last = frontiers[-1]
+        ends = last.costs + self._network.sink[np.arange(self._network.objects), last.nodes].sum(axis=1)
+        if not len(ends) or not ends.min() < cost:
+            return None
+        at = int(ends.argmin())
+        columns = []
+        for frontier in reversed(frontiers):
+            columns.append(frontier.nodes[at])
+            at = int(frontier.origin[at])
+        return np.array(columns[::-1]).T
+
+
 """Relative: excesses are sums of some tens of costs, each with its rounding error."""
 
 

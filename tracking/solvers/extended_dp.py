@@ -5,13 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from tracking.boxes import Floats
-from tracking.conflicts import Bools
-from tracking.network import Network
-from tracking.solvers.base import Solution
-from tracking.solvers.finish import Proof, answered, nothing
-from tracking.solvers.hint import Hint
+from tracking.model.conflicts import Bools
+from tracking.model.network import Network
+from tracking.solvers.base import Solution, TimedSolver
 from tracking.solvers.objective import Ints
-from tracking.solvers.timed import TimedSolver
+from tracking.solvers.solution_builder import Proof, answered, nothing
+from tracking.solvers.warm_start import Hint
 
 _LARGEST = 30_000_000
 """Numbers held at once, 240 MB: three objects with 70 places, say."""

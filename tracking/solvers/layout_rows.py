@@ -9,7 +9,7 @@ import numpy as np
 from scipy import sparse
 
 from tracking.boxes import BOX_SIDES, Floats
-from tracking.network import Network
+from tracking.model.network import Network
 from tracking.solvers.objective import Ints
 
 

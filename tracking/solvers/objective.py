@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracking.boxes import Floats
-from tracking.network import Network
+from tracking.model.network import Network
 from tracking.solvers.base import OCCLUDED
 
 Ints = NDArray[np.int64]

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from tracking.boxes import Floats
-from tracking.conflicts import Bools
-from tracking.network import Network
-from tracking.solvers.conflict_finder import ConflictRow
-from tracking.solvers.highs import optimum, quiet_highs
+from tracking.model.conflicts import Bools
+from tracking.model.network import Network
+from tracking.solvers.cutting_planes import ConflictRow
+from tracking.solvers.linear_program import optimum, quiet_highs
 from tracking.solvers.objective import Ints
 from tracking.solvers.viterbi import Paths
 

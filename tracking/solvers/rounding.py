@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from tracking.boxes import Floats
-from tracking.conflicts import Bools
-from tracking.network import Network
-from tracking.solvers.objective import Ints
+from tracking.model.conflicts import Bools
+from tracking.model.network import Network
+from tracking.solvers.objective import Ints, locations_at, objective, path_cost
+from tracking.solvers.viterbi import Marginals, Packed, Trellis, best_paths, trace
 
 _NOTHING = 1e-9
 """A node with less than this on it is not on any path."""
@@ -52,3 +53,122 @@ def _round_frame(network: Network, usage: Floats, exclusions: Bools) -> Ints:
             usage[:, :places][np.broadcast_to(barred, (len(usage), places))] = 0.0
         usage[owner] = 0.0
     return nodes
+
+
+_ROUNDS = 20
+"""Far above what it takes to settle; bounds the time whatever the window."""
+
+_NO_LESS = 1e-12
+"""Relative: what is cheaper by less is no cheaper."""
+
+
+class Improver:
+    """Improves states of one network; `power` is that of its layout term.
+
+    Attributes:
+        alone: the cheapest path of each object, the others ignored.
+    """
+
+    def __init__(self, network: Network, power: int = 1) -> None:
+        self._network = network
+        self._power = power
+        self._trellis = Trellis.of(network)
+        self._passes = Marginals.of(self._trellis)
+        self.alone = trace(self._trellis, self._passes.ahead)
+
+    def improved(self, nodes: Ints) -> Ints:
+        """Give nodes (n, M) without conflicts that cost no more, from nodes without conflicts.
+
+        Repairs what the rounding of II.D may leave, since it looks at each frame by itself: arcs that do
+        not exist where arcs are gated, and jumps where the relaxation was split.
+        """
+        turns = _Turns(self._network, self._trellis, self._passes, self._power)
+        turns.nodes = nodes.copy()
+        cost = objective(self._network, nodes, self._power)
+        for _ in range(_ROUNDS):
+            changed = [turns.take(owner) for owner in range(self._network.objects)]
+            before, cost = cost, objective(self._network, turns.nodes, self._power)
+            if not any(changed) or not cost < before - _NO_LESS * max(1.0, abs(cost)):
+                break
+        return turns.nodes
+
+
+class _Turns:
+    """Lets one object after the other choose; an object whose others have not moved has nothing to do."""
+
+    def __init__(self, network: Network, trellis: Trellis, passes: Marginals, power: int) -> None:
+        self._network = network
+        self._power = power
+        self._exclusions = network.exclusions()
+        self._trellis = trellis
+        self._through, self._least = passes.through, passes.least
+        self._settled = np.zeros(network.objects, dtype=np.bool_)
+        self.nodes = np.empty((network.objects, network.frames), dtype=np.int64)
+
+    def take(self, owner: int) -> bool:
+        """Give an object its best path around the others; say whether it moved."""
+        if self._settled[owner]:
+            return False
+        cost = self._own_cost(owner)
+        if np.isfinite(cost) and cost <= self._least[owner] + _NO_LESS * max(1.0, abs(cost)):
+            return False
+        before = self.nodes[owner].copy()
+        self.nodes[owner] = self._rerouted(owner, cost)
+        moved = self._own_cost(owner) < cost
+        if moved:
+            self._settled[:] = False
+        else:
+            self.nodes[owner] = before
+        self._settled[owner] = True
+        return moved
+
+    def _own_cost(self, owner: int) -> float:
+        """Give the part of the objective that depends on one object's path."""
+        network = self._network
+        cost = path_cost(network, self.nodes[owner], owner)
+        if network.layout:
+            moves = np.diff(locations_at(network, self.nodes), axis=1)
+            cost += network.layout * float((np.abs(moves - moves[owner]) ** self._power).sum())
+        return cost
+
+    def _rerouted(self, owner: int, cost: float) -> Ints:
+        """Give the best path of one object while the others stay where they are; it has one at `cost`.
+
+        The layout term takes nothing off a path, so states through which every path costs more than that
+        can be left out before it is computed.
+        """
+        network = self._network
+        node = network.node[owner].copy()
+        node[:, :-1][self._barred(owner)] = np.inf
+        limit = cost + _NO_LESS * max(1.0, abs(cost)) if np.isfinite(cost) else np.inf
+        packed = Packed.of(((self._through[owner] <= limit) & np.isfinite(node))[None])
+        trellis = packed.trellis(self._trellis.only(np.array([owner])).with_node(node[None]))
+        if network.layout:
+            trellis.pair[0] += network.layout * self._layout_of_arcs(owner, packed)
+        return np.asarray(packed.named(best_paths(trellis).nodes)[0])
+
+    def _barred(self, owner: int) -> Bools:
+        """Say which places of one object the others bar, (M, K)."""
+        network = self._network
+        places, sets = network.places, network.sets
+        others = np.delete(np.arange(network.objects), owner)
+        taken = self.nodes[others]
+        visible = taken < places
+        at = np.where(visible, sets[others, None] * places + taken, 0)
+        own = slice(sets[owner] * places, (sets[owner] + 1) * places)
+        if not self._exclusions.size:
+            return np.zeros((network.frames, places), dtype=np.bool_)
+        barred = self._exclusions[np.arange(network.frames), at, own] & visible[:, :, None]
+        return np.asarray(barred.any(axis=0))
+
+    def _layout_of_arcs(self, owner: int, packed: Packed) -> Floats:
+        """Give what each arc between states kept adds to the layout term without μ, (M - 1, W, W)."""
+        network = self._network
+        where = packed.states(network.locations[network.sets[[owner]]], 0.0)[0]
+        others = np.diff(np.delete(locations_at(network, self.nodes), owner, axis=0), axis=1)
+        apart = np.zeros((network.frames - 1, where.shape[1], where.shape[1]))
+        for side in range(where.shape[2]):
+            moves = where[1:, None, :, side] - where[:-1, :, None, side]
+            for other in others[:, :, side]:
+                apart += np.abs(moves - other[:, None, None]) ** self._power
+        return apart

@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from tracking.appearance_samples import with_glimpses
 from tracking.boxes import Floats, iou
-from tracking.detections import Detections
-from tracking.glimpses import with_glimpses
+from tracking.model.object_state import mean_histogram
 from tracking.solvers.base import OCCLUDED
-from tracking.templates import mean_histogram
 from tracking.temporal.trails import Stops, Trails
+from tracking.types import Detections
 from tracking.window import WindowTrack
 
 _SAME = 0.3

@@ -7,7 +7,6 @@ from collections.abc import Iterable
 import numpy as np
 
 from tracking.boxes import Floats
-from tracking.detections import Detections
 from tracking.detectors.base import Image
 from tracking.solvers.base import SolveReport
 from tracking.temporal.blobs import Blobs
@@ -16,6 +15,7 @@ from tracking.temporal.settings import TemporalSettings
 from tracking.temporal.telling import told_tracks
 from tracking.temporal.trails import Stops, Trails
 from tracking.temporal.window import Commitment, Stage, TemporalWindow
+from tracking.types import Detections
 from tracking.window import WindowResult, WindowSettings
 
 

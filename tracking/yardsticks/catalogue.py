@@ -7,12 +7,12 @@ from importlib import import_module
 from typing import Any, Protocol, runtime_checkable
 
 from tracking.assist import AssistedTracker, AssistSettings
-from tracking.costs import CostSettings
-from tracking.detections import Detections
 from tracking.detectors.base import Image
+from tracking.model.settings import CostSettings
 from tracking.solvers.base import Solver
 from tracking.temporal import TemporalSettings
 from tracking.tracker import OnlineTracker
+from tracking.types import Detections
 from tracking.window import WindowResult, WindowSettings
 from tracking.yardsticks.method import Method
 from tracking.yardsticks.stepwise import StepwiseTracker

@@ -15,13 +15,13 @@ from typing import Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from tracking.appearance_samples import with_glimpses
 from tracking.assignment import best_pairs
 from tracking.boxes import BOX_SIDES, Floats, iou
-from tracking.detections import Detections
 from tracking.detectors.base import Image
-from tracking.glimpses import with_glimpses
+from tracking.model.object_state import mean_histogram
 from tracking.solvers.base import OCCLUDED, SolveReport
-from tracking.templates import mean_histogram
+from tracking.types import Detections
 from tracking.window import WindowResult, WindowSettings, WindowTrack
 from tracking.yardsticks.method import Method
 

@@ -15,9 +15,9 @@ import cv2
 import numpy as np
 
 from tracking.boxes import Floats, areas, intersections
-from tracking.detections import Detections
 from tracking.detectors.base import Image
 from tracking.solvers.base import OCCLUDED
+from tracking.types import Detections
 from tracking.window import WindowSettings
 from tracking.yardsticks.kalman import Kalman
 from tracking.yardsticks.stepwise import StepwiseSettings, StepwiseTracker

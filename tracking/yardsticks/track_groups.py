@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from tracking.boxes import Floats
-from tracking.detections import Detections
+from tracking.types import Detections
 from tracking.yardsticks.stepwise import Followed
 from tracking.yardsticks.track_links import End
 

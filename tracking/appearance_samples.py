@@ -1,0 +1,55 @@
+"""How an object looks while nobody else is in its box, run by run of frames."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracking.boxes import Floats, iou
+from tracking.solvers.base import OCCLUDED
+from tracking.types import Detections
+from tracking.window import Glimpse, WindowTrack
+
+_CROWDED = 0.2
+"""Overlap (IoU) above which somebody else is in the box. Whoever is hidden just now counts too."""
+
+
+def with_glimpses(
+    tracks: Sequence[WindowTrack],
+    states: Sequence[NDArray[np.int64]],
+    first: int,
+    final: Sequence[Detections],
+) -> tuple[WindowTrack, ...]:
+    """Give the tracks with how they look in the final frames of the window, of which `first` is the first.
+
+    `states` are the observations that each of the tracks is in, frame by frame, -1 where hidden.
+    """
+    if not tracks:
+        return ()
+    boxes = np.stack([track.bridged for track in tracks])[:, : len(final)]
+    overlaps = np.nan_to_num(iou(boxes[:, None], boxes[None]))
+    overlaps[np.arange(len(tracks)), np.arange(len(tracks))] = 0.0
+    alone = overlaps.max(axis=1) <= _CROWDED
+    return tuple(
+        replace(track, looks=_runs(mine, row, first, final))
+        for track, mine, row in zip(tracks, alone, states, strict=True)
+    )
+
+
+def _runs(
+    alone: NDArray[np.bool_], states: NDArray[np.int64], first: int, final: Sequence[Detections]
+) -> tuple[Glimpse, ...]:
+    """Put the frames together that follow each other."""
+    runs: list[tuple[int, list[Floats]]] = []
+    for place, seen in enumerate(final):
+        if not alone[place] or states[place] == OCCLUDED or not seen.histograms.shape[1]:
+            continue
+        histogram = seen.histograms[states[place]]
+        if runs and runs[-1][0] + len(runs[-1][1]) == first + place:
+            runs[-1][1].append(histogram)
+        else:
+            runs.append((first + place, [histogram]))
+    return tuple(Glimpse(at, at + len(run) - 1, np.mean(run, axis=0)) for at, run in runs)

@@ -1,0 +1,47 @@
+"""How far an object can have got since it was seen: places out of reach are no places of its network.
+
+Paper II.B allows partially connected networks for exactly this reason. Without it an object that comes
+out of an occlusion node may do so anywhere in the picture.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from tracking.boxes import Floats, heights, strides
+from tracking.model.network import Network
+from tracking.model.object_state import RememberedObject
+from tracking.types import Detections
+from tracking.window import WindowSettings
+
+
+def reachable(
+    item: RememberedObject, frame: int, detections: Detections, window: WindowSettings
+) -> npt.NDArray[np.bool_]:
+    """Say which detections of a frame the object can be, `(K,)` bool."""
+    return near(item.box, detections.boxes, abs(frame - item.frame), window)
+
+
+def near(box: Floats, boxes: Floats, elapsed: int, window: WindowSettings) -> npt.NDArray[np.bool_]:
+    """Say which boxes `(K, 4)` an object of `box` `(4,)` can have reached after `elapsed` frames, `(K,)`.
+
+    It may have gone (`strides`) `reach + reach_per_frame (elapsed - 1)` heights, and the height
+    changed by a factor.
+    """
+    tall, other = float(heights(box)), heights(boxes)
+    far = window.reach + window.reach_per_frame * max(elapsed - 1, 0)
+    alike = (other <= window.grow * max(tall, 1.0)) & (tall <= window.grow * np.maximum(other, 1.0))
+    return np.asarray((strides(box, boxes) <= far) & (alike | (elapsed > window.window)))
+
+
+def within_reach(network: Network, allowed: Sequence[Sequence[npt.NDArray[np.bool_]]]) -> Network:
+    """Give the network without the places out of reach; `allowed[n][m]` is `(K_m,)` bool."""
+    node = network.node.copy()
+    for n, frames in enumerate(allowed):
+        for m, places in enumerate(frames):
+            node[n, m, : len(places)][~places] = np.inf
+    return replace(network, node=node)

@@ -1,0 +1,99 @@
+"""Which places exclude each other: the conflict sets O(v) of paper II.B, and their rows in the program."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracking.boxes import BOX_SIDES, corner_distance, overlap
+from tracking.model.observations import Places
+from tracking.model.settings import CostSettings
+
+Bools = NDArray[np.bool_]
+
+
+def conflict_relation(places: Places, settings: CostSettings) -> Bools:
+    """Say which places of a frame conflict, shape (M, P K, P K), symmetric, each with itself.
+
+    Places are numbered `p K + i`. Padding conflicts with nothing, not even with itself.
+    """
+    sets, frames, width = places.present.shape
+    boxes = np.swapaxes(places.boxes, 0, 1).reshape(frames, sets * width, BOX_SIDES)
+    present = np.swapaxes(places.present, 0, 1).reshape(frames, sets * width)
+    relation = np.empty((frames, sets * width, sets * width), dtype=np.bool_)
+    for m in range(frames):
+        pair = boxes[m, :, None], boxes[m, None]
+        if settings.conflict_rule == "corners":
+            relation[m] = corner_distance(*pair) < settings.conflict_distance
+        else:
+            relation[m] = overlap(*pair) > settings.conflict_overlap
+        np.fill_diagonal(relation[m], val=True)
+    return relation & present[:, :, None] & present[:, None]
+
+
+def clique_rows(relation: Bools, owners: NDArray[np.int64] | None) -> Bools:
+    """Cover conflicts of one frame by cliques: (R, V) bool, at most one path through each row.
+
+    `relation` is (V, V); `owners` (V,) says which object each place belongs to, None: to all of them.
+    Every conflicting pair of places that two objects could take is in some row together. The places of
+    one object join a clique freely, since an object takes one place only. The cover of a connected part
+    does not depend on the rest, so it may be computed by itself.
+    """
+    joined, uncovered = relation.copy(), relation.copy()
+    if owners is not None:
+        own = owners[:, None] == owners
+        present = relation.diagonal()
+        joined |= own & present[:, None] & present
+        uncovered &= ~own
+    if len(relation) and uncovered.any() and joined.all():
+        return np.ones((1, len(relation)), dtype=np.bool_)
+    rows = []
+    for first in range(len(relation)):
+        while uncovered[first].any():
+            row = _grow(first, int(uncovered[first].argmax()), joined, uncovered)
+            uncovered[np.ix_(row, row)] = False
+            rows.append(row)
+    return np.array(rows).reshape(len(rows), len(relation))
+
+
+def connected(relation: Bools, place: int) -> NDArray[np.int64]:
+    """Give the places of a frame that `place` conflicts with, directly or through others, ascending."""
+    reached = relation[place]
+    while True:
+        further = relation[reached].any(axis=0)
+        if (further == reached).all():
+            return np.flatnonzero(reached)
+        reached = further
+
+
+def _grow(first: int, second: int, joined: Bools, uncovered: Bools) -> Bools:
+    """Grow the clique of two places, by those that cover most that is uncovered first."""
+    row = np.zeros(len(joined), dtype=np.bool_)
+    row[[first, second]] = True
+    candidates = joined[first] & joined[second] & ~row
+    while candidates.any():
+        gain = uncovered[:, row].sum(axis=1)
+        gain[~candidates] = -1
+        best = int(gain.argmax())
+        row[best] = True
+        candidates &= joined[best]
+        candidates[best] = False
+    return row
+
+
+def star_exclusions(relation: Bools, sets: int, objects: int) -> Bools:
+    """Say which places two objects cannot both take when stars are the rows, (M, P K, P K).
+
+    Under II.D to the letter two places also exclude each other if both conflict with one place of a
+    third object.
+    """
+    if objects <= 2:  # noqa: PLR2004 — there is no third object
+        return relation
+    step = relation.copy()
+    if sets > 1:
+        width = relation.shape[1] // sets
+        for p in range(sets):
+            own = slice(p * width, (p + 1) * width)
+            step[:, own, own] = False
+    counts = step.astype(np.float64)
+    return relation | (counts @ counts > 0.0)

@@ -1,0 +1,155 @@
+"""What it costs to be elsewhere than somebody who goes on as they went: not in the paper."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tracking.appearance import appearance_distance
+from tracking.boxes import BOX_SIDES, Floats, displacement, heights
+from tracking.model.motion import Motion
+from tracking.model.object_state import Template
+from tracking.model.observations import Places
+from tracking.model.settings import CostSettings
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MotionCharges:
+    """What arcs to the places of a window cost objects of known motion; nothing for the others.
+
+    Attributes:
+        off_course: (n, M, K) coming from another place.
+        returned: (n, M, K) coming out of hiding; infinite where nobody comes back so far off, or so unlike.
+    """
+
+    off_course: Floats
+    returned: Floats
+
+
+def motion_charges(
+    templates: Sequence[Template], likeness: Floats, places: Places, settings: CostSettings
+) -> MotionCharges | None:
+    """Charge all objects; `likeness` is (n, M, K). `None` where it costs nobody anything."""
+    known = any(template.motion is not None for template in templates)
+    if not known or not (settings.course or settings.comeback):
+        return None
+    boxes = np.broadcast_to(places.boxes, (len(templates), *places.boxes.shape[1:]))
+    charges = MotionCharges(np.zeros(likeness.shape), np.zeros(likeness.shape))
+    for n, template in enumerate(templates):
+        if template.motion is not None:
+            charges.off_course[n], charges.returned[n] = _charges(
+                template.motion, boxes[n], likeness[n], settings
+            )
+    return charges
+
+
+def _charges(
+    motion: Motion, boxes: Floats, likeness: Floats, settings: CostSettings
+) -> tuple[Floats, Floats]:
+    """Give the two charges of one object for boxes (M, K, 4), both (M, K)."""
+    away, moved = motion.deviations(boxes), motion.moved(len(boxes))[:, None]
+    share = np.minimum(away / (settings.slack + settings.course_drift * moved), 1.0)
+    off_course = settings.course * share
+    if not settings.comeback:
+        return off_course, off_course
+    share = away / (settings.slack + settings.comeback_drift * moved)
+    returned = off_course + settings.comeback * share**2
+    returned[(share > 1.0) | (likeness > settings.alike)] = np.inf
+    return off_course, returned
+
+
+def node_costs(likeness: Floats, places: Places, settings: CostSettings) -> Floats:
+    """Give what every arc into a state costs, (n, M, S): `likeness` (n, M, K) to it, or the occlusion."""
+    objects, frames, width = likeness.shape
+    costs = np.empty((objects, frames, width + 1))
+    doubt = settings.confidence * (1.0 - places.scores)
+    costs[:, :, :width] = likeness + doubt
+    costs[:, :, :width][~np.broadcast_to(places.present, costs[:, :, :width].shape)] = np.inf
+    costs[:, :, width] = settings.change + settings.occlusion
+    return costs
+
+
+def source_costs(
+    templates: Sequence[Template],
+    likeness: Floats,
+    charges: MotionCharges | None,
+    places: Places,
+    settings: CostSettings,
+) -> Floats:
+    """Give what the arcs from the source cost besides the node, (n, S); `likeness` is (n, M, K)."""
+    width = places.present.shape[2]
+    costs = np.full((len(templates), width + 1), settings.change)
+    costs[:, width] = 0.0
+    first_boxes = np.broadcast_to(places.boxes[:, 0], (len(templates), width, BOX_SIDES))
+    for n, template in enumerate(templates):
+        if template.box is not None:
+            moved = _moves(template.box[None], first_boxes[n], settings)[0]
+            costs[n, :width] = settings.appearance * likeness[n, 0] + moved
+            costs[n, width] = settings.leave
+        if charges is not None:
+            first = charges.returned if template.box is None else charges.off_course
+            costs[n, :width] += first[n, 0]
+    return costs
+
+
+def pair_costs(charges: MotionCharges | None, places: Places, settings: CostSettings) -> Floats:
+    """Give what the arcs between two frames cost besides the node, (Q, M - 1, S, S).
+
+    Q is the number of sets of observations, or n where somebody's motion is known.
+    """
+    sets, frames, width = places.present.shape
+    costs = np.zeros((sets, max(frames - 1, 0), width + 1, width + 1))
+    before, after = places.histograms[:, :-1], places.histograms[:, 1:]
+    seen = costs[:, :, :width, :width]
+    seen += settings.appearance * appearance_distance(before, after, settings.measure)
+    seen += _moves(places.boxes[:, :-1], places.boxes[:, 1:], settings)
+    costs[:, :, width, :width] = settings.change
+    costs[:, :, :width, width] = settings.leave
+    if charges is None:
+        return costs
+    costs = np.broadcast_to(costs, (len(charges.returned), *costs.shape[1:])).copy()
+    costs[:, :, :width, :width] += charges.off_course[:, 1:, None]
+    costs[:, :, width, :width] += charges.returned[:, 1:]
+    return costs
+
+
+def sink_costs(objects: int, places: Places, settings: CostSettings) -> Floats:
+    """Give what the arcs into the sink cost, (n, S): one constant."""
+    return np.full((objects, places.present.shape[2] + 1), settings.change + settings.occlusion)
+
+
+def _moves(before: Floats, after: Floats, settings: CostSettings) -> Floats:
+    """Give the cost of moving from boxes (..., I, 4) to boxes (..., J, 4), (..., I, J)."""
+    before, after = before[..., :, None, :], after[..., None, :, :]
+    moved = displacement(before, after)
+    if settings.displacement_unit == "heights":
+        mean = (heights(before) + heights(after)) / 2.0
+        moved = moved / np.where(mean > 0.0, mean, 1.0)
+    costs = settings.displacement * moved
+    if settings.gate is not None:
+        costs[moved > settings.gate] = np.inf
+    return costs
+
+
+def template_distances(templates: Sequence[Template], places: Places, settings: CostSettings) -> Floats:
+    """Compare each template with each place: g(s_n, v), (n, M, K)."""
+    sets, frames, width, bins = places.histograms.shape
+    distances = np.full((len(templates), frames, width), settings.unknown)
+    known = [n for n, template in enumerate(templates) if template.histogram.size and bins]
+    if not known:
+        return distances
+    wrong = {templates[n].histogram.size for n in known} - {bins}
+    if wrong:
+        raise ValueError(f"templates need histograms of {bins} bins like the frames, not {sorted(wrong)}")
+    looks = np.array([templates[n].histogram for n in known])
+    if sets == 1:
+        seen = places.histograms.reshape(frames * width, bins)
+        table = appearance_distance(looks, seen, settings.measure)
+        distances[known] = table.reshape(len(known), frames, width)
+    else:
+        own = places.histograms[known].reshape(len(known), frames * width, bins)
+        table = appearance_distance(looks[:, None], own, settings.measure)
+        distances[known] = table.reshape(len(known), frames, width)
+    return distances

@@ -1,0 +1,228 @@
+"""The network of one window: all places that each object can be in, and what moving between them costs.
+
+Paper II.B, Fig. 4. The observations of a frame are padded to K places; the node after them, the last
+one, is the occlusion node, so that index -1 means occluded everywhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracking.boxes import BOX_SIDES, Floats
+from tracking.model.conflicts import Bools, clique_rows, conflict_relation, star_exclusions
+from tracking.model.costs import (
+    motion_charges,
+    node_costs,
+    pair_costs,
+    sink_costs,
+    source_costs,
+    template_distances,
+)
+from tracking.model.object_state import Template
+from tracking.model.observations import Places, stack_places
+from tracking.model.settings import ConflictRows, CostSettings
+from tracking.types import Detections
+
+__all__ = [
+    "CostSettings",
+    "Network",
+    "Template",
+    "build_network",
+    "build_network_per_object",
+]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Network:
+    """One window of M frames and n objects; S = K + 1 states a frame, the last one occlusion.
+
+    The cost of the arc from state i of frame m to state j of frame m + 1 of object n is
+    `pair[q, m, i, j] + node[n, m + 1, j]`, where q is `pair_sets[n]`; infinite: there is no such arc.
+
+    Attributes:
+        boxes: (P, M, K, 4) pixels, zero on padding. P = 1: all objects share the observations;
+            else P = n and set n belongs to object n.
+        present: (P, M, K) bool, False on padding.
+        source: (n, S) cost of the arc from the source s_n to a state of the first frame, without `node`.
+        node: (n, M, S) cost of being in a state, the same for all arcs into it.
+        pair: (Q, M - 1, S, S) cost of going from one state to another; Q = 1: the same for all objects,
+            else n.
+        sink: (n, S) cost of the arc from a state of the last frame to the sink t_n.
+        conflicts: (M, P K, P K) bool, places `p K + i` of a frame that occupy one region.
+        conflict_rows: how conflicts become rows of the program.
+        locations: (P, M, S, 4) location vectors of the layout term, pixels.
+        layout: μ, cost per pixel.
+    """
+
+    boxes: Floats
+    present: NDArray[np.bool_]
+    source: Floats
+    node: Floats
+    pair: Floats
+    sink: Floats
+    conflicts: Bools
+    conflict_rows: ConflictRows
+    locations: Floats
+    layout: float
+
+    @property
+    def objects(self) -> int:
+        """The number n of objects."""
+        return int(self.node.shape[0])
+
+    @property
+    def frames(self) -> int:
+        """The number M of frames."""
+        return int(self.node.shape[1])
+
+    @property
+    def places(self) -> int:
+        """The number K of places in the fullest frame."""
+        return int(self.node.shape[2]) - 1
+
+    @property
+    def shared(self) -> bool:
+        """Whether all objects share one set of observations."""
+        return len(self.boxes) == 1
+
+    @property
+    def sets(self) -> NDArray[np.int64]:
+        """The set of observations that each object takes its places from, (n,)."""
+        return np.zeros(self.objects, dtype=np.int64) if self.shared else np.arange(self.objects)
+
+    @property
+    def pair_sets(self) -> NDArray[np.int64]:
+        """The row of `pair` that each object's arcs cost, (n,)."""
+        alike = len(self.pair) == 1
+        return np.zeros(self.objects, dtype=np.int64) if alike else np.arange(self.objects)
+
+    @property
+    def owners(self) -> NDArray[np.int64] | None:
+        """The object that each of the places `p K + i` belongs to, (P K,); None: all share them."""
+        return None if self.shared else np.repeat(np.arange(self.objects), self.places)
+
+    def exclusions(self) -> Bools:
+        """Say which places of each frame two objects cannot both take, (M, P K, P K)."""
+        if self.conflict_rows == "clique":
+            return self.conflicts
+        return star_exclusions(self.conflicts, len(self.boxes), self.objects)
+
+    def rows(self, frame: int) -> Bools:
+        """Give the conflict rows of a frame, (R, n, K): through each, at most one path goes."""
+        relation = self.conflicts[frame]
+        places = self.places
+        if self.objects < 2 or not relation.size:  # noqa: PLR2004 — one object conflicts with nobody
+            return np.zeros((0, self.objects, places), dtype=np.bool_)
+        if self.conflict_rows == "clique":
+            rows = clique_rows(relation, self.owners).reshape(-1, len(self.boxes), places)
+            return np.broadcast_to(rows, (len(rows), self.objects, places))
+        return self._stars(frame)
+
+    def _stars(self, frame: int) -> Bools:
+        """Give one row for each place of each object: itself, and what conflicts of the others."""
+        sets, n, places = self.sets, self.objects, self.places
+        relation = self.conflicts[frame].reshape(len(self.boxes), places, len(self.boxes), places)
+        rows = relation[sets][:, :, sets].copy()
+        for k in range(n):
+            rows[k, :, k] = np.eye(places, dtype=np.bool_)
+        used = self.present[sets, frame].ravel()
+        return np.asarray(rows.reshape(n * places, n, places)[used])
+
+    def only(self, objects: Sequence[int]) -> Network:
+        """Give the network of some of the objects, in the order given."""
+        chosen = np.asarray(objects, dtype=np.int64)
+        if self.shared:
+            boxes, present = self.boxes, self.present
+            conflicts, locations = self.conflicts, self.locations
+        else:
+            boxes, present = self.boxes[chosen], self.present[chosen]
+            places = (chosen[:, None] * self.places + np.arange(self.places)).ravel()
+            conflicts = self.conflicts[:, places[:, None], places]
+            locations = self.locations[chosen]
+        return Network(
+            boxes=boxes,
+            present=present,
+            source=self.source[chosen],
+            node=self.node[chosen],
+            pair=self.pair if len(self.pair) == 1 else self.pair[chosen],
+            sink=self.sink[chosen],
+            conflicts=conflicts,
+            conflict_rows=self.conflict_rows,
+            locations=locations,
+            layout=self.layout,
+        )
+
+
+def build_network(
+    templates: Sequence[Template],
+    frames: Sequence[Detections],
+    settings: CostSettings,
+    centre: tuple[float, float] | None = None,
+) -> Network:
+    """Build the network of a window in which all objects share the observations of each frame.
+
+    `templates` are the n objects in the frame before the window, `frames` the M frames after it.
+    `centre`, pixels, is where the layout term places an occluded object (II.D: the centre of the image);
+    None: the middle of all observations.
+
+    Raises:
+        ValueError: there is no frame, or histograms differ in their number of bins.
+    """
+    return _build(templates, stack_places([frames]), settings, centre)
+
+
+def build_network_per_object(
+    templates: Sequence[Template],
+    frames: Sequence[Sequence[Detections]],
+    settings: CostSettings,
+    centre: tuple[float, float] | None = None,
+) -> Network:
+    """Build the network of a window in which each object has observations of its own (template matching).
+
+    `frames[n][m]` are the observations of object n in frame m; else as `build_network`.
+
+    Raises:
+        ValueError: there is no object or no frame, lengths do not fit, or histograms differ in bins.
+    """
+    if len(templates) != len(frames):
+        raise ValueError(f"{len(templates)} templates need as many lists of frames, not {len(frames)}")
+    return _build(templates, stack_places(frames), settings, centre)
+
+
+def _build(
+    templates: Sequence[Template],
+    places: Places,
+    settings: CostSettings,
+    centre: tuple[float, float] | None,
+) -> Network:
+    likeness = template_distances(templates, places, settings)
+    charges = motion_charges(templates, likeness, places, settings)
+    return Network(
+        boxes=places.boxes,
+        present=places.present,
+        source=source_costs(templates, likeness, charges, places, settings),
+        node=node_costs(likeness, places, settings),
+        pair=pair_costs(charges, places, settings),
+        sink=sink_costs(len(templates), places, settings),
+        conflicts=conflict_relation(places, settings),
+        conflict_rows=settings.conflict_rows,
+        locations=_locations(places, centre),
+        layout=settings.layout,
+    )
+
+
+def _locations(places: Places, centre: tuple[float, float] | None) -> Floats:
+    """Give the location vectors r of II.D, (P, M, S, 4); occlusion is a box without size at `centre`."""
+    sets, frames, width = places.present.shape
+    if centre is None:
+        seen = places.boxes[places.present]
+        middle = (seen.min(axis=0) + seen.max(axis=0)) / 2.0 if len(seen) else np.zeros(BOX_SIDES)
+        centre = (float(middle[[0, 2]].mean()), float(middle[[1, 3]].mean()))
+    locations = np.empty((sets, frames, width + 1, BOX_SIDES))
+    locations[:] = (*centre, *centre)
+    locations[:, :, :width][places.present] = places.boxes[places.present]
+    return locations

@@ -1,0 +1,68 @@
+"""The observations of a window as padded arrays, so that costs are computed for all frames at once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracking.boxes import BOX_SIDES, Floats
+from tracking.types import Detections
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Places:
+    """P sets of observations over M frames, padded to the K of the fullest frame.
+
+    P is 1 where all objects share the observations, else the number of objects.
+
+    Attributes:
+        boxes: (P, M, K, 4) pixels; padding is zero.
+        scores: (P, M, K); padding is zero.
+        histograms: (P, M, K, B); padding is zero.
+        present: (P, M, K) bool, False on padding.
+    """
+
+    boxes: Floats
+    scores: Floats
+    histograms: Floats
+    present: NDArray[np.bool_]
+
+
+def stack_places(sets: Sequence[Sequence[Detections]]) -> Places:
+    """Pad the sets of frames into arrays.
+
+    Raises:
+        ValueError: there is no frame, sets differ in length, or histograms differ in bins.
+    """
+    lengths = {len(frames) for frames in sets}
+    if lengths == {0} or not sets:
+        raise ValueError("a window needs at least one frame")
+    if len(lengths) > 1:
+        raise ValueError(f"every object needs as many frames as the others, not {sorted(lengths)}")
+    shape = (len(sets), lengths.pop())
+    width = max(len(seen) for frames in sets for seen in frames)
+    bins = _bins(sets)
+    boxes = np.zeros((*shape, width, BOX_SIDES))
+    scores = np.zeros((*shape, width))
+    appearance = np.zeros((*shape, width, bins))
+    present = np.zeros((*shape, width), dtype=np.bool_)
+    for p, frames in enumerate(sets):
+        for m, seen in enumerate(frames):
+            count = len(seen)
+            if count:
+                boxes[p, m, :count] = seen.boxes
+                scores[p, m, :count] = seen.scores
+                appearance[p, m, :count] = seen.histograms
+                present[p, m, :count] = True
+    return Places(boxes, scores, appearance, present)
+
+
+def _bins(sets: Sequence[Sequence[Detections]]) -> int:
+    """Give the number of bins that all frames with observations have."""
+    bins = {seen.histograms.shape[1] for frames in sets for seen in frames if len(seen)}
+    if len(bins) > 1:
+        raise ValueError(f"all histograms of a window need the same number of bins, not {sorted(bins)}")
+    return bins.pop() if bins else 0

@@ -1,0 +1,119 @@
+"""The settings of the network's costs (paper II.B)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from tracking.appearance import AppearanceMeasure
+
+ConflictRule = Literal["corners", "overlap"]
+ConflictRows = Literal["clique", "star"]
+DisplacementUnit = Literal["pixels", "heights"]
+
+
+# Pixels: below this a gate was meant for the other unit.
+_LEAST_GATE = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class CostSettings:
+    """What a path through the network costs, and which places exclude each other.
+
+    An arc between two observations costs g(template, target) + λ1 g(from, to) + λ2 d(from, to); an arc
+    out of an occlusion c_a + g(template, target); an arc into an occlusion or into the sink c_a + c_b.
+
+    Raises:
+        ValueError: a weight is negative, or a gate or threshold is not positive.
+    """
+
+    # λ1: weight of the change of appearance between two frames; no unit (g is in [0, 1]).
+    appearance: float = 0.25
+    # λ2: weight of the displacement between two frames; cost per displacement unit (below).
+    displacement: float = 2.0
+    # What displacement (and the gate) count in: pixels of the image, or mean heights of the two boxes.
+    displacement_unit: DisplacementUnit = "heights"
+    # c_a: what a usual change of place and appearance between two frames costs.
+    change: float = 0.3
+    # c_b: above the appearance difference of one object to itself, below that of two objects.
+    occlusion: float = 0.8
+    # Added for an observation of score 0, falling to nothing at score 1: a hypothesis that explains
+    # nothing of its own is nearly as dear as being hidden. 0 is the paper.
+    confidence: float = 0.7
+    # Added where somebody seen becomes hidden, once for however long it lasts. 0 is the paper.
+    leave: float = 1.0
+    # Weight of the distance from where somebody known should be by now if they go on as they went: the
+    # full weight from `slack + course_drift * frames elapsed` heights on. 0 is the paper.
+    course: float = 0.2
+    course_drift: float = 0.04
+    # Weight of the square of that distance where somebody comes out of hiding, in units of
+    # `slack + comeback_drift * frames elapsed` heights; nobody comes back farther off. 0 is the paper:
+    # anywhere.
+    comeback: float = 1.0
+    comeback_drift: float = 0.03
+    # Largest difference of appearance to their template at which somebody comes out of hiding, 0 to 1.
+    alike: float = 0.5
+    # How far somebody may be from there without having moved, heights.
+    slack: float = 0.2
+    # g of somebody or something whose appearance is not known: about what one object differs from
+    # itself, so that the other costs weigh the same with pictures and without.
+    unknown: float = 0.3
+    # How histograms are compared: g(.), in [0, 1].
+    measure: AppearanceMeasure = "bhattacharyya"
+    # Longest displacement from one frame to the next, in displacement units; None: any.
+    gate: float | None = 0.6
+    # μ: weight of the spatial layout term, cost per pixel of L1 change between two objects; 0 is off.
+    layout: float = 0.0
+    # When two boxes occupy one place: by the city-block distance of their corners, or by their overlap.
+    conflict_rule: ConflictRule = "overlap"
+    # Rule "corners": boxes conflict below this total city-block distance of the 4 corners, pixels.
+    conflict_distance: float = 60.0
+    # Rule "overlap": boxes conflict above this ratio of shared to average area.
+    conflict_overlap: float = 0.5
+    # "clique": no two objects hold conflicting boxes. "star" is II.D to the letter: at most one path
+    # goes through the conflict set of every box, even where the box itself is nobody's; from three
+    # objects on that forbids more.
+    conflict_rows: ConflictRows = "clique"
+
+    def __post_init__(self) -> None:
+        weights = (
+            "appearance",
+            "displacement",
+            "change",
+            "occlusion",
+            "confidence",
+            "leave",
+            "course",
+            "comeback",
+            "unknown",
+            "layout",
+        )
+        for name in weights:
+            if not getattr(self, name) >= 0.0:
+                raise ValueError(f"{name} must not be negative, not {getattr(self, name)}")
+        if not min(self.slack, self.course_drift, self.comeback_drift) > 0.0:
+            raise ValueError("slack, course_drift and comeback_drift must be positive")
+        if self.gate is not None and not self.gate > 0.0:
+            raise ValueError(f"gate must be positive, not {self.gate}")
+        if self.gate is not None and self.displacement_unit == "pixels" and self.gate < _LEAST_GATE:
+            raise ValueError(f"a gate of {self.gate:g} pixels lets nobody move: give another, or none")
+        if not self.conflict_distance > 0.0:
+            raise ValueError(f"conflict_distance must be positive, not {self.conflict_distance}")
+        if not self.conflict_overlap > 0.0:
+            raise ValueError(f"conflict_overlap must be positive, not {self.conflict_overlap}")
+
+
+PAPER_COSTS = CostSettings(
+    appearance=0.5,
+    displacement=0.01,
+    displacement_unit="pixels",
+    confidence=0.0,
+    leave=0.0,
+    course=0.0,
+    comeback=0.0,
+    gate=None,
+    occlusion=0.5,
+    unknown=0.0,
+    conflict_rule="corners",
+)
+"""The costs as paper II.B has them, in pixels of a CIF picture (the defaults are free of its size)."""

@@ -1,0 +1,244 @@
+"""Column generation over whole paths, for windows without layout term.
+
+Every object starts on its cheapest path. Where these conflict, the objects concerned, and no others,
+enter a small program that mixes their paths so that the rows they broke hold. Its duals price the places
+of the rows; a Viterbi pass over the priced network finds each object's best path or proves that there is
+no better one. Objects that never meet never share a row, so the program falls into independent groups
+of objects, and a group whose prices stand still is not priced again; most objects of most windows never
+enter it.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+
+from tracking.model.conflicts import Bools
+from tracking.model.network import Network
+from tracking.solvers.arc_generation import ArcSearch, arc_search
+from tracking.solvers.arc_master import ArcMaster, arcs_of_paths
+from tracking.solvers.base import Solution, TimedSolver
+from tracking.solvers.cutting_planes import ConflictFinder, ConflictRow, groups_of, priced_rows
+from tracking.solvers.dynamic_programming import greedy_paths
+from tracking.solvers.objective import Ints, conflict_count, path_costs
+from tracking.solvers.path_master import MasterPoint, PathMaster
+from tracking.solvers.relaxation import CLOSE, Relaxed, recall, with_prices
+from tracking.solvers.rounding import Improver
+from tracking.solvers.solution_builder import finished, nothing
+from tracking.solvers.viterbi import Paths, Pricing, Trellis
+from tracking.solvers.warm_start import Hint
+
+_FEW_OBJECTS = 12
+"""Up to so many objects in conflict, paths settle sooner than arcs do."""
+
+_STEPS, _BOLD = 8, 1.2
+"""Steps of prices in each round, and how much longer than Polyak's they are: into the optimum, not onto
+its edge.
+"""
+
+_PATIENCE, _WORTHWHILE = 2, 0.8
+"""After so many steps, those that leave more than this share of what is missing, each, are given up."""
+
+_ROUNDS_OF_FEW, _ROUNDS_OF_MANY = 50, 4
+"""Rounds of paths before arcs take over."""
+
+
+class PathSearch:
+    """One search; `run` it once. The network has at least one object and no layout term."""
+
+    def __init__(self, network: Network) -> None:
+        self._network = network
+        self._pricing = Pricing(Trellis.of(network))
+        self._alone = self._pricing.alone
+        self._bound = -np.inf
+        self._priced = network.node
+        self._prices = np.empty(0)
+        self._point = MasterPoint(0.0, np.empty(0), np.empty(0))
+        self._meets = np.zeros((network.objects, network.objects), dtype=np.bool_)
+        self._active = np.zeros(network.objects, dtype=np.bool_)
+        self._usage = np.zeros(network.node.shape)
+        each, frames = np.indices(self._alone.nodes.shape)
+        self._usage[each, frames, self._alone.nodes] = 1.0
+
+    def run(self, hint: Hint | None = None) -> Relaxed:
+        """Find the optimum of the relaxation."""
+        if not conflict_count(self._network, self._alone.nodes):
+            return Relaxed(self._usage, float(self._alone.costs.sum()), self._priced, 0)
+        return self._of_those_who_meet(hint)
+
+    def _of_those_who_meet(self, hint: Hint | None) -> Relaxed:
+        rows = self._finder.broken(self._usage)
+        told = recall(self._network, self._pricing, self._finder, hint) if hint else None
+        if told is not None and told.proven is not None:
+            return told.proven
+        self._meet(rows)
+        if self._largest_group() > _FEW_OBJECTS:
+            return arc_search(self._network, self._pricing, ConflictFinder(self._network)).run()
+        self._bind([*rows, *self._finder.fresh(told.rows)] if told else rows)
+        for paths in told.paths if told else ():
+            active = np.flatnonzero(self._active)
+            self._master.add_paths(active, paths.only(active))
+        self._solve()
+        self._keep_rows()
+        rounds = 0
+        while rounds < (_ROUNDS_OF_FEW if self._largest_group() <= _FEW_OBJECTS else _ROUNDS_OF_MANY):
+            rounds += 1
+            if not self._enter_better_paths():
+                prices = priced_rows(self._network, self._master.rows, self._prices)
+                return Relaxed(self._usage, self._bound, self._priced, rounds, prices)
+            self._solve()
+            self._keep_rows()
+        return self._by_arcs(rounds)
+
+    @cached_property
+    def _finder(self) -> ConflictFinder:
+        return ConflictFinder(self._network)
+
+    @cached_property
+    def _master(self) -> PathMaster:
+        return PathMaster(self._network)
+
+    def _by_arcs(self, rounds: int) -> Relaxed:
+        """Go on from the arcs of the paths in use: many objects that meet want parts of paths combined."""
+        owners, nodes = self._master.used()
+        calm = np.flatnonzero(~self._active)
+        starts = arcs_of_paths(
+            np.concatenate([owners, calm]), np.concatenate([nodes, self._alone.nodes[calm]])
+        )
+        found = ArcSearch(self._network, starts, self._master.rows, self._finder).run()
+        return Relaxed(found.usage, found.bound, found.priced, found.rounds + rounds)
+
+    def _solve(self) -> None:
+        self._point = self._master.solve()
+        self._master.put_usage(self._usage)
+
+    def _keep_rows(self) -> None:
+        """Bind the program by the rows it breaks until it breaks none."""
+        while rows := self._finder.broken(self._usage):
+            self._bind(rows)
+            self._solve()
+
+    def _meet(self, rows: list[ConflictRow]) -> Bools:
+        """Note who meets whom on the rows; say which objects are on any, (n,)."""
+        concerned = np.zeros(self._network.objects, dtype=np.bool_)
+        for row in rows:
+            there = np.asarray((self._usage[:, row.frame] * row.members).any(axis=1))
+            self._meets |= np.outer(there, there)
+            concerned |= there
+        return concerned
+
+    def _largest_group(self) -> int:
+        """Give the size of the largest group of objects that meet, directly or through others."""
+        return int(np.bincount(groups_of(self._meets)).max())
+
+    def _bind(self, rows: list[ConflictRow]) -> None:
+        """Let the objects that break the rows, and paths around all rows, into the program."""
+        concerned = self._meet(rows)
+        new = np.flatnonzero(concerned & ~self._active)
+        self._active[new] = True
+        if len(new):
+            self._master.add_objects(new.tolist())
+        self._master.add_rows(rows)
+        # Occluded all along, an object keeps every row: the program always has a solution.
+        hidden = np.full((self._network.objects, self._network.frames), self._network.places)
+        self._master.add_paths(new, Paths(hidden, path_costs(self._network, hidden)).only(new))
+        self._master.add_paths(new, self._alone.only(new))
+        self._enter_detours(np.flatnonzero(concerned))
+
+    def _enter_detours(self, objects: Ints) -> None:
+        """Let in, for each of the objects, the best path that goes through no row at all."""
+        node = self._network.node.copy()
+        for row in self._master.rows:
+            node[:, row.frame][row.members] = np.inf
+        self._master.add_paths(objects, self._pricing.best_paths(node, objects))
+
+    def _enter_better_paths(self) -> bool:
+        """Price all paths; let the better ones in; say whether there are any. Keeps the bound.
+
+        Where objects meet for some frames on end, the program's duals charge for one of the frames, and
+        a round would go by for each of the others. So prices take some steps of their own from there,
+        up to the cost that the program has attained: Polyak's subgradient steps.
+        """
+        active, prices = np.flatnonzero(self._active), self._point.prices
+        others = float(self._alone.costs[~self._active].sum())
+        cost = others + self._point.objective
+        met: list[Ints] = []
+        missing: list[float] = []
+        for step in range(_STEPS):
+            self._priced = with_prices(self._network, self._master.rows, prices)
+            self._prices = prices
+            paths = self._pricing.best_paths(self._priced, active)
+            self._bound = others + float(paths.costs.sum() - prices.sum())
+            missing.append(cost - self._bound)
+            if missing[-1] <= CLOSE * max(1.0, abs(cost)):
+                return False
+            met.append(paths.nodes)
+            if step >= _PATIENCE and missing[-1] > _WORTHWHILE**step * missing[0]:
+                break
+            loads = [row.members[active, paths.nodes[:, row.frame]].sum() for row in self._master.rows]
+            slope = np.array(loads) - 1.0
+            slope[(slope < 0.0) & (prices == 0.0)] = 0.0
+            if not slope.any():
+                break
+            prices = np.maximum(0.0, prices + _BOLD * missing[-1] / float(slope @ slope) * slope)
+        return sum([self._enter(active, nodes) for nodes in met]) > 0
+
+    def _enter(self, objects: Ints, nodes: Ints) -> int:
+        """Let paths of objects in; give how many are new."""
+        every = self._alone.nodes.copy()
+        every[objects] = nodes
+        return self._master.add_paths(objects, Paths(nodes, path_costs(self._network, every)[objects]))
+
+
+class Columns(TimedSolver):
+    """The optimum of the relaxation from a few of its columns; equal to `arcs`, and many times faster."""
+
+    name = "columns"
+
+    def _answer(self, network: Network, hint: Hint | None) -> Solution:
+        """Solve the relaxation and round it where it is not whole."""
+        if not network.objects:
+            return nothing(self.name, network)
+        return finished(self.name, network, relaxation_by_columns(network, hint))
+
+
+def relaxation_by_columns(network: Network, hint: Hint | None = None) -> Relaxed:
+    """Give the optimum of the relaxation of a network with at least one object.
+
+    Paths are the columns where only conflicts couple the objects; under the layout term, which whole
+    paths fit badly, arcs are.
+    """
+    if not network.layout:
+        return PathSearch(network).run(hint)
+    return arc_search(network, Pricing(Trellis.of(network)), ConflictFinder(network)).run()
+
+
+_SQUARE = 2
+
+
+class L2(TimedSolver):
+    """As `columns`, but a change of layout by d pixels costs μ d²: many small changes rather than a jump.
+
+    Without layout term or a second object it is `columns`.
+    """
+
+    name = "l2"
+
+    def _answer(self, network: Network, _hint: Hint | None) -> Solution:
+        """Solve the relaxation and round it where it is not whole."""
+        if not network.objects:
+            return nothing(self.name, network)
+        if not network.layout:
+            return finished(self.name, network, relaxation_by_columns(network))
+        start = Improver(network, _SQUARE).improved(greedy_paths(network).nodes)
+        starts = arcs_of_paths(np.arange(network.objects), start)
+        found = _SquaredSearch(network, starts, [], ConflictFinder(network)).run()
+        return finished(self.name, network, found, _SQUARE)
+
+
+class _SquaredSearch(ArcSearch):
+    """The same search with the quadratic program."""
+
+    def _new_master(self) -> ArcMaster:
+        return ArcMaster(self._network, squared=True)

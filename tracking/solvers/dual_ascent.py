@@ -1,0 +1,220 @@
+"""Steps uphill along slopes that jump about: each number by steps of its own size, as Adam takes them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from tracking.boxes import BOX_SIDES, Floats
+from tracking.model.network import Network
+from tracking.solvers.cutting_planes import ConflictFinder, ConflictRow
+from tracking.solvers.objective import Ints
+from tracking.solvers.viterbi import Marginals, Packed, Pricing, best_paths
+
+_MEMORY, _MEMORY_OF_SIZE = 0.6, 0.9
+"""Shares of the former direction, and of the former typical size of a slope, in the next one."""
+
+_STILL = 1e-3
+"""Slopes far below this are no reason to move."""
+
+
+class Steps:
+    """Remembers slopes; numbers may join at the end of the first axis."""
+
+    def __init__(self) -> None:
+        self._way = self._size = np.empty(0)
+        self._weight = self._weight_of_size = 0.0
+
+    def along(self, slope: Floats) -> Floats:
+        """Give the next step, about 1 where the slopes agree with each other and near 0 where not."""
+        if len(self._way) < len(slope):
+            joined = np.zeros((len(slope) - len(self._way), *slope.shape[1:]))
+            self._way = np.concatenate([self._way.reshape(-1, *slope.shape[1:]), joined])
+            self._size = np.concatenate([self._size.reshape(-1, *slope.shape[1:]), joined])
+        self._way = _MEMORY * self._way + (1.0 - _MEMORY) * slope
+        self._size = _MEMORY_OF_SIZE * self._size + (1.0 - _MEMORY_OF_SIZE) * slope**2
+        self._weight = _MEMORY * self._weight + (1.0 - _MEMORY)
+        self._weight_of_size = _MEMORY_OF_SIZE * self._weight_of_size + (1.0 - _MEMORY_OF_SIZE)
+        typical = np.sqrt(self._size / self._weight_of_size)
+        return np.asarray(self._way / self._weight / (typical + _STILL))
+
+
+def with_pulls(node: Floats, where: Floats, pulls: Floats) -> Floats:
+    """Give the costs of nodes `node` (n, M, S) at `where` (n, M, S, 4) with what moves earn.
+
+    `pulls` (n, M - 1, 4) is what a move by a pixel earns.
+    """
+    inward = np.zeros((*node.shape[:2], BOX_SIDES))
+    inward[:, 1:] -= pulls
+    inward[:, :-1] += pulls
+    return np.asarray(node + (where @ inward[:, :, :, None])[:, :, :, 0])
+
+
+class LayoutForces:
+    """Forces within [-μ, μ] on the difference of two objects' moves, climbing; 0 at first."""
+
+    def __init__(self, network: Network) -> None:
+        count = network.objects if network.layout else 0
+        self._objects = network.objects
+        self._pairs = np.array(list(combinations(range(count), 2)), dtype=np.int64).reshape(-1, 2)
+        self._forces = np.zeros((len(self._pairs), network.frames - 1, BOX_SIDES))
+        self._most = network.layout
+        self._steps = Steps()
+
+    def pulls(self) -> Floats:
+        """Give what a move by a pixel earns each object, (n, M - 1, 4)."""
+        pulls = np.zeros((self._objects, *self._forces.shape[1:]))
+        np.add.at(pulls, self._pairs[:, 0], self._forces)
+        np.add.at(pulls, self._pairs[:, 1], -self._forces)
+        return pulls
+
+    def climb(self, where: Floats, length: float) -> bool:
+        """Step by `length` of the largest force, for objects at `where` (n, M, 4); False: all in step."""
+        slope = self._slope(where)
+        if not slope.any():
+            return False
+        self._forces += length * self._most * self._steps.along(slope)
+        np.clip(self._forces, -self._most, self._most, out=self._forces)
+        return True
+
+    def _slope(self, where: Floats) -> Floats:
+        """Give how much less the first of a pair moves than the second."""
+        moves: Floats = np.diff(where, axis=1)
+        first, second = self._pairs.T
+        return np.asarray(moves[second] - moves[first])
+
+
+class RowPrices:
+    """Prices, never negative, of conflict rows on a packed trellis, climbing; rows join at price 0."""
+
+    def __init__(self, packed: Packed) -> None:
+        self._packed = packed
+        objects, self._frames, width = packed.index.shape
+        self._members = np.zeros((0, objects, width))
+        self._frame = np.empty(0, dtype=np.int64)
+        self._steps = Steps()
+        self.rows: list[ConflictRow] = []
+        self.prices = np.empty(0)
+
+    def join(self, rows: Sequence[ConflictRow]) -> None:
+        """Let more rows have a price."""
+        if not rows:
+            return
+        each = np.arange(self._members.shape[1])[:, None]
+        members = [row.members[each, self._packed.index[:, row.frame]] for row in rows]
+        self._members = np.concatenate([self._members, np.array(members, dtype=np.float64)])
+        self._frame = np.concatenate([self._frame, [row.frame for row in rows]])
+        self.prices = np.concatenate([self.prices, np.zeros(len(rows))])
+        self.rows.extend(rows)
+
+    def on(self, node: Floats) -> Floats:
+        """Give the costs of nodes, `node` (n, M, W), with the prices."""
+        if not len(self.prices):
+            return node
+        at = (self._frame == np.arange(self._frames)[:, None]) * self.prices
+        added = at @ self._members.reshape(len(self.prices), -1)
+        return np.asarray(node + np.swapaxes(added.reshape(self._frames, *self._members.shape[1:]), 0, 1))
+
+    def climb(self, slots: Ints, length: float) -> bool:
+        """Step by `length` for objects in `slots` (n, M); False: no row is broken and none costs."""
+        if not len(self.prices):
+            return False
+        rows, each = np.arange(len(self.prices))[:, None], np.arange(len(slots))
+        slope = self._members[rows, each, slots[:, self._frame].T].sum(axis=1) - 1.0
+        slope[(slope < 0.0) & (self.prices == 0.0)] = 0.0
+        if not slope.any():
+            return False
+        self.prices = np.maximum(0.0, self.prices + length * self._steps.along(slope))
+        return True
+
+
+@dataclass(frozen=True, slots=True)
+class _Pace:
+    """How an ascent goes.
+
+    Attributes:
+        steps: how many it takes.
+        shorter: the length of each as a share of the one before.
+        states: how many states of a frame and object it looks at, the cheapest without prices.
+        price: length of the first step of prices, as a share of a typical one.
+    """
+
+    steps: int
+    shorter: float
+    states: int
+    price: float
+
+
+_WITH_LAYOUT = _Pace(steps=30, shorter=0.94, states=40, price=1.0)
+_BY_CONFLICTS = _Pace(steps=25, shorter=0.92, states=10, price=0.2)
+"""The layout term leads further off the cheapest paths than conflicts do."""
+
+_FORCE = 0.2
+"""Length of the first step of forces, as a share of the largest."""
+
+_KEPT = 8
+"""Of the last paths met: they are near those of the optimum."""
+
+_EARLY, _NOW_AND_THEN = 10, 3
+"""Broken rows are looked for in each of the first steps, later in some: few are still to be found."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Guess:
+    """What the ascent came to.
+
+    Attributes:
+        rows: the conflict rows that cost, or that paths broke.
+        prices: (R,) what going through them costs.
+        pulls: (n, M - 1, 4) what a move by a pixel earns.
+        paths: (G, n, M) the last paths met, of all objects at a time.
+    """
+
+    rows: list[ConflictRow]
+    prices: Floats
+    pulls: Floats
+    paths: Ints
+
+
+def guessed(network: Network, pricing: Pricing, finder: ConflictFinder) -> Guess:
+    """Guess the duals of a network."""
+    passes = Marginals.of(pricing.trellis, pricing.ahead)
+    pace = _WITH_LAYOUT if network.layout else _BY_CONFLICTS
+    packed = Packed.cheapest(passes.through, pace.states)
+    trellis = packed.trellis(pricing.trellis)
+    forces, prices = LayoutForces(network), RowPrices(packed)
+    where = packed.states(network.locations[network.sets], 0.0) if network.layout else None
+    typical = _typical_price(packed.states(passes.through, np.inf), passes.least)
+    each, frames = np.indices((network.objects, network.frames))
+    best, best_prices, best_pulls = -np.inf, prices.prices, forces.pulls()
+    met: list[Ints] = []
+    for step in range(pace.steps):
+        node, pulls = prices.on(trellis.node), forces.pulls()
+        paths = best_paths(trellis.with_node(node if where is None else with_pulls(node, where, pulls)))
+        met = [*met, packed.named(paths.nodes)][-_KEPT:]
+        bound = float(paths.costs.sum() - prices.prices.sum())
+        if bound > best:
+            best, best_prices, best_pulls = bound, prices.prices, pulls
+        if step < _EARLY or step % _NOW_AND_THEN == 0:
+            usage = np.zeros(network.node.shape)
+            usage[each, frames, met[-1]] = 1.0
+            prices.join(finder.broken(usage))
+        length = pace.shorter**step
+        moved = prices.climb(paths.nodes, length * pace.price * typical)
+        if where is not None:
+            moved |= forces.climb(where[each, frames, paths.nodes], length * _FORCE)
+        if not moved:
+            break
+    late = np.zeros(len(prices.prices) - len(best_prices))
+    return Guess(prices.rows, np.concatenate([best_prices, late]), best_pulls, np.array(met))
+
+
+def _typical_price(through: Floats, least: Floats) -> float:
+    """Give what it costs on average to be in the second best state of a frame; (n, M, W) and (n,)."""
+    if through.shape[2] == 1:
+        return 0.0
+    regret = np.partition(through, 1, axis=2)[:, :, 1] - least[:, None]
+    return float(regret[np.isfinite(regret)].mean()) if np.isfinite(regret).any() else 0.0

@@ -1,0 +1,188 @@
+"""The LP solver, called in one way everywhere: one thread, dual simplex, no presolve, no clock."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import highspy
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import sparse
+
+from tracking.boxes import Floats
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LinearProgram:
+    """Minimise `costs x` with `row_lower <= matrix x <= row_upper` and `lower <= x <= upper`."""
+
+    costs: Floats
+    lower: Floats
+    upper: Floats
+    matrix: sparse.csc_array
+    row_lower: Floats
+    row_upper: Floats
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LinearSolution:
+    """The optimum: `values` (columns,), `duals` (rows,), the `objective`, and simplex `iterations`."""
+
+    values: Floats
+    duals: Floats
+    objective: float
+    iterations: int
+
+
+_DEVEX = 1
+"""Edge weights that need no start-up: a growing program is started from many bases."""
+
+_DUAL, _AS_IT_STANDS = 1, 0
+"""Simplex strategies: dual, best from nothing; or primal after new columns and dual after new rows."""
+
+
+def quiet_highs(*, growing: bool = False, presolve: bool = False) -> highspy.Highs:
+    """Give a solver that is deterministic and says nothing; `growing`: for a program that gets columns.
+
+    With `presolve` the program is made smaller before it is solved for the first time; after that it
+    goes on from its last basis.
+    """
+    solver: highspy.Highs = highspy.Highs()  # type: ignore[no-untyped-call]
+    options: dict[str, bool | int | float | str] = {
+        "output_flag": False,
+        "threads": 1,
+        "parallel": "off",
+        "solver": "simplex",
+        "simplex_strategy": _AS_IT_STANDS if growing else _DUAL,
+        "presolve": "on" if presolve else "off",
+        "random_seed": 0,
+        "primal_feasibility_tolerance": 1e-9,
+        "dual_feasibility_tolerance": 1e-9,
+    }
+    if growing:
+        options["simplex_dual_edge_weight_strategy"] = _DEVEX
+    for name, value in options.items():
+        if solver.setOptionValue(name, value) != highspy.HighsStatus.kOk:
+            raise RuntimeError(f"the LP solver does not take {name} = {value}")
+    return solver
+
+
+def highs_model(program: LinearProgram) -> highspy.HighsLp:
+    """Put a program into the solver's own form."""
+    model = highspy.HighsLp()
+    rows, columns = program.matrix.shape
+    model.num_col_ = columns
+    model.num_row_ = rows
+    model.col_cost_ = program.costs
+    model.col_lower_ = program.lower
+    model.col_upper_ = program.upper
+    model.row_lower_ = program.row_lower
+    model.row_upper_ = program.row_upper
+    model.a_matrix_.format_ = highspy.MatrixFormat.kColwise
+    model.a_matrix_.start_ = program.matrix.indptr
+    model.a_matrix_.index_ = program.matrix.indices
+    model.a_matrix_.value_ = program.matrix.data
+    return model
+
+
+_OTHERWISE: tuple[tuple[str, str | float], ...] = (("presolve", "off"), ("qp_regularization_value", 0.0))
+"""What to try anew with, from no basis, where there is no optimum: a basis kept from before columns and rows
+came may be too ill-conditioned to go on from; presolve has called whole-number programs infeasible that
+had answers; and squares with a little added to be regular have ended in an error of the solver's own."""
+
+
+def optimum(solver: highspy.Highs) -> LinearSolution:
+    """Run the solver and give what it found.
+
+    Raises:
+        RuntimeError: the program has no optimum, which no network gives rise to.
+    """
+    solver.run()
+    status = solver.getModelStatus()
+    for name, value in _OTHERWISE:
+        if status == highspy.HighsModelStatus.kOptimal:
+            break
+        _, usual = solver.getOptionValue(name)
+        solver.clearSolver()
+        solver.setOptionValue(name, value)
+        solver.run()
+        status = solver.getModelStatus()
+        solver.setOptionValue(name, usual)
+    if status != highspy.HighsModelStatus.kOptimal:
+        raise RuntimeError(f"the LP solver ended with {solver.modelStatusToString(status)}")
+    found = solver.getSolution()
+    info = solver.getInfo()
+    return LinearSolution(
+        values=np.asarray(found.col_value),
+        duals=np.asarray(found.row_dual),
+        objective=float(info.objective_function_value),
+        iterations=int(info.simplex_iteration_count),
+    )
+
+
+def solve_program(program: LinearProgram, integer: NDArray[np.bool_] | None = None) -> LinearSolution:
+    """Solve one program from nothing; columns where `integer` is true are whole."""
+    solver = quiet_highs()
+    model = highs_model(program)
+    if integer is not None:
+        kinds = (highspy.HighsVarType.kContinuous, highspy.HighsVarType.kInteger)
+        model.integrality_ = [kinds[int(whole)] for whole in integer]
+        for name in ("mip_rel_gap", "mip_abs_gap"):
+            solver.setOptionValue(name, 0.0)
+        solver.setOptionValue("presolve", "on")
+        solver.setOptionValue("solver", "choose")
+    solver.passModel(model)
+    return optimum(solver)
+
+
+class Assembly:
+    """Collects the columns and rows of a program; entries of one place add up."""
+
+    def __init__(self) -> None:
+        self._costs: list[Floats] = []
+        self._lower: list[Floats] = []
+        self._row_lower: list[Floats] = []
+        self._row_upper: list[Floats] = []
+        self._entries: list[tuple[NDArray[np.int64], NDArray[np.int64], Floats]] = []
+        self._columns = 0
+        self._rows = 0
+
+    def columns(self, costs: Floats, lower: float = 0.0) -> NDArray[np.int64]:
+        """Add columns without upper bound; give their numbers."""
+        first, self._columns = self._columns, self._columns + len(costs)
+        self._costs.append(costs)
+        self._lower.append(np.full(len(costs), lower))
+        return np.arange(first, self._columns)
+
+    def rows(self, count: int, lower: float, upper: float) -> NDArray[np.int64]:
+        """Add `count` empty rows; give their numbers."""
+        first, self._rows = self._rows, self._rows + count
+        self._row_lower.append(np.full(count, lower))
+        self._row_upper.append(np.full(count, upper))
+        return np.arange(first, self._rows)
+
+    def put(self, rows: ArrayLike, columns: ArrayLike, values: ArrayLike) -> None:
+        """Put values into the matrix; the three broadcast."""
+        at_row, at_column, value = np.broadcast_arrays(rows, columns, values)
+        self._entries.append(
+            (
+                at_row.ravel().astype(np.int64),
+                at_column.ravel().astype(np.int64),
+                value.ravel().astype(np.float64),
+            )
+        )
+
+    def program(self) -> LinearProgram:
+        """Give the program as collected."""
+        rows, columns, values = (np.concatenate(part) for part in zip(*self._entries, strict=True))
+        matrix = sparse.csc_array(
+            sparse.coo_array((values, (rows, columns)), shape=(self._rows, self._columns))
+        )
+        return LinearProgram(
+            costs=np.concatenate(self._costs),
+            lower=np.concatenate(self._lower),
+            upper=np.full(self._columns, np.inf),
+            matrix=matrix,
+            row_lower=np.concatenate(self._row_lower),
+            row_upper=np.concatenate(self._row_upper),
+        )

@@ -1,0 +1,75 @@
+"""What a detector hands on: the hypotheses of one frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracking.boxes import BOX_SIDES
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Detections:
+    """What was seen in one frame: K hypotheses of where an object might be (paper II.A).
+
+    Attributes:
+        boxes: (K, 4) float64, `left, top, right, bottom` in pixels.
+        scores: (K,) float64 in [0, 1], how sure the detector is.
+        histograms: (K, B) float64, appearance; rows sum to 1. B = 0: no appearance is known.
+
+    Raises:
+        ValueError: the shapes do not fit together.
+    """
+
+    boxes: NDArray[np.float64]
+    scores: NDArray[np.float64]
+    histograms: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        count = len(self.scores)
+        if self.boxes.shape != (count, BOX_SIDES):
+            raise ValueError(f"{count} scores need boxes of shape ({count}, 4), not {self.boxes.shape}")
+        if self.histograms.ndim != 2 or len(self.histograms) != count:  # noqa: PLR2004 — rows and bins
+            raise ValueError(
+                f"{count} scores need histograms of shape ({count}, B), not {self.histograms.shape}"
+            )
+
+    def __len__(self) -> int:
+        return len(self.scores)
+
+    @classmethod
+    def empty(cls, bins: int) -> Detections:
+        """Nothing was seen; histograms would have had `bins` bins."""
+        return cls(np.empty((0, BOX_SIDES)), np.empty(0), np.empty((0, bins)))
+
+
+Reason = Literal["alike", "exchange", "fading", "gap"]
+"""Why: two who look alike are about to cross; two could just as well have exchanged their identities;
+somebody fades into the background; the window's answer is not proven to be the best one."""
+
+
+@dataclass(frozen=True, slots=True)
+class Trouble:
+    """One thing that may go wrong. Windows that follow each other tell of the same.
+
+    Attributes:
+        reason: why.
+        objects: the ids of the one or two tracks that it is about; first whom to point at.
+        frame: when it is expected. The newest frame or later for what is ahead; within the window for what
+            has been seen to be doubtful (`exchange`: where the identities would part): pictures are shown
+            later than they are tracked, so that it may still be ahead of who looks at them.
+        margin: how sure the tracker is, as a cost: 0 is undecided.
+        length: frames for which the two are in each other's way, or somebody is hidden.
+        risk: how likely it is to go wrong unless somebody helps, in [0, 1]: what troubles of all reasons are
+            compared by.
+    """
+
+    reason: Reason
+    objects: tuple[int, ...]
+    frame: int
+    margin: float
+    length: int
+    risk: float
