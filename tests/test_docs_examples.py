@@ -5,7 +5,10 @@ from __future__ import annotations
 import asyncio
 import importlib
 import io
+import os
 import re
+import subprocess
+import sys
 from collections.abc import AsyncIterator, Iterator
 from contextlib import redirect_stdout
 from dataclasses import dataclass
@@ -27,9 +30,15 @@ from server.wire import messages
 from server.wire.sections import Http
 
 ROOT = Path(__file__).parents[1]
-DOCS = sorted((ROOT / "docs").glob("*.md"))
-INTERFACES = (ROOT / "docs" / "interfaces.md").read_text(encoding="utf-8")
-OPERATING = (ROOT / "docs" / "operating.md").read_text(encoding="utf-8")
+DOCS = sorted((ROOT / "docs").rglob("*.md"))
+TUTORIALS = sorted((ROOT / "docs" / "tutorials").glob("*.md"))
+
+
+def reference(page: str) -> str:
+    """Return the text of a page of the reference."""
+    return (ROOT / "docs" / "reference" / f"{page}.md").read_text(encoding="utf-8")
+
+
 URL = "http://localhost:8080"
 _BLOCK = re.compile(
     r"^```python runnable\n(.*?)^```\n(?:\n```text output\n(.*?)^```\n)?", re.DOTALL | re.MULTILINE
@@ -98,6 +107,27 @@ def test_there_are_examples_of_all_libraries() -> None:
         assert f"from {room} import" in code
 
 
+_COMMANDS = re.compile(r"^```console\n(.*?)^```\n", re.DOTALL | re.MULTILINE)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", TUTORIALS, ids=[path.stem for path in TUTORIALS])
+def test_the_commands_of_a_tutorial_run(path: Path, tmp_path: Path) -> None:
+    script = "\n".join(_COMMANDS.findall(path.read_text(encoding="utf-8")))
+    assert "myview" in script
+    programs = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    ran = subprocess.run(
+        ["bash", "-eu", "-c", script],
+        cwd=tmp_path,
+        env={**os.environ, "PATH": programs},
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+    assert ran.returncode == 0, ran.stdout + ran.stderr
+
+
 def test_links_between_the_documents_lead_somewhere() -> None:
     for path in DOCS:
         for target in re.findall(r"\]\(([^)#\s:]+)(?:#[^)]*)?\)", path.read_text(encoding="utf-8")):
@@ -121,7 +151,7 @@ def anchors(text: str) -> list[str]:
 def test_every_command_and_option_is_described() -> None:
     group: Any = typer.main.get_command(command_line)
     for name, command in group.commands.items():
-        assert f"`myview {name}" in INTERFACES
+        assert f"`myview {name}" in reference("cli")
         rows = option_rows(name)
         for option in (flag for it in command.params for flag in it.opts if flag.startswith("--")):
             assert option == "--help" or f"`{option}`" in rows, f"myview {name} {option}"
@@ -130,7 +160,7 @@ def test_every_command_and_option_is_described() -> None:
 def option_rows(command: str) -> str:
     """Give the rows of the table of options that belong to a command."""
     rows, mine = [], False
-    for line in INTERFACES.splitlines():
+    for line in reference("cli").splitlines():
         cells = [cell.strip() for cell in line.split("|")]
         if len(cells) == 6:  # a table of four columns
             mine = command in cells[1].split(", ") if cells[1] else mine
@@ -143,20 +173,21 @@ async def test_every_path_is_described(by_hand: Any) -> None:
     app = make_app(BestViewService(by_hand.small_config()))
     paths = {route.resource.canonical for route in app.router.routes() if route.resource is not None}
     assert len(paths) > 10
+    described = reference("http-api") + reference("streams")
     for path in sorted(paths):
         plain = re.sub(r"\{(\w+)(:[^/]*)?\}(?=[/.]|$)", r"{\1}", path)
-        assert f"`{plain}`" in INTERFACES, plain
+        assert f"`{plain}`" in described, plain
 
 
 @pytest.mark.parametrize("kind", [SiteInfo, ObjectInfo, CameraInfo, Choice])
 def test_every_field_of_an_answer_is_described(kind: type[msgspec.Struct]) -> None:
-    http = INTERFACES.partition("## HTTP")[2].partition("## zenoh")[0]
+    http = reference("http-api")
     for field in msgspec.structs.fields(kind):
         assert f"`{field.encode_name}`" in http, field.encode_name
 
 
 def test_every_field_of_a_message_is_described() -> None:
-    zenoh = INTERFACES.partition("## zenoh")[2].partition("## Pulses")[0]
+    zenoh = reference("messages")
     kinds = [it for it in vars(messages).values() if isinstance(it, type) and issubclass(it, msgspec.Struct)]
     assert len(kinds) > 5
     for kind in kinds:
@@ -171,7 +202,7 @@ async def test_every_metric_is_described(by_hand: Any) -> None:
     metrics: CollectorRegistry = make_app(service)[METRICS]
     names = [f"{it.name}_total" if it.type == "counter" else it.name for it in metrics.collect()]
     for name in [name for name in names if name.startswith("myview_")]:
-        assert f"`{name}`" in OPERATING, name
+        assert f"`{name}`" in reference("metrics"), name
 
 
 def test_every_test_that_a_document_names_is_there() -> None:
@@ -181,7 +212,6 @@ def test_every_test_that_a_document_names_is_there() -> None:
         for path in DOCS
         for file, test in _TEST.findall(path.read_text(encoding="utf-8"))
     ]
-    assert named
     for document, file, test in named:
         assert (ROOT / file).is_file(), f"{document}: {file}"
         assert not test or f"def {test}(" in (ROOT / file).read_text(encoding="utf-8"), f"{document}: {test}"

@@ -1,4 +1,4 @@
-"""Marked points from a file: JSON or CSV, as docs/interfaces.md has them."""
+"""Marked points from a file: JSON or CSV, as docs/reference/files.md has them."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ def router_finding(check: str, certificate: Path, key: Path, authority: Path, ho
         handshake(certificate, key, authority, host)
     except ssl.SSLCertVerificationError as error:
         text = f"{certificate}: who connects to {host} by {authority} refuses it: {error.verify_message}"
-        return bad(check, text, "one that this authority has signed for this host: docs/security.md")
+        return bad(check, text, "one that this authority has signed for this host: docs/how-to/secure.md")
     except (ssl.SSLError, OSError, ValueError):
         pass  # which is said of the files
     return None

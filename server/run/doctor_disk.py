@@ -15,7 +15,7 @@ from server.wire.config import Config
 from server.wire.private_files import rights_of_others
 
 _INDEX_BYTES = 100
-"""A frame of a camera, beside its picture: docs/operating.md, "Recording"."""
+"""A frame of a camera, beside its picture: docs/how-to/record.md."""
 _TRY_AGAIN = "try again when it answers; where encode.max_kbps is set, that is taken for its rate"
 
 

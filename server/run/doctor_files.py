@@ -17,7 +17,7 @@ from server.wire.pulse_users import SETTING, SHORTEST, pulse_clients
 from server.wire.tokens import read_tokens
 from server.wire.users import read_users
 
-_LINES = "name:password, one a line, in a file that this user can read: docs/security.md"
+_LINES = "name:password, one a line, in a file that this user can read: docs/how-to/secure.md"
 
 
 def file_findings(config: Config) -> list[Finding]:

@@ -19,7 +19,7 @@ from server.wire.kept_clock import clock_is_kept
 _FAR_S = 1.0
 _ANSWER_S = 2.0
 _SERVICE_CORES = 0.3
-"""The best view with a few cameras and viewers, and the pulse server: docs/scaling.md has more of them."""
+"""The best view with a few cameras and viewers, and the pulse server; see docs/how-to/scale.md."""
 _FULL = 0.8
 """Share of the cores above which a machine has nothing left for a busy scene."""
 _PROCESS_MB = 250

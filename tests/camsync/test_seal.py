@@ -13,7 +13,7 @@ from camsync.seal import SealError, Seals, new_nonce
 
 
 def test_lines_are_sealed_as_the_documents_say() -> None:
-    """docs/interfaces.md, "Pulses"."""
+    """docs/reference/pulses.md."""
     password, name, servers, clients = "a password", "c0", "1" * 32, "2" * 32
     seals = Seals.of(password, name, (servers, clients))
     for way, seal in (("client", seals.client), ("server", seals.server)):

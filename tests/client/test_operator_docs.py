@@ -1,4 +1,4 @@
-"""docs/operator.md names every section and every button of the operator's page."""
+"""docs/how-to/operate.md names every section and every button of the operator's page."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "client/page/operator.html").read_text(encoding="utf-8")
-DOCS = (ROOT / "docs/operator.md").read_text(encoding="utf-8")
+DOCS = (ROOT / "docs/how-to/operate.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("words", re.findall(r"<(?:button|a) [^>]*>([^<]+)<", PAGE))

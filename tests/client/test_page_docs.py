@@ -1,4 +1,4 @@
-"""docs/page.md names every button of the page, and every key."""
+"""docs/how-to/watch.md names every button of the page, and every key."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "client/page/index.html").read_text(encoding="utf-8")
-DOCS = (ROOT / "docs/page.md").read_text(encoding="utf-8")
+DOCS = (ROOT / "docs/how-to/watch.md").read_text(encoding="utf-8")
 KEYS = {"Space": "space"}
 
 

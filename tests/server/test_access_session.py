@@ -39,7 +39,7 @@ HEADS_OF_PROXIES = (
     ),
     *("X-Envoy-External-Address", "Front-End-Https", "X-Amzn-Trace-Id", "X-Scheme", "WL-Proxy-Client-IP"),
 )
-"""What one proxy or another sends as the only sign of itself; the first is what docs/security.md asks for."""
+"""What one proxy or another sends as the only sign of itself; docs/how-to/secure.md asks for the first."""
 
 
 @pytest.fixture

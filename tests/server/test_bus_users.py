@@ -26,12 +26,12 @@ from server.wire.users import password_of, read_users
 pytestmark = needs_openssl
 
 SITE = Keys("hall")
-SECURITY = (Path(__file__).parents[2] / "docs" / "security.md").read_text(encoding="utf-8")
+SECURITY = (Path(__file__).parents[2] / "docs" / "how-to" / "secure.md").read_text(encoding="utf-8")
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Make certificates by the very lines of docs/security.md."""
+    """Make certificates by the very lines of docs/how-to/secure.md."""
     folder = tmp_path_factory.mktemp("bus")
     found = re.search(r"```sh\n(openssl.*?)```", SECURITY, re.DOTALL)
     assert found

@@ -133,8 +133,8 @@ def test_a_recording_begins_later_and_again(tmp_path: Path) -> None:
 
 @needs_ffmpeg
 def test_what_the_manual_tells_to_do_fits(tmp_path: Path) -> None:
-    """A camera that is set up as docs/operating.md says passes through."""
-    manual = (Path(__file__).parents[2] / "docs" / "operating.md").read_text(encoding="utf-8")
+    """A camera that is set up as docs/how-to/run.md says passes through."""
+    manual = (Path(__file__).parents[2] / "docs" / "how-to" / "run.md").read_text(encoding="utf-8")
     (told,) = re.findall(r"^ffmpeg .* (-c:v libx264 .*?) \S+$", manual, re.MULTILINE)
     gop, path = 10, tmp_path / "told.mp4"
     test_picture = f"-f lavfi -i testsrc2=size={WIDTH}x{HEIGHT}:rate={FPS} -t 2 -pix_fmt yuv420p"

@@ -243,7 +243,7 @@ def sees_one_person(request: web.Request) -> bool:
 def _unknown(need: Need) -> web.Response:
     if need is Need.OPERATOR:
         return _challenged("operating needs an operator's token; sign in at /operator")
-    return _challenged("watching needs a token; sign in at /, or send it (docs/security.md)")
+    return _challenged("watching needs a token; sign in at /, or send it (docs/how-to/secure.md)")
 
 
 def _challenged(why: str) -> web.Response:
