@@ -25,7 +25,7 @@ from benchmarks.peers.plot import plot
 from benchmarks.report import Report
 from benchmarks.surroundings import CannotRunError, finish, parser
 from server.run.track import Frame, final_rows, loaded_for, searched
-from tracking import CostSettings, WindowSettings, solver_named
+from tracking import CostSettings, WindowSettings, create_solver
 from tracking.evaluation import HEADINGS, Scores, cells, evaluate, perfect_association
 from tracking.motchallenge import MotRow, read_rows
 from tracking.solvers import DEFAULT_SOLVER
@@ -81,7 +81,7 @@ def follow(name: str, view: View) -> tuple[list[MotRow], float]:
     """Give a tracker's tracks, and the milliseconds that it took for each frame."""
     frames = view.frames
     tracker = tracker_named(
-        name, WindowSettings(), CostSettings(), lambda: solver_named(DEFAULT_SOLVER), fps=view.fps
+        name, WindowSettings(), CostSettings(), lambda: create_solver(DEFAULT_SOLVER), fps=view.fps
     )
     if isinstance(tracker, Preparing):  # as a recording is looked at ahead
         tracker.prepare(it.image for it in frames[:_AHEAD:_AHEAD_EVERY] if it.image is not None)

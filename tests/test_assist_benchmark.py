@@ -18,7 +18,7 @@ from benchmarks.assist.watch import FISH, Watched, watch
 from benchmarks.experiments.scene import Truth
 from server.wire.sections import Flags
 from tracking import Detections
-from tracking.assist import Reason, Trouble
+from tracking.assist import RiskEvent, RiskReason
 
 FRAMES = 200
 FPS = 25.0
@@ -62,7 +62,7 @@ def test_the_operator_points_at_what_was_on_the_late_screen_once_they_have_react
     truth = _truth()
     shown = _tracks(truth, [[1] * FRAMES, [2] * FRAMES])
     operator = Operator(Person(reaction_s=0.4, error=0.0, delay_s=1.0), Desk(ALL, FPS), truth, FPS, seed=1)
-    operator.hear(60, [Trouble("exchange", (2, 1), 55, 0.1, 5, 0.5)])
+    operator.hear(60, [RiskEvent("exchange", (2, 1), 55, 0.1, 5, 0.5)])
     said = {newest: operator.look(newest, shown) for newest in range(60, 100)}
     assert all(said[newest] is None for newest in range(60, 70))
     first = said[70]
@@ -76,7 +76,7 @@ def test_who_is_under_the_wrong_box_when_the_operator_looks_is_followed_wrongly(
     truth = _truth()
     shown = _tracks(truth, [[2] * FRAMES, [1] * FRAMES])
     operator = Operator(Person(delay_s=0.0), Desk(ALL, FPS), truth, FPS, seed=1)
-    operator.hear(60, [Trouble("exchange", (2, 1), 55, 0.1, 5, 0.5)])
+    operator.hear(60, [RiskEvent("exchange", (2, 1), 55, 0.1, 5, 0.5)])
     for newest in range(60, 80):
         operator.look(newest, shown)
     assert operator.flags[0].fish == 0
@@ -129,8 +129,8 @@ def test_flags_go_to_the_riskiest_and_once_to_the_same_two() -> None:
     assert desk.raised(15, [_trouble((4, 3), 15, 0.9), _trouble((1, 2), 15, 0.2)]) == []
 
 
-def _trouble(objects: tuple[int, int], frame: int, risk: float) -> Trouble:
-    return Trouble("exchange", objects, frame, 0.1, 5, risk)
+def _trouble(objects: tuple[int, int], frame: int, risk: float) -> RiskEvent:
+    return RiskEvent("exchange", objects, frame, 0.1, 5, risk)
 
 
 RIGHT = [[1] * FRAMES, [2] * FRAMES]
@@ -176,7 +176,7 @@ def test_a_flag_about_others_than_those_who_fail_was_not_needed() -> None:
 @pytest.mark.parametrize("reason", ["alike", "fading"])
 @pytest.mark.parametrize(("others", "kind"), [([], "alone"), ([100], "2 way"), ([98, 104], "3 way")])
 def test_whether_others_were_in_the_way_is_told_by_where_they_were_and_not_by_the_reason(
-    others: list[int], kind: Kind, reason: Reason
+    others: list[int], kind: Kind, reason: RiskReason
 ) -> None:
     """Of the first fish, which the others meet in these frames, and nowhere else."""
     boxes = _truth().boxes
@@ -186,7 +186,7 @@ def test_whether_others_were_in_the_way_is_told_by_where_they_were_and_not_by_th
     truth = Truth(boxes, np.ones((len(boxes), FRAMES)))
     numbers = [[n + 1] * FRAMES for n in range(len(boxes))]
     numbers[0] = [1] * 100 + [9] * 100
-    flag = Flag(Trouble(reason, (1,), 100, 0.1, 5, 0.5), 1, raised=99, until=100)
+    flag = Flag(RiskEvent(reason, (1,), 100, 0.1, 5, 0.5), 1, raised=99, until=100)
     watched = _watched(truth, numbers, [flag])
     cases = count([(watched, watched)], Person())
     assert dict(cases.flags) == {(kind, "no help"): 1}

@@ -12,7 +12,7 @@ from benchmarks.endurance.__main__ import describe, run_tracker, spans
 from benchmarks.endurance.crowd import crowd
 from benchmarks.endurance.memory import Samples, resident_megabytes
 from benchmarks.report import Report
-from tracking import CostSettings, OnlineTracker, WindowSettings, solver_named
+from tracking import CostSettings, OnlineTracker, WindowSettings, create_solver
 
 WARM_UP, FRAMES = 400, 900
 MOST_GROWTH = 200_000
@@ -22,7 +22,7 @@ MOST_GROWTH = 200_000
 @pytest.mark.slow
 def test_the_tracker_holds_no_more_after_hundreds_of_frames() -> None:
     settings = WindowSettings(forget_after=50, most_objects=8)
-    tracker = OnlineTracker(settings, CostSettings(), solver_named("columns"))
+    tracker = OnlineTracker(settings, CostSettings(), create_solver("columns"))
     scene = crowd(2, seed=1)
     objects, held = 0, 0
     try:

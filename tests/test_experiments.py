@@ -17,7 +17,7 @@ from benchmarks.experiments.scene import Scene, Truth
 from benchmarks.experiments.toys import TOYS, play_toys
 from benchmarks.experiments.walks import Walking
 from benchmarks.report import Report
-from tracking import PAPER_COSTS, CostSettings, Detections, Template, WindowSettings, solver_named
+from tracking import PAPER_COSTS, CostSettings, Detections, Template, WindowSettings, create_solver
 from tracking.boxes import iou
 
 FRAMES = 40
@@ -96,22 +96,22 @@ def test_each_object_has_one_track_and_each_track_one_object() -> None:
 def test_people_who_stand_apart_keep_their_labels(solver: str) -> None:
     scene = two_apart()
     window = WindowSettings(window=3, stride=2, birth_window=3)
-    followed = follow(scene, PAPER_COSTS, window, solver_named(solver))
+    followed = follow(scene, PAPER_COSTS, window, create_solver(solver))
     assert len(followed.reports) == 1  # three frames after the templates'
     np.testing.assert_array_equal(followed.boxes, scene.truth.boxes)
 
 
 def test_people_who_are_not_known_are_found() -> None:
     scene = play(replace(CAST, known=False), 1)
-    followed = follow(scene, CostSettings(), WindowSettings(), solver_named("columns"))
+    followed = follow(scene, CostSettings(), WindowSettings(), create_solver("columns"))
     assert (~np.isnan(followed.boxes[..., 0])).mean() > 0.7
     assert per_frame(judge(scene, followed.boxes).wrong) < 0.1
 
 
 def test_separate_paths_share_boxes_where_the_program_does_not() -> None:
     scene = play(Cast((0, 0), FRAMES, Walking(6.0, 0.25, side=140.0)), 3)
-    together = follow(scene, PAPER_COSTS, PAPER_WINDOW, solver_named("columns"))
-    apart = follow(scene, PAPER_COSTS, PAPER_WINDOW, solver_named("separate-dp"))
+    together = follow(scene, PAPER_COSTS, PAPER_WINDOW, create_solver("columns"))
+    apart = follow(scene, PAPER_COSTS, PAPER_WINDOW, create_solver("separate-dp"))
     assert sum(report.conflicts for report in together.reports) == 0
     assert sum(report.conflicts for report in apart.reports) > 0
 

@@ -1,22 +1,22 @@
 """Frames or detections in, tracks out: detectors, the network model, its solvers, the online window."""
 
-from tracking.appearance import histograms
-from tracking.interpolation import between
+from tracking.appearance import grey_histograms
+from tracking.interpolation import interpolate_detections
 from tracking.model.network import Network, build_network
 from tracking.model.object_state import Template
 from tracking.model.settings import PAPER_COSTS, CostSettings
-from tracking.solvers.base import DEFAULT_SOLVER, Solution, Solver, SolveReport, solver_named, solver_names
+from tracking.solvers.base import DEFAULT_SOLVER, Solution, Solver, SolveReport, create_solver, solver_names
 from tracking.template_tracker import TemplateTracker
 from tracking.tracker import OnlineTracker
 from tracking.types import Detections
-from tracking.window import Glimpse, WindowResult, WindowSettings, WindowTrack, joined
+from tracking.window import AppearanceSample, WindowResult, WindowSettings, WindowTrack, merge_results
 
 __all__ = [
     "DEFAULT_SOLVER",
     "PAPER_COSTS",
+    "AppearanceSample",
     "CostSettings",
     "Detections",
-    "Glimpse",
     "Network",
     "OnlineTracker",
     "Solution",
@@ -27,10 +27,10 @@ __all__ = [
     "WindowResult",
     "WindowSettings",
     "WindowTrack",
-    "between",
     "build_network",
-    "histograms",
-    "joined",
-    "solver_named",
+    "create_solver",
+    "grey_histograms",
+    "interpolate_detections",
+    "merge_results",
     "solver_names",
 ]

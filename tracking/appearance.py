@@ -14,7 +14,7 @@ GREY_LEVELS = 256
 AppearanceMeasure = Literal["bhattacharyya", "intersection"]
 
 
-def histograms(
+def grey_histograms(
     grey: NDArray[np.uint8],
     boxes: Floats,
     bins: int = 64,
@@ -33,7 +33,7 @@ def histograms(
         raise ValueError(f"bins must be between 1 and {GREY_LEVELS}, not {bins}")
     levels = np.arange(GREY_LEVELS) * bins // GREY_LEVELS
     result = np.full((len(boxes), bins), 1.0 / bins)
-    for row, (left, top, right, bottom) in enumerate(_whole_pixels(boxes, grey.shape)):
+    for row, (left, top, right, bottom) in enumerate(_pixel_ranges(boxes, grey.shape)):
         pixels = grey[top:bottom, left:right]
         kept = pixels.ravel() if mask is None else pixels[mask[top:bottom, left:right] != 0]
         if kept.size:
@@ -41,7 +41,7 @@ def histograms(
     return result
 
 
-def _whole_pixels(boxes: Floats, shape: tuple[int, ...]) -> NDArray[np.int64]:
+def _pixel_ranges(boxes: Floats, shape: tuple[int, ...]) -> NDArray[np.int64]:
     """Round boxes (K, 4) to pixel ranges inside an image of `shape` (height, width)."""
     height, width = shape[:2]
     limits = np.array([width, height, width, height], dtype=np.float64)

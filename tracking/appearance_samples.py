@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from tracking.boxes import Floats, iou
 from tracking.solvers.base import OCCLUDED
 from tracking.types import Detections
-from tracking.window import Glimpse, WindowTrack
+from tracking.window import AppearanceSample, WindowTrack
 
-_CROWDED = 0.2
+_MAX_OVERLAP = 0.2
 """Overlap (IoU) above which somebody else is in the box. Whoever is hidden just now counts too."""
 
 
-def with_glimpses(
+def add_appearance_samples(
     tracks: Sequence[WindowTrack],
     states: Sequence[NDArray[np.int64]],
     first: int,
@@ -32,16 +32,16 @@ def with_glimpses(
     boxes = np.stack([track.bridged for track in tracks])[:, : len(final)]
     overlaps = np.nan_to_num(iou(boxes[:, None], boxes[None]))
     overlaps[np.arange(len(tracks)), np.arange(len(tracks))] = 0.0
-    alone = overlaps.max(axis=1) <= _CROWDED
+    alone = overlaps.max(axis=1) <= _MAX_OVERLAP
     return tuple(
-        replace(track, looks=_runs(mine, row, first, final))
+        replace(track, looks=_samples_of_runs(mine, row, first, final))
         for track, mine, row in zip(tracks, alone, states, strict=True)
     )
 
 
-def _runs(
+def _samples_of_runs(
     alone: NDArray[np.bool_], states: NDArray[np.int64], first: int, final: Sequence[Detections]
-) -> tuple[Glimpse, ...]:
+) -> tuple[AppearanceSample, ...]:
     """Put the frames together that follow each other."""
     runs: list[tuple[int, list[Floats]]] = []
     for place, seen in enumerate(final):
@@ -52,4 +52,4 @@ def _runs(
             runs[-1][1].append(histogram)
         else:
             runs.append((first + place, [histogram]))
-    return tuple(Glimpse(at, at + len(run) - 1, np.mean(run, axis=0)) for at, run in runs)
+    return tuple(AppearanceSample(at, at + len(run) - 1, np.mean(run, axis=0)) for at, run in runs)

@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 
 from tracking.boxes import Floats
 
-_ROUNDING = float(np.finfo(np.float64).eps)
+_ROUNDING_ERROR = float(np.finfo(np.float64).eps)
 """An overlap that is the least one but for its last digit is enough."""
 
 
-def best_pairs(
+def assign_pairs(
     similarity: Floats, least: float, bonus: Floats | None = None
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Assign rows to columns so that the total similarity (and bonus) is largest.
@@ -25,7 +25,7 @@ def best_pairs(
     Returns:
         `(P,)` rows and `(P,)` columns of the pairs.
     """
-    possible = similarity >= least - _ROUNDING
+    possible = similarity >= least - _ROUNDING_ERROR
     worth = np.where(possible, similarity if bonus is None else similarity + bonus, 0.0)
     rows, columns = scipy.optimize.linear_sum_assignment(worth, maximize=True)
     paired = possible[rows, columns]

@@ -61,7 +61,7 @@ def corner_distance(first: Floats, second: Floats) -> Floats:
 
     A box moved by `(x, y)` is `4 (|x| + |y|)` away from itself.
     """
-    return _CORNERS_PER_SIDE * _sides_apart(first, second)
+    return _CORNERS_PER_SIDE * _side_distance(first, second)
 
 
 def displacement(first: Floats, second: Floats) -> Floats:
@@ -69,10 +69,10 @@ def displacement(first: Floats, second: Floats) -> Floats:
 
     A box moved by `(x, y)` has a displacement of `|x| + |y|`.
     """
-    return _MEAN_SIDES * _sides_apart(first, second)
+    return _MEAN_SIDES * _side_distance(first, second)
 
 
-def strides(first: Floats, second: Floats) -> Floats:
+def normalized_distance(first: Floats, second: Floats) -> Floats:
     """Give how far somebody goes from one box to another, in mean heights, shape (...).
 
     The middle's way across, and the shorter of the ways of head and foot: one of them may be cut off by
@@ -84,7 +84,7 @@ def strides(first: Floats, second: Floats) -> Floats:
     return np.asarray(np.hypot(across, down) / size)
 
 
-def _sides_apart(first: Floats, second: Floats) -> Floats:
+def _side_distance(first: Floats, second: Floats) -> Floats:
     """Sum the distances of the four sides; side by side, which is faster than a sum over a short axis."""
     apart = np.abs(first[..., 0] - second[..., 0])
     for side in range(1, BOX_SIDES):

@@ -10,7 +10,7 @@ from tracking.boxes import Floats, iou
 from tracking.types import Detections
 
 
-def bridged(boxes: Floats, last: tuple[int, Floats] | None, most: int) -> Floats:
+def interpolate_gaps(boxes: Floats, last: tuple[int, Floats] | None, most: int) -> Floats:
     """Give the boxes (F, 4) of a window with short gaps filled, (F, 4).
 
     Args:
@@ -31,11 +31,11 @@ def bridged(boxes: Floats, last: tuple[int, Floats] | None, most: int) -> Floats
     return filled
 
 
-_SAME = 0.2
+_MIN_MATCH_IOU = 0.2
 """Overlap (IoU) of two boxes at least that are taken for the same thing a few frames later."""
 
 
-def between(before: Detections, after: Detections, share: float) -> Detections:
+def interpolate_detections(before: Detections, after: Detections, share: float) -> Detections:
     """Give the detections of a frame that lies `share` of the way from one searched frame to the next.
 
     Boxes of the two frames that overlap each other most are the same thing, which went straight from one to
@@ -52,7 +52,7 @@ def between(before: Detections, after: Detections, share: float) -> Detections:
     alike = iou(after.boxes[:, None], before.boxes[None])
     nearest, back = alike.argmax(axis=1), alike.argmax(axis=0)
     rows = np.arange(len(after))
-    kept = rows[(back[nearest] == rows) & (alike[rows, nearest] >= _SAME)]
+    kept = rows[(back[nearest] == rows) & (alike[rows, nearest] >= _MIN_MATCH_IOU)]
     matched = nearest[kept]
     return Detections(
         (1.0 - share) * before.boxes[matched] + share * after.boxes[kept],

@@ -13,16 +13,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 # frame, id and the four numbers of the box; the others are optional.
-_LEAST_FIELDS = 6
-_MOST_FIELDS = 10
-_CONFIDENCE = 6
+_MIN_FIELDS = 6
+_MAX_FIELDS = 10
+_CONFIDENCE_FIELD = 6
 # Larger frame numbers are a file of something else (timestamps), and would make a reader wait for ever.
-_LAST_FRAME = 10_000_000
+_MAX_FRAME = 10_000_000
 # Pixels; beyond, a box has no area that counts to a number.
-_FARTHEST = 1e9
+_MAX_COORDINATE = 1e9
 # Beyond, not every whole number is one of its own.
-_LARGEST_ID = 2**53
-_MOST_UNPACKED = 300_000_000  # bytes
+_MAX_ID = 2**53
+_MAX_UNPACKED_BYTES = 300_000_000  # bytes
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,11 +63,11 @@ def read_rows(path: Path) -> list[MotRow]:
     if path.suffix == ".gz":
         try:
             with gzip.open(path) as file:
-                data = file.read(_MOST_UNPACKED + 1)
+                data = file.read(_MAX_UNPACKED_BYTES + 1)
         except (gzip.BadGzipFile, EOFError, zlib.error) as error:
             raise ValueError(f"{path}: not a whole gzip file: {error}") from None
-        if len(data) > _MOST_UNPACKED:
-            raise ValueError(f"{path}: unpacks to more than {_MOST_UNPACKED // 10**6} megabytes")
+        if len(data) > _MAX_UNPACKED_BYTES:
+            raise ValueError(f"{path}: unpacks to more than {_MAX_UNPACKED_BYTES // 10**6} megabytes")
     try:
         text = data.decode("ascii")
     except UnicodeDecodeError as error:
@@ -84,7 +84,7 @@ def parse_rows(lines: Iterable[str], name: str) -> Iterator[MotRow]:
     for number, line in enumerate(lines, start=1):
         if line.strip():
             try:
-                yield _row(line)
+                yield _parse_row(line)
             except ValueError as error:
                 raise ValueError(f"{name}:{number}: {error}") from None
 
@@ -92,7 +92,7 @@ def parse_rows(lines: Iterable[str], name: str) -> Iterator[MotRow]:
 def format_row(row: MotRow) -> str:
     """Give the row as text without the line's end: two decimals, the same bytes for the same row."""
     numbers = (row.left, row.top, row.width, row.height, row.confidence)
-    return f"{row.frame},{row.id}," + ",".join(_decimal(number) for number in numbers) + ",-1,-1,-1"
+    return f"{row.frame},{row.id}," + ",".join(_format_number(number) for number in numbers) + ",-1,-1,-1"
 
 
 def format_rows(rows: Iterable[MotRow]) -> str:
@@ -115,44 +115,44 @@ def write_rows(path: Path, rows: Iterable[MotRow]) -> None:
         partial.unlink(missing_ok=True)
 
 
-def _decimal(number: float) -> str:
+def _format_number(number: float) -> str:
     text = f"{number:.2f}"
     # A negative zero would make equal boxes differ in the file.
     return "0.00" if text == "-0.00" else text
 
 
-def _row(line: str) -> MotRow:
+def _parse_row(line: str) -> MotRow:
     fields = [field.strip() for field in line.split(",")]
-    if not _LEAST_FIELDS <= len(fields) <= _MOST_FIELDS:
-        raise ValueError(f"expected {_LEAST_FIELDS} to {_MOST_FIELDS} fields, found {len(fields)}")
-    frame = _whole(fields[0], "frame")
-    if not 1 <= frame <= _LAST_FRAME:
-        raise ValueError(f"frame {frame} is not between 1 and {_LAST_FRAME}")
+    if not _MIN_FIELDS <= len(fields) <= _MAX_FIELDS:
+        raise ValueError(f"expected {_MIN_FIELDS} to {_MAX_FIELDS} fields, found {len(fields)}")
+    frame = _parse_integer(fields[0], "frame")
+    if not 1 <= frame <= _MAX_FRAME:
+        raise ValueError(f"frame {frame} is not between 1 and {_MAX_FRAME}")
     left, top, width, height = (
-        _number(field, name)
+        _parse_number(field, name)
         for field, name in zip(fields[2:6], ("left", "top", "width", "height"), strict=True)
     )
-    if max(map(abs, (left, top, width, height))) > _FARTHEST:
-        raise ValueError(f"a box is in pixels, none of them beyond {_FARTHEST:g}")
+    if max(map(abs, (left, top, width, height))) > _MAX_COORDINATE:
+        raise ValueError(f"a box is in pixels, none of them beyond {_MAX_COORDINATE:g}")
     if width <= 0.0 or height <= 0.0:
         raise ValueError(f"a box needs a positive width and height, not {width:g} x {height:g}")
-    confidence = _number(fields[6], "confidence") if len(fields) > _CONFIDENCE else 1.0
+    confidence = _parse_number(fields[6], "confidence") if len(fields) > _CONFIDENCE_FIELD else 1.0
     # Ground truth has nine fields, `..., class, visible`; results have ten, the last three of them -1.
-    visible = _number(fields[8], "visible") if len(fields) == _MOST_FIELDS - 1 else -1.0
-    number = _whole(fields[1], "id")
-    if abs(number) > _LARGEST_ID:
+    visible = _parse_number(fields[8], "visible") if len(fields) == _MAX_FIELDS - 1 else -1.0
+    number = _parse_integer(fields[1], "id")
+    if abs(number) > _MAX_ID:
         raise ValueError(f"id {fields[1][:40]} is not between -2^53 and 2^53")
     return MotRow(frame, number, left, top, width, height, confidence, visible)
 
 
-def _whole(text: str, name: str) -> int:
-    number = _number(text, name)
+def _parse_integer(text: str, name: str) -> int:
+    number = _parse_number(text, name)
     if not number.is_integer():
         raise ValueError(f"{name} is a whole number, not {text[:40]!r}")
     return int(number)
 
 
-def _number(text: str, name: str) -> float:
+def _parse_number(text: str, name: str) -> float:
     try:
         number = float(text)
     except ValueError:

@@ -12,7 +12,7 @@ from tracking.model.object_state import Template
 from tracking.model.settings import CostSettings
 from tracking.solvers.base import Solver, SolveReport
 from tracking.types import Detections
-from tracking.window import WindowResult, WindowSettings, WindowTrack, boxes_of, confidence_of
+from tracking.window import WindowResult, WindowSettings, WindowTrack, mean_confidence, select_boxes
 
 
 class TemplateTracker:
@@ -40,7 +40,7 @@ class TemplateTracker:
         places = np.asarray(boxes, dtype=np.float64)
         if places.ndim != 2 or places.shape[1] != BOX_SIDES or not len(places):  # noqa: PLR2004 — rows, sides
             raise ValueError(f"templates are boxes (n, 4), at least one, not {places.shape}")
-        self._detectors = [TemplateDetector(_cut(image, box), settings) for box in places]
+        self._detectors = [TemplateDetector(_crop(image, box), settings) for box in places]
         self._places: list[Floats | None] = list(places)
         self._window, self._costs, self._solver = window, costs, solver
         self._seen: list[list[Detections]] = [[] for _ in places]
@@ -70,9 +70,9 @@ class TemplateTracker:
         templates = [Template(n, one.histogram, place) for n, (one, place) in enumerate(objects, 1)]
         network = build_network_per_object(templates, self._seen, self._costs)
         solution = self._solver.solve(network)
-        rows = [boxes_of(states, seen) for states, seen in zip(solution.states, self._seen, strict=True)]
+        rows = [select_boxes(states, seen) for states, seen in zip(solution.states, self._seen, strict=True)]
         tracks = tuple(
-            WindowTrack(item.id, boxes, boxes, item.histogram, confidence_of(states, seen))
+            WindowTrack(item.id, boxes, boxes, item.histogram, mean_confidence(states, seen))
             for item, boxes, states, seen in zip(templates, rows, solution.states, self._seen, strict=True)
             if not np.isnan(boxes).all()
         )
@@ -91,6 +91,6 @@ class TemplateTracker:
         return result
 
 
-def _cut(image: Image, box: Floats) -> Image:
+def _crop(image: Image, box: Floats) -> Image:
     left, top, right, bottom = (max(round(float(side)), 0) for side in box)
     return image[top:bottom, left:right].copy()

@@ -8,22 +8,29 @@ import numpy as np
 import numpy.typing as npt
 
 from tracking.appearance import appearance_distance
-from tracking.appearance_samples import with_glimpses
+from tracking.appearance_samples import add_appearance_samples
 from tracking.boxes import Floats, iou
 from tracking.detectors.base import Image
-from tracking.interpolation import bridged
-from tracking.lifecycle.gating import reachable, within_reach
+from tracking.interpolation import interpolate_gaps
+from tracking.lifecycle.gating import gate_detections, restrict_network
 from tracking.lifecycle.initiation import Birth, find_births
-from tracking.lifecycle.termination import ended
+from tracking.lifecycle.termination import terminated_ids
 from tracking.model.network import CostSettings, Network, build_network
-from tracking.model.object_state import RememberedObject, Sighting
-from tracking.solvers.base import OCCLUDED, Solver, SolveReport, solver_named
-from tracking.solvers.warm_start import Told
+from tracking.model.object_state import Sighting, TrackedObject
+from tracking.solvers.base import OCCLUDED, Solver, SolveReport, create_solver
+from tracking.solvers.warm_start import WindowWarmStart
 from tracking.types import Detections
-from tracking.window import WindowResult, WindowSettings, WindowTrack, boxes_of, confidence_of, joined
+from tracking.window import (
+    WindowResult,
+    WindowSettings,
+    WindowTrack,
+    mean_confidence,
+    merge_results,
+    select_boxes,
+)
 
 # Two boxes that overlap (IoU) by this much hold parts of each other's object.
-_CROWDED = 0.15
+_MAX_OVERLAP = 0.15
 
 
 class OnlineTracker:
@@ -39,11 +46,11 @@ class OnlineTracker:
         self._costs = costs
         self._solver = solver
         # One object alone is a shortest path: dynamic programming is exact.
-        self._single = solver_named("separate-dp")
+        self._single = create_solver("separate-dp")
         self._seen: dict[int, Detections] = {}
-        self._objects: list[RememberedObject] = []
+        self._objects: list[TrackedObject] = []
         self._next_id = 1
-        self._told: Told | None = None
+        self._told: WindowWarmStart | None = None
         self._first: int | None = None
         self._last: int | None = None
 
@@ -75,11 +82,11 @@ class OnlineTracker:
         self._last = frame
         if (frame + 1) % self._window.stride == 0:
             results.append(self._solve(frame, frame - self._window.lag))
-        return joined(results)
+        return merge_results(results)
 
     def flush(self) -> WindowResult | None:
         """End the recording: all frames become final. `None` where they were already."""
-        return joined(self._end())
+        return merge_results(self._end())
 
     def _start_again(self, frame: int, detections: Detections) -> WindowResult | None:
         """After a long gap: end what was before, and begin with this frame as with a first one.
@@ -112,8 +119,8 @@ class OnlineTracker:
         born = self._give_birth(first, frames, states)
         if born:
             states, report = self._assign(first, frames)
-        boxes = [boxes_of(row, frames) for row in states]
-        gone = ended(self._objects, boxes, self._window.duplicate)
+        boxes = [select_boxes(row, frames) for row in states]
+        gone = terminated_ids(self._objects, boxes, self._window.duplicate)
         shown = [
             n
             for n, (item, rows) in enumerate(zip(self._objects, boxes, strict=True))
@@ -121,7 +128,7 @@ class OnlineTracker:
         ]
         tracks = [self._track(self._objects[n], first, states[n], boxes[n], frames) for n in shown]
         final = frames[: max(final_to - first + 1, 0)]
-        looking = with_glimpses(tracks, [states[n] for n in shown], first, final)
+        looking = add_appearance_samples(tracks, [states[n] for n in shown], first, final)
         alive = [n for n, item in enumerate(self._objects) if item.id not in gone]
         self._objects = [self._objects[n] for n in alive]
         self._finish(first, final_to, frames, states[alive])
@@ -144,20 +151,22 @@ class OnlineTracker:
             return states, report
         templates = [self._objects[n].template(first) for n in inside]
         ids = [template.id for template in templates]
-        network = within_reach(build_network(templates, frames, self._costs), [allowed[n] for n in inside])
+        network = restrict_network(
+            build_network(templates, frames, self._costs), [allowed[n] for n in inside]
+        )
         network = self._weighed(network, first, ids)
         solution = self._solver.solve(network, self._told.hint_for(first, ids) if self._told else None)
-        self._told = Told(first, ids, solution.hint)
+        self._told = WindowWarmStart(first, ids, solution.hint)
         states[inside] = solution.states
         return states, solution.report
 
     def _allowed(
-        self, item: RememberedObject, first: int, frames: Sequence[Detections]
+        self, item: TrackedObject, first: int, frames: Sequence[Detections]
     ) -> list[npt.NDArray[np.bool_]]:
         """Say for each frame which detections the object can be, `(K_m,)` bool; nothing: none in any."""
         if item.hidden_for(first - 1) > self._window.long_hidden:
             return []
-        return [reachable(item, first + m, seen, self._window) for m, seen in enumerate(frames)]
+        return [gate_detections(item, first + m, seen, self._window) for m, seen in enumerate(frames)]
 
     def _weighed(self, network: Network, first: int, ids: list[int]) -> Network:  # noqa: ARG002
         """Give the network of the objects `ids` as it is solved: here is where others add what they know."""
@@ -184,7 +193,7 @@ class OnlineTracker:
                 added = True
             elif self._make_room(first, hidden):
                 self._objects.append(
-                    RememberedObject(self._number(birth, frame), birth.histogram, birth.box, frame)
+                    TrackedObject(self._number(birth, frame), birth.histogram, birth.box, frame)
                 )
                 added = True
         return added
@@ -217,15 +226,15 @@ class OnlineTracker:
 
     def _track(
         self,
-        item: RememberedObject,
+        item: TrackedObject,
         first: int,
         states: npt.NDArray[np.int64],
         boxes: Floats,
         frames: Sequence[Detections],
     ) -> WindowTrack:
         last = (item.frame - first, item.box) if item.frame < first else None
-        filled = bridged(boxes, last, self._window.bridge)
-        return WindowTrack(item.id, boxes, filled, item.histogram, confidence_of(states, frames))
+        filled = interpolate_gaps(boxes, last, self._window.bridge)
+        return WindowTrack(item.id, boxes, filled, item.histogram, mean_confidence(states, frames))
 
     def _finish(
         self, first: int, final_to: int, frames: Sequence[Detections], states: npt.NDArray[np.int64]
@@ -239,7 +248,7 @@ class OnlineTracker:
             for item, state in zip(self._objects, column, strict=True):
                 item.present = bool(state != OCCLUDED)
                 if item.present:
-                    alone = bool(np.count_nonzero(iou(seen.boxes[state], shown) > _CROWDED) <= 1)
+                    alone = bool(np.count_nonzero(iou(seen.boxes[state], shown) > _MAX_OVERLAP) <= 1)
                     look = seen.histograms[state]
                     item.see(Sighting(first + m, seen.boxes[state], look, alone), self._window.template_rate)
         forget_after = self._window.forget_after

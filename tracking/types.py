@@ -46,13 +46,13 @@ class Detections:
         return cls(np.empty((0, BOX_SIDES)), np.empty(0), np.empty((0, bins)))
 
 
-Reason = Literal["alike", "exchange", "fading", "gap"]
+RiskReason = Literal["alike", "exchange", "fading", "gap"]
 """Why: two who look alike are about to cross; two could just as well have exchanged their identities;
 somebody fades into the background; the window's answer is not proven to be the best one."""
 
 
 @dataclass(frozen=True, slots=True)
-class Trouble:
+class RiskEvent:
     """One thing that may go wrong. Windows that follow each other tell of the same.
 
     Attributes:
@@ -67,7 +67,7 @@ class Trouble:
             compared by.
     """
 
-    reason: Reason
+    reason: RiskReason
     objects: tuple[int, ...]
     frame: int
     margin: float

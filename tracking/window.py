@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from tracking.boxes import BOX_SIDES, Floats
 from tracking.solvers.base import OCCLUDED, SolveReport
-from tracking.types import Detections, Trouble
+from tracking.types import Detections, RiskEvent
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +60,7 @@ class WindowSettings:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Glimpse:
+class AppearanceSample:
     """How an object looks in consecutive frames in which nobody else is in its box.
 
     Attributes:
@@ -92,7 +92,7 @@ class WindowTrack:
     bridged: Floats
     histogram: Floats
     confidence: float
-    looks: tuple[Glimpse, ...] = ()
+    looks: tuple[AppearanceSample, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -116,11 +116,11 @@ class WindowResult:
     final_to: int
     tracks: tuple[WindowTrack, ...]
     report: SolveReport
-    troubles: tuple[Trouble, ...] = ()
+    troubles: tuple[RiskEvent, ...] = ()
     mended_from: int | None = None
 
 
-def joined(results: list[WindowResult]) -> WindowResult | None:
+def merge_results(results: list[WindowResult]) -> WindowResult | None:
     """Give one result for windows that were solved one after the other; `None` for no window.
 
     Later windows overwrite what was provisional in earlier ones.
@@ -144,7 +144,7 @@ def joined(results: list[WindowResult]) -> WindowResult | None:
     return replace(newest, first=first, tracks=tuple(seen))
 
 
-def boxes_of(states: npt.NDArray[np.int64], frames: Sequence[Detections]) -> Floats:
+def select_boxes(states: npt.NDArray[np.int64], frames: Sequence[Detections]) -> Floats:
     """Give the boxes of states `(F,)`, `(F, 4)` pixels, NaN where the object is hidden."""
     boxes = np.full((len(frames), BOX_SIDES), np.nan)
     for m, state in enumerate(states):
@@ -153,7 +153,7 @@ def boxes_of(states: npt.NDArray[np.int64], frames: Sequence[Detections]) -> Flo
     return boxes
 
 
-def confidence_of(states: npt.NDArray[np.int64], frames: Sequence[Detections]) -> float:
+def mean_confidence(states: npt.NDArray[np.int64], frames: Sequence[Detections]) -> float:
     """Give the mean score of the boxes of states `(F,)`, 0 where the object is hidden; in [0, 1]."""
     scores = [float(frames[m].scores[state]) for m, state in enumerate(states) if state != OCCLUDED]
     return sum(scores) / len(frames)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from benchmarks.assist.failures import Failure, Kind, involved, kind_of, matches
 from benchmarks.assist.operator import Flag, Person
 from benchmarks.assist.watch import Watched
-from tracking.assist import Trouble
+from tracking.assist import RiskEvent
 
 Outcome = Literal["helped", "not needed", "harmed", "no help"]
 Cause = Literal[
@@ -120,7 +120,7 @@ def _outcome(flag: Flag, about: set[int], alone: Watched, helped: Watched) -> Ou
     return "harmed" if with_help else "not needed"
 
 
-def tells(trouble: Trouble, newest: int, failure: Failure, fps: float, person: Person) -> bool:
+def tells(trouble: RiskEvent, newest: int, failure: Failure, fps: float, person: Person) -> bool:
     """Say whether a trouble is about a failure, and came early enough for the operator to see it happen."""
     early = newest - person.delay_s * fps + person.reaction_s * fps <= failure.frame
     return bool(

@@ -13,7 +13,7 @@ from benchmarks.assist.desk import Desk
 from benchmarks.assist.operator import Person
 from benchmarks.assist.watch import Watched
 from server.wire.sections import Flags
-from tracking.assist import Trouble
+from tracking.assist import RiskEvent
 
 RISKS = (0.6, 0.5, 0.45, 0.4, 0.35, 0.3, 0.25, 0.2, 0.15, 0.1, 0.0)
 """Risks from which a flag is raised."""
@@ -71,9 +71,9 @@ def _point(watched: Sequence[Watched], person: Person, settings: Flags) -> Point
     return Point(settings.risk, flags, foreseen, failures, sum(it.clip.minutes for it in watched))
 
 
-def _raised(watched: Watched, desk: Desk) -> list[tuple[int, Trouble]]:
+def _raised(watched: Watched, desk: Desk) -> list[tuple[int, RiskEvent]]:
     """Give the flags of a clip, each with the newest frame when it was raised."""
-    windows: dict[int, list[Trouble]] = {}
+    windows: dict[int, list[RiskEvent]] = {}
     for newest, it in watched.troubles:
         windows.setdefault(newest, []).append(it)
     return [(newest, it) for newest, told in windows.items() for it in desk.raised(newest, told)]

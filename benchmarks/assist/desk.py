@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from server.view.helping.flag_budget import Budget
 from server.wire.sections import Flags
-from tracking.assist import Trouble
+from tracking.assist import RiskEvent
 
 _MOST = 1000
 """Numbers that people of one clip have at most."""
@@ -26,7 +26,7 @@ class Desk:
         self._began = self._last = self._last + 1
         self._raised = {}
 
-    def raised(self, newest: int, troubles: Sequence[Trouble]) -> list[Trouble]:
+    def raised(self, newest: int, troubles: Sequence[RiskEvent]) -> list[RiskEvent]:
         """Give those of a window's troubles for which a flag is raised, the riskiest first."""
         now = self._last = self._began + newest
         whose = [frozenset(self._began * _MOST + it for it in trouble.objects) for trouble in troubles]

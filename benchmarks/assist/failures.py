@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.experiments.scene import Truth
-from tracking.assignment import best_pairs
+from tracking.assignment import assign_pairs
 from tracking.boxes import Floats, iou
 
 _LEAST_IOU = 0.3
@@ -90,7 +90,7 @@ def matches(truth: Truth, tracks: Tracks) -> NDArray[np.int64]:
         ids = np.array(sorted(here))
         overlaps = np.nan_to_num(iou(truth.boxes[:, t, None], np.stack([here[k] for k in ids])[None]))
         stay = 0.5 * (held[:, None] == ids[None])
-        fish, rows = best_pairs(overlaps, _LEAST_IOU, stay)
+        fish, rows = assign_pairs(overlaps, _LEAST_IOU, stay)
         found[fish, t] = ids[rows]
         held[fish] = ids[rows]
     return found

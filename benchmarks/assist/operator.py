@@ -12,7 +12,7 @@ import numpy as np
 
 from benchmarks.assist.desk import Desk
 from benchmarks.experiments.scene import Truth
-from tracking.assist import Pointing, Trouble
+from tracking.assist import Pointing, RiskEvent
 from tracking.boxes import Floats, iou
 
 _SEEN = 0.15
@@ -64,7 +64,7 @@ class Flag:
         ended: the frame on the screen when it was over; `None`: not yet.
     """
 
-    trouble: Trouble
+    trouble: RiskEvent
     object: int
     raised: int
     until: int
@@ -97,7 +97,7 @@ class Operator:
         """Frames after the last one for which there is something to look at."""
         return max(self._delay, self._back)
 
-    def hear(self, newest: int, troubles: Sequence[Trouble]) -> None:
+    def hear(self, newest: int, troubles: Sequence[RiskEvent]) -> None:
         """Be told the troubles of a window, some of which raise flags."""
         now = self._now
         others = []

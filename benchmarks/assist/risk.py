@@ -23,7 +23,7 @@ from benchmarks.assist.operator import Person
 from benchmarks.assist.watch import Watched, watch
 from benchmarks.report import Report
 from benchmarks.surroundings import parser
-from tracking.assist import Reason, Signs
+from tracking.assist import RiskReason, Signs
 from tracking.boxes import Floats
 
 _MARGIN, _GONE = 4.0, 5
@@ -43,7 +43,7 @@ def fitted(terms: Floats, wrong: Floats) -> Floats:
     return weights
 
 
-def examples(watched: Sequence[Watched], reason: Reason) -> tuple[Floats, Floats]:
+def examples(watched: Sequence[Watched], reason: RiskReason) -> tuple[Floats, Floats]:
     """Give the terms `(N, D)` of the troubles of a reason, and 1 where they went wrong `(N,)`."""
     rows, wrong, person = [], [], Person()
     for it in watched:
@@ -65,7 +65,7 @@ def main() -> None:
     setup = replace(kind.setup, assist=assist)
     watched = [watch(clip, setup) for clip in kind.clips(chosen.clips, first=0)]
     table = []
-    for reason in get_args(Reason):
+    for reason in get_args(RiskReason):
         terms, wrong = examples(watched, reason)
         if not len(wrong):
             continue

@@ -12,8 +12,8 @@ from benchmarks.assist.desk import Desk
 from benchmarks.assist.failures import Failure, failures
 from benchmarks.assist.operator import Flag, Operator, Person
 from server.wire.sections import Flags
-from tracking import CostSettings, WindowResult, WindowSettings, solver_named
-from tracking.assist import AssistedTracker, AssistSettings, Pointing, Trouble
+from tracking import CostSettings, WindowResult, WindowSettings, create_solver
+from tracking.assist import AssistedTracker, AssistSettings, Pointing, RiskEvent
 from tracking.boxes import Floats
 from tracking.solvers import DEFAULT_SOLVER
 
@@ -66,7 +66,7 @@ class Watched:
 
     clip: Clip
     failures: list[Failure]
-    troubles: list[tuple[int, Trouble]]
+    troubles: list[tuple[int, RiskEvent]]
     flags: list[Flag]
     tracks: dict[int, dict[int, Floats]]
 
@@ -78,17 +78,17 @@ def watch(clip: Clip, setup: Setup, person: Person | None = None, desk: Desk | N
     """
     desk = desk or Desk(_ALL, clip.fps)
     desk.begin()
-    tracker = AssistedTracker(setup.window, setup.costs, solver_named(DEFAULT_SOLVER), setup.assist)
+    tracker = AssistedTracker(setup.window, setup.costs, create_solver(DEFAULT_SOLVER), setup.assist)
     operator = Operator(person, desk, clip.truth, clip.fps, clip.seed) if person else None
     shown: dict[int, dict[int, Floats]] = {}
-    troubles: list[tuple[int, Trouble]] = []
+    troubles: list[tuple[int, RiskEvent]] = []
     waiting: list[Pointing] = []
     count = len(clip.seen)
     for newest in range(count + (operator.after if operator else 0)):
         if newest < count:
             result = tracker.push(newest, clip.seen[newest])
             _show(shown, result)
-            found: Sequence[Trouble] = result.troubles if result else ()
+            found: Sequence[RiskEvent] = result.troubles if result else ()
             troubles += [(newest, it) for it in found]
             if operator:
                 operator.hear(newest, found)

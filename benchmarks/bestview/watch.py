@@ -16,7 +16,7 @@ from server.camera.sources import SourceEnded
 from server.camera.witness import Witness
 from server.wire.config import Config
 from server.wire.messages import CameraTracks
-from tracking import Detections, OnlineTracker, solver_named
+from tracking import Detections, OnlineTracker, create_solver
 from tracking.detectors import MotFileDetector
 from tracking.motchallenge import MotRow
 
@@ -110,7 +110,7 @@ class _Camera:
 
     def __init__(self, config: Config, camera: str, frames: Frames) -> None:
         track = config.track
-        self.tracker = OnlineTracker(track.window, track.costs, solver_named(track.solver))
+        self.tracker = OnlineTracker(track.window, track.costs, create_solver(track.solver))
         self.reporter = Reporter(camera, 0, frames.size, track.window.stride)
         self.witness = Witness(config, camera, frames.size, 0) if config.witnesses(camera) else None
         self._frames = frames

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.bestview.watch import Rows
-from tracking.assignment import best_pairs
+from tracking.assignment import assign_pairs
 from tracking.evaluation.frames import line_up
 
 Ints = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
@@ -55,7 +55,7 @@ class Met:
         for camera, (name, truth) in enumerate(sorted(gt.items())):
             numbers = sorted({row.frame for rows in (truth, tracks[name]) for row in rows})
             for number, it in zip(numbers, line_up(truth, tracks[name], least_iou), strict=True):
-                rows, columns = best_pairs(it.similarity, least_iou)
+                rows, columns = assign_pairs(it.similarity, least_iou)
                 pairs = zip(it.truth[rows].tolist(), it.tracks[columns].tolist(), strict=True)
                 found += [(camera, number, person, track) for person, track in pairs]
         return cls(*np.array(found, dtype=np.int64).reshape(-1, 4).T)

@@ -20,7 +20,7 @@ from benchmarks.endurance.memory import SPAN, Samples
 from benchmarks.experiments.scene import HEIGHT, WIDTH
 from benchmarks.report import Report
 from benchmarks.surroundings import parser
-from tracking import CostSettings, OnlineTracker, WindowSettings, solver_named
+from tracking import CostSettings, OnlineTracker, WindowSettings, create_solver
 from tracking.solvers.base import DEFAULT_SOLVER
 
 _EVERY = 250
@@ -48,7 +48,7 @@ class Run:
 
 def run_tracker(frames: int) -> Run:
     """Push so many frames of a crowd into a tracker."""
-    tracker = OnlineTracker(WindowSettings(), CostSettings(), solver_named(DEFAULT_SOLVER))
+    tracker = OnlineTracker(WindowSettings(), CostSettings(), create_solver(DEFAULT_SOLVER))
     scene = crowd(_PEOPLE, seed=1)
     run = Run("tracker", Samples())
 

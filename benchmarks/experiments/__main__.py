@@ -21,7 +21,7 @@ from benchmarks.experiments.runs import Followed, follow
 from benchmarks.experiments.scene import Scene
 from benchmarks.report import Report
 from benchmarks.surroundings import parser
-from tracking import solver_named
+from tracking import create_solver
 
 _PLOTTED = ("columns", "greedy-dp", "separate-dp")
 _LINEAR = ("columns", "exact")
@@ -43,7 +43,7 @@ class Outcome:
 
 def attempt(scene: Scene, setting: Setting, solver: str) -> Outcome:
     """Follow everybody in a scene, and judge the labels."""
-    followed = follow(scene, setting.costs, setting.window, solver_named(solver))
+    followed = follow(scene, setting.costs, setting.window, create_solver(solver))
     return Outcome(followed, judge(scene, followed.boxes))
 
 

@@ -109,7 +109,7 @@ def time_camera(folder: str, camera: str) -> None:
     from server.camera.pipeline import CameraPipeline  # noqa: PLC0415
     from server.camera.witness import Witness  # noqa: PLC0415
     from server.wire.bus import Bus  # noqa: PLC0415
-    from tracking import DEFAULT_SOLVER, OnlineTracker, solver_named  # noqa: PLC0415
+    from tracking import DEFAULT_SOLVER, OnlineTracker, create_solver  # noqa: PLC0415
     from tracking.detectors import BackgroundDetector  # noqa: PLC0415
 
     watch, frames = ThreadWatch(), 0
@@ -132,5 +132,5 @@ def time_camera(folder: str, camera: str) -> None:
     watch.wrap(Witness, "scored", "witness")
     watch.wrap(BackgroundDetector, "detect", "detect")
     watch.wrap(OnlineTracker, "push", "track")
-    watch.wrap(type(solver_named(DEFAULT_SOLVER)), "solve", "solve")
+    watch.wrap(type(create_solver(DEFAULT_SOLVER)), "solve", "solve")
     watch.wrap(Bus, "publish", "publish")

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 
 from benchmarks.observations.observed import View
-from tracking import CostSettings, Detections, OnlineTracker, WindowResult, WindowSettings, solver_named
+from tracking import CostSettings, Detections, OnlineTracker, WindowResult, WindowSettings, create_solver
 from tracking.detectors import (
     BackgroundDetector,
     BackgroundSettings,
@@ -95,7 +95,7 @@ class Seen:
 def watch(observer: Observer, view: View, frames: int | None) -> Seen:
     """Show a view to an observer, and its boxes to the tracker."""
     detector = observer.make(view)
-    tracker = OnlineTracker(WindowSettings(), CostSettings(), solver_named("columns"))
+    tracker = OnlineTracker(WindowSettings(), CostSettings(), create_solver("columns"))
     boxes: list[MotRow] = []
     tracks: list[MotRow] = []
     count, detecting, following = 0, 0.0, 0.0

@@ -16,7 +16,7 @@ from server.view.align import Aligner
 from server.view.choice.decide import Decider
 from server.wire.config import Config
 from server.wire.loading import read_content
-from tracking import OnlineTracker, solver_named
+from tracking import OnlineTracker, create_solver
 from tracking.detectors import BackgroundDetector
 
 STAGES = {
@@ -54,7 +54,7 @@ def time_stages(views: Views, config_path: Path, folder: Path) -> StageTimes:
         (Witness, "scored", "witness"),
         (OnlineTracker, "push", "track"),
         (OnlineTracker, "flush", "track"),
-        (type(solver_named(config.track.solver)), "solve", "solve"),
+        (type(create_solver(config.track.solver)), "solve", "solve"),
         (CameraPipeline, "follow", "publish"),
         (CameraPipeline, "finish", "publish"),
         (Decider, "step", "decide"),

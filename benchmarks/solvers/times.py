@@ -11,7 +11,7 @@ import numpy as np
 from benchmarks.solvers.windows import Size, moving_windows, random_window, walking_window
 from tracking.model.network import CostSettings, Network, build_network
 from tracking.model.settings import PAPER_COSTS
-from tracking.solvers import Solution, solver_named
+from tracking.solvers import Solution, create_solver
 
 GATE = 60.0
 """Pixels a frame; people at 25 frames a second and CIF move a tenth of it."""
@@ -63,7 +63,7 @@ class Timed:
 
 def timed(solver: str, network: Network) -> Timed:
     """Solve once."""
-    found = solver_named(solver)
+    found = create_solver(solver)
     start = time.process_time()
     solution = found.solve(network)
     return Timed(time.process_time() - start, solution)
@@ -106,7 +106,7 @@ class Live:
 
 def live(size: Size, steps: int, *, told: bool) -> Live:
     """Solve windows at a stride of one frame; `told`: each with the hint of the one before."""
-    solver, settings = solver_named("columns"), replace(PAPER_COSTS, gate=GATE)
+    solver, settings = create_solver("columns"), replace(PAPER_COSTS, gate=GATE)
     times, rounds = [], []
     hint = None
     for templates, frames in moving_windows(size, steps, seed=0):

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tracking import WindowResult, WindowTrack, joined
+from tracking import WindowResult, WindowTrack, merge_results
 
 
 def mended(result: WindowResult, anew: WindowResult) -> WindowResult:
@@ -24,7 +24,7 @@ def mended(result: WindowResult, anew: WindowResult) -> WindowResult:
         return _from(anew, changed)
     if anew.first <= result.first:
         return replace(_from(anew, result.first), mended_from=None)
-    both = joined([result, anew])
+    both = merge_results([result, anew])
     assert both is not None  # noqa: S101 — two make one
     return replace(both, mended_from=None)
 

@@ -23,7 +23,7 @@ from server.wire.config import Config
 from server.wire.fit import Fit
 from server.wire.help import POINTS_MOST
 from server.wire.messages import CameraTracks, Found
-from tracking import Detections, solver_named
+from tracking import Detections, create_solver
 from tracking.assist import Pointing
 
 _BY_ITSELF = Heard()
@@ -102,7 +102,7 @@ class CameraPipeline:
             track.tracker,
             camera,
             self.source,
-            lambda: solver_named(track.solver),
+            lambda: create_solver(track.solver),
             self._fit,
             ready=ready,
         )

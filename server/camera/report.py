@@ -101,7 +101,7 @@ def _track(track: WindowTrack) -> Track:
     )
 
 
-def _trouble(trouble: types.Trouble) -> Trouble:
+def _trouble(trouble: types.RiskEvent) -> Trouble:
     return Trouble(
         reason=trouble.reason,
         tracks=list(trouble.objects),
@@ -111,7 +111,7 @@ def _trouble(trouble: types.Trouble) -> Trouble:
     )
 
 
-def _glimpse(look: tracking.Glimpse) -> Glimpse:
+def _glimpse(look: tracking.AppearanceSample) -> Glimpse:
     shares = [round(float(share), _LOOK_DIGITS) for share in look.histogram]
     return Glimpse(first=look.first, last=look.last, histogram=shares)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from tracking import Detections, WindowResult, between, joined
+from tracking import Detections, WindowResult, interpolate_detections, merge_results
 from tracking.assist import AssistedTracker, Pointing
 from tracking.detectors import Image
 from tracking.yardsticks import Tracker
@@ -33,7 +33,7 @@ class Stepping:
         """Take in what was found in a frame."""
         results = [self._release((pulse, detections)), self._tracker.push(pulse, detections, image)]
         self._before = pulse, detections
-        return joined([it for it in results if it is not None])
+        return merge_results([it for it in results if it is not None])
 
     def point(self, pointings: Sequence[Pointing]) -> WindowResult | None:
         """Take in where somebody points; None: that changes nothing, or the tracker takes no pointings."""
@@ -42,16 +42,16 @@ class Stepping:
     def flush(self) -> WindowResult | None:
         """End the recording."""
         results = [self._release(None), self._tracker.flush()]
-        return joined([it for it in results if it is not None])
+        return merge_results([it for it in results if it is not None])
 
     def _release(self, after: tuple[int, Detections] | None) -> WindowResult | None:
         """Give the tracker what waits; ``after`` is the next searched frame."""
         held, self._held = self._held, []
         results = [self._tracker.push(it, self._guessed(it, after)) for it in held]
-        return joined([it for it in results if it is not None])
+        return merge_results([it for it in results if it is not None])
 
     def _guessed(self, pulse: int, after: tuple[int, Detections] | None) -> Detections:
         before = self._before
         if before is None or after is None or after[0] - before[0] > self._stride:
             return self._nothing
-        return between(before[1], after[1], (pulse - before[0]) / (after[0] - before[0]))
+        return interpolate_detections(before[1], after[1], (pulse - before[0]) / (after[0] - before[0]))

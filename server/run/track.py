@@ -19,7 +19,7 @@ from server.wire.errors import UserError
 from server.wire.fit import Fit
 from server.wire.loading import build_config, read_content
 from server.wire.output import whole_file
-from tracking import Detections, Solver, WindowResult, solver_named, solver_names
+from tracking import Detections, Solver, WindowResult, create_solver, solver_names
 from tracking.detectors import MotFileDetector
 from tracking.motchallenge import MotRow, write_rows
 from tracking.yardsticks import Tracker, needs_pictures, tracker_names
@@ -97,7 +97,7 @@ def solver_for(config: Config, name: str | None) -> Solver:
     """
     if name is not None and name not in solver_names():
         raise UserError(f"--solver: no solver is called {name!r}; there are {', '.join(solver_names())}")
-    return solver_named(name or config.track.solver)
+    return create_solver(name or config.track.solver)
 
 
 def loaded_for(video: Path | None, det: Path | None, config: Path | None) -> Config:

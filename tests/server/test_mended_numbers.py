@@ -14,7 +14,7 @@ from server.view.align import Epoch
 from server.view.helping.pointing import Place, pointings
 from server.view.who.people import People
 from server.wire.messages import CameraTracks
-from tracking import CostSettings, Detections, WindowSettings, solver_named
+from tracking import CostSettings, Detections, WindowSettings, create_solver
 from tracking.assist import AssistedTracker, AssistSettings, Pointing
 
 WIDTH, HEIGHT = 640, 360
@@ -44,7 +44,7 @@ class Camera:
     """One camera's tracker, and what it says."""
 
     def __init__(self) -> None:
-        solver = solver_named("columns")
+        solver = create_solver("columns")
         self._tracker = AssistedTracker(WINDOW, CostSettings(), solver, ASSIST)
         self._reporter = Reporter("c0", 1, (WIDTH, HEIGHT), WINDOW.stride)
 

@@ -10,14 +10,14 @@ import pytest
 from benchmarks.endurance.crowd import crowd
 from server.camera.ladder import Rung, rungs
 from server.camera.stepping import Stepping
-from tracking import CostSettings, Detections, OnlineTracker, WindowResult, WindowSettings, solver_named
+from tracking import CostSettings, Detections, OnlineTracker, WindowResult, WindowSettings, create_solver
 
 WINDOW = WindowSettings()
 FRAMES = 80
 
 
 def stepping(bins: int) -> Stepping:
-    tracker = OnlineTracker(WINDOW, CostSettings(), solver_named("columns"))
+    tracker = OnlineTracker(WINDOW, CostSettings(), create_solver("columns"))
     return Stepping(tracker, bins, WINDOW.stride)
 
 
@@ -61,7 +61,7 @@ def test_somebody_is_one_person_however_few_frames_are_searched(rung: Rung) -> N
 
 def test_where_every_frame_is_searched_nothing_is_different() -> None:
     scene = list(islice(crowd(3, seed=2), 60))
-    tracker = OnlineTracker(WINDOW, CostSettings(), solver_named("columns"))
+    tracker = OnlineTracker(WINDOW, CostSettings(), create_solver("columns"))
     steps = stepping(scene[0].histograms.shape[1])
     for frame, seen in enumerate(scene):
         one, other = tracker.push(frame, seen), steps.push(frame, seen)

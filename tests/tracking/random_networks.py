@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from tracking.model.network import CostSettings, Network, Template, build_network, build_network_per_object
 from tracking.model.settings import PAPER_COSTS
-from tracking.solvers.objective import conflict_count, objective
+from tracking.solvers.objective import conflict_count, total_cost
 from tracking.types import Detections
 
 BINS = 4
@@ -95,7 +95,7 @@ def best_by_trying(network: Network) -> float:
     best = np.inf
     for flat in product(states, repeat=network.objects * network.frames):
         nodes = np.array(flat).reshape(network.objects, network.frames)
-        cost = objective(network, nodes)
+        cost = total_cost(network, nodes)
         if cost < best and conflict_count(network, nodes) == 0:
             best = cost
     return best

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tracking.model.settings import CostSettings
-from tracking.solvers.base import solver_named
+from tracking.solvers.base import create_solver
 from tracking.tracker import OnlineTracker
 from tracking.types import Detections
 from tracking.window import WindowResult, WindowSettings
@@ -53,7 +53,7 @@ def seen_at(people: Iterable[Stroll], frame: int, jitter: float = 0.0, seed: int
 
 
 def tracker(settings: WindowSettings | None = None) -> OnlineTracker:
-    return OnlineTracker(settings or WindowSettings(), TEST_COSTS, solver_named("greedy-dp"))
+    return OnlineTracker(settings or WindowSettings(), TEST_COSTS, create_solver("greedy-dp"))
 
 
 def follow(stream: Sequence[Detections], tracked: OnlineTracker, start: int = 0) -> list[WindowResult]:

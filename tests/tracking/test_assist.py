@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from strolls import TEST_COSTS, WIDTH, Stroll, final_boxes, follow, seen_at
 
-from tracking import Detections, OnlineTracker, WindowResult, WindowSettings, solver_named
+from tracking import Detections, OnlineTracker, WindowResult, WindowSettings, create_solver
 from tracking.assist import AssistedTracker, AssistSettings, Pointing
 from tracking.assist.carry import carried
 from tracking.boxes import iou
@@ -21,11 +21,11 @@ ALIKE = [Stroll(0, 50, 4.0, 1), Stroll(300, 50, -4.0, 1)]
 
 def _helped(memory: int = 250) -> AssistedTracker:
     assist = AssistSettings(enabled=True, memory=memory)
-    return AssistedTracker(WindowSettings(), TEST_COSTS, solver_named("columns"), assist)
+    return AssistedTracker(WindowSettings(), TEST_COSTS, create_solver("columns"), assist)
 
 
 def _plain() -> OnlineTracker:
-    return OnlineTracker(WindowSettings(), TEST_COSTS, solver_named("columns"))
+    return OnlineTracker(WindowSettings(), TEST_COSTS, create_solver("columns"))
 
 
 def _crossing(people: Sequence[Stroll] = ALIKE, frames: int = 80) -> list[Detections]:
@@ -216,7 +216,7 @@ def test_after_the_end_of_a_recording_it_is_still_mended() -> None:
 def test_only_who_asks_for_help_gets_a_tracker_that_takes_it(
     assist: AssistSettings | None, kind: Callable[..., object]
 ) -> None:
-    found = tracker_named("lp", WindowSettings(), TEST_COSTS, lambda: solver_named("columns"), assist=assist)
+    found = tracker_named("lp", WindowSettings(), TEST_COSTS, lambda: create_solver("columns"), assist=assist)
     assert type(found) is kind
 
 

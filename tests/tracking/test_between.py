@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tracking import Detections, between
+from tracking import Detections, interpolate_detections
 
 
 def seen(
@@ -21,20 +21,22 @@ def seen(
 
 
 def test_who_walks_is_half_way_in_the_middle() -> None:
-    there = between(seen((0, 0, 10, 30), scores=(0.5,)), seen((4, 2, 14, 32)), 0.5)
+    there = interpolate_detections(seen((0, 0, 10, 30), scores=(0.5,)), seen((4, 2, 14, 32)), 0.5)
     assert there.boxes.tolist() == [[2, 1, 12, 31]]
     assert there.scores.tolist() == [0.5]
 
 
 def test_two_who_walk_past_each_other_are_not_mixed_up() -> None:
-    there = between(seen((0, 0, 10, 30), (30, 0, 40, 30)), seen((27, 0, 37, 30), (3, 0, 13, 30)), 1 / 3)
+    there = interpolate_detections(
+        seen((0, 0, 10, 30), (30, 0, 40, 30)), seen((27, 0, 37, 30), (3, 0, 13, 30)), 1 / 3
+    )
     assert there.boxes[:, 0] == pytest.approx([29.0, 1.0])
 
 
 def test_who_comes_or_goes_is_not_guessed() -> None:
-    assert len(between(seen((0, 0, 10, 30)), seen((50, 0, 60, 30)), 0.5)) == 0
-    assert len(between(seen(), seen((50, 0, 60, 30)), 0.5)) == 0
-    assert between(seen((0, 0, 10, 30)), seen(bins=2), 0.5).histograms.shape == (0, 2)
+    assert len(interpolate_detections(seen((0, 0, 10, 30)), seen((50, 0, 60, 30)), 0.5)) == 0
+    assert len(interpolate_detections(seen(), seen((50, 0, 60, 30)), 0.5)) == 0
+    assert interpolate_detections(seen((0, 0, 10, 30)), seen(bins=2), 0.5).histograms.shape == (0, 2)
 
 
 sides = st.tuples(st.integers(0, 60), st.integers(0, 60), st.integers(4, 30), st.integers(4, 60))
@@ -45,7 +47,7 @@ def test_nobody_is_guessed_twice_and_all_lie_between(
     first: list[tuple[int, int, int, int]], second: list[tuple[int, int, int, int]], share: float
 ) -> None:
     before, after = (seen(*((x, y, x + w, y + h) for x, y, w, h in some)) for some in (first, second))
-    there = between(before, after, share)
+    there = interpolate_detections(before, after, share)
     assert len(there) <= min(len(before), len(after))
     starts = (there.boxes[:, None] - share * after.boxes[None]) / max(1.0 - share, 1e-9)
     if share < 0.99 and len(there):

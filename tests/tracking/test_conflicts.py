@@ -9,10 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from random_networks import Case, cases, network_of
 
-from tracking.model.conflicts import clique_rows, connected
+from tracking.model.conflicts import clique_rows, connected_places
 from tracking.model.network import CostSettings, Network, Template, build_network
 from tracking.model.settings import PAPER_COSTS
-from tracking.solvers.cutting_planes import ConflictFinder
+from tracking.solvers.cutting_planes import ConflictSeparator
 from tracking.types import Detections
 
 PERSON = np.array([0.0, 0.0, 20.0, 50.0])
@@ -84,7 +84,7 @@ def test_cliques_are_cliques_and_the_cover_of_a_part_is_the_part_of_the_cover(se
     for row in rows:
         assert joined[np.ix_(row, row)].all()
     for place in range(12):
-        part = connected(relation, place)
+        part = connected_places(relation, place)
         inside = rows[rows[:, part].any(axis=1)]
         alone = clique_rows(relation[np.ix_(part, part)], None if owners is None else owners[part])
         assert {row.tobytes() for row in inside[:, part]} == {row.tobytes() for row in alone}
@@ -103,7 +103,7 @@ def test_the_finder_gives_every_broken_row_once_and_no_other(case: Case) -> None
         for row in network.rows(m)
         if usage[:, m, :-1][row].sum() > 1.0 + 1e-9
     }
-    finder = ConflictFinder(network)
+    finder = ConflictSeparator(network)
     found = [(row.frame, np.ascontiguousarray(row.members[:, :-1]).tobytes()) for row in finder.broken(usage)]
     assert sorted(found) == sorted(expected)
     assert not finder.broken(usage)

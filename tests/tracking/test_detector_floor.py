@@ -14,7 +14,7 @@ import pytest
 from scipy.optimize import linear_sum_assignment
 
 from server.camera.scene import Scene
-from tracking import DEFAULT_SOLVER, CostSettings, OnlineTracker, WindowSettings, solver_named
+from tracking import DEFAULT_SOLVER, CostSettings, OnlineTracker, WindowSettings, create_solver
 from tracking.boxes import iou
 from tracking.detectors import BackgroundDetector, BackgroundSettings
 from tracking.motchallenge import read_rows
@@ -39,7 +39,7 @@ def tracked(
 ) -> dict[int, Boxes]:
     """Give the final boxes of every frame, counted from 0."""
     detector = BackgroundDetector(BackgroundSettings(ignore=ignore))
-    tracker = OnlineTracker(WindowSettings(), CostSettings(), solver_named(DEFAULT_SOLVER))
+    tracker = OnlineTracker(WindowSettings(), CostSettings(), create_solver(DEFAULT_SOLVER))
     found: dict[int, Boxes] = {}
     results = [tracker.push(frame, detector.detect(image)) for frame, image in enumerate(images)]
     for result in [*results, tracker.flush()]:

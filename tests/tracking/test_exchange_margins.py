@@ -13,13 +13,13 @@ from random_networks import SETTINGS, Case, cases, network_of
 
 from tracking.assist import exchange_margins, exchanges
 from tracking.model.network import Network
-from tracking.solvers.base import OCCLUDED, solver_named
-from tracking.solvers.objective import conflict_count, nodes_of, objective
+from tracking.solvers.base import OCCLUDED, create_solver
+from tracking.solvers.objective import conflict_count, nodes_from_states, total_cost
 
 
 def _solved(case: Case) -> tuple[Network, np.ndarray, float]:
     network = network_of(replace(case, shared=True, settings=replace(case.settings, layout=0.0)))
-    solution = solver_named("exact").solve(network)
+    solution = create_solver("exact").solve(network)
     return network, solution.states, solution.report.objective
 
 
@@ -36,7 +36,7 @@ def test_a_margin_is_what_the_cheapest_exchange_costs_of_all_tried(case: Case) -
     found = exchanges(network, states)
     for a, b in combinations(range(network.objects), 2):
         tried = [
-            objective(network, nodes_of(network, _exchanged(states, a, b, frame))) - cost
+            total_cost(network, nodes_from_states(network, _exchanged(states, a, b, frame))) - cost
             for frame in range(network.frames)
             if (states[[a, b], frame:] != OCCLUDED).any()
         ]
@@ -45,8 +45,10 @@ def test_a_margin_is_what_the_cheapest_exchange_costs_of_all_tried(case: Case) -
         assert found.margins[a, b] == pytest.approx(least, abs=1e-9)
         if np.isfinite(least):
             there = _exchanged(states, a, b, int(found.frames[a, b]))
-            assert objective(network, nodes_of(network, there)) - cost == pytest.approx(least, abs=1e-9)
-            assert conflict_count(network, nodes_of(network, there)) == 0
+            assert total_cost(network, nodes_from_states(network, there)) - cost == pytest.approx(
+                least, abs=1e-9
+            )
+            assert conflict_count(network, nodes_from_states(network, there)) == 0
 
 
 @given(cases(objects=3, frames=4, places=3))
@@ -64,7 +66,7 @@ def test_a_margin_is_no_less_than_what_the_best_answer_costs_in_which_the_two_en
         for one, other in ((a, b), (b, a)):
             barred = np.arange(network.places + 1) != states[other, -1] % (network.places + 1)
             node[one, -1, barred] = np.inf
-        best = solver_named("exact").solve(replace(network, node=node))
+        best = create_solver("exact").solve(replace(network, node=node))
         assert best.report.objective - cost <= margins[a, b] + 1e-9
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from tracking import Detections, Glimpse, WindowTrack
-from tracking.appearance_samples import with_glimpses
+from tracking import AppearanceSample, Detections, WindowTrack
+from tracking.appearance_samples import add_appearance_samples
 
 HERE, THERE, BESIDE = (0.0, 0.0, 10.0, 20.0), (200.0, 0.0, 210.0, 20.0), (3.0, 0.0, 13.0, 20.0)
 
@@ -20,7 +20,7 @@ def track(number: int, *boxes: tuple[float, ...] | None) -> WindowTrack:
     return WindowTrack(number, rows, rows, np.full(4, 0.25), 1.0)
 
 
-def told(looks: tuple[Glimpse, ...]) -> list[tuple[int, int, list[float]]]:
+def told(looks: tuple[AppearanceSample, ...]) -> list[tuple[int, int, list[float]]]:
     return [(it.first, it.last, it.histogram.tolist()) for it in looks]
 
 
@@ -29,7 +29,7 @@ def test_frames_in_a_row_are_one_glimpse_and_a_crowd_or_a_hiding_ends_it() -> No
     two = track(2, THERE, THERE, BESIDE, THERE, None, THERE)
     states = [np.zeros(6, dtype=np.int64), np.array([1, 1, 1, 1, -1, 1])]
     frames = [seen(HERE, THERE), seen(HERE, THERE), seen(HERE, BESIDE)] + [seen(HERE, THERE)] * 3
-    first, second = with_glimpses([one, two], states, 100, frames)
+    first, second = add_appearance_samples([one, two], states, 100, frames)
     assert told(first.looks) == [(100, 101, [1, 0, 0, 0]), (103, 105, [1, 0, 0, 0])]
     assert told(second.looks) == [
         (100, 101, [0, 1, 0, 0]),
@@ -42,7 +42,7 @@ def test_only_final_frames_tell_and_whoever_is_hidden_may_be_in_the_box() -> Non
     one, two = track(1, HERE, HERE, HERE), track(2, BESIDE, THERE, THERE)
     states = [np.zeros(3, dtype=np.int64), np.full(3, -1)]  # two is not seen, but known to be there
     frames = [seen(HERE)] * 2
-    first, second = with_glimpses([one, two], states, 7, frames)
+    first, second = add_appearance_samples([one, two], states, 7, frames)
     assert told(first.looks) == [(8, 8, [1, 0, 0, 0])]
     assert second.looks == ()
-    assert with_glimpses([], [], 7, frames) == ()
+    assert add_appearance_samples([], [], 7, frames) == ()

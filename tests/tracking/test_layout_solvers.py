@@ -12,8 +12,8 @@ from random_networks import SETTINGS, Case, cases, network_of
 
 from tracking.model.network import Network, Template, build_network
 from tracking.model.settings import PAPER_COSTS
-from tracking.solvers import solver_named
-from tracking.solvers.objective import conflict_count, layout_cost, objective
+from tracking.solvers import create_solver
+from tracking.solvers.objective import conflict_count, layout_cost, total_cost
 from tracking.types import Detections
 
 SQUARE = 2
@@ -24,7 +24,7 @@ def best_square_by_trying(network: Network) -> float:
     best = np.inf
     for flat in product(range(network.places + 1), repeat=network.objects * network.frames):
         nodes = np.array(flat).reshape(network.objects, network.frames)
-        cost = objective(network, nodes, SQUARE)
+        cost = total_cost(network, nodes, SQUARE)
         if cost < best and conflict_count(network, nodes) == 0:
             best = cost
     return best
@@ -40,7 +40,7 @@ REGULAR_IS_WORSE = Case(3, 2, 2, shared=True, settings=ILL, seed=1537)
 @example(case=REGULAR_IS_WORSE)
 def test_squares_are_bounded_below_the_optimum_and_whole_relaxations_attain_it(case: Case) -> None:
     network = network_of(case)
-    report = solver_named("l2").solve(network).report
+    report = create_solver("l2").solve(network).report
     optimum = best_square_by_trying(network)
     assert report.bound <= optimum + 1e-6
     assert report.objective >= optimum - 1e-9
@@ -53,7 +53,7 @@ def test_squares_are_bounded_below_the_optimum_and_whole_relaxations_attain_it(c
 @given(case=cases(objects=4, frames=4, places=4))
 def test_without_layout_squares_change_nothing(case: Case) -> None:
     network = network_of(case)
-    columns, squares = solver_named("columns").solve(network), solver_named("l2").solve(network)
+    columns, squares = create_solver("columns").solve(network), create_solver("l2").solve(network)
     np.testing.assert_array_equal(columns.states, squares.states)
 
 
@@ -77,8 +77,8 @@ def side_by_side(layout: float) -> Network:
 
 @pytest.mark.parametrize("name", ["arcs", "columns", "exact", "extended-dp"])
 def test_the_layout_term_keeps_people_in_step(name: str) -> None:
-    apart = solver_named(name).solve(side_by_side(layout=0.0))
-    together = solver_named(name).solve(side_by_side(layout=0.01))
+    apart = create_solver(name).solve(side_by_side(layout=0.0))
+    together = create_solver(name).solve(side_by_side(layout=0.01))
     assert apart.states[1].tolist() == [1, 1, 2]
     assert together.states[1].tolist() == [1, 1, 1]
 

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tracking.interpolation import bridged
-from tracking.model.motion import Motion
+from tracking.interpolation import interpolate_gaps
+from tracking.model.motion import MotionModel
 from tracking.model.network import Network, build_network
 from tracking.model.object_state import Template
 from tracking.model.settings import CostSettings
@@ -21,13 +21,13 @@ RIGHT = np.array([5.0, 0.0, 5.0, 0.0])
 LOOK, OTHER = np.array([1.0, 0.0]), np.array([0.0, 1.0])
 
 
-def walked(frames: int = 12) -> Motion:
+def walked(frames: int = 12) -> MotionModel:
     boxes = np.stack([BOX + n * RIGHT for n in range(frames)])
-    return Motion.of(range(frames), boxes, frames)
+    return MotionModel.of(range(frames), boxes, frames)
 
 
 def window(
-    motion: Motion | None, settings: CostSettings, *boxes: np.ndarray, look: np.ndarray = LOOK
+    motion: MotionModel | None, settings: CostSettings, *boxes: np.ndarray, look: np.ndarray = LOOK
 ) -> Network:
     """Give a window of one hidden object and one box a frame."""
     frames = [Detections(box[None], np.ones(1), look[None]) for box in boxes]
@@ -44,7 +44,7 @@ def test_somebody_goes_on_as_they_went_and_slower_the_longer_they_are_away() -> 
 
 
 def test_one_sighting_has_no_direction() -> None:
-    motion = Motion.of([7], BOX[None], 9)
+    motion = MotionModel.of([7], BOX[None], 9)
     assert motion.velocity == pytest.approx([0.0, 0.0])
     assert motion.elapsed == 2
     assert motion.predicted(3) == pytest.approx(np.stack([BOX] * 3))
@@ -53,7 +53,7 @@ def test_one_sighting_has_no_direction() -> None:
 @given(st.lists(st.integers(1, 5), min_size=1, max_size=11), st.integers(1, 50))
 def test_a_velocity_is_never_overestimated_whatever_frames_it_is_seen_in(gaps: list[int], after: int) -> None:
     frames = [int(n) for n in np.cumsum([0, *gaps])]
-    motion = Motion.of(frames, np.stack([BOX + n * RIGHT for n in frames]), frames[-1] + after)
+    motion = MotionModel.of(frames, np.stack([BOX + n * RIGHT for n in frames]), frames[-1] + after)
     assert 0.0 < motion.velocity[0] <= 5.0
     assert motion.velocity[1] == pytest.approx(0.0)
 
@@ -93,7 +93,7 @@ def test_short_gaps_are_bridged_and_long_ones_are_not() -> None:
     boxes = np.full((12, 4), np.nan)
     for frame, box in seen.items():
         boxes[frame] = box
-    filled = bridged(boxes, None, 3)
+    filled = interpolate_gaps(boxes, None, 3)
     assert filled[:4] == pytest.approx(np.stack([BOX + n * RIGHT for n in range(4)]))
     assert np.isnan(filled[4:9]).all()
     assert np.isnan(filled[10:]).all(), "nobody knows where they go next"
@@ -103,6 +103,6 @@ def test_short_gaps_are_bridged_and_long_ones_are_not() -> None:
 def test_a_gap_that_began_before_the_window_is_bridged_from_there() -> None:
     boxes = np.full((4, 4), np.nan)
     boxes[2] = BOX + 2 * RIGHT
-    filled = bridged(boxes, (-2, BOX - 2 * RIGHT), 5)
+    filled = interpolate_gaps(boxes, (-2, BOX - 2 * RIGHT), 5)
     assert filled[:3] == pytest.approx(np.stack([BOX + n * RIGHT for n in range(3)]))
-    assert np.isnan(bridged(boxes, (-20, BOX), 5)[:2]).all()
+    assert np.isnan(interpolate_gaps(boxes, (-20, BOX), 5)[:2]).all()

@@ -9,7 +9,7 @@ from random_networks import SETTINGS, Case, network_of
 
 from tracking.assist import Pointing
 from tracking.assist.placing import is_found, place_of, with_place, with_places
-from tracking.solvers.base import OCCLUDED, solver_named
+from tracking.solvers.base import OCCLUDED, create_solver
 from tracking.types import Detections
 
 SIZE = np.array([20.0, 40.0])
@@ -48,6 +48,6 @@ def test_a_place_that_was_made_for_one_is_none_for_others_and_in_nobodys_way() -
     assert np.isinf(made.node[0, 1, 1])
     np.testing.assert_array_equal(made.node[1], network.node[1])
     assert made.conflicts[1].tolist() == [[True, False], [False, True]]
-    states = solver_named("exact").solve(made).states
+    states = create_solver("exact").solve(made).states
     assert states[0, 1] in {0, OCCLUDED}
     assert with_places(network, 10, [7, 8], {20: {8: 1}}, change=0.3) is network

@@ -12,7 +12,7 @@ from random_networks import SETTINGS, Case, cases, network_of
 
 from tracking.assist import AssistSettings, Pointing
 from tracking.assist.pointing import farness, with_pointings
-from tracking.solvers.base import solver_named
+from tracking.solvers.base import create_solver
 
 ASSIST = AssistSettings(enabled=True)
 
@@ -61,5 +61,5 @@ def test_a_pointing_exchanges_two_who_could_be_either() -> None:
         left, top, right, bottom = network.boxes[0, 2, 0].tolist()
         said = Pointing(2, owner, (left + right) / 2.0, (top + bottom) / 2.0, 1.0)
         pointed = with_pointings(even, 0, [0, 1], {2: {owner: said}}, ASSIST, 1.0)
-        states = solver_named("exact").solve(pointed).states
+        states = create_solver("exact").solve(pointed).states
         assert states[owner, 2] == 0

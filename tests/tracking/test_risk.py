@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from benchmarks.assist.risk import fitted
-from tracking.assist import Reason, Signs
+from tracking.assist import RiskReason, Signs
 from tracking.assist.risk import WEIGHTS, risk_of
 
 
-@pytest.mark.parametrize("reason", get_args(Reason))
-def test_a_risk_is_a_probability_and_no_larger_where_the_tracker_is_surer(reason: Reason) -> None:
+@pytest.mark.parametrize("reason", get_args(RiskReason))
+def test_a_risk_is_a_probability_and_no_larger_where_the_tracker_is_surer(reason: RiskReason) -> None:
     for lead in (-20.0, 0.0, 20.0):
         risks = [risk_of(reason, Signs(margin, lead, 10.0)) for margin in (0.0, 0.5, 2.0, 100.0, np.inf)]
         assert all(0.0 < it < 1.0 for it in risks)
@@ -35,4 +35,4 @@ def test_the_weights_that_made_the_examples_are_found_again() -> None:
 
 
 def test_every_reason_has_weights() -> None:
-    assert set(WEIGHTS) == set(get_args(Reason))
+    assert set(WEIGHTS) == set(get_args(RiskReason))

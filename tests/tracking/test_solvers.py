@@ -12,8 +12,8 @@ from random_networks import SETTINGS, Case, best_by_trying, cases, network_of
 
 from tracking.model.network import Template, build_network
 from tracking.model.settings import PAPER_COSTS
-from tracking.solvers import OCCLUDED, Solution, solver_named
-from tracking.solvers.objective import conflict_count, nodes_of, objective
+from tracking.solvers import OCCLUDED, Solution, create_solver
+from tracking.solvers.objective import conflict_count, nodes_from_states, total_cost
 from tracking.types import Detections
 
 CLOSE = 1e-9
@@ -23,12 +23,12 @@ bounded = settings(deadline=None, max_examples=60)
 
 
 def solved(case: Case, name: str) -> Solution:
-    return solver_named(name).solve(network_of(case))
+    return create_solver(name).solve(network_of(case))
 
 
 def test_an_unknown_solver_is_refused_with_the_names_there_are() -> None:
     with pytest.raises(ValueError, match=r"'simplex'.*arcs, columns"):
-        solver_named("simplex")
+        create_solver("simplex")
 
 
 @pytest.mark.parametrize("name", WITHOUT_CONFLICTS)
@@ -36,12 +36,12 @@ def test_an_unknown_solver_is_refused_with_the_names_there_are() -> None:
 @given(case=cases(layouts=(0.0, 0.002)))
 def test_states_exist_and_keep_all_conflicts(name: str, case: Case) -> None:
     network = network_of(case)
-    solution = solver_named(name).solve(network)
-    nodes = nodes_of(network, solution.states)
+    solution = create_solver(name).solve(network)
+    nodes = nodes_from_states(network, solution.states)
     assert solution.states.shape == (network.objects, network.frames)
     assert solution.states.dtype == np.int64
     assert solution.states.min(initial=OCCLUDED) >= OCCLUDED
-    assert solution.report.objective == pytest.approx(objective(network, nodes), rel=CLOSE)
+    assert solution.report.objective == pytest.approx(total_cost(network, nodes), rel=CLOSE)
     assert np.isfinite(solution.report.objective)
     assert conflict_count(network, nodes) == solution.report.conflicts == 0
 
@@ -52,7 +52,7 @@ def test_states_exist_and_keep_all_conflicts(name: str, case: Case) -> None:
 def test_the_bound_is_below_the_optimum_and_whole_relaxations_are_optimal(name: str, case: Case) -> None:
     network = network_of(case)
     optimum = best_by_trying(network)
-    report = solver_named(name).solve(network).report
+    report = create_solver(name).solve(network).report
     assert report.bound <= optimum + CLOSE
     if report.conflicts == 0:
         assert report.objective >= optimum - CLOSE
@@ -72,8 +72,8 @@ def test_where_objects_must_be_somewhere_they_are_there_or_the_answer_says_it_is
     network = replace(network, node=np.where(barred, np.inf, network.node))
     optimum = best_by_trying(network)
     assume(np.isfinite(optimum))
-    found = solver_named(name).solve(network)
-    assert found.report.conflicts == conflict_count(network, nodes_of(network, found.states))
+    found = create_solver(name).solve(network)
+    assert found.report.conflicts == conflict_count(network, nodes_from_states(network, found.states))
     if not found.report.conflicts:
         assert found.report.objective >= optimum - CLOSE
     if name != "greedy-dp":
@@ -85,7 +85,7 @@ def test_where_objects_must_be_somewhere_they_are_there_or_the_answer_says_it_is
 
 def test_greedy_ends_where_there_is_a_way_for_nobody() -> None:
     network = network_of(Case(3, 3, 2, shared=True, settings=SETTINGS, seed=1))
-    found = solver_named("greedy-dp").solve(replace(network, node=np.full_like(network.node, np.inf)))
+    found = create_solver("greedy-dp").solve(replace(network, node=np.full_like(network.node, np.inf)))
     assert np.isinf(found.report.objective)
 
 
@@ -95,7 +95,7 @@ def test_three_objects_get_the_optimum_where_the_relaxation_is_whole(case: Case)
     network = network_of(case)
     optimum = best_by_trying(network)
     for name in RELAXING:
-        report = solver_named(name).solve(network).report
+        report = create_solver(name).solve(network).report
         assert report.bound <= optimum + CLOSE
         assert not report.integral or report.objective == pytest.approx(optimum, rel=CLOSE)
 
@@ -137,7 +137,7 @@ def test_columns_finds_the_optimum_of_many_small_groups() -> None:
 
     templates = [Template(n, np.ones(1), boxes[n]) for n in range(20)]
     network = build_network(templates, [seen(m) for m in range(5)], replace(PAPER_COSTS, displacement=0.003))
-    columns, arcs = (solver_named(name).solve(network).report for name in RELAXING)
+    columns, arcs = (create_solver(name).solve(network).report for name in RELAXING)
     assert columns.rounds > 0
     assert columns.bound == pytest.approx(arcs.bound, rel=CLOSE)
     assert columns.integral

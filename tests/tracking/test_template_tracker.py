@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from tracking import PAPER_COSTS, CostSettings, TemplateTracker, WindowSettings, solver_named
+from tracking import PAPER_COSTS, CostSettings, TemplateTracker, WindowSettings, create_solver
 from tracking.boxes import iou
 from tracking.detectors import TemplateSettings
 from tracking.window import WindowResult
@@ -46,7 +46,7 @@ def tracker(stride: int = 5) -> TemplateTracker:
     costs = replace(PAPER_COSTS, confidence=1.0)
     window = WindowSettings(window=15, stride=stride)
     settings = TemplateSettings(most_peaks=30)
-    return TemplateTracker(picture(0), places(0), settings, window, costs, solver_named("columns"))
+    return TemplateTracker(picture(0), places(0), settings, window, costs, create_solver("columns"))
 
 
 def final(results: list[WindowResult | None]) -> dict[int, dict[int, npt.NDArray[np.float64]]]:
@@ -88,4 +88,4 @@ def test_templates_are_boxes() -> None:
     costs, window = CostSettings(), WindowSettings()
     for boxes in (np.empty((0, 4)), np.zeros(4), np.zeros((2, 3))):
         with pytest.raises(ValueError, match=r"boxes \(n, 4\)"):
-            TemplateTracker(picture(0), boxes, TemplateSettings(), window, costs, solver_named("columns"))
+            TemplateTracker(picture(0), boxes, TemplateSettings(), window, costs, create_solver("columns"))

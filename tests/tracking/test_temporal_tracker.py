@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from strolls import final_boxes
 
-from tracking import CostSettings, Detections, WindowResult, WindowSettings, solver_named
+from tracking import CostSettings, Detections, WindowResult, WindowSettings, create_solver
 from tracking.boxes import Floats, iou
 from tracking.detectors.base import Image
 from tracking.temporal import BlobSettings, TemporalSettings
@@ -173,7 +173,7 @@ def test_a_frame_that_does_not_come_after_the_last_one_is_refused() -> None:
 
 def test_it_is_a_tracker_by_name_that_needs_pictures() -> None:
     assert needs_pictures("temporal")
-    made = tracker_named("temporal", WINDOW, CostSettings(), lambda: solver_named("columns"), SETTINGS, FPS)
+    made = tracker_named("temporal", WINDOW, CostSettings(), lambda: create_solver("columns"), SETTINGS, FPS)
     assert isinstance(made, TemporalTracker)
 
 

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from strolls import BINS, Stroll, final_boxes, look, seen_at
 
-from tracking import CostSettings, Detections, WindowSettings, solver_named
+from tracking import CostSettings, Detections, WindowSettings, create_solver
 from tracking.appearance import appearance_distance
 from tracking.boxes import iou
 from tracking.yardsticks import Tracker, tracker_named
@@ -23,7 +23,7 @@ CLOSE = 25
 
 def _tracker(name: str) -> Tracker:
     window = WindowSettings(window=6, stride=3, birth_window=6)
-    return tracker_named(name, window, CostSettings(), lambda: solver_named("columns"))
+    return tracker_named(name, window, CostSettings(), lambda: create_solver("columns"))
 
 
 def _end(rng: np.random.Generator, frame: int) -> End:

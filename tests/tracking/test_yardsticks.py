@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from strolls import Stroll, final_boxes, seen_at
 
-from tracking import CostSettings, Detections, WindowResult, WindowSettings, solver_named
+from tracking import CostSettings, Detections, WindowResult, WindowSettings, create_solver
 from tracking.boxes import Floats, iou
 from tracking.detectors.base import Image
 from tracking.yardsticks import (
@@ -32,7 +32,7 @@ _COLOURS = ((40, 40, 220), (220, 60, 30))
 
 
 def _tracker(name: str) -> Tracker:
-    return tracker_named(name, WINDOW, CostSettings(), lambda: solver_named("columns"))
+    return tracker_named(name, WINDOW, CostSettings(), lambda: create_solver("columns"))
 
 
 def _where(person: int, frame: int) -> Floats:
@@ -119,7 +119,7 @@ def test_the_same_pictures_give_the_same_tracks(name: str) -> None:
 
 def test_a_name_that_no_tracker_has_is_told_with_those_that_there_are() -> None:
     with pytest.raises(ValueError, match=r"'sort'.*kalman.*lp|'sort'.*lp.*kalman"):
-        tracker_named("sort", WINDOW, CostSettings(), lambda: solver_named("columns"))
+        tracker_named("sort", WINDOW, CostSettings(), lambda: create_solver("columns"))
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ from tracking.assist.pointing import Pointing
 from tracking.assist.risk import Signs
 from tracking.assist.settings import AssistSettings
 from tracking.assist.tracker import AssistedTracker
-from tracking.types import Reason, Trouble
+from tracking.types import RiskEvent, RiskReason
 
 __all__ = [
     "AssistSettings",
@@ -14,9 +14,9 @@ __all__ = [
     "Exchanges",
     "Foresight",
     "Pointing",
-    "Reason",
+    "RiskEvent",
+    "RiskReason",
     "Signs",
-    "Trouble",
     "exchange_margins",
     "exchanges",
 ]

@@ -9,7 +9,7 @@ import numpy as np
 from tracking.assist.exchange import exchanges
 from tracking.assist.solved import Solved
 from tracking.boxes import Floats, overlap
-from tracking.model.motion import Motion
+from tracking.model.motion import MotionModel
 from tracking.model.network import build_network
 from tracking.model.object_state import Template
 from tracking.model.settings import CostSettings
@@ -57,10 +57,10 @@ def ways(window: Solved, frames: int) -> dict[int, tuple[int, Floats]]:
     return found
 
 
-def _motion(trail: Floats, first: int) -> Motion:
+def _motion(trail: Floats, first: int) -> MotionModel:
     """Give how somebody moves who was at `trail` `(T, 4)`, for frames from `first` on."""
     seen = np.flatnonzero(~np.isnan(trail[:, 0]))[-_SIGHTINGS:]
-    return Motion.of(seen.tolist(), trail[seen], first)
+    return MotionModel.of(seen.tolist(), trail[seen], first)
 
 
 def crossings(window: Solved, horizon: int, costs: CostSettings) -> list[Crossing]:

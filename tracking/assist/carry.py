@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from tracking.assist.exchange import exchanges
 from tracking.assist.memory import Memory
 from tracking.assist.pointing import Pointing, farness
-from tracking.boxes import Floats, heights, strides
+from tracking.boxes import Floats, heights, normalized_distance
 from tracking.model.network import build_network
 from tracking.model.object_state import Template
 from tracking.model.settings import CostSettings
@@ -114,5 +114,5 @@ def _nearest(states: NDArray[np.int64], frames: Sequence[Detections]) -> int:
     both = np.flatnonzero((states != OCCLUDED).all(axis=0))
     if not len(both):
         return int(np.flatnonzero(states[1] != OCCLUDED)[0]) if (states[1] != OCCLUDED).any() else 0
-    apart = [float(strides(*frames[m].boxes[states[:, m]])) for m in both.tolist()]
+    apart = [float(normalized_distance(*frames[m].boxes[states[:, m]])) for m in both.tolist()]
     return int(both[len(apart) - 1 - int(np.argmin(apart[::-1]))])

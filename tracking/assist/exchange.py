@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from tracking.boxes import Floats
 from tracking.model.network import Network
 from tracking.solvers.base import OCCLUDED
-from tracking.solvers.objective import nodes_of
+from tracking.solvers.objective import nodes_from_states
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,7 +52,7 @@ def exchanges(network: Network, states: NDArray[np.int64]) -> Exchanges:
     n = network.objects
     if not n:
         return Exchanges(np.empty((0, 0)), np.empty((0, 0), dtype=np.int64))
-    own, crossed = _ways(network, nodes_of(network, states))
+    own, crossed = _ways(network, nodes_from_states(network, states))
     both = crossed + crossed.transpose(1, 0, 2)
     # Two who stay hidden to the end have exchanged nothing that could be seen.
     shown = (states != OCCLUDED)[:, ::-1].cumsum(axis=1)[:, ::-1] > 0

@@ -12,7 +12,7 @@ from tracking.assist.settings import AssistSettings
 from tracking.assist.solved import Solved
 from tracking.boxes import Floats, overlap
 from tracking.model.settings import CostSettings
-from tracking.types import Reason, Trouble
+from tracking.types import RiskEvent, RiskReason
 
 _TOUCH = 0.25
 """Shared over average area from which somebody covers somebody else."""
@@ -28,7 +28,7 @@ class Foresight:
         self._settings = settings
         self._costs = costs
 
-    def troubles(self, window: Solved) -> tuple[Trouble, ...]:
+    def troubles(self, window: Solved) -> tuple[RiskEvent, ...]:
         """Give the troubles of a window, the worst first: each pair once for a reason."""
         found = exchanges(window.network, window.states)
         troubles = [
@@ -38,12 +38,12 @@ class Foresight:
             *self._fading(window),
             *self._gap(window, found.margins),
         ]
-        once: dict[tuple[str, tuple[int, ...]], Trouble] = {}
+        once: dict[tuple[str, tuple[int, ...]], RiskEvent] = {}
         for it in sorted(troubles, key=lambda it: (-it.risk, it.frame, it.objects, it.reason)):
             once.setdefault((it.reason, tuple(sorted(it.objects))), it)
         return tuple(once.values())
 
-    def _exchanges(self, window: Solved, found: Exchanges) -> list[Trouble]:
+    def _exchanges(self, window: Solved, found: Exchanges) -> list[RiskEvent]:
         """Give the pairs whose identities could be exchanged for little, in a frame that becomes final now.
 
         Of later frames more will be known when they become final.
@@ -62,7 +62,7 @@ class Foresight:
             for a, b in zip(first.tolist(), second.tolist(), strict=True)
         ]
 
-    def _alike(self, window: Solved) -> list[Trouble]:
+    def _alike(self, window: Solved) -> list[RiskEvent]:
         """Give those whose ways cross within the horizon, and who could then be exchanged for little."""
         found = crossings(window, self._settings.horizon, self._costs)
         return [
@@ -78,7 +78,7 @@ class Foresight:
             if it.margin < self._settings.alike
         ]
 
-    def _vanished(self, window: Solved) -> list[Trouble]:
+    def _vanished(self, window: Solved) -> list[RiskEvent]:
         """Give those who have been hidden for a while: with who covers them and looks alike, or alone.
 
         The margin is what the looks of a whole window tell of the two, over what one differs from oneself;
@@ -103,7 +103,7 @@ class Foresight:
                 found.append(_trouble("fading", (window.known[n],), window, frame, 0.0, hidden))
         return found
 
-    def _fading(self, window: Solved) -> list[Trouble]:
+    def _fading(self, window: Solved) -> list[RiskEvent]:
         """Give those whose detections have become faint of late, or will within the horizon at this rate."""
         found = []
         scores, faint = window.scores, self._settings.faint
@@ -118,7 +118,7 @@ class Foresight:
                 found.append(_trouble("fading", (number,), window, frame, float(level - faint), 0))
         return found
 
-    def _gap(self, window: Solved, margins: Floats) -> list[Trouble]:
+    def _gap(self, window: Solved, margins: Floats) -> list[RiskEvent]:
         """Give the two who are nearest to being exchanged, where the window's answer is not proven."""
         if window.report.gap <= self._settings.gap or not np.isfinite(margins).any():
             return []
@@ -128,12 +128,12 @@ class Foresight:
 
 
 def _trouble(
-    reason: Reason, objects: tuple[int, ...], window: Solved, frame: int, margin: float, length: int
-) -> Trouble:
+    reason: RiskReason, objects: tuple[int, ...], window: Solved, frame: int, margin: float, length: int
+) -> RiskEvent:
     """Give a trouble with its risk; `length` as in `Signs`."""
     margin = max(margin, 0.0)
     likely = risk_of(reason, Signs(margin, frame - window.last, length))
-    return Trouble(reason, objects, frame, margin, length, likely)
+    return RiskEvent(reason, objects, frame, margin, length, likely)
 
 
 def _unclear(window: Solved, a: int, b: int) -> int:

@@ -13,9 +13,9 @@ from tracking.assist.placing import is_found, place_of, with_place
 from tracking.assist.pointing import Pointing, farness
 from tracking.assist.settings import AssistSettings
 from tracking.boxes import BOX_SIDES, Floats, iou
-from tracking.model.object_state import RememberedObject
+from tracking.model.object_state import TrackedObject
 from tracking.solvers.base import OCCLUDED
-from tracking.solvers.warm_start import Told
+from tracking.solvers.warm_start import WindowWarmStart
 from tracking.types import Detections
 
 _SAME_PLACE = 0.5
@@ -43,8 +43,8 @@ class Step:
     first: int
     end: int
     final_to: int
-    objects: tuple[RememberedObject, ...]
-    told: Told | None
+    objects: tuple[TrackedObject, ...]
+    told: WindowWarmStart | None
 
     @property
     def window(self) -> tuple[int, int]:

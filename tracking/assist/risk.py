@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from tracking.types import Reason
+from tracking.types import RiskReason
 
 _MUCH = 10.0
 """A margin from which more of it tells nothing."""
@@ -36,7 +36,7 @@ class Signs:
         return 1.0, min(self.margin, _MUCH), ahead, ahead * self.lead / _LEAD, begun
 
 
-WEIGHTS: Mapping[Reason, tuple[float, float, float, float, float]] = {
+WEIGHTS: Mapping[RiskReason, tuple[float, float, float, float, float]] = {
     "exchange": (-0.50, -0.84, 0.00, 0.00, 0.26),
     "alike": (-2.40, -0.02, 0.45, -0.08, 0.48),
     "fading": (-4.71, -0.02, -0.05, -0.12, 1.23),
@@ -47,7 +47,7 @@ answers, so that no school ever has such a trouble. What stands there is a guess
 twenty, and less the surer the two are told apart."""
 
 
-def risk_of(reason: Reason, signs: Signs) -> float:
+def risk_of(reason: RiskReason, signs: Signs) -> float:
     """Give the probability of a failure, by a logistic regression on its signs."""
     odds = sum(weight * term for weight, term in zip(WEIGHTS[reason], signs.terms, strict=True))
     return 1.0 / (1.0 + math.exp(-odds))

@@ -19,12 +19,12 @@ from tracking.boxes import BOX_SIDES
 from tracking.detectors.base import Image
 from tracking.lifecycle.initiation import Birth
 from tracking.model.network import Network
-from tracking.model.object_state import RememberedObject
+from tracking.model.object_state import TrackedObject
 from tracking.model.settings import CostSettings
 from tracking.solvers.base import Solver, SolveReport
 from tracking.tracker import OnlineTracker
 from tracking.types import Detections
-from tracking.window import WindowResult, WindowSettings, joined
+from tracking.window import WindowResult, WindowSettings, merge_results
 
 _DOUBT = 0.25
 """Share of a pointing's weight from which windows are solved again: small errors change nothing."""
@@ -158,7 +158,7 @@ class AssistedTracker(OnlineTracker):
             results.append(self._solve(step.end, step.final_to))
         first = self._first
         self._seen = {n: it for n, it in self._memory.seen.items() if n >= first}
-        result = joined(results)
+        result = merge_results(results)
         changed = [n for n, it in sorted(self._memory.where.items()) if it != before.get(n)]
         if result is None or not changed:
             return None
@@ -203,7 +203,7 @@ class AssistedTracker(OnlineTracker):
         return states, report
 
     def _allowed(
-        self, item: RememberedObject, first: int, frames: Sequence[Detections]
+        self, item: TrackedObject, first: int, frames: Sequence[Detections]
     ) -> list[npt.NDArray[np.bool_]]:
         allowed = super()._allowed(item, first, frames)
         for m, seen in enumerate(frames):

@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from tracking.appearance import histograms
+from tracking.appearance import grey_histograms
 from tracking.boxes import Floats
 from tracking.detectors.base import Image, Mask
 
@@ -73,7 +73,7 @@ class Looks:
         if self.settings.colour:
             return colour_histograms(image, boxes, self.settings.colour_bins, mask)
         grey = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
-        return histograms(grey, boxes, self.grey_bins, mask)
+        return grey_histograms(grey, boxes, self.grey_bins, mask)
 
 
 def colour_histograms(image: Image, boxes: Floats, bins: int, mask: Mask | None = None) -> Floats:

@@ -9,7 +9,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from tracking.appearance import histograms
+from tracking.appearance import grey_histograms
 from tracking.boxes import BOX_SIDES, iou
 from tracking.detectors.base import Image
 from tracking.motchallenge import MotRow, read_rows
@@ -66,7 +66,7 @@ class MotFileDetector:
         if not bins:
             return Detections(boxes, scores, np.empty((len(boxes), 0)))
         grey = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
-        return Detections(boxes, scores, histograms(grey, boxes, bins))
+        return Detections(boxes, scores, grey_histograms(grey, boxes, bins))
 
 
 def _by_frame(rows: Sequence[MotRow]) -> dict[int, np.ndarray[tuple[int, int], np.dtype[np.float64]]]:

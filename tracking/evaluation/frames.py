@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tracking.assignment import best_pairs
+from tracking.assignment import assign_pairs
 from tracking.boxes import BOX_SIDES, Floats, iou
 from tracking.motchallenge import MotRow
 
@@ -62,7 +62,7 @@ def _frame(truth: Sequence[MotRow], tracks: Sequence[MotRow], least_iou: float) 
     similarity = iou(_boxes(truth)[:, None], _boxes(tracks)[None])
     kept = np.ones(len(tracks), dtype=bool)
     if not counts.all():
-        people, results = best_pairs(similarity, least_iou)
+        people, results = assign_pairs(similarity, least_iou)
         kept[results[~counts[people]]] = False
     return Frame(_ids(truth)[counts], _ids(tracks)[kept], similarity[np.ix_(counts, kept)])
 

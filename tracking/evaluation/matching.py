@@ -14,7 +14,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from tracking.assignment import best_pairs
+from tracking.assignment import assign_pairs
 from tracking.evaluation.frames import Frame
 
 _STAY = 1000.0
@@ -30,7 +30,7 @@ def matched(frames: Iterable[Frame], least_iou: float) -> Iterator[NDArray[np.bo
             # NaN is no track's id.
             held = np.array([before.get(person, np.nan) for person in frame.truth.tolist()])
             stay = _STAY * (held[:, None] == frame.tracks[None])
-            rows, columns = best_pairs(frame.similarity, least_iou, stay)
+            rows, columns = assign_pairs(frame.similarity, least_iou, stay)
             pairs[rows, columns] = True
             before = dict(zip(frame.truth[rows].tolist(), frame.tracks[columns].tolist(), strict=True))
         yield pairs

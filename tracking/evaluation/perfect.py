@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tracking.assignment import best_pairs
+from tracking.assignment import assign_pairs
 from tracking.boxes import BOX_SIDES, iou
 from tracking.evaluation.scores import DEFAULT_IOU
 from tracking.motchallenge import MotRow
@@ -27,7 +27,7 @@ def perfect_association(
     for number, found in _by_frame(detections).items():
         there = people.get(number, [])
         similarity = iou(_boxes(there)[:, None], _boxes(found)[None])
-        rows, columns = best_pairs(similarity, least_iou)
+        rows, columns = assign_pairs(similarity, least_iou)
         tracks += [replace(found[c], id=there[r].id) for r, c in zip(rows, columns, strict=True)]
     return tracks
 

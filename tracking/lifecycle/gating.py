@@ -12,33 +12,33 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from tracking.boxes import Floats, heights, strides
+from tracking.boxes import Floats, heights, normalized_distance
 from tracking.model.network import Network
-from tracking.model.object_state import RememberedObject
+from tracking.model.object_state import TrackedObject
 from tracking.types import Detections
 from tracking.window import WindowSettings
 
 
-def reachable(
-    item: RememberedObject, frame: int, detections: Detections, window: WindowSettings
+def gate_detections(
+    item: TrackedObject, frame: int, detections: Detections, window: WindowSettings
 ) -> npt.NDArray[np.bool_]:
     """Say which detections of a frame the object can be, `(K,)` bool."""
-    return near(item.box, detections.boxes, abs(frame - item.frame), window)
+    return within_gate(item.box, detections.boxes, abs(frame - item.frame), window)
 
 
-def near(box: Floats, boxes: Floats, elapsed: int, window: WindowSettings) -> npt.NDArray[np.bool_]:
+def within_gate(box: Floats, boxes: Floats, elapsed: int, window: WindowSettings) -> npt.NDArray[np.bool_]:
     """Say which boxes `(K, 4)` an object of `box` `(4,)` can have reached after `elapsed` frames, `(K,)`.
 
-    It may have gone (`strides`) `reach + reach_per_frame (elapsed - 1)` heights, and the height
+    It may have gone (`normalized_distance`) `reach + reach_per_frame (elapsed - 1)` heights, and the height
     changed by a factor.
     """
     tall, other = float(heights(box)), heights(boxes)
     far = window.reach + window.reach_per_frame * max(elapsed - 1, 0)
     alike = (other <= window.grow * max(tall, 1.0)) & (tall <= window.grow * np.maximum(other, 1.0))
-    return np.asarray((strides(box, boxes) <= far) & (alike | (elapsed > window.window)))
+    return np.asarray((normalized_distance(box, boxes) <= far) & (alike | (elapsed > window.window)))
 
 
-def within_reach(network: Network, allowed: Sequence[Sequence[npt.NDArray[np.bool_]]]) -> Network:
+def restrict_network(network: Network, allowed: Sequence[Sequence[npt.NDArray[np.bool_]]]) -> Network:
     """Give the network without the places out of reach; `allowed[n][m]` is `(K_m,)` bool."""
     node = network.node.copy()
     for n, frames in enumerate(allowed):

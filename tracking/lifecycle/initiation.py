@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tracking.boxes import Floats, iou
-from tracking.lifecycle.gating import near, within_reach
+from tracking.lifecycle.gating import restrict_network, within_gate
 from tracking.model.network import CostSettings, build_network
 from tracking.model.object_state import Template, mean_histogram
 from tracking.solvers.base import OCCLUDED, Solver
@@ -17,8 +17,8 @@ from tracking.types import Detections
 from tracking.window import WindowSettings
 
 # Share of the frames seen by either that the backward and the forward track must have in common.
-_AGREEMENT = 0.8
-_SAME_PLACE = 0.5
+_MIN_AGREEMENT = 0.8
+_SAME_PLACE_IOU = 0.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,10 +54,10 @@ def find_births(
     """
     if len(frames) < window.birth_window:
         return []
-    test = _Test(window, costs, solver)
-    left = [_left_over(seen, boxes, window) for seen, boxes in zip(frames, taken, strict=True)]
+    test = _BirthTest(window, costs, solver)
+    left = [_unassigned_detections(seen, boxes, window) for seen, boxes in zip(frames, taken, strict=True)]
     births: list[Birth] = []
-    latest = max(len(frames) - _needed(window), 1)  # who must be seen in all of them is in the last
+    latest = max(len(frames) - _required_frames(window), 1)  # who must be seen in all of them is in the last
     tries = 0
     for last in range(len(frames) - 1, max(len(frames) - 1 - latest, -1), -1):
         tried = np.zeros(len(left[last]), dtype=np.bool_)
@@ -69,19 +69,22 @@ def find_births(
             tries += 1
             path = test.run(left, last, seed)
             if path is not None:
-                births.append(_birth(left, path))
+                births.append(_birth_from_path(left, path))
                 gone = [left[m].boxes[[k]] if k != OCCLUDED else np.empty((0, 4)) for m, k in enumerate(path)]
-                left = [_left_over(seen, boxes, window) for seen, boxes in zip(left, gone, strict=True)]
+                left = [
+                    _unassigned_detections(seen, boxes, window)
+                    for seen, boxes in zip(left, gone, strict=True)
+                ]
                 tried = np.zeros(len(left[last]), dtype=np.bool_)
     return births
 
 
-def _needed(window: WindowSettings) -> int:
+def _required_frames(window: WindowSettings) -> int:
     """Give in how many frames a new object must be seen."""
     return int(np.ceil(window.birth_visible * window.birth_window))
 
 
-def _left_over(seen: Detections, boxes: Floats, window: WindowSettings) -> Detections:
+def _unassigned_detections(seen: Detections, boxes: Floats, window: WindowSettings) -> Detections:
     """Give the sure detections of a frame that are not where somebody known is."""
     sure = seen.scores >= window.birth_score
     if len(boxes) and len(seen):
@@ -89,14 +92,14 @@ def _left_over(seen: Detections, boxes: Floats, window: WindowSettings) -> Detec
     return Detections(seen.boxes[sure], seen.scores[sure], seen.histograms[sure])
 
 
-def _birth(frames: Sequence[Detections], path: npt.NDArray[np.int64]) -> Birth:
+def _birth_from_path(frames: Sequence[Detections], path: npt.NDArray[np.int64]) -> Birth:
     seen = [m for m, place in enumerate(path) if place != OCCLUDED]
     looks = np.stack([frames[m].histograms[path[m]] for m in seen])
     return Birth(mean_histogram(looks), frames[seen[0]].boxes[path[seen[0]]], seen[0])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Test:
+class _BirthTest:
     window: WindowSettings
     costs: CostSettings
     solver: Solver
@@ -105,20 +108,21 @@ class _Test:
         """Say whether enough frames have anything near the seed: cheap, before anything is solved."""
         box = frames[last].boxes[seed]
         hits = sum(
-            bool(near(box, seen.boxes, abs(last - m), self.window).any()) for m, seen in enumerate(frames)
+            bool(within_gate(box, seen.boxes, abs(last - m), self.window).any())
+            for m, seen in enumerate(frames)
         )
-        return hits >= _needed(self.window)
+        return hits >= _required_frames(self.window)
 
     def run(self, frames: Sequence[Detections], last: int, seed: int) -> npt.NDArray[np.int64] | None:
         """Track backward from the seed, then forward from where that ends; `None` unless they agree."""
         backward = self._track(frames[: last + 1][::-1], 0, seed)[::-1]
         seen = np.flatnonzero(backward != OCCLUDED)
-        if len(seen) < _needed(self.window):
+        if len(seen) < _required_frames(self.window):
             return None
         first = int(seen[0])
         forward = self._track(frames[first:], 0, int(backward[first]))
         path = np.concatenate([np.full(first, OCCLUDED), forward])
-        if np.count_nonzero(path != OCCLUDED) < _needed(self.window):
+        if np.count_nonzero(path != OCCLUDED) < _required_frames(self.window):
             return None
         sure = max(seen.scores[k] for seen, k in zip(frames, path, strict=True) if k != OCCLUDED)
         if sure < self.window.birth_sure:
@@ -134,8 +138,8 @@ class _Test:
         box, histogram = frames[0].boxes[seed], frames[0].histograms[seed]
         rest = list(frames[1:])
         network = build_network([Template(0, histogram, box)], rest, self.costs)
-        allowed = [near(box, seen.boxes, m + 1, self.window) for m, seen in enumerate(rest)]
-        solution = self.solver.solve(within_reach(network, [allowed]))
+        allowed = [within_gate(box, seen.boxes, m + 1, self.window) for m, seen in enumerate(rest)]
+        solution = self.solver.solve(restrict_network(network, [allowed]))
         found[1:] = solution.states[0]
         hidden = np.count_nonzero(found == OCCLUDED)
         # The path's cost less what hidden frames and the sink cost: what the visible ones cost.
@@ -153,6 +157,6 @@ class _Test:
         for seen, one, other in zip(frames, first, second, strict=True):
             either += one != OCCLUDED or other != OCCLUDED
             if OCCLUDED not in {one, other}:
-                same = one == other or iou(seen.boxes[one], seen.boxes[other]) >= _SAME_PLACE
+                same = one == other or iou(seen.boxes[one], seen.boxes[other]) >= _SAME_PLACE_IOU
                 both += bool(same)
-        return both >= _AGREEMENT * either
+        return both >= _MIN_AGREEMENT * either

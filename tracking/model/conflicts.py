@@ -6,13 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracking.boxes import BOX_SIDES, corner_distance, overlap
-from tracking.model.observations import Places
+from tracking.model.observations import ObservationArrays
 from tracking.model.settings import CostSettings
 
 Bools = NDArray[np.bool_]
 
 
-def conflict_relation(places: Places, settings: CostSettings) -> Bools:
+def conflict_relation(places: ObservationArrays, settings: CostSettings) -> Bools:
     """Say which places of a frame conflict, shape (M, P K, P K), symmetric, each with itself.
 
     Places are numbered `p K + i`. Padding conflicts with nothing, not even with itself.
@@ -50,13 +50,13 @@ def clique_rows(relation: Bools, owners: NDArray[np.int64] | None) -> Bools:
     rows = []
     for first in range(len(relation)):
         while uncovered[first].any():
-            row = _grow(first, int(uncovered[first].argmax()), joined, uncovered)
+            row = _grow_clique(first, int(uncovered[first].argmax()), joined, uncovered)
             uncovered[np.ix_(row, row)] = False
             rows.append(row)
     return np.array(rows).reshape(len(rows), len(relation))
 
 
-def connected(relation: Bools, place: int) -> NDArray[np.int64]:
+def connected_places(relation: Bools, place: int) -> NDArray[np.int64]:
     """Give the places of a frame that `place` conflicts with, directly or through others, ascending."""
     reached = relation[place]
     while True:
@@ -66,7 +66,7 @@ def connected(relation: Bools, place: int) -> NDArray[np.int64]:
         reached = further
 
 
-def _grow(first: int, second: int, joined: Bools, uncovered: Bools) -> Bools:
+def _grow_clique(first: int, second: int, joined: Bools, uncovered: Bools) -> Bools:
     """Grow the clique of two places, by those that cover most that is uncovered first."""
     row = np.zeros(len(joined), dtype=np.bool_)
     row[[first, second]] = True

@@ -9,14 +9,14 @@ import numpy as np
 
 from tracking.appearance import appearance_distance
 from tracking.boxes import BOX_SIDES, Floats, displacement, heights
-from tracking.model.motion import Motion
+from tracking.model.motion import MotionModel
 from tracking.model.object_state import Template
-from tracking.model.observations import Places
+from tracking.model.observations import ObservationArrays
 from tracking.model.settings import CostSettings
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class MotionCharges:
+class MotionCosts:
     """What arcs to the places of a window cost objects of known motion; nothing for the others.
 
     Attributes:
@@ -28,25 +28,25 @@ class MotionCharges:
     returned: Floats
 
 
-def motion_charges(
-    templates: Sequence[Template], likeness: Floats, places: Places, settings: CostSettings
-) -> MotionCharges | None:
+def motion_costs(
+    templates: Sequence[Template], likeness: Floats, places: ObservationArrays, settings: CostSettings
+) -> MotionCosts | None:
     """Charge all objects; `likeness` is (n, M, K). `None` where it costs nobody anything."""
     known = any(template.motion is not None for template in templates)
     if not known or not (settings.course or settings.comeback):
         return None
     boxes = np.broadcast_to(places.boxes, (len(templates), *places.boxes.shape[1:]))
-    charges = MotionCharges(np.zeros(likeness.shape), np.zeros(likeness.shape))
+    charges = MotionCosts(np.zeros(likeness.shape), np.zeros(likeness.shape))
     for n, template in enumerate(templates):
         if template.motion is not None:
-            charges.off_course[n], charges.returned[n] = _charges(
+            charges.off_course[n], charges.returned[n] = _object_motion_costs(
                 template.motion, boxes[n], likeness[n], settings
             )
     return charges
 
 
-def _charges(
-    motion: Motion, boxes: Floats, likeness: Floats, settings: CostSettings
+def _object_motion_costs(
+    motion: MotionModel, boxes: Floats, likeness: Floats, settings: CostSettings
 ) -> tuple[Floats, Floats]:
     """Give the two charges of one object for boxes (M, K, 4), both (M, K)."""
     away, moved = motion.deviations(boxes), motion.moved(len(boxes))[:, None]
@@ -60,7 +60,7 @@ def _charges(
     return off_course, returned
 
 
-def node_costs(likeness: Floats, places: Places, settings: CostSettings) -> Floats:
+def node_costs(likeness: Floats, places: ObservationArrays, settings: CostSettings) -> Floats:
     """Give what every arc into a state costs, (n, M, S): `likeness` (n, M, K) to it, or the occlusion."""
     objects, frames, width = likeness.shape
     costs = np.empty((objects, frames, width + 1))
@@ -74,8 +74,8 @@ def node_costs(likeness: Floats, places: Places, settings: CostSettings) -> Floa
 def source_costs(
     templates: Sequence[Template],
     likeness: Floats,
-    charges: MotionCharges | None,
-    places: Places,
+    charges: MotionCosts | None,
+    places: ObservationArrays,
     settings: CostSettings,
 ) -> Floats:
     """Give what the arcs from the source cost besides the node, (n, S); `likeness` is (n, M, K)."""
@@ -85,7 +85,7 @@ def source_costs(
     first_boxes = np.broadcast_to(places.boxes[:, 0], (len(templates), width, BOX_SIDES))
     for n, template in enumerate(templates):
         if template.box is not None:
-            moved = _moves(template.box[None], first_boxes[n], settings)[0]
+            moved = _displacement_costs(template.box[None], first_boxes[n], settings)[0]
             costs[n, :width] = settings.appearance * likeness[n, 0] + moved
             costs[n, width] = settings.leave
         if charges is not None:
@@ -94,7 +94,7 @@ def source_costs(
     return costs
 
 
-def pair_costs(charges: MotionCharges | None, places: Places, settings: CostSettings) -> Floats:
+def pair_costs(charges: MotionCosts | None, places: ObservationArrays, settings: CostSettings) -> Floats:
     """Give what the arcs between two frames cost besides the node, (Q, M - 1, S, S).
 
     Q is the number of sets of observations, or n where somebody's motion is known.
@@ -104,7 +104,7 @@ def pair_costs(charges: MotionCharges | None, places: Places, settings: CostSett
     before, after = places.histograms[:, :-1], places.histograms[:, 1:]
     seen = costs[:, :, :width, :width]
     seen += settings.appearance * appearance_distance(before, after, settings.measure)
-    seen += _moves(places.boxes[:, :-1], places.boxes[:, 1:], settings)
+    seen += _displacement_costs(places.boxes[:, :-1], places.boxes[:, 1:], settings)
     costs[:, :, width, :width] = settings.change
     costs[:, :, :width, width] = settings.leave
     if charges is None:
@@ -115,12 +115,12 @@ def pair_costs(charges: MotionCharges | None, places: Places, settings: CostSett
     return costs
 
 
-def sink_costs(objects: int, places: Places, settings: CostSettings) -> Floats:
+def sink_costs(objects: int, places: ObservationArrays, settings: CostSettings) -> Floats:
     """Give what the arcs into the sink cost, (n, S): one constant."""
     return np.full((objects, places.present.shape[2] + 1), settings.change + settings.occlusion)
 
 
-def _moves(before: Floats, after: Floats, settings: CostSettings) -> Floats:
+def _displacement_costs(before: Floats, after: Floats, settings: CostSettings) -> Floats:
     """Give the cost of moving from boxes (..., I, 4) to boxes (..., J, 4), (..., I, J)."""
     before, after = before[..., :, None, :], after[..., None, :, :]
     moved = displacement(before, after)
@@ -133,7 +133,9 @@ def _moves(before: Floats, after: Floats, settings: CostSettings) -> Floats:
     return costs
 
 
-def template_distances(templates: Sequence[Template], places: Places, settings: CostSettings) -> Floats:
+def template_distances(
+    templates: Sequence[Template], places: ObservationArrays, settings: CostSettings
+) -> Floats:
     """Compare each template with each place: g(s_n, v), (n, M, K)."""
     sets, frames, width, bins = places.histograms.shape
     distances = np.full((len(templates), frames, width), settings.unknown)

@@ -7,17 +7,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tracking.boxes import Floats, strides
+from tracking.boxes import Floats, normalized_distance
 
 # Frames over which somebody out of sight keeps their velocity: people turn and stop.
-_KEEPS = 20.0
+_VELOCITY_DECAY_FRAMES = 20.0
 # Sum of squared times, frames², at which the sightings count as much as the belief that nobody moves:
 # that of three sightings in a row, whose boxes tremble by more than a step.
-_TREMBLE = 3.0
+_VELOCITY_REGULARIZATION = 3.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Motion:
+class MotionModel:
     """How an object moved before the window.
 
     Attributes:
@@ -31,7 +31,7 @@ class Motion:
     elapsed: int
 
     @classmethod
-    def of(cls, frames: Sequence[int], boxes: Floats, first: int) -> Motion:
+    def of(cls, frames: Sequence[int], boxes: Floats, first: int) -> MotionModel:
         """Give the motion of an object seen at `boxes` (F, 4) in `frames` (F,), for a window from `first`.
 
         The velocity is the slope of the least-squares line through the middles, drawn towards zero by
@@ -40,7 +40,7 @@ class Motion:
         times = np.asarray(frames, dtype=np.float64)
         times -= times.mean()
         middles = boxes.reshape(-1, 2, 2).mean(axis=1)
-        velocity = times @ middles / (times @ times + _TREMBLE)
+        velocity = times @ middles / (times @ times + _VELOCITY_REGULARIZATION)
         return cls(boxes[-1], velocity, first - frames[-1])
 
     def moved(self, frames: int) -> Floats:
@@ -49,7 +49,7 @@ class Motion:
         Every frame counts less than the one before, since people turn and stop: 20 (1 - exp(-t / 20)).
         """
         elapsed = self.elapsed + np.arange(frames, dtype=np.float64)
-        return np.asarray(_KEEPS * (1.0 - np.exp(-elapsed / _KEEPS)))
+        return np.asarray(_VELOCITY_DECAY_FRAMES * (1.0 - np.exp(-elapsed / _VELOCITY_DECAY_FRAMES)))
 
     def predicted(self, frames: int) -> Floats:
         """Give where it is expected in each of the window's frames, (M, 4)."""
@@ -57,4 +57,4 @@ class Motion:
 
     def deviations(self, boxes: Floats) -> Floats:
         """Give how far boxes (M, K, 4) are from where it is expected, in heights, (M, K)."""
-        return strides(self.predicted(len(boxes))[:, None], boxes)
+        return normalized_distance(self.predicted(len(boxes))[:, None], boxes)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from tracking.boxes import BOX_SIDES, Floats
 from tracking.model.conflicts import Bools, clique_rows, conflict_relation, star_exclusions
 from tracking.model.costs import (
-    motion_charges,
+    motion_costs,
     node_costs,
     pair_costs,
     sink_costs,
@@ -23,7 +23,7 @@ from tracking.model.costs import (
     template_distances,
 )
 from tracking.model.object_state import Template
-from tracking.model.observations import Places, stack_places
+from tracking.model.observations import ObservationArrays, stack_observations
 from tracking.model.settings import ConflictRows, CostSettings
 from tracking.types import Detections
 
@@ -172,7 +172,7 @@ def build_network(
     Raises:
         ValueError: there is no frame, or histograms differ in their number of bins.
     """
-    return _build(templates, stack_places([frames]), settings, centre)
+    return _build(templates, stack_observations([frames]), settings, centre)
 
 
 def build_network_per_object(
@@ -190,17 +190,17 @@ def build_network_per_object(
     """
     if len(templates) != len(frames):
         raise ValueError(f"{len(templates)} templates need as many lists of frames, not {len(frames)}")
-    return _build(templates, stack_places(frames), settings, centre)
+    return _build(templates, stack_observations(frames), settings, centre)
 
 
 def _build(
     templates: Sequence[Template],
-    places: Places,
+    places: ObservationArrays,
     settings: CostSettings,
     centre: tuple[float, float] | None,
 ) -> Network:
     likeness = template_distances(templates, places, settings)
-    charges = motion_charges(templates, likeness, places, settings)
+    charges = motion_costs(templates, likeness, places, settings)
     return Network(
         boxes=places.boxes,
         present=places.present,
@@ -215,7 +215,7 @@ def _build(
     )
 
 
-def _locations(places: Places, centre: tuple[float, float] | None) -> Floats:
+def _locations(places: ObservationArrays, centre: tuple[float, float] | None) -> Floats:
     """Give the location vectors r of II.D, (P, M, S, 4); occlusion is a box without size at `centre`."""
     sets, frames, width = places.present.shape
     if centre is None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tracking.boxes import BOX_SIDES, Floats
-from tracking.model.motion import Motion
+from tracking.model.motion import MotionModel
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,7 +29,7 @@ class Template:
     id: int
     histogram: Floats
     box: Floats | None
-    motion: Motion | None = None
+    motion: MotionModel | None = None
 
     def __post_init__(self) -> None:
         if self.histogram.ndim != 1:
@@ -39,7 +39,7 @@ class Template:
 
 
 # Sightings that the velocity is taken from.
-_REMEMBERED = 12
+_HISTORY_LENGTH = 12
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,7 +59,7 @@ class Sighting:
     alone: bool
 
 
-class RememberedObject:
+class TrackedObject:
     """One entry of the object list.
 
     Attributes:
@@ -78,13 +78,13 @@ class RememberedObject:
         self.histogram = histogram
         self.box = box
         self.frame = frame
-        self._past: deque[tuple[int, Floats]] = deque(maxlen=_REMEMBERED)
+        self._past: deque[tuple[int, Floats]] = deque(maxlen=_HISTORY_LENGTH)
         self.confirmed = False
         self.present = False
 
-    def copy(self) -> RememberedObject:
+    def copy(self) -> TrackedObject:
         """Give what is remembered now, to go back to."""
-        other = RememberedObject(self.id, self.histogram, self.box, self.frame)
+        other = TrackedObject(self.id, self.histogram, self.box, self.frame)
         other._past.extend(self._past)
         other.confirmed, other.present = self.confirmed, self.present
         return other
@@ -97,7 +97,7 @@ class RememberedObject:
         motion = None
         if self._past:
             frames, boxes = zip(*self._past, strict=True)
-            motion = Motion.of(frames, np.stack(boxes), first)
+            motion = MotionModel.of(frames, np.stack(boxes), first)
         return Template(self.id, self.histogram, self.box if self.present else None, motion)
 
     def see(self, sighting: Sighting, rate: float) -> None:

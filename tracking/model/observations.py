@@ -13,7 +13,7 @@ from tracking.types import Detections
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Places:
+class ObservationArrays:
     """P sets of observations over M frames, padded to the K of the fullest frame.
 
     P is 1 where all objects share the observations, else the number of objects.
@@ -31,7 +31,7 @@ class Places:
     present: NDArray[np.bool_]
 
 
-def stack_places(sets: Sequence[Sequence[Detections]]) -> Places:
+def stack_observations(sets: Sequence[Sequence[Detections]]) -> ObservationArrays:
     """Pad the sets of frames into arrays.
 
     Raises:
@@ -44,7 +44,7 @@ def stack_places(sets: Sequence[Sequence[Detections]]) -> Places:
         raise ValueError(f"every object needs as many frames as the others, not {sorted(lengths)}")
     shape = (len(sets), lengths.pop())
     width = max(len(seen) for frames in sets for seen in frames)
-    bins = _bins(sets)
+    bins = _common_bin_count(sets)
     boxes = np.zeros((*shape, width, BOX_SIDES))
     scores = np.zeros((*shape, width))
     appearance = np.zeros((*shape, width, bins))
@@ -57,10 +57,10 @@ def stack_places(sets: Sequence[Sequence[Detections]]) -> Places:
                 scores[p, m, :count] = seen.scores
                 appearance[p, m, :count] = seen.histograms
                 present[p, m, :count] = True
-    return Places(boxes, scores, appearance, present)
+    return ObservationArrays(boxes, scores, appearance, present)
 
 
-def _bins(sets: Sequence[Sequence[Detections]]) -> int:
+def _common_bin_count(sets: Sequence[Sequence[Detections]]) -> int:
     """Give the number of bins that all frames with observations have."""
     bins = {seen.histograms.shape[1] for frames in sets for seen in frames if len(seen)}
     if len(bins) > 1:

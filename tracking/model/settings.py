@@ -13,7 +13,7 @@ DisplacementUnit = Literal["pixels", "heights"]
 
 
 # Pixels: below this a gate was meant for the other unit.
-_LEAST_GATE = 2.0
+_MIN_GATE_PIXELS = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +95,7 @@ class CostSettings:
             raise ValueError("slack, course_drift and comeback_drift must be positive")
         if self.gate is not None and not self.gate > 0.0:
             raise ValueError(f"gate must be positive, not {self.gate}")
-        if self.gate is not None and self.displacement_unit == "pixels" and self.gate < _LEAST_GATE:
+        if self.gate is not None and self.displacement_unit == "pixels" and self.gate < _MIN_GATE_PIXELS:
             raise ValueError(f"a gate of {self.gate:g} pixels lets nobody move: give another, or none")
         if not self.conflict_distance > 0.0:
             raise ValueError(f"conflict_distance must be positive, not {self.conflict_distance}")

@@ -1,4 +1,4 @@
-"""Solvers of the network: pick one by name with `solver_named`."""
+"""Solvers of the network: pick one by name with `create_solver`."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ from tracking.solvers.base import (
     Solution,
     Solver,
     SolveReport,
-    solver_named,
+    create_solver,
     solver_names,
 )
-from tracking.solvers.warm_start import UNKNOWN, Hint, PricedRow
+from tracking.solvers.warm_start import UNKNOWN_STATE, ConflictPrice, WarmStart
 
 __all__ = [
     "DEFAULT_SOLVER",
     "OCCLUDED",
-    "UNKNOWN",
-    "Hint",
-    "PricedRow",
+    "UNKNOWN_STATE",
+    "ConflictPrice",
     "Solution",
     "SolveReport",
     "Solver",
-    "solver_named",
+    "WarmStart",
+    "create_solver",
     "solver_names",
 ]

@@ -11,10 +11,10 @@ from tracking.boxes import BOX_SIDES, Floats
 from tracking.model.conflicts import Bools
 from tracking.model.network import Network
 from tracking.solvers.cutting_planes import ConflictRow
-from tracking.solvers.layout_rows import LayoutRows
-from tracking.solvers.linear_program import optimum, quiet_highs
+from tracking.solvers.layout_rows import LayoutConstraints
+from tracking.solvers.linear_program import create_highs, run_highs
 from tracking.solvers.objective import Ints
-from tracking.solvers.viterbi import Marginals, Packed, Trellis
+from tracking.solvers.viterbi import MinMarginals, PrunedStates, Trellis
 
 _NO_ROW = -1
 
@@ -52,7 +52,7 @@ class ArcSet:
         )
 
 
-def arcs_of_paths(owners: Ints, nodes: Ints) -> ArcSet:
+def path_arcs(owners: Ints, nodes: Ints) -> ArcSet:
     """Give the arcs on paths, `nodes` (P, M), of the objects `owners` (P,), each arc once."""
     path, frame = (index.ravel() for index in np.indices(nodes.shape))
     before = np.zeros_like(nodes)
@@ -62,7 +62,7 @@ def arcs_of_paths(owners: Ints, nodes: Ints) -> ArcSet:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ArcPoint:
+class ArcMasterSolution:
     """The optimum of a restricted program.
 
     Attributes:
@@ -88,7 +88,7 @@ class ArcMaster:
 
     def __init__(self, network: Network, *, squared: bool = False) -> None:
         self._network = network
-        self._highs = quiet_highs(growing=True, presolve=not squared)
+        self._highs = create_highs(growing=True, presolve=not squared)
         objects, frames, states = network.node.shape
         none = np.empty(0, dtype=np.int64)
         self._arcs = ArcSet(none, none, none, none)
@@ -101,7 +101,7 @@ class ArcMaster:
         self._empty_rows(ones, ones)
         self._layout = None
         if network.layout and frames > 1:
-            self._layout = LayoutRows(network, self._highs, squared=squared)
+            self._layout = LayoutConstraints(network, self._highs, squared=squared)
         self._values = np.empty(0)
 
     def _empty_rows(self, lower: Floats, upper: Floats) -> Ints:
@@ -192,9 +192,9 @@ class ArcMaster:
             index = self._columns[through].astype(np.int32)
             self._highs.addRow(-np.inf, 1.0, len(index), index, np.ones(len(index)))
 
-    def solve(self) -> ArcPoint:
+    def solve(self) -> ArcMasterSolution:
         """Choose anew."""
-        found = optimum(self._highs)
+        found = run_highs(self._highs)
         self._values = found.values[self._columns]
         objects, frames = self._network.objects, self._network.frames
         prices = np.maximum(0.0, -found.duals[self._conflict_rows]) if self.rows else np.empty(0)
@@ -202,7 +202,7 @@ class ArcMaster:
         if self._layout is not None:
             forces = self._layout.forces(found.duals)
             pulls, charge = self._layout.pulls(forces), charge + self._layout.slack(forces)
-        return ArcPoint(found.objective, prices, pulls, found.duals[:objects], charge)
+        return ArcMasterSolution(found.objective, prices, pulls, found.duals[:objects], charge)
 
     def usage(self) -> Floats:
         """Give y (n, M, S)."""
@@ -212,14 +212,16 @@ class ArcMaster:
         return usage
 
 
-def arcs_through(trellis: Trellis, passes: Marginals, worths: Floats, most: int) -> tuple[ArcSet, Floats]:
+def find_improving_arcs(
+    trellis: Trellis, passes: MinMarginals, worths: Floats, most: int
+) -> tuple[ArcSet, Floats]:
     """Give the arcs (A,) whose best path costs less than `worths` (n,) of its object, and that cost (A,).
 
     Only arcs between the `most` cheapest states of each frame and object are looked at.
     """
     through = passes.through
     width = int((through < worths[:, None, None]).sum(axis=2).max(initial=0))
-    packed = Packed.cheapest(through, max(min(width, most), 1))
+    packed = PrunedStates.cheapest(through, max(min(width, most), 1))
     n, j = np.nonzero(packed.states(through, np.inf)[:, 0] < worths[:, None])
     zero = np.zeros(len(n), dtype=np.int64)
     begin = ArcSet(n, zero, zero, packed.index[n, 0, j])

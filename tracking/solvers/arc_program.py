@@ -12,10 +12,10 @@ from scipy import sparse
 from tracking.boxes import BOX_SIDES
 from tracking.model.network import Network
 from tracking.solvers.base import Solution, TimedSolver
-from tracking.solvers.linear_program import Assembly, LinearProgram, solve_program
-from tracking.solvers.relaxation import Relaxed
-from tracking.solvers.solution_builder import finished, nothing
-from tracking.solvers.warm_start import Hint
+from tracking.solvers.linear_program import LinearProgram, LinearProgramBuilder, solve_program
+from tracking.solvers.relaxation import RelaxedSolution
+from tracking.solvers.solution_builder import empty_solution, solution_from_relaxation
+from tracking.solvers.warm_start import WarmStart
 
 Ints = NDArray[np.int64]
 
@@ -39,12 +39,12 @@ class ArcProgram:
     moves: Ints
 
 
-def arc_program(network: Network, allowed: NDArray[np.bool_] | None = None) -> ArcProgram:
+def build_arc_program(network: Network, allowed: NDArray[np.bool_] | None = None) -> ArcProgram:
     """Write down the program of a network with at least one object.
 
     `allowed` (n, M - 1, S, S), where given, leaves only its arcs between frames in.
     """
-    build = Assembly()
+    build = LinearProgramBuilder()
     exists = np.isfinite(network.node)
     # Arcs are the first columns, nodes the next: the flow rows join them.
     pair = network.pair[network.pair_sets] + network.node[:, 1:, None, :]
@@ -82,7 +82,7 @@ def _ends(network: Network, exists: NDArray[np.bool_]) -> tuple[Ints, ...]:
     return np.nonzero(np.isfinite(network.sink) & exists[:, -1])
 
 
-def _add_conflicts(build: Assembly, network: Network, nodes: Ints) -> None:
+def _add_conflicts(build: LinearProgramBuilder, network: Network, nodes: Ints) -> None:
     """Let at most one path go through each conflict row."""
     for m in range(network.frames):
         rows = network.rows(m)
@@ -91,7 +91,7 @@ def _add_conflicts(build: Assembly, network: Network, nodes: Ints) -> None:
         build.put(build.rows(len(rows), -np.inf, 1.0)[row[column >= 0]], column[column >= 0], 1.0)
 
 
-def _add_layout(build: Assembly, network: Network, nodes: Ints) -> Ints:
+def _add_layout(build: LinearProgramBuilder, network: Network, nodes: Ints) -> Ints:
     """Add p, tied to y, and p+ - p- = the change of the vector between two objects, for all pairs."""
     pairs = list(combinations(range(network.objects), 2))
     steps = network.frames - 1
@@ -117,41 +117,41 @@ def _add_layout(build: Assembly, network: Network, nodes: Ints) -> Ints:
     return moves
 
 
-class Arcs(TimedSolver):
+class ArcProgramSolver(TimedSolver):
     """All arcs of the window in one program; slow, and simple enough to trust."""
 
     name = "arcs"
 
-    def _answer(self, network: Network, _hint: Hint | None) -> Solution:
+    def _answer(self, network: Network, _hint: WarmStart | None) -> Solution:
         """Solve the relaxation and round it where it is not whole."""
         if not network.objects:
-            return nothing(self.name, network)
-        return finished(self.name, network, relaxation(network))
+            return empty_solution(self.name, network)
+        return solution_from_relaxation(self.name, network, solve_arc_relaxation(network))
 
 
-def relaxation(network: Network) -> Relaxed:
+def solve_arc_relaxation(network: Network) -> RelaxedSolution:
     """Give the optimum of the full relaxation of a network with at least one object; no prices.
 
     The program is that of II.D with y replaced by the sums of arcs that define it: half the simplex
     iterations, the fastest way that is known to solve all arcs at once.
     """
-    built = arc_program(network)
-    short = without_nodes(built)
+    built = build_arc_program(network)
+    short = eliminate_nodes(built)
     found = solve_program(short.program)
     usage = np.zeros(network.node.shape)
     usage[built.nodes >= 0] = short.sums @ found.values
-    return Relaxed(usage, found.objective, network.node, rounds=1)
+    return RelaxedSolution(usage, found.objective, network.node, rounds=1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ShortProgram:
+class ReducedProgram:
     """The program without y: `sums` (y, columns) times its columns gives them back."""
 
     program: LinearProgram
     sums: sparse.csr_array
 
 
-def without_nodes(built: ArcProgram) -> ShortProgram:
+def eliminate_nodes(built: ArcProgram) -> ReducedProgram:
     """Replace each y by the sum of arcs that its row sets it equal to."""
     program = built.program
     nodes = built.nodes[built.nodes >= 0]
@@ -170,4 +170,4 @@ def without_nodes(built: ArcProgram) -> ShortProgram:
         row_lower=program.row_lower[kept],
         row_upper=program.row_upper[kept],
     )
-    return ShortProgram(short, sums)
+    return ReducedProgram(short, sums)

@@ -12,20 +12,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracking.model.network import Network
-from tracking.solvers.warm_start import Hint, PricedRow
+from tracking.solvers.warm_start import ConflictPrice, WarmStart
 
 OCCLUDED = -1
 """The state of an object that is on no observation of a frame."""
 
 # Modules are imported when asked for: a tracker with a dynamic program need not load the LP solver.
 _SOLVERS = {
-    "arcs": ("tracking.solvers.arc_program", "Arcs"),
-    "columns": ("tracking.solvers.column_generation", "Columns"),
-    "exact": ("tracking.solvers.exact", "Exact"),
-    "extended-dp": ("tracking.solvers.extended_dp", "ExtendedDp"),
-    "greedy-dp": ("tracking.solvers.dynamic_programming", "GreedyDp"),
-    "l2": ("tracking.solvers.column_generation", "L2"),
-    "separate-dp": ("tracking.solvers.dynamic_programming", "SeparateDp"),
+    "arcs": ("tracking.solvers.arc_program", "ArcProgramSolver"),
+    "columns": ("tracking.solvers.column_generation", "ColumnGenerationSolver"),
+    "exact": ("tracking.solvers.exact", "ExactSolver"),
+    "extended-dp": ("tracking.solvers.extended_dp", "ExtendedDpSolver"),
+    "greedy-dp": ("tracking.solvers.dynamic_programming", "GreedyDpSolver"),
+    "l2": ("tracking.solvers.column_generation", "SquaredLayoutSolver"),
+    "separate-dp": ("tracking.solvers.dynamic_programming", "SeparateDpSolver"),
 }
 
 DEFAULT_SOLVER = "columns"
@@ -74,12 +74,12 @@ class Solution:
 
     states: NDArray[np.int64]
     report: SolveReport
-    prices: tuple[PricedRow, ...] = ()
+    prices: tuple[ConflictPrice, ...] = ()
 
     @property
-    def hint(self) -> Hint:
-        """What this answer tells about a window with the same frames; see `Hint.later`."""
-        return Hint(self.prices, self.states)
+    def hint(self) -> WarmStart:
+        """What this answer tells about a window with the same frames; see `WarmStart.later`."""
+        return WarmStart(self.prices, self.states)
 
 
 class Solver(Protocol):
@@ -89,7 +89,7 @@ class Solver(Protocol):
     def name(self) -> str:
         """The name in the registry."""
 
-    def solve(self, network: Network, hint: Hint | None = None) -> Solution:
+    def solve(self, network: Network, hint: WarmStart | None = None) -> Solution:
         """Give the states of all objects in all frames; the same network and hint give the same answer.
 
         A hint, `Solution.hint.later(...)` of the window before, makes it quicker, whatever it says.
@@ -101,7 +101,7 @@ def solver_names() -> tuple[str, ...]:
     return tuple(sorted(_SOLVERS))
 
 
-def solver_named(name: str) -> Solver:
+def create_solver(name: str) -> Solver:
     """Give the solver of that name.
 
     Raises:
@@ -118,7 +118,7 @@ class TimedSolver(ABC):
 
     name: ClassVar[str]
 
-    def solve(self, network: Network, hint: Hint | None = None) -> Solution:
+    def solve(self, network: Network, hint: WarmStart | None = None) -> Solution:
         """Give the states of all objects in all frames; a hint only makes it quicker."""
         start = time.perf_counter()
         solution = self._answer(network, hint)
@@ -126,5 +126,5 @@ class TimedSolver(ABC):
         return replace(solution, report=replace(solution.report, seconds=seconds))
 
     @abstractmethod
-    def _answer(self, network: Network, _hint: Hint | None) -> Solution:
+    def _answer(self, network: Network, _hint: WarmStart | None) -> Solution:
         """Solve the network, which may be one without objects."""

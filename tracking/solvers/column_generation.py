@@ -16,65 +16,70 @@ import numpy as np
 
 from tracking.model.conflicts import Bools
 from tracking.model.network import Network
-from tracking.solvers.arc_generation import ArcSearch, arc_search
-from tracking.solvers.arc_master import ArcMaster, arcs_of_paths
+from tracking.solvers.arc_generation import ArcGeneration, start_arc_generation
+from tracking.solvers.arc_master import ArcMaster, path_arcs
 from tracking.solvers.base import Solution, TimedSolver
-from tracking.solvers.cutting_planes import ConflictFinder, ConflictRow, groups_of, priced_rows
+from tracking.solvers.cutting_planes import ConflictRow, ConflictSeparator, conflict_prices, group_objects
 from tracking.solvers.dynamic_programming import greedy_paths
 from tracking.solvers.objective import Ints, conflict_count, path_costs
-from tracking.solvers.path_master import MasterPoint, PathMaster
-from tracking.solvers.relaxation import CLOSE, Relaxed, recall, with_prices
-from tracking.solvers.rounding import Improver
-from tracking.solvers.solution_builder import finished, nothing
-from tracking.solvers.viterbi import Paths, Pricing, Trellis
-from tracking.solvers.warm_start import Hint
+from tracking.solvers.path_master import PathMaster, PathMasterSolution
+from tracking.solvers.relaxation import (
+    OPTIMALITY_TOLERANCE,
+    RelaxedSolution,
+    add_conflict_prices,
+    try_warm_start,
+)
+from tracking.solvers.rounding import LocalSearch
+from tracking.solvers.solution_builder import empty_solution, solution_from_relaxation
+from tracking.solvers.viterbi import PathPricer, Paths, Trellis
+from tracking.solvers.warm_start import WarmStart
 
-_FEW_OBJECTS = 12
+_MAX_PATH_GROUP = 12
 """Up to so many objects in conflict, paths settle sooner than arcs do."""
 
-_STEPS, _BOLD = 8, 1.2
+_SUBGRADIENT_STEPS, _STEP_FACTOR = 8, 1.2
 """Steps of prices in each round, and how much longer than Polyak's they are: into the optimum, not onto
 its edge.
 """
 
-_PATIENCE, _WORTHWHILE = 2, 0.8
+_PATIENCE, _MIN_PROGRESS = 2, 0.8
 """After so many steps, those that leave more than this share of what is missing, each, are given up."""
 
-_ROUNDS_OF_FEW, _ROUNDS_OF_MANY = 50, 4
+_MAX_ROUNDS_SMALL_GROUP, _MAX_ROUNDS_LARGE_GROUP = 50, 4
 """Rounds of paths before arcs take over."""
 
 
-class PathSearch:
+class PathGeneration:
     """One search; `run` it once. The network has at least one object and no layout term."""
 
     def __init__(self, network: Network) -> None:
         self._network = network
-        self._pricing = Pricing(Trellis.of(network))
+        self._pricing = PathPricer(Trellis.of(network))
         self._alone = self._pricing.alone
         self._bound = -np.inf
         self._priced = network.node
         self._prices = np.empty(0)
-        self._point = MasterPoint(0.0, np.empty(0), np.empty(0))
+        self._point = PathMasterSolution(0.0, np.empty(0), np.empty(0))
         self._meets = np.zeros((network.objects, network.objects), dtype=np.bool_)
         self._active = np.zeros(network.objects, dtype=np.bool_)
         self._usage = np.zeros(network.node.shape)
         each, frames = np.indices(self._alone.nodes.shape)
         self._usage[each, frames, self._alone.nodes] = 1.0
 
-    def run(self, hint: Hint | None = None) -> Relaxed:
+    def run(self, hint: WarmStart | None = None) -> RelaxedSolution:
         """Find the optimum of the relaxation."""
         if not conflict_count(self._network, self._alone.nodes):
-            return Relaxed(self._usage, float(self._alone.costs.sum()), self._priced, 0)
+            return RelaxedSolution(self._usage, float(self._alone.costs.sum()), self._priced, 0)
         return self._of_those_who_meet(hint)
 
-    def _of_those_who_meet(self, hint: Hint | None) -> Relaxed:
+    def _of_those_who_meet(self, hint: WarmStart | None) -> RelaxedSolution:
         rows = self._finder.broken(self._usage)
-        told = recall(self._network, self._pricing, self._finder, hint) if hint else None
+        told = try_warm_start(self._network, self._pricing, self._finder, hint) if hint else None
         if told is not None and told.proven is not None:
             return told.proven
         self._meet(rows)
-        if self._largest_group() > _FEW_OBJECTS:
-            return arc_search(self._network, self._pricing, ConflictFinder(self._network)).run()
+        if self._largest_group() > _MAX_PATH_GROUP:
+            return start_arc_generation(self._network, self._pricing, ConflictSeparator(self._network)).run()
         self._bind([*rows, *self._finder.fresh(told.rows)] if told else rows)
         for paths in told.paths if told else ():
             active = np.flatnonzero(self._active)
@@ -82,32 +87,32 @@ class PathSearch:
         self._solve()
         self._keep_rows()
         rounds = 0
-        while rounds < (_ROUNDS_OF_FEW if self._largest_group() <= _FEW_OBJECTS else _ROUNDS_OF_MANY):
+        while rounds < (
+            _MAX_ROUNDS_SMALL_GROUP if self._largest_group() <= _MAX_PATH_GROUP else _MAX_ROUNDS_LARGE_GROUP
+        ):
             rounds += 1
             if not self._enter_better_paths():
-                prices = priced_rows(self._network, self._master.rows, self._prices)
-                return Relaxed(self._usage, self._bound, self._priced, rounds, prices)
+                prices = conflict_prices(self._network, self._master.rows, self._prices)
+                return RelaxedSolution(self._usage, self._bound, self._priced, rounds, prices)
             self._solve()
             self._keep_rows()
         return self._by_arcs(rounds)
 
     @cached_property
-    def _finder(self) -> ConflictFinder:
-        return ConflictFinder(self._network)
+    def _finder(self) -> ConflictSeparator:
+        return ConflictSeparator(self._network)
 
     @cached_property
     def _master(self) -> PathMaster:
         return PathMaster(self._network)
 
-    def _by_arcs(self, rounds: int) -> Relaxed:
+    def _by_arcs(self, rounds: int) -> RelaxedSolution:
         """Go on from the arcs of the paths in use: many objects that meet want parts of paths combined."""
         owners, nodes = self._master.used()
         calm = np.flatnonzero(~self._active)
-        starts = arcs_of_paths(
-            np.concatenate([owners, calm]), np.concatenate([nodes, self._alone.nodes[calm]])
-        )
-        found = ArcSearch(self._network, starts, self._master.rows, self._finder).run()
-        return Relaxed(found.usage, found.bound, found.priced, found.rounds + rounds)
+        starts = path_arcs(np.concatenate([owners, calm]), np.concatenate([nodes, self._alone.nodes[calm]]))
+        found = ArcGeneration(self._network, starts, self._master.rows, self._finder).run()
+        return RelaxedSolution(found.usage, found.bound, found.priced, found.rounds + rounds)
 
     def _solve(self) -> None:
         self._point = self._master.solve()
@@ -130,7 +135,7 @@ class PathSearch:
 
     def _largest_group(self) -> int:
         """Give the size of the largest group of objects that meet, directly or through others."""
-        return int(np.bincount(groups_of(self._meets)).max())
+        return int(np.bincount(group_objects(self._meets)).max())
 
     def _bind(self, rows: list[ConflictRow]) -> None:
         """Let the objects that break the rows, and paths around all rows, into the program."""
@@ -165,23 +170,23 @@ class PathSearch:
         cost = others + self._point.objective
         met: list[Ints] = []
         missing: list[float] = []
-        for step in range(_STEPS):
-            self._priced = with_prices(self._network, self._master.rows, prices)
+        for step in range(_SUBGRADIENT_STEPS):
+            self._priced = add_conflict_prices(self._network, self._master.rows, prices)
             self._prices = prices
             paths = self._pricing.best_paths(self._priced, active)
             self._bound = others + float(paths.costs.sum() - prices.sum())
             missing.append(cost - self._bound)
-            if missing[-1] <= CLOSE * max(1.0, abs(cost)):
+            if missing[-1] <= OPTIMALITY_TOLERANCE * max(1.0, abs(cost)):
                 return False
             met.append(paths.nodes)
-            if step >= _PATIENCE and missing[-1] > _WORTHWHILE**step * missing[0]:
+            if step >= _PATIENCE and missing[-1] > _MIN_PROGRESS**step * missing[0]:
                 break
             loads = [row.members[active, paths.nodes[:, row.frame]].sum() for row in self._master.rows]
             slope = np.array(loads) - 1.0
             slope[(slope < 0.0) & (prices == 0.0)] = 0.0
             if not slope.any():
                 break
-            prices = np.maximum(0.0, prices + _BOLD * missing[-1] / float(slope @ slope) * slope)
+            prices = np.maximum(0.0, prices + _STEP_FACTOR * missing[-1] / float(slope @ slope) * slope)
         return sum([self._enter(active, nodes) for nodes in met]) > 0
 
     def _enter(self, objects: Ints, nodes: Ints) -> int:
@@ -191,33 +196,33 @@ class PathSearch:
         return self._master.add_paths(objects, Paths(nodes, path_costs(self._network, every)[objects]))
 
 
-class Columns(TimedSolver):
+class ColumnGenerationSolver(TimedSolver):
     """The optimum of the relaxation from a few of its columns; equal to `arcs`, and many times faster."""
 
     name = "columns"
 
-    def _answer(self, network: Network, hint: Hint | None) -> Solution:
+    def _answer(self, network: Network, hint: WarmStart | None) -> Solution:
         """Solve the relaxation and round it where it is not whole."""
         if not network.objects:
-            return nothing(self.name, network)
-        return finished(self.name, network, relaxation_by_columns(network, hint))
+            return empty_solution(self.name, network)
+        return solution_from_relaxation(self.name, network, solve_relaxation(network, hint))
 
 
-def relaxation_by_columns(network: Network, hint: Hint | None = None) -> Relaxed:
+def solve_relaxation(network: Network, hint: WarmStart | None = None) -> RelaxedSolution:
     """Give the optimum of the relaxation of a network with at least one object.
 
     Paths are the columns where only conflicts couple the objects; under the layout term, which whole
     paths fit badly, arcs are.
     """
     if not network.layout:
-        return PathSearch(network).run(hint)
-    return arc_search(network, Pricing(Trellis.of(network)), ConflictFinder(network)).run()
+        return PathGeneration(network).run(hint)
+    return start_arc_generation(network, PathPricer(Trellis.of(network)), ConflictSeparator(network)).run()
 
 
-_SQUARE = 2
+_SQUARED_POWER = 2
 
 
-class L2(TimedSolver):
+class SquaredLayoutSolver(TimedSolver):
     """As `columns`, but a change of layout by d pixels costs μ d²: many small changes rather than a jump.
 
     Without layout term or a second object it is `columns`.
@@ -225,19 +230,19 @@ class L2(TimedSolver):
 
     name = "l2"
 
-    def _answer(self, network: Network, _hint: Hint | None) -> Solution:
+    def _answer(self, network: Network, _hint: WarmStart | None) -> Solution:
         """Solve the relaxation and round it where it is not whole."""
         if not network.objects:
-            return nothing(self.name, network)
+            return empty_solution(self.name, network)
         if not network.layout:
-            return finished(self.name, network, relaxation_by_columns(network))
-        start = Improver(network, _SQUARE).improved(greedy_paths(network).nodes)
-        starts = arcs_of_paths(np.arange(network.objects), start)
-        found = _SquaredSearch(network, starts, [], ConflictFinder(network)).run()
-        return finished(self.name, network, found, _SQUARE)
+            return solution_from_relaxation(self.name, network, solve_relaxation(network))
+        start = LocalSearch(network, _SQUARED_POWER).improved(greedy_paths(network).nodes)
+        starts = path_arcs(np.arange(network.objects), start)
+        found = _SquaredLayoutGeneration(network, starts, [], ConflictSeparator(network)).run()
+        return solution_from_relaxation(self.name, network, found, _SQUARED_POWER)
 
 
-class _SquaredSearch(ArcSearch):
+class _SquaredLayoutGeneration(ArcGeneration):
     """The same search with the quadratic program."""
 
     def _new_master(self) -> ArcMaster:

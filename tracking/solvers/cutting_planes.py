@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from tracking.boxes import Floats
-from tracking.model.conflicts import Bools, clique_rows, connected
+from tracking.model.conflicts import Bools, clique_rows, connected_places
 from tracking.model.network import Network
 from tracking.solvers.objective import Ints
-from tracking.solvers.warm_start import PricedRow
+from tracking.solvers.warm_start import ConflictPrice
 
 _TOLERANCE = 1e-9
 """Rows are broken beyond the feasibility tolerance of the LP solver only."""
@@ -26,7 +26,7 @@ class ConflictRow:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Part:
+class _ConflictComponent:
     """The rows of places of one frame that conflict with each other, directly or through others.
 
     Attributes:
@@ -36,25 +36,27 @@ class _Part:
     rows: Floats
 
 
-def priced_rows(network: Network, rows: Sequence[ConflictRow], prices: Floats) -> tuple[PricedRow, ...]:
+def conflict_prices(
+    network: Network, rows: Sequence[ConflictRow], prices: Floats
+) -> tuple[ConflictPrice, ...]:
     """Give the rows with a price, if all objects share them."""
     if not network.shared or network.conflict_rows == "star":
         return ()
     return tuple(
-        PricedRow(row.frame, tuple(np.flatnonzero(row.members[0]).tolist()), float(price))
+        ConflictPrice(row.frame, tuple(np.flatnonzero(row.members[0]).tolist()), float(price))
         for row, price in zip(rows, prices, strict=True)
         if price > 0.0
     )
 
 
-class ConflictFinder:
+class ConflictSeparator:
     """Finds the rows of a network that a point breaks; the rows are those of `Network.rows`."""
 
     def __init__(self, network: Network) -> None:
         self._network = network
         self._stars = network.conflict_rows == "star"
         self._relation = network.conflicts.astype(np.float64)
-        self._parts: dict[tuple[int, int], _Part] = {}
+        self._parts: dict[tuple[int, int], _ConflictComponent] = {}
         self._given: set[tuple[int, bytes]] = set()
 
     def broken(self, usage: Floats) -> list[ConflictRow]:
@@ -74,7 +76,7 @@ class ConflictFinder:
                         found.append(self._row(frame, row))
         return found
 
-    def recalled(self, rows: Sequence[PricedRow]) -> tuple[list[ConflictRow], list[float]]:
+    def recalled(self, rows: Sequence[ConflictPrice]) -> tuple[list[ConflictRow], list[float]]:
         """Give those rows, and their prices, that are rows of this network, given before or not."""
         found: list[ConflictRow] = []
         prices: list[float] = []
@@ -118,12 +120,12 @@ class ConflictFinder:
         members[:, :-1] = row.reshape(-1, network.places) > 0.0
         return ConflictRow(frame, members)
 
-    def _parts_at(self, frame: int, places: Ints) -> list[_Part]:
+    def _parts_at(self, frame: int, places: Ints) -> list[_ConflictComponent]:
         """Give the parts that places of a frame are in, each once."""
         if self._stars:
             if (frame, 0) not in self._parts:
                 rows = self._network.rows(frame)
-                self._parts[frame, 0] = _Part(rows.reshape(len(rows), -1).astype(np.float64))
+                self._parts[frame, 0] = _ConflictComponent(rows.reshape(len(rows), -1).astype(np.float64))
             return [self._parts[frame, 0]]
         parts = {}
         for place in places.tolist():
@@ -136,16 +138,16 @@ class ConflictFinder:
     def _cover(self, frame: int, place: int) -> None:
         """Compute the rows of the part that a place is in."""
         relation, owners = self._network.conflicts[frame], self._network.owners
-        inside = connected(relation, place)
+        inside = connected_places(relation, place)
         cliques = clique_rows(relation[np.ix_(inside, inside)], None if owners is None else owners[inside])
         rows = np.zeros((len(cliques), len(relation)))
         rows[:, inside] = cliques
-        part = _Part(rows)
+        part = _ConflictComponent(rows)
         for member in inside.tolist():
             self._parts[frame, member] = part
 
 
-def groups_of(meets: Bools) -> Ints:
+def group_objects(meets: Bools) -> Ints:
     """Give the lowest object of the group of each, (n,); `meets` (n, n) is symmetric."""
     reached = meets | np.eye(len(meets), dtype=np.bool_)
     while True:

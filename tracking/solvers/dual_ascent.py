@@ -10,18 +10,18 @@ import numpy as np
 
 from tracking.boxes import BOX_SIDES, Floats
 from tracking.model.network import Network
-from tracking.solvers.cutting_planes import ConflictFinder, ConflictRow
+from tracking.solvers.cutting_planes import ConflictRow, ConflictSeparator
 from tracking.solvers.objective import Ints
-from tracking.solvers.viterbi import Marginals, Packed, Pricing, best_paths
+from tracking.solvers.viterbi import MinMarginals, PathPricer, PrunedStates, best_paths
 
-_MEMORY, _MEMORY_OF_SIZE = 0.6, 0.9
+_MOMENTUM, _SECOND_MOMENT_DECAY = 0.6, 0.9
 """Shares of the former direction, and of the former typical size of a slope, in the next one."""
 
-_STILL = 1e-3
+_EPSILON = 1e-3
 """Slopes far below this are no reason to move."""
 
 
-class Steps:
+class AdamSteps:
     """Remembers slopes; numbers may join at the end of the first axis."""
 
     def __init__(self) -> None:
@@ -34,15 +34,15 @@ class Steps:
             joined = np.zeros((len(slope) - len(self._way), *slope.shape[1:]))
             self._way = np.concatenate([self._way.reshape(-1, *slope.shape[1:]), joined])
             self._size = np.concatenate([self._size.reshape(-1, *slope.shape[1:]), joined])
-        self._way = _MEMORY * self._way + (1.0 - _MEMORY) * slope
-        self._size = _MEMORY_OF_SIZE * self._size + (1.0 - _MEMORY_OF_SIZE) * slope**2
-        self._weight = _MEMORY * self._weight + (1.0 - _MEMORY)
-        self._weight_of_size = _MEMORY_OF_SIZE * self._weight_of_size + (1.0 - _MEMORY_OF_SIZE)
+        self._way = _MOMENTUM * self._way + (1.0 - _MOMENTUM) * slope
+        self._size = _SECOND_MOMENT_DECAY * self._size + (1.0 - _SECOND_MOMENT_DECAY) * slope**2
+        self._weight = _MOMENTUM * self._weight + (1.0 - _MOMENTUM)
+        self._weight_of_size = _SECOND_MOMENT_DECAY * self._weight_of_size + (1.0 - _SECOND_MOMENT_DECAY)
         typical = np.sqrt(self._size / self._weight_of_size)
-        return np.asarray(self._way / self._weight / (typical + _STILL))
+        return np.asarray(self._way / self._weight / (typical + _EPSILON))
 
 
-def with_pulls(node: Floats, where: Floats, pulls: Floats) -> Floats:
+def add_layout_prices(node: Floats, where: Floats, pulls: Floats) -> Floats:
     """Give the costs of nodes `node` (n, M, S) at `where` (n, M, S, 4) with what moves earn.
 
     `pulls` (n, M - 1, 4) is what a move by a pixel earns.
@@ -53,7 +53,7 @@ def with_pulls(node: Floats, where: Floats, pulls: Floats) -> Floats:
     return np.asarray(node + (where @ inward[:, :, :, None])[:, :, :, 0])
 
 
-class LayoutForces:
+class LayoutDuals:
     """Forces within [-μ, μ] on the difference of two objects' moves, climbing; 0 at first."""
 
     def __init__(self, network: Network) -> None:
@@ -62,7 +62,7 @@ class LayoutForces:
         self._pairs = np.array(list(combinations(range(count), 2)), dtype=np.int64).reshape(-1, 2)
         self._forces = np.zeros((len(self._pairs), network.frames - 1, BOX_SIDES))
         self._most = network.layout
-        self._steps = Steps()
+        self._steps = AdamSteps()
 
     def pulls(self) -> Floats:
         """Give what a move by a pixel earns each object, (n, M - 1, 4)."""
@@ -87,15 +87,15 @@ class LayoutForces:
         return np.asarray(moves[second] - moves[first])
 
 
-class RowPrices:
+class ConflictDuals:
     """Prices, never negative, of conflict rows on a packed trellis, climbing; rows join at price 0."""
 
-    def __init__(self, packed: Packed) -> None:
+    def __init__(self, packed: PrunedStates) -> None:
         self._packed = packed
         objects, self._frames, width = packed.index.shape
         self._members = np.zeros((0, objects, width))
         self._frame = np.empty(0, dtype=np.int64)
-        self._steps = Steps()
+        self._steps = AdamSteps()
         self.rows: list[ConflictRow] = []
         self.prices = np.empty(0)
 
@@ -132,7 +132,7 @@ class RowPrices:
 
 
 @dataclass(frozen=True, slots=True)
-class _Pace:
+class _AscentSchedule:
     """How an ascent goes.
 
     Attributes:
@@ -148,22 +148,22 @@ class _Pace:
     price: float
 
 
-_WITH_LAYOUT = _Pace(steps=30, shorter=0.94, states=40, price=1.0)
-_BY_CONFLICTS = _Pace(steps=25, shorter=0.92, states=10, price=0.2)
+_WITH_LAYOUT = _AscentSchedule(steps=30, shorter=0.94, states=40, price=1.0)
+_BY_CONFLICTS = _AscentSchedule(steps=25, shorter=0.92, states=10, price=0.2)
 """The layout term leads further off the cheapest paths than conflicts do."""
 
-_FORCE = 0.2
+_FIRST_FORCE_STEP = 0.2
 """Length of the first step of forces, as a share of the largest."""
 
-_KEPT = 8
+_KEPT_PATHS = 8
 """Of the last paths met: they are near those of the optimum."""
 
-_EARLY, _NOW_AND_THEN = 10, 3
+_EARLY_STEPS, _SEPARATION_INTERVAL = 10, 3
 """Broken rows are looked for in each of the first steps, later in some: few are still to be found."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Guess:
+class DualGuess:
     """What the ascent came to.
 
     Attributes:
@@ -179,13 +179,13 @@ class Guess:
     paths: Ints
 
 
-def guessed(network: Network, pricing: Pricing, finder: ConflictFinder) -> Guess:
+def guess_duals(network: Network, pricing: PathPricer, finder: ConflictSeparator) -> DualGuess:
     """Guess the duals of a network."""
-    passes = Marginals.of(pricing.trellis, pricing.ahead)
+    passes = MinMarginals.of(pricing.trellis, pricing.ahead)
     pace = _WITH_LAYOUT if network.layout else _BY_CONFLICTS
-    packed = Packed.cheapest(passes.through, pace.states)
+    packed = PrunedStates.cheapest(passes.through, pace.states)
     trellis = packed.trellis(pricing.trellis)
-    forces, prices = LayoutForces(network), RowPrices(packed)
+    forces, prices = LayoutDuals(network), ConflictDuals(packed)
     where = packed.states(network.locations[network.sets], 0.0) if network.layout else None
     typical = _typical_price(packed.states(passes.through, np.inf), passes.least)
     each, frames = np.indices((network.objects, network.frames))
@@ -193,23 +193,25 @@ def guessed(network: Network, pricing: Pricing, finder: ConflictFinder) -> Guess
     met: list[Ints] = []
     for step in range(pace.steps):
         node, pulls = prices.on(trellis.node), forces.pulls()
-        paths = best_paths(trellis.with_node(node if where is None else with_pulls(node, where, pulls)))
-        met = [*met, packed.named(paths.nodes)][-_KEPT:]
+        paths = best_paths(
+            trellis.with_node(node if where is None else add_layout_prices(node, where, pulls))
+        )
+        met = [*met, packed.named(paths.nodes)][-_KEPT_PATHS:]
         bound = float(paths.costs.sum() - prices.prices.sum())
         if bound > best:
             best, best_prices, best_pulls = bound, prices.prices, pulls
-        if step < _EARLY or step % _NOW_AND_THEN == 0:
+        if step < _EARLY_STEPS or step % _SEPARATION_INTERVAL == 0:
             usage = np.zeros(network.node.shape)
             usage[each, frames, met[-1]] = 1.0
             prices.join(finder.broken(usage))
         length = pace.shorter**step
         moved = prices.climb(paths.nodes, length * pace.price * typical)
         if where is not None:
-            moved |= forces.climb(where[each, frames, paths.nodes], length * _FORCE)
+            moved |= forces.climb(where[each, frames, paths.nodes], length * _FIRST_FORCE_STEP)
         if not moved:
             break
     late = np.zeros(len(prices.prices) - len(best_prices))
-    return Guess(prices.rows, np.concatenate([best_prices, late]), best_pulls, np.array(met))
+    return DualGuess(prices.rows, np.concatenate([best_prices, late]), best_pulls, np.array(met))
 
 
 def _typical_price(through: Floats, least: Floats) -> float:

@@ -9,21 +9,27 @@ import numpy as np
 
 from tracking.model.network import Network
 from tracking.solvers.base import Solution, SolveReport, TimedSolver
-from tracking.solvers.objective import Ints, block, conflict_count, objective, states_of
+from tracking.solvers.objective import (
+    Ints,
+    block_conflicting_nodes,
+    conflict_count,
+    states_from_nodes,
+    total_cost,
+)
 from tracking.solvers.viterbi import Paths, Trellis, best_paths
-from tracking.solvers.warm_start import Hint
+from tracking.solvers.warm_start import WarmStart
 
 
-class SeparateDp(TimedSolver):
+class SeparateDpSolver(TimedSolver):
     """The cheapest path of each object; two objects may take one place. A baseline, and a bound."""
 
     name = "separate-dp"
 
-    def _answer(self, network: Network, _hint: Hint | None) -> Solution:
+    def _answer(self, network: Network, _hint: WarmStart | None) -> Solution:
         """Give the cheapest paths; the sum of their costs is the bound."""
         paths = best_paths(Trellis.of(network))
         conflicts = conflict_count(network, paths.nodes)
-        cost = objective(network, paths.nodes)
+        cost = total_cost(network, paths.nodes)
         bound = float(paths.costs.sum())
         report = SolveReport(
             solver=self.name,
@@ -33,7 +39,7 @@ class SeparateDp(TimedSolver):
             conflicts=conflicts,
             rounds=1,
         )
-        return Solution(states_of(network, paths.nodes), report)
+        return Solution(states_from_nodes(network, paths.nodes), report)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,7 +67,7 @@ def greedy_paths(network: Network, alone: Paths | None = None) -> GreedyPaths:
         rest = np.flatnonzero(left)
         owner = int(rest[costs[rest].argmin()])
         left[owner] = False
-        block(network, exclusions, trellis.node, (owner, nodes[owner]))
+        block_conflicting_nodes(network, exclusions, trellis.node, (owner, nodes[owner]))
         # A cheapest path of which nothing is barred is still the cheapest.
         cut = np.flatnonzero(left & np.isinf(trellis.node[each, frames, nodes]).any(axis=1))
         if len(cut):
@@ -70,15 +76,15 @@ def greedy_paths(network: Network, alone: Paths | None = None) -> GreedyPaths:
     return GreedyPaths(nodes, bound)
 
 
-class GreedyDp(TimedSolver):
+class GreedyDpSolver(TimedSolver):
     """Best track first: quick, never in conflict, not always right. A baseline."""
 
     name = "greedy-dp"
 
-    def _answer(self, network: Network, _hint: Hint | None) -> Solution:
+    def _answer(self, network: Network, _hint: WarmStart | None) -> Solution:
         """Give the greedy paths; the bound is the cost of all cheapest paths, conflicts ignored."""
         paths = greedy_paths(network)
-        cost, conflicts = objective(network, paths.nodes), conflict_count(network, paths.nodes)
+        cost, conflicts = total_cost(network, paths.nodes), conflict_count(network, paths.nodes)
         attained = math.isfinite(cost) and cost - paths.bound <= 1e-9 * max(1.0, abs(cost))
         report = SolveReport(
             solver=self.name,
@@ -88,4 +94,4 @@ class GreedyDp(TimedSolver):
             conflicts=conflicts,
             rounds=network.objects,
         )
-        return Solution(states_of(network, paths.nodes), report)
+        return Solution(states_from_nodes(network, paths.nodes), report)

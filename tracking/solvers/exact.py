@@ -16,27 +16,27 @@ from scipy.spatial.distance import cdist
 from tracking.boxes import BOX_SIDES, Floats
 from tracking.model.conflicts import Bools
 from tracking.model.network import Network
-from tracking.solvers.arc_program import arc_program
+from tracking.solvers.arc_program import build_arc_program
 from tracking.solvers.base import Solution, TimedSolver
-from tracking.solvers.column_generation import relaxation_by_columns
+from tracking.solvers.column_generation import solve_relaxation
 from tracking.solvers.linear_program import solve_program
-from tracking.solvers.objective import Ints, objective
-from tracking.solvers.relaxation import Relaxed
+from tracking.solvers.objective import Ints, total_cost
+from tracking.solvers.relaxation import RelaxedSolution
 from tracking.solvers.rounding import is_integral
-from tracking.solvers.solution_builder import Proof, answered, nothing, whole_nodes
-from tracking.solvers.viterbi import Marginals, Trellis, backward, forward
-from tracking.solvers.warm_start import Hint
+from tracking.solvers.solution_builder import Certificate, build_solution, empty_solution, integer_nodes
+from tracking.solvers.viterbi import MinMarginals, Trellis, backward, forward
+from tracking.solvers.warm_start import WarmStart
 
-_MOST_STATES = 150_000
+_MAX_JOINT_STATES = 150_000
 """Joint states of a frame."""
 
-_MOST_STEPS = 2_000_000_000
+_MAX_TRANSITIONS = 2_000_000_000
 """Pairs of joint states of two frames, over the whole window: about half a minute."""
 
-_AT_ONCE = 2_000_000
+_BLOCK_SIZE = 2_000_000
 """Numbers held at once, 16 MB."""
 
-_SLACK = 1e-9
+_TOLERANCE = 1e-9
 """Relative: bounds are sums of some tens of costs, each with its rounding error."""
 
 
@@ -53,14 +53,14 @@ class _Frontier:
     origin: Ints
 
 
-class JointSearch:
+class JointStateSearch:
     """Searches a network with layout term whose relaxation is solved, its duals known."""
 
-    def __init__(self, network: Network, found: Relaxed) -> None:
+    def __init__(self, network: Network, found: RelaxedSolution) -> None:
         self._network = network
         self._bound = found.bound
         self._exclusions = network.exclusions()
-        passes = Marginals.of(Trellis.of(network).with_node(found.priced))
+        passes = MinMarginals.of(Trellis.of(network).with_node(found.priced))
         self._excess = passes.through - passes.least[:, None, None]
         self._where = network.locations[network.sets]
         # What the way from a state on costs at least: the part of a pull that acts at the cut is undone.
@@ -74,7 +74,7 @@ class JointSearch:
         Raises:
             TooManyStatesError: finding out would take too long.
         """
-        limit = cost + _SLACK * max(1.0, abs(cost))
+        limit = cost + _TOLERANCE * max(1.0, abs(cost))
         network = self._network
         nodes = self._candidates(0, limit)
         costs = (network.source + network.node[:, 0])[np.arange(network.objects), nodes].sum(axis=1)
@@ -83,7 +83,7 @@ class JointSearch:
         for m in range(1, network.frames):
             nodes = self._candidates(m, limit)
             steps += len(nodes) * len(frontiers[-1].nodes)
-            if steps > _MOST_STEPS:
+            if steps > _MAX_TRANSITIONS:
                 raise TooManyStatesError
             frontiers.append(self._hopeful(m, self._arrived(m, frontiers[-1], nodes), limit))
         return self._traced(frontiers, cost)
@@ -99,7 +99,7 @@ class JointSearch:
             for other in range(n):
                 fits &= ~self._barred(frame, (other, n))[np.ix_(joint[:, other], own)]
             first, second = np.nonzero(fits)
-            if len(first) > _MOST_STATES:
+            if len(first) > _MAX_JOINT_STATES:
                 raise TooManyStatesError
             joint = np.column_stack([joint[first], own[second]])
             excess = total[first, second]
@@ -125,7 +125,7 @@ class JointSearch:
         network = self._network
         best, origin = np.full(len(nodes), np.inf), np.zeros(len(nodes), dtype=np.int64)
         leaving, entering = self._apart(frame - 1, before.nodes), self._apart(frame, nodes)
-        size = max(1, _AT_ONCE // max(1, len(nodes)))
+        size = max(1, _BLOCK_SIZE // max(1, len(nodes)))
         for first in range(0, len(before.nodes), size):
             part = slice(first, first + size)
             ways = network.layout * cdist(leaving[part], entering, "cityblock")
@@ -161,7 +161,7 @@ class JointSearch:
 """Relative: excesses are sums of some tens of costs, each with its rounding error."""
 
 
-class Exact(TimedSolver):
+class ExactSolver(TimedSolver):
     """Fixes what the relaxation proves needless, and tries the little that is left.
 
     Under the layout term, joint states that the duals leave possible are tried by dynamic programming.
@@ -172,39 +172,39 @@ class Exact(TimedSolver):
 
     name = "exact"
 
-    def _answer(self, network: Network, _hint: Hint | None) -> Solution:
+    def _answer(self, network: Network, _hint: WarmStart | None) -> Solution:
         """Give the cheapest states without conflicts; the bound is their cost."""
         if not network.objects:
-            return nothing(self.name, network)
-        found = relaxation_by_columns(network)
-        nodes = whole_nodes(network, found.usage)
+            return empty_solution(self.name, network)
+        found = solve_relaxation(network)
+        nodes = integer_nodes(network, found.usage)
         rounds = found.rounds
         if not is_integral(found.usage):
-            nodes = _optimum(network, found, nodes)
+            nodes = _integer_optimum(network, found, nodes)
             rounds += 1
-        cost = objective(network, nodes)
-        return answered(network, nodes, Proof(self.name, cost, integral=True, rounds=rounds))
+        cost = total_cost(network, nodes)
+        return build_solution(network, nodes, Certificate(self.name, cost, integral=True, rounds=rounds))
 
 
-def _optimum(network: Network, found: Relaxed, nodes: Ints) -> Ints:
+def _integer_optimum(network: Network, found: RelaxedSolution, nodes: Ints) -> Ints:
     """Give the cheapest states; `nodes` are some without conflicts."""
     if network.layout:
         with suppress(TooManyStatesError):
-            better = JointSearch(network, found).cheaper_than(objective(network, nodes))
+            better = JointStateSearch(network, found).cheaper_than(total_cost(network, nodes))
             return nodes if better is None else better
-    return by_branching(network, found, nodes)
+    return branch_and_bound(network, found, nodes)
 
 
-def by_branching(network: Network, found: Relaxed, nodes: Ints) -> Ints:
+def branch_and_bound(network: Network, found: RelaxedSolution, nodes: Ints) -> Ints:
     """Give the cheapest states by branch and bound, first among the arcs that are tight, then the rest."""
     excess = arc_excess(network, found)
-    tight = _SLACK * max(1.0, abs(objective(network, nodes)))
-    nodes = _cheaper(network, nodes, _best_among(network, nodes, excess <= tight))
-    gap = max(0.0, objective(network, nodes) - found.bound) + tight
-    return _cheaper(network, nodes, _best_among(network, nodes, excess <= gap))
+    tight = _TOLERANCE * max(1.0, abs(total_cost(network, nodes)))
+    nodes = _cheaper_nodes(network, nodes, _solve_restricted(network, nodes, excess <= tight))
+    gap = max(0.0, total_cost(network, nodes) - found.bound) + tight
+    return _cheaper_nodes(network, nodes, _solve_restricted(network, nodes, excess <= gap))
 
 
-def arc_excess(network: Network, found: Relaxed) -> Floats:
+def arc_excess(network: Network, found: RelaxedSolution) -> Floats:
     """Give how much the best path through each arc costs above its object's best path, priced.
 
     Shape (n, M - 1, S, S); infinite where there is no arc.
@@ -221,12 +221,12 @@ def arc_excess(network: Network, found: Relaxed) -> Floats:
     return excess
 
 
-def _best_among(network: Network, nodes: Ints, allowed: Bools) -> Ints:
+def _solve_restricted(network: Network, nodes: Ints, allowed: Bools) -> Ints:
     """Give the cheapest states on the arcs allowed and those of `nodes`."""
     each, steps = np.indices(nodes[:, 1:].shape)
     allowed = allowed.copy()
     allowed[each, steps, nodes[:, :-1], nodes[:, 1:]] = True
-    built = arc_program(network, allowed)
+    built = build_arc_program(network, allowed)
     whole = np.zeros(len(built.program.costs), dtype=np.bool_)
     whole[built.nodes[built.nodes >= 0]] = True
     values = solve_program(built.program, whole).values
@@ -234,5 +234,5 @@ def _best_among(network: Network, nodes: Ints, allowed: Bools) -> Ints:
     return np.asarray(usage.argmax(axis=2))
 
 
-def _cheaper(network: Network, first: Ints, second: Ints) -> Ints:
-    return second if objective(network, second) < objective(network, first) else first
+def _cheaper_nodes(network: Network, first: Ints, second: Ints) -> Ints:
+    return second if total_cost(network, second) < total_cost(network, first) else first

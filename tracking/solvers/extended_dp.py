@@ -9,14 +9,14 @@ from tracking.model.conflicts import Bools
 from tracking.model.network import Network
 from tracking.solvers.base import Solution, TimedSolver
 from tracking.solvers.objective import Ints
-from tracking.solvers.solution_builder import Proof, answered, nothing
-from tracking.solvers.warm_start import Hint
+from tracking.solvers.solution_builder import Certificate, build_solution, empty_solution
+from tracking.solvers.warm_start import WarmStart
 
-_LARGEST = 30_000_000
+_MAX_NUMBERS = 30_000_000
 """Numbers held at once, 240 MB: three objects with 70 places, say."""
 
 
-class ExtendedDp(TimedSolver):
+class ExtendedDpSolver(TimedSolver):
     """The integer optimum by trying all joint states; an oracle for up to three objects or so.
 
     Without the layout term the step from one frame to the next separates by object, and a window costs
@@ -25,25 +25,25 @@ class ExtendedDp(TimedSolver):
 
     name = "extended-dp"
 
-    def _answer(self, network: Network, _hint: Hint | None) -> Solution:
+    def _answer(self, network: Network, _hint: WarmStart | None) -> Solution:
         """Give the cheapest states without conflicts; the bound is their cost.
 
         Raises:
             ValueError: the joint states of the objects are too many to hold.
         """
         if not network.objects:
-            return nothing(self.name, network)
+            return empty_solution(self.name, network)
         power = 2 * network.objects if network.layout else network.objects + 1
-        if (network.places + 1) ** power > _LARGEST:
+        if (network.places + 1) ** power > _MAX_NUMBERS:
             raise ValueError(
                 f"extended-dp cannot hold the joint states of {network.objects} objects in"
                 f" {network.places} places; columns or exact can"
             )
-        nodes = _Joint(network).best()
-        return answered(network, nodes, Proof(self.name, np.inf, integral=True, rounds=1))
+        nodes = _JointStates(network).best()
+        return build_solution(network, nodes, Certificate(self.name, np.inf, integral=True, rounds=1))
 
 
-class _Joint:
+class _JointStates:
     """Joint states are arrays of n axes of S states each."""
 
     def __init__(self, network: Network) -> None:

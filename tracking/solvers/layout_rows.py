@@ -13,7 +13,7 @@ from tracking.model.network import Network
 from tracking.solvers.objective import Ints
 
 
-class LayoutRows:
+class LayoutConstraints:
     """Columns δ, p+ and p- and their rows; the network has two frames or more.
 
     A row per object, step and side says that δ is the move of the flow; a row per pair of objects, step

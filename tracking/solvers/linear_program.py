@@ -37,11 +37,11 @@ class LinearSolution:
 _DEVEX = 1
 """Edge weights that need no start-up: a growing program is started from many bases."""
 
-_DUAL, _AS_IT_STANDS = 1, 0
+_DUAL, _CHOOSE = 1, 0
 """Simplex strategies: dual, best from nothing; or primal after new columns and dual after new rows."""
 
 
-def quiet_highs(*, growing: bool = False, presolve: bool = False) -> highspy.Highs:
+def create_highs(*, growing: bool = False, presolve: bool = False) -> highspy.Highs:
     """Give a solver that is deterministic and says nothing; `growing`: for a program that gets columns.
 
     With `presolve` the program is made smaller before it is solved for the first time; after that it
@@ -53,7 +53,7 @@ def quiet_highs(*, growing: bool = False, presolve: bool = False) -> highspy.Hig
         "threads": 1,
         "parallel": "off",
         "solver": "simplex",
-        "simplex_strategy": _AS_IT_STANDS if growing else _DUAL,
+        "simplex_strategy": _CHOOSE if growing else _DUAL,
         "presolve": "on" if presolve else "off",
         "random_seed": 0,
         "primal_feasibility_tolerance": 1e-9,
@@ -67,7 +67,7 @@ def quiet_highs(*, growing: bool = False, presolve: bool = False) -> highspy.Hig
     return solver
 
 
-def highs_model(program: LinearProgram) -> highspy.HighsLp:
+def to_highs_model(program: LinearProgram) -> highspy.HighsLp:
     """Put a program into the solver's own form."""
     model = highspy.HighsLp()
     rows, columns = program.matrix.shape
@@ -85,13 +85,13 @@ def highs_model(program: LinearProgram) -> highspy.HighsLp:
     return model
 
 
-_OTHERWISE: tuple[tuple[str, str | float], ...] = (("presolve", "off"), ("qp_regularization_value", 0.0))
+_FALLBACKS: tuple[tuple[str, str | float], ...] = (("presolve", "off"), ("qp_regularization_value", 0.0))
 """What to try anew with, from no basis, where there is no optimum: a basis kept from before columns and rows
 came may be too ill-conditioned to go on from; presolve has called whole-number programs infeasible that
 had answers; and squares with a little added to be regular have ended in an error of the solver's own."""
 
 
-def optimum(solver: highspy.Highs) -> LinearSolution:
+def run_highs(solver: highspy.Highs) -> LinearSolution:
     """Run the solver and give what it found.
 
     Raises:
@@ -99,7 +99,7 @@ def optimum(solver: highspy.Highs) -> LinearSolution:
     """
     solver.run()
     status = solver.getModelStatus()
-    for name, value in _OTHERWISE:
+    for name, value in _FALLBACKS:
         if status == highspy.HighsModelStatus.kOptimal:
             break
         _, usual = solver.getOptionValue(name)
@@ -122,8 +122,8 @@ def optimum(solver: highspy.Highs) -> LinearSolution:
 
 def solve_program(program: LinearProgram, integer: NDArray[np.bool_] | None = None) -> LinearSolution:
     """Solve one program from nothing; columns where `integer` is true are whole."""
-    solver = quiet_highs()
-    model = highs_model(program)
+    solver = create_highs()
+    model = to_highs_model(program)
     if integer is not None:
         kinds = (highspy.HighsVarType.kContinuous, highspy.HighsVarType.kInteger)
         model.integrality_ = [kinds[int(whole)] for whole in integer]
@@ -132,10 +132,10 @@ def solve_program(program: LinearProgram, integer: NDArray[np.bool_] | None = No
         solver.setOptionValue("presolve", "on")
         solver.setOptionValue("solver", "choose")
     solver.passModel(model)
-    return optimum(solver)
+    return run_highs(solver)
 
 
-class Assembly:
+class LinearProgramBuilder:
     """Collects the columns and rows of a program; entries of one place add up."""
 
     def __init__(self) -> None:

@@ -12,12 +12,12 @@ from tracking.solvers.base import OCCLUDED
 Ints = NDArray[np.int64]
 
 
-def nodes_of(network: Network, states: Ints) -> Ints:
+def nodes_from_states(network: Network, states: Ints) -> Ints:
     """Give node numbers for states: the occlusion node is the last one instead of -1."""
     return np.where(states == OCCLUDED, network.places, states)
 
 
-def states_of(network: Network, nodes: Ints) -> Ints:
+def states_from_nodes(network: Network, nodes: Ints) -> Ints:
     """Give states for node numbers: occluded is -1."""
     return np.where(nodes == network.places, OCCLUDED, nodes)
 
@@ -55,7 +55,7 @@ def locations_at(network: Network, nodes: Ints) -> Floats:
     return network.locations[network.sets[:, None], np.arange(network.frames), nodes]
 
 
-def objective(network: Network, nodes: Ints, power: int = 1) -> float:
+def total_cost(network: Network, nodes: Ints, power: int = 1) -> float:
     """Give the cost of all paths together, the layout term with its `power` included (II.C)."""
     total = float(path_costs(network, nodes).sum())
     if network.layout:
@@ -76,7 +76,9 @@ def conflict_count(network: Network, nodes: Ints) -> int:
     return int((barred & visible[first] & visible[second]).sum())
 
 
-def block(network: Network, exclusions: NDArray[np.bool_], node: Floats, taken: tuple[int, Ints]) -> None:
+def block_conflicting_nodes(
+    network: Network, exclusions: NDArray[np.bool_], node: Floats, taken: tuple[int, Ints]
+) -> None:
     """Make infinite in `node` (n, M, S) what others cannot take once `taken`, object and path, is fixed."""
     owner, path = taken
     if not exclusions.size:

@@ -11,13 +11,13 @@ from tracking.boxes import Floats
 from tracking.model.conflicts import Bools
 from tracking.model.network import Network
 from tracking.solvers.cutting_planes import ConflictRow
-from tracking.solvers.linear_program import optimum, quiet_highs
+from tracking.solvers.linear_program import create_highs, run_highs
 from tracking.solvers.objective import Ints
 from tracking.solvers.viterbi import Paths
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class MasterPoint:
+class PathMasterSolution:
     """The optimum of a restricted program.
 
     Attributes:
@@ -36,7 +36,7 @@ class PathMaster:
 
     def __init__(self, network: Network) -> None:
         self._network = network
-        self._highs = quiet_highs(growing=True)
+        self._highs = create_highs(growing=True)
         self._known: set[tuple[int, bytes]] = set()
         self._owners = np.empty(0, dtype=np.int64)
         self._paths = np.empty((0, network.frames), dtype=np.int64)
@@ -95,14 +95,14 @@ class PathMaster:
             self.rows.append(row)
             self._highs.addRow(-np.inf, 1.0, len(through), through.astype(np.int32), np.ones(len(through)))
 
-    def solve(self) -> MasterPoint:
+    def solve(self) -> PathMasterSolution:
         """Choose anew."""
-        found = optimum(self._highs)
+        found = run_highs(self._highs)
         self._values = found.values
         worths = np.full(self._network.objects, np.inf)
         worths[list(self._object_rows)] = found.duals[self._row_numbers()]
         prices = np.maximum(0.0, -found.duals[self._conflict_rows]) if self.rows else np.empty(0)
-        return MasterPoint(found.objective, prices, worths)
+        return PathMasterSolution(found.objective, prices, worths)
 
     def used(self) -> tuple[Ints, Ints]:
         """Give the paths in use: their objects (P,) and nodes (P, M)."""

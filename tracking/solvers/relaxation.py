@@ -8,17 +8,17 @@ import numpy as np
 
 from tracking.boxes import Floats
 from tracking.model.network import Network
-from tracking.solvers.cutting_planes import ConflictFinder, ConflictRow, priced_rows
+from tracking.solvers.cutting_planes import ConflictRow, ConflictSeparator, conflict_prices
 from tracking.solvers.objective import Ints, conflict_count, path_costs
-from tracking.solvers.viterbi import Paths, Pricing, best_paths
-from tracking.solvers.warm_start import Hint, PricedRow
+from tracking.solvers.viterbi import PathPricer, Paths, best_paths
+from tracking.solvers.warm_start import ConflictPrice, WarmStart
 
-CLOSE = 1e-11
+OPTIMALITY_TOLERANCE = 1e-11
 """Relative distance of cost and bound at which the optimum is proven; far below the 1e-9 promised."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Relaxed:
+class RelaxedSolution:
     """The optimum of the relaxation.
 
     Attributes:
@@ -36,13 +36,13 @@ class Relaxed:
     bound: float
     priced: Floats
     rounds: int
-    prices: tuple[PricedRow, ...] = ()
+    prices: tuple[ConflictPrice, ...] = ()
     pulls: Floats = field(default_factory=lambda: np.empty(0))
     charges: Floats = field(default_factory=lambda: np.empty(0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Recalled:
+class WarmStartResult:
     """What a hint is worth in a network.
 
     Attributes:
@@ -53,29 +53,33 @@ class Recalled:
 
     rows: list[ConflictRow]
     paths: list[Paths]
-    proven: Relaxed | None
+    proven: RelaxedSolution | None
 
 
-def recall(network: Network, pricing: Pricing, finder: ConflictFinder, hint: Hint) -> Recalled:
+def try_warm_start(
+    network: Network, pricing: PathPricer, finder: ConflictSeparator, hint: WarmStart
+) -> WarmStartResult:
     """Try a hint; of a network without layout term."""
     rows, costs = finder.recalled(hint.rows)
     prices = np.array(costs)
-    node = with_prices(network, rows, prices)
+    node = add_conflict_prices(network, rows, prices)
     priced = pricing.best_paths(node, np.arange(network.objects))
     bound = float(priced.costs.sum() - prices.sum())
     paths = []
-    for nodes in (priced.nodes, _as_hinted(network, pricing, node, hint, priced.nodes)):
+    for nodes in (priced.nodes, _follow_warm_start(network, pricing, node, hint, priced.nodes)):
         true_costs = path_costs(network, nodes)
         paths.append(Paths(nodes, true_costs))
         cost = float(true_costs.sum())
-        if cost - bound <= CLOSE * max(1.0, abs(cost)) and not conflict_count(network, nodes):
+        if cost - bound <= OPTIMALITY_TOLERANCE * max(1.0, abs(cost)) and not conflict_count(network, nodes):
             usage = np.zeros(network.node.shape)
             np.put_along_axis(usage, nodes[:, :, None], 1.0, axis=2)
-            return Recalled(rows, paths, Relaxed(usage, bound, node, 0, priced_rows(network, rows, prices)))
-    return Recalled(rows, paths, None)
+            return WarmStartResult(
+                rows, paths, RelaxedSolution(usage, bound, node, 0, conflict_prices(network, rows, prices))
+            )
+    return WarmStartResult(rows, paths, None)
 
 
-def with_prices(network: Network, rows: list[ConflictRow], prices: Floats) -> Floats:
+def add_conflict_prices(network: Network, rows: list[ConflictRow], prices: Floats) -> Floats:
     """Give the costs of nodes (n, M, S) with the prices of conflict rows."""
     node = network.node.copy()
     for price, row in zip(prices, rows, strict=True):
@@ -84,7 +88,9 @@ def with_prices(network: Network, rows: list[ConflictRow], prices: Floats) -> Fl
     return node
 
 
-def _as_hinted(network: Network, pricing: Pricing, node: Floats, hint: Hint, nodes: Ints) -> Ints:
+def _follow_warm_start(
+    network: Network, pricing: PathPricer, node: Floats, hint: WarmStart, nodes: Ints
+) -> Ints:
     """Give `nodes` (n, M), but for objects that the hint has elsewhere the best paths that follow it."""
     if len(hint.states) != network.objects:
         return nodes

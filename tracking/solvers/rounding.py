@@ -7,22 +7,22 @@ import numpy as np
 from tracking.boxes import Floats
 from tracking.model.conflicts import Bools
 from tracking.model.network import Network
-from tracking.solvers.objective import Ints, locations_at, objective, path_cost
-from tracking.solvers.viterbi import Marginals, Packed, Trellis, best_paths, trace
+from tracking.solvers.objective import Ints, locations_at, path_cost, total_cost
+from tracking.solvers.viterbi import MinMarginals, PrunedStates, Trellis, best_paths, trace_back
 
-_NOTHING = 1e-9
+_ZERO_TOLERANCE = 1e-9
 """A node with less than this on it is not on any path."""
 
-INTEGRAL = 1e-6
+INTEGRALITY_TOLERANCE = 1e-6
 """Nodes within this of 0 or 1 are whole: well above the solver's feasibility tolerance."""
 
 
 def is_integral(usage: Floats) -> bool:
     """Say whether all of y are 0 or 1."""
-    return bool((np.minimum(usage, 1.0 - usage) <= INTEGRAL).all())
+    return bool((np.minimum(usage, 1.0 - usage) <= INTEGRALITY_TOLERANCE).all())
 
 
-def rounded(network: Network, usage: Floats) -> Ints:
+def round_relaxation(network: Network, usage: Floats) -> Ints:
     """Round y = `usage` (n, M, S) to nodes (n, M) without conflicts.
 
     In each frame the largest y becomes 1, its conflicting nodes and the other nodes of its object 0;
@@ -31,7 +31,7 @@ def rounded(network: Network, usage: Floats) -> Ints:
     """
     exclusions = network.exclusions()
     nodes = np.full((network.objects, network.frames), network.places, dtype=np.int64)
-    whole = usage.max(axis=2, initial=0.0) >= 1.0 - INTEGRAL
+    whole = usage.max(axis=2, initial=0.0) >= 1.0 - INTEGRALITY_TOLERANCE
     for m in range(network.frames):
         if whole[:, m].all():
             nodes[:, m] = usage[:, m].argmax(axis=1)
@@ -45,7 +45,7 @@ def _round_frame(network: Network, usage: Floats, exclusions: Bools) -> Ints:
     nodes = np.full(network.objects, places, dtype=np.int64)
     for _ in range(network.objects):
         owner, state = divmod(int(usage.argmax()), places + 1)
-        if usage[owner, state] <= _NOTHING:
+        if usage[owner, state] <= _ZERO_TOLERANCE:
             break
         nodes[owner] = state
         if state < places:
@@ -55,14 +55,14 @@ def _round_frame(network: Network, usage: Floats, exclusions: Bools) -> Ints:
     return nodes
 
 
-_ROUNDS = 20
+_MAX_ROUNDS = 20
 """Far above what it takes to settle; bounds the time whatever the window."""
 
-_NO_LESS = 1e-12
+_MIN_IMPROVEMENT = 1e-12
 """Relative: what is cheaper by less is no cheaper."""
 
 
-class Improver:
+class LocalSearch:
     """Improves states of one network; `power` is that of its layout term.
 
     Attributes:
@@ -73,8 +73,8 @@ class Improver:
         self._network = network
         self._power = power
         self._trellis = Trellis.of(network)
-        self._passes = Marginals.of(self._trellis)
-        self.alone = trace(self._trellis, self._passes.ahead)
+        self._passes = MinMarginals.of(self._trellis)
+        self.alone = trace_back(self._trellis, self._passes.ahead)
 
     def improved(self, nodes: Ints) -> Ints:
         """Give nodes (n, M) without conflicts that cost no more, from nodes without conflicts.
@@ -82,21 +82,21 @@ class Improver:
         Repairs what the rounding of II.D may leave, since it looks at each frame by itself: arcs that do
         not exist where arcs are gated, and jumps where the relaxation was split.
         """
-        turns = _Turns(self._network, self._trellis, self._passes, self._power)
+        turns = _CoordinateDescent(self._network, self._trellis, self._passes, self._power)
         turns.nodes = nodes.copy()
-        cost = objective(self._network, nodes, self._power)
-        for _ in range(_ROUNDS):
+        cost = total_cost(self._network, nodes, self._power)
+        for _ in range(_MAX_ROUNDS):
             changed = [turns.take(owner) for owner in range(self._network.objects)]
-            before, cost = cost, objective(self._network, turns.nodes, self._power)
-            if not any(changed) or not cost < before - _NO_LESS * max(1.0, abs(cost)):
+            before, cost = cost, total_cost(self._network, turns.nodes, self._power)
+            if not any(changed) or not cost < before - _MIN_IMPROVEMENT * max(1.0, abs(cost)):
                 break
         return turns.nodes
 
 
-class _Turns:
+class _CoordinateDescent:
     """Lets one object after the other choose; an object whose others have not moved has nothing to do."""
 
-    def __init__(self, network: Network, trellis: Trellis, passes: Marginals, power: int) -> None:
+    def __init__(self, network: Network, trellis: Trellis, passes: MinMarginals, power: int) -> None:
         self._network = network
         self._power = power
         self._exclusions = network.exclusions()
@@ -110,7 +110,7 @@ class _Turns:
         if self._settled[owner]:
             return False
         cost = self._own_cost(owner)
-        if np.isfinite(cost) and cost <= self._least[owner] + _NO_LESS * max(1.0, abs(cost)):
+        if np.isfinite(cost) and cost <= self._least[owner] + _MIN_IMPROVEMENT * max(1.0, abs(cost)):
             return False
         before = self.nodes[owner].copy()
         self.nodes[owner] = self._rerouted(owner, cost)
@@ -140,8 +140,8 @@ class _Turns:
         network = self._network
         node = network.node[owner].copy()
         node[:, :-1][self._barred(owner)] = np.inf
-        limit = cost + _NO_LESS * max(1.0, abs(cost)) if np.isfinite(cost) else np.inf
-        packed = Packed.of(((self._through[owner] <= limit) & np.isfinite(node))[None])
+        limit = cost + _MIN_IMPROVEMENT * max(1.0, abs(cost)) if np.isfinite(cost) else np.inf
+        packed = PrunedStates.of(((self._through[owner] <= limit) & np.isfinite(node))[None])
         trellis = packed.trellis(self._trellis.only(np.array([owner])).with_node(node[None]))
         if network.layout:
             trellis.pair[0] += network.layout * self._layout_of_arcs(owner, packed)
@@ -161,7 +161,7 @@ class _Turns:
         barred = self._exclusions[np.arange(network.frames), at, own] & visible[:, :, None]
         return np.asarray(barred.any(axis=0))
 
-    def _layout_of_arcs(self, owner: int, packed: Packed) -> Floats:
+    def _layout_of_arcs(self, owner: int, packed: PrunedStates) -> Floats:
         """Give what each arc between states kept adds to the layout term without μ, (M - 1, W, W)."""
         network = self._network
         where = packed.states(network.locations[network.sets[[owner]]], 0.0)[0]

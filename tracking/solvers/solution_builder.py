@@ -10,54 +10,56 @@ from tracking.boxes import Floats
 from tracking.model.network import Network
 from tracking.solvers.base import Solution, SolveReport
 from tracking.solvers.dynamic_programming import greedy_paths
-from tracking.solvers.objective import Ints, conflict_count, objective, states_of
-from tracking.solvers.relaxation import Relaxed
-from tracking.solvers.rounding import Improver, is_integral, rounded
-from tracking.solvers.warm_start import PricedRow
+from tracking.solvers.objective import Ints, conflict_count, states_from_nodes, total_cost
+from tracking.solvers.relaxation import RelaxedSolution
+from tracking.solvers.rounding import LocalSearch, is_integral, round_relaxation
+from tracking.solvers.warm_start import ConflictPrice
 
 
-def finished(solver: str, network: Network, found: Relaxed, power: int = 1) -> Solution:
+def solution_from_relaxation(
+    solver: str, network: Network, found: RelaxedSolution, power: int = 1
+) -> Solution:
     """Give the answer for the optimum of the relaxation; `power` is that of the layout term."""
-    nodes = whole_nodes(network, found.usage, power)
+    nodes = integer_nodes(network, found.usage, power)
     integral = is_integral(found.usage)
-    proof = Proof(solver, found.bound, integral, found.rounds, found.prices)
-    return answered(network, nodes, proof, power)
+    proof = Certificate(solver, found.bound, integral, found.rounds, found.prices)
+    return build_solution(network, nodes, proof, power)
 
 
-def whole_nodes(network: Network, usage: Floats, power: int = 1) -> Ints:
+def integer_nodes(network: Network, usage: Floats, power: int = 1) -> Ints:
     """Give nodes (n, M) without conflicts for y = `usage` (n, M, S).
 
     Where y is whole they are its paths. Where not, it is rounded (II.D) and improved, and so are the
     greedy paths; the cheaper are taken, the rounded ones where equal.
     """
-    nodes = rounded(network, usage)
+    nodes = round_relaxation(network, usage)
     if is_integral(usage):
         return nodes
-    improver = Improver(network, power)
+    improver = LocalSearch(network, power)
     nodes = improver.improved(nodes)
     greedy = improver.improved(greedy_paths(network, improver.alone).nodes)
     if conflict_count(network, greedy):
         return nodes
-    return greedy if objective(network, greedy, power) < objective(network, nodes, power) else nodes
+    return greedy if total_cost(network, greedy, power) < total_cost(network, nodes, power) else nodes
 
 
 @dataclass(frozen=True, slots=True)
-class Proof:
+class Certificate:
     """What a solver knows of its answer: see `SolveReport` and `Solution`."""
 
     solver: str
     bound: float
     integral: bool
     rounds: int
-    prices: tuple[PricedRow, ...] = ()
+    prices: tuple[ConflictPrice, ...] = ()
 
 
-def answered(network: Network, nodes: Ints, proof: Proof, power: int = 1) -> Solution:
+def build_solution(network: Network, nodes: Ints, proof: Certificate, power: int = 1) -> Solution:
     """Give nodes (n, M) as the answer, with the report on it.
 
     The bound is no better than the cost of an answer that attains it: rounding errors are cut off.
     """
-    cost = objective(network, nodes, power)
+    cost = total_cost(network, nodes, power)
     report = SolveReport(
         solver=proof.solver,
         objective=cost,
@@ -66,10 +68,10 @@ def answered(network: Network, nodes: Ints, proof: Proof, power: int = 1) -> Sol
         conflicts=conflict_count(network, nodes),
         rounds=proof.rounds,
     )
-    return Solution(states_of(network, nodes), report, proof.prices)
+    return Solution(states_from_nodes(network, nodes), report, proof.prices)
 
 
-def nothing(solver: str, network: Network) -> Solution:
+def empty_solution(solver: str, network: Network) -> Solution:
     """Give the answer for a network without objects."""
     nodes = np.empty((0, network.frames), dtype=np.int64)
-    return answered(network, nodes, Proof(solver, 0.0, integral=True, rounds=0))
+    return build_solution(network, nodes, Certificate(solver, 0.0, integral=True, rounds=0))

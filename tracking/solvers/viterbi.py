@@ -91,7 +91,7 @@ def backward(trellis: Trellis) -> Floats:
     return best
 
 
-def trace(trellis: Trellis, best: Floats) -> Paths:
+def trace_back(trellis: Trellis, best: Floats) -> Paths:
     """Follow `forward` back from the sink; of equal ways the one through the lowest state is taken."""
     objects, frames, _ = trellis.node.shape
     each = np.arange(objects)
@@ -105,7 +105,7 @@ def trace(trellis: Trellis, best: Floats) -> Paths:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Marginals:
+class MinMarginals:
     """Both passes over a trellis: what the best ways into and out of each state cost.
 
     Attributes:
@@ -119,7 +119,7 @@ class Marginals:
     least: Floats
 
     @classmethod
-    def of(cls, trellis: Trellis, ahead: Floats | None = None) -> Marginals:
+    def of(cls, trellis: Trellis, ahead: Floats | None = None) -> MinMarginals:
         """Go over the trellis forward and backward; `ahead`, where given, is the forward pass."""
         ahead = forward(trellis) if ahead is None else ahead
         return cls(ahead, backward(trellis), (ahead[-1] + trellis.sink).min(axis=1))
@@ -132,11 +132,11 @@ class Marginals:
 
 def best_paths(trellis: Trellis) -> Paths:
     """Give the cheapest path of each object on its own."""
-    return trace(trellis, forward(trellis))
+    return trace_back(trellis, forward(trellis))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Packed:
+class PrunedStates:
     """W slots for each object and frame, in the order of their states; empty slots are the last.
 
     Attributes:
@@ -148,7 +148,7 @@ class Packed:
     filled: Bools
 
     @classmethod
-    def of(cls, kept: Bools) -> Packed:
+    def of(cls, kept: Bools) -> PrunedStates:
         """Keep the states where `kept` (n, M, S) is true."""
         counts = kept.sum(axis=2)
         width = int(counts.max(initial=1))
@@ -156,7 +156,7 @@ class Packed:
         return cls(index, np.arange(width) < counts[:, :, None])
 
     @classmethod
-    def cheapest(cls, costs: Floats, most: int) -> Packed:
+    def cheapest(cls, costs: Floats, most: int) -> PrunedStates:
         """Keep the `most` states of an object and frame that cost least by `costs` (n, M, S)."""
         if most < costs.shape[2]:
             index = np.sort(np.argpartition(costs, most - 1, axis=2)[:, :, :most], axis=2)
@@ -194,7 +194,7 @@ class Packed:
         return np.asarray(np.take_along_axis(self.index, slots[:, :, None], axis=2)[:, :, 0])
 
 
-class Pricing:
+class PathPricer:
     """Answers for one trellis under many node costs.
 
     Attributes:
@@ -206,7 +206,7 @@ class Pricing:
     def __init__(self, trellis: Trellis) -> None:
         self.trellis = trellis
         self.ahead = forward(trellis)
-        self.alone = trace(trellis, self.ahead)
+        self.alone = trace_back(trellis, self.ahead)
         self._node = trellis.node.copy()
         self._paths = Paths(self.alone.nodes.copy(), self.alone.costs.copy())
 
@@ -219,7 +219,7 @@ class Pricing:
             # Up to the first frame with a price the ways are those without prices.
             priced = (trellis.node != self.trellis.node[touched]).any(axis=(0, 2))
             first = int(priced.argmax()) if priced.any() else len(priced)
-            paths = trace(trellis, forward(trellis, self.ahead[:first, touched]))
+            paths = trace_back(trellis, forward(trellis, self.ahead[:first, touched]))
             self._paths.nodes[touched] = paths.nodes
             self._paths.costs[touched] = paths.costs
         return self._paths.only(objects)

@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-UNKNOWN = -2
+UNKNOWN_STATE = -2
 """The state of an object of which the hint does not know where it is."""
 
 
 @dataclass(frozen=True, slots=True)
-class PricedRow:
+class ConflictPrice:
     """A conflict row that binds: at most one object in `places` of `frame`, and what that costs."""
 
     frame: int
@@ -22,34 +22,34 @@ class PricedRow:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Hint:
+class WarmStart:
     """A guess at an answer, right or wrong: a solver that is told reaches the same optimum, only sooner.
 
     Attributes:
         rows: conflict rows thought to bind.
         states: (n, F) where each object is thought to be in the first F frames: the index of its
-            observation, -1 where occluded, `UNKNOWN`.
+            observation, -1 where occluded, `UNKNOWN_STATE`.
     """
 
-    rows: tuple[PricedRow, ...]
+    rows: tuple[ConflictPrice, ...]
     states: NDArray[np.int64]
 
-    def later(self, frames: int, objects: Sequence[int | None]) -> Hint:
+    def later(self, frames: int, objects: Sequence[int | None]) -> WarmStart:
         """Give the hint for a window that begins `frames` later.
 
         `objects` says for each object of that window which it was in this one; None: it was not.
         Observations must be numbered as they were.
         """
-        states = np.full((len(objects), max(self.states.shape[1] - frames, 0)), UNKNOWN, dtype=np.int64)
+        states = np.full((len(objects), max(self.states.shape[1] - frames, 0)), UNKNOWN_STATE, dtype=np.int64)
         for n, was in enumerate(objects):
             if was is not None:
                 states[n] = self.states[was, frames:]
         rows = (replace(row, frame=row.frame - frames) for row in self.rows if row.frame >= frames)
-        return Hint(tuple(rows), states)
+        return WarmStart(tuple(rows), states)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Told:
+class WindowWarmStart:
     """The answer of a window.
 
     Attributes:
@@ -60,9 +60,9 @@ class Told:
 
     first: int
     ids: Sequence[int]
-    hint: Hint
+    hint: WarmStart
 
-    def hint_for(self, first: int, ids: Sequence[int]) -> Hint:
+    def hint_for(self, first: int, ids: Sequence[int]) -> WarmStart:
         """Give the hint for a window of the objects `ids` that begins with the frame `first`."""
         rows = {number: n for n, number in enumerate(self.ids)}
         return self.hint.later(first - self.first, [rows.get(number) for number in ids])

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from tracking.appearance_samples import with_glimpses
+from tracking.appearance_samples import add_appearance_samples
 from tracking.boxes import Floats, iou
 from tracking.model.object_state import mean_histogram
 from tracking.solvers.base import OCCLUDED
@@ -37,7 +37,7 @@ def told_tracks(
         sure = float(np.mean(~np.isnan(boxes[:, 0])))
         tracks.append(WindowTrack(number, boxes, boxes, histogram, sure))
         states.append(shown)
-    return with_glimpses(tracks, states, first, seen[: final - first + 1])
+    return add_appearance_samples(tracks, states, first, seen[: final - first + 1])
 
 
 def _shown(boxes: Floats, seen: Sequence[Detections]) -> NDArray[np.int64]:

@@ -15,8 +15,8 @@ from typing import Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from tracking.appearance_samples import with_glimpses
-from tracking.assignment import best_pairs
+from tracking.appearance_samples import add_appearance_samples
+from tracking.assignment import assign_pairs
 from tracking.boxes import BOX_SIDES, Floats, iou
 from tracking.detectors.base import Image
 from tracking.model.object_state import mean_histogram
@@ -150,7 +150,7 @@ class StepwiseTracker(Generic[S]):
             return taken
         places = np.stack([item.box for item in self._objects])
         overlaps = iou(places[:, None], detections.boxes[None])
-        for row, column in zip(*best_pairs(overlaps, max(self._settings.match, 1e-9)), strict=True):
+        for row, column in zip(*assign_pairs(overlaps, max(self._settings.match, 1e-9)), strict=True):
             item = self._objects[row]
             item.box = self._method.found(item.known, detections.boxes[column])
             item.matches, item.away = item.matches + 1, 0
@@ -201,7 +201,7 @@ class StepwiseTracker(Generic[S]):
             for item in told
         ]
         report = SolveReport(self._method.name, 0.0, 0.0, integral=False, conflicts=0, rounds=0)
-        result = WindowResult(first, last, last, with_glimpses(tracks, states, first, seen), report)
+        result = WindowResult(first, last, last, add_appearance_samples(tracks, states, first, seen), report)
         for item in self._everybody():
             # Who does not count yet is not told of; when they do, it is from the next window on.
             item.shown = {}

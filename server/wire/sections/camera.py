@@ -11,7 +11,7 @@ from bestview import WitnessSettings, checked_homography
 from server.wire.ground_unit import checked_unit
 from server.wire.library import validated
 from server.wire.sections.base import Name, Polygon, Section
-from tracking import DEFAULT_SOLVER, CostSettings, WindowSettings, solver_named
+from tracking import DEFAULT_SOLVER, CostSettings, WindowSettings, create_solver
 from tracking.assist import AssistSettings
 from tracking.temporal import TemporalSettings
 from tracking.yardsticks import DEFAULT_TRACKER, TEMPORAL, tracker_names
@@ -96,5 +96,5 @@ class Track(Section):
     @field_validator("solver")
     @classmethod
     def _solver_is_known(cls, solver: str) -> str:
-        solver_named(solver)
+        create_solver(solver)
         return solver
