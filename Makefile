@@ -47,7 +47,7 @@ bench: $(STAMP)
 
 # The documents as a site, in build/site.
 docs: $(DOCS_STAMP)
-	NO_MKDOCS_2_WARNING=1 DISABLE_MKDOCS_2_WARNING=true $(BIN)/mkdocs build --quiet --strict
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
 # The pins in requirements/lock.txt, made anew from the ranges in pyproject.toml.
 lock: $(STAMP)
