@@ -149,7 +149,7 @@ def test_what_a_machine_has_to_be_told_stands_in_the_example_of_its_env_file(fil
     """Or the next command of compose, typed in another shell, would not have it."""
     needed = set(re.findall(r"\$\{(MYVIEW_\w+):\?", (ROOT / file).read_text(encoding="utf-8")))
     assert needed
-    text = (ROOT / "docs" / "operating.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "how-to" / "containers.md").read_text(encoding="utf-8")
     blocks = [it.partition("\n")[2] for it in text.split("```")[1::2]]
     (env,) = [it for it in blocks if it.startswith("COMPOSE_FILE=") and file in it]
     assert needed | {"MYVIEW_CONFIG"} <= {line.partition("=")[0] for line in env.splitlines()}

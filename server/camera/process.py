@@ -7,7 +7,7 @@ import logging
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from statistics import fmean
 from typing import TypeVar
@@ -155,8 +155,9 @@ class CameraProcess:
     async def _follow_pulses(self) -> None:
         sync, fps = self._config.sync, self._config.site.fps
         # A recording makes up for a stall; a camera goes on with its newest picture.
-        queue = self._backlog_pictures if self._pipeline.source.recorded else 2
-        settings = ClientSettings(queue=queue, free_run_after=sync.start_timeout_s)
+        settings = ClientSettings(queue=2, free_run_after=sync.start_timeout_s)
+        if self._pipeline.source.recorded:
+            settings = replace(settings, queue=self._backlog_pictures, catch_up=self._config.track.backlog_s)
         client = PulseClient(
             sync.host,
             sync.port,

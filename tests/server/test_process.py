@@ -15,7 +15,7 @@ import zenoh
 from patience import PATIENCE
 from videos_by_hand import write_video
 
-from camsync import PulseServer
+from camsync import PulseServer, ServerLimits
 from server.camera.ladder import Bounds, Ladder, rungs
 from server.camera.load import Load
 from server.camera.pipeline import CameraPipeline
@@ -64,7 +64,12 @@ class Running:
         self._tasks: list[asyncio.Task[None]] = []
         expect = {*config.camera_ids, pulse_client(0)}
         self.pulses = PulseServer(
-            FPS, expect=expect, start_timeout=PATIENCE, port=config.sync.port, users=pulse_users(config)
+            FPS,
+            expect=expect,
+            start_timeout=PATIENCE,
+            port=config.sync.port,
+            users=pulse_users(config),
+            limits=ServerLimits(catch_up=PATIENCE),  # a machine that stalls must not skip pulses here
         )
 
     def camera(self, camera: str) -> asyncio.Task[None]:
