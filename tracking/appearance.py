@@ -20,7 +20,7 @@ def grey_histograms(
     bins: int = 64,
     mask: NDArray[np.uint8] | None = None,
 ) -> Floats:
-    """Give the grey histogram of each box, shape (K, bins), rows summing to 1 (paper II.D, Example 1).
+    """Return the grey histogram of each box, shape (K, bins), rows summing to 1 (paper II.D, Example 1).
 
     `grey` is (H, W); `boxes` (K, 4) in pixels are cut to the image; `mask` (H, W), where given, leaves
     only its non-zero pixels in. A box that holds no pixel gets the uniform histogram: it looks like

@@ -23,7 +23,7 @@ def add_appearance_samples(
     first: int,
     final: Sequence[Detections],
 ) -> tuple[WindowTrack, ...]:
-    """Give the tracks with how they look in the final frames of the window, of which `first` is the first.
+    """Return the tracks with how they look in the final frames of the window, of which `first` is the first.
 
     `states` are the observations that each of the tracks is in, frame by frame, -1 where hidden.
     """

@@ -21,22 +21,22 @@ _CORNERS_PER_SIDE = 2.0
 
 
 def widths(boxes: Floats) -> Floats:
-    """Give the widths in pixels, shape (...); negative extents count as none."""
+    """Return the widths in pixels, shape (...); negative extents count as none."""
     return np.maximum(boxes[..., 2] - boxes[..., 0], 0.0)
 
 
 def heights(boxes: Floats) -> Floats:
-    """Give the heights in pixels, shape (...); negative extents count as none."""
+    """Return the heights in pixels, shape (...); negative extents count as none."""
     return np.maximum(boxes[..., 3] - boxes[..., 1], 0.0)
 
 
 def areas(boxes: Floats) -> Floats:
-    """Give the areas in square pixels, shape (...)."""
+    """Return the areas in square pixels, shape (...)."""
     return widths(boxes) * heights(boxes)
 
 
 def intersections(first: Floats, second: Floats) -> Floats:
-    """Give the areas in square pixels that two boxes share, shape (...)."""
+    """Return the areas in square pixels that two boxes share, shape (...)."""
     left_top = np.maximum(first[..., :2], second[..., :2])
     right_bottom = np.minimum(first[..., 2:], second[..., 2:])
     sides = np.maximum(right_bottom - left_top, 0.0)
@@ -44,20 +44,20 @@ def intersections(first: Floats, second: Floats) -> Floats:
 
 
 def overlap(first: Floats, second: Floats) -> Floats:
-    """Give the shared area over the average area, in [0, 1], shape (...) (paper II.B, conflict sets)."""
+    """Return the shared area over the average area, in [0, 1], shape (...) (paper II.B, conflict sets)."""
     average = (areas(first) + areas(second)) / 2.0
     return intersections(first, second) / np.where(average > 0.0, average, 1.0)
 
 
 def iou(first: Floats, second: Floats) -> Floats:
-    """Give the intersection over the union, in [0, 1], shape (...)."""
+    """Return the intersection over the union, in [0, 1], shape (...)."""
     shared = intersections(first, second)
     union = areas(first) + areas(second) - shared
     return np.asarray(shared / np.where(union > 0.0, union, 1.0))
 
 
 def corner_distance(first: Floats, second: Floats) -> Floats:
-    """Give the total city-block distance of the 4 corners in pixels, shape (...) (paper II.B, Fig. 5).
+    """Return the total city-block distance of the 4 corners in pixels, shape (...) (paper II.B, Fig. 5).
 
     A box moved by `(x, y)` is `4 (|x| + |y|)` away from itself.
     """
@@ -65,7 +65,7 @@ def corner_distance(first: Floats, second: Floats) -> Floats:
 
 
 def displacement(first: Floats, second: Floats) -> Floats:
-    """Give the mean city-block distance of the corners in pixels, shape (...): d(.) of paper II.B.
+    """Return the mean city-block distance of the corners in pixels, shape (...): d(.) of paper II.B.
 
     A box moved by `(x, y)` has a displacement of `|x| + |y|`.
     """
@@ -73,7 +73,7 @@ def displacement(first: Floats, second: Floats) -> Floats:
 
 
 def normalized_distance(first: Floats, second: Floats) -> Floats:
-    """Give how far somebody goes from one box to another, in mean heights, shape (...).
+    """Return how far somebody goes from one box to another, in mean heights, shape (...).
 
     The middle's way across, and the shorter of the ways of head and foot: one of them may be cut off by
     the border, or hidden by somebody in front.

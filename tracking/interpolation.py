@@ -11,7 +11,7 @@ from tracking.types import Detections
 
 
 def interpolate_gaps(boxes: Floats, last: tuple[int, Floats] | None, most: int) -> Floats:
-    """Give the boxes (F, 4) of a window with short gaps filled, (F, 4).
+    """Return the boxes (F, 4) of a window with short gaps filled, (F, 4).
 
     Args:
         boxes: NaN where the object is hidden.
@@ -36,7 +36,7 @@ _MIN_MATCH_IOU = 0.2
 
 
 def interpolate_detections(before: Detections, after: Detections, share: float) -> Detections:
-    """Give the detections of a frame that lies `share` of the way from one searched frame to the next.
+    """Return the detections of a frame that lies `share` of the way from one searched frame to the next.
 
     Boxes of the two frames that overlap each other most are the same thing, which went straight from one to
     the other; its score is the lower of the two, and it looks as in the later frame. What has no such box in

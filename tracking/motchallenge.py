@@ -90,13 +90,13 @@ def parse_rows(lines: Iterable[str], name: str) -> Iterator[MotRow]:
 
 
 def format_row(row: MotRow) -> str:
-    """Give the row as text without the line's end: two decimals, the same bytes for the same row."""
+    """Return the row as text without the line's end: two decimals, the same bytes for the same row."""
     numbers = (row.left, row.top, row.width, row.height, row.confidence)
     return f"{row.frame},{row.id}," + ",".join(_format_number(number) for number in numbers) + ",-1,-1,-1"
 
 
 def format_rows(rows: Iterable[MotRow]) -> str:
-    """Give the text of a file: sorted by frame and id, each line ended."""
+    """Return the text of a file: sorted by frame and id, each line ended."""
     ordered = sorted(rows, key=lambda row: (row.frame, row.id, row.left, row.top))
     return "".join(format_row(row) + "\n" for row in ordered)
 

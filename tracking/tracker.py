@@ -106,7 +106,7 @@ class OnlineTracker:
         return [self._solve(self._last, self._last)]
 
     def _ends(self, start: int, stop: int) -> list[int]:
-        """Give the window ends in `start <= n < stop`."""
+        """Return the window ends in `start <= n < stop`."""
         stride = self._window.stride
         return list(range(start + (-(start + 1)) % stride, stop, stride))
 
@@ -163,17 +163,17 @@ class OnlineTracker:
     def _allowed(
         self, item: TrackedObject, first: int, frames: Sequence[Detections]
     ) -> list[npt.NDArray[np.bool_]]:
-        """Say for each frame which detections the object can be, `(K_m,)` bool; nothing: none in any."""
+        """Return for each frame which detections the object can be, `(K_m,)` bool; nothing: none in any."""
         if item.hidden_for(first - 1) > self._window.long_hidden:
             return []
         return [gate_detections(item, first + m, seen, self._window) for m, seen in enumerate(frames)]
 
     def _weighed(self, network: Network, first: int, ids: list[int]) -> Network:  # noqa: ARG002
-        """Give the network of the objects `ids` as it is solved: here is where others add what they know."""
+        """Return the network of the objects `ids` as it is solved: here is where others add what they know."""
         return network
 
     def _number(self, birth: Birth, frame: int) -> int:  # noqa: ARG002
-        """Give somebody new, who begins in this frame, a number that nobody has had."""
+        """Return somebody new, who begins in this frame, a number that nobody has had."""
         self._next_id += 1
         return self._next_id - 1
 
@@ -199,7 +199,7 @@ class OnlineTracker:
         return added
 
     def _come_back(self, first: int, frame: int, birth: Birth) -> bool:
-        """Give somebody new the entry of a long hidden object that looks the same, where there is one."""
+        """Return somebody new the entry of a long hidden object that looks the same, where there is one."""
         away = [item for item in self._objects if item.hidden_for(first - 1) > self._window.long_hidden]
         if not away or not birth.histogram.size:
             return False

@@ -121,7 +121,7 @@ class WindowResult:
 
 
 def merge_results(results: list[WindowResult]) -> WindowResult | None:
-    """Give one result for windows that were solved one after the other; `None` for no window.
+    """Return one result for windows that were solved one after the other; `None` for no window.
 
     Later windows overwrite what was provisional in earlier ones.
     """
@@ -145,7 +145,7 @@ def merge_results(results: list[WindowResult]) -> WindowResult | None:
 
 
 def select_boxes(states: npt.NDArray[np.int64], frames: Sequence[Detections]) -> Floats:
-    """Give the boxes of states `(F,)`, `(F, 4)` pixels, NaN where the object is hidden."""
+    """Return the boxes of states `(F,)`, `(F, 4)` pixels, NaN where the object is hidden."""
     boxes = np.full((len(frames), BOX_SIDES), np.nan)
     for m, state in enumerate(states):
         if state != OCCLUDED:
@@ -154,6 +154,6 @@ def select_boxes(states: npt.NDArray[np.int64], frames: Sequence[Detections]) ->
 
 
 def mean_confidence(states: npt.NDArray[np.int64], frames: Sequence[Detections]) -> float:
-    """Give the mean score of the boxes of states `(F,)`, 0 where the object is hidden; in [0, 1]."""
+    """Return the mean score of the boxes of states `(F,)`, 0 where the object is hidden; in [0, 1]."""
     scores = [float(frames[m].scores[state]) for m, state in enumerate(states) if state != OCCLUDED]
     return sum(scores) / len(frames)

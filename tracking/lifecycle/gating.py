@@ -22,12 +22,12 @@ from tracking.window import WindowSettings
 def gate_detections(
     item: TrackedObject, frame: int, detections: Detections, window: WindowSettings
 ) -> npt.NDArray[np.bool_]:
-    """Say which detections of a frame the object can be, `(K,)` bool."""
+    """Return which detections of a frame the object can be, `(K,)` bool."""
     return within_gate(item.box, detections.boxes, abs(frame - item.frame), window)
 
 
 def within_gate(box: Floats, boxes: Floats, elapsed: int, window: WindowSettings) -> npt.NDArray[np.bool_]:
-    """Say which boxes `(K, 4)` an object of `box` `(4,)` can have reached after `elapsed` frames, `(K,)`.
+    """Return which boxes `(K, 4)` an object of `box` `(4,)` can have reached after `elapsed` frames, `(K,)`.
 
     It may have gone (`normalized_distance`) `reach + reach_per_frame (elapsed - 1)` heights, and the height
     changed by a factor.
@@ -39,7 +39,7 @@ def within_gate(box: Floats, boxes: Floats, elapsed: int, window: WindowSettings
 
 
 def restrict_network(network: Network, allowed: Sequence[Sequence[npt.NDArray[np.bool_]]]) -> Network:
-    """Give the network without the places out of reach; `allowed[n][m]` is `(K_m,)` bool."""
+    """Return the network without the places out of reach; `allowed[n][m]` is `(K_m,)` bool."""
     node = network.node.copy()
     for n, frames in enumerate(allowed):
         for m, places in enumerate(frames):

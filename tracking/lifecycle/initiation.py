@@ -80,12 +80,12 @@ def find_births(
 
 
 def _required_frames(window: WindowSettings) -> int:
-    """Give in how many frames a new object must be seen."""
+    """Return in how many frames a new object must be seen."""
     return int(np.ceil(window.birth_visible * window.birth_window))
 
 
 def _unassigned_detections(seen: Detections, boxes: Floats, window: WindowSettings) -> Detections:
-    """Give the sure detections of a frame that are not where somebody known is."""
+    """Return the sure detections of a frame that are not where somebody known is."""
     sure = seen.scores >= window.birth_score
     if len(boxes) and len(seen):
         sure &= iou(seen.boxes[:, None], boxes[None]).max(axis=1) < window.apart
@@ -105,7 +105,7 @@ class _BirthTest:
     solver: Solver
 
     def promising(self, frames: Sequence[Detections], last: int, seed: int) -> bool:
-        """Say whether enough frames have anything near the seed: cheap, before anything is solved."""
+        """Return whether enough frames have anything near the seed: cheap, before anything is solved."""
         box = frames[last].boxes[seed]
         hits = sum(
             bool(within_gate(box, seen.boxes, abs(last - m), self.window).any())

@@ -16,7 +16,7 @@ _MIN_COMMON_SHARE = 0.7
 
 
 def duplicate_ids(ids: Sequence[int], boxes: Sequence[Floats], overlap: float) -> list[int]:
-    """Give the ids of tracks that follow what an older track follows, ascending.
+    """Return the ids of tracks that follow what an older track follows, ascending.
 
     Args:
         ids: ascending ids.
@@ -50,7 +50,7 @@ _MIN_VISIBLE_FRAMES = 3
 
 
 def terminated_ids(objects: Sequence[TrackedObject], boxes: Sequence[Floats], duplicate: float) -> set[int]:
-    """Give the ids that end with this window: a second track on somebody, a new one that was none.
+    """Return the ids that end with this window: a second track on somebody, a new one that was none.
 
     `boxes` are everybody's, `(F, 4)` with NaN rows where hidden; `duplicate` as in `duplicate_ids`.
     """

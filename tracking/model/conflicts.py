@@ -13,7 +13,7 @@ Bools = NDArray[np.bool_]
 
 
 def conflict_relation(places: ObservationArrays, settings: CostSettings) -> Bools:
-    """Say which places of a frame conflict, shape (M, P K, P K), symmetric, each with itself.
+    """Return which places of a frame conflict, shape (M, P K, P K), symmetric, each with itself.
 
     Places are numbered `p K + i`. Padding conflicts with nothing, not even with itself.
     """
@@ -57,7 +57,7 @@ def clique_rows(relation: Bools, owners: NDArray[np.int64] | None) -> Bools:
 
 
 def connected_places(relation: Bools, place: int) -> NDArray[np.int64]:
-    """Give the places of a frame that `place` conflicts with, directly or through others, ascending."""
+    """Return the places of a frame that `place` conflicts with, directly or through others, ascending."""
     reached = relation[place]
     while True:
         further = relation[reached].any(axis=0)
@@ -82,7 +82,7 @@ def _grow_clique(first: int, second: int, joined: Bools, uncovered: Bools) -> Bo
 
 
 def star_exclusions(relation: Bools, sets: int, objects: int) -> Bools:
-    """Say which places two objects cannot both take when stars are the rows, (M, P K, P K).
+    """Return which places two objects cannot both take when stars are the rows, (M, P K, P K).
 
     Under II.D to the letter two places also exclude each other if both conflict with one place of a
     third object.

@@ -48,7 +48,7 @@ def motion_costs(
 def _object_motion_costs(
     motion: MotionModel, boxes: Floats, likeness: Floats, settings: CostSettings
 ) -> tuple[Floats, Floats]:
-    """Give the two charges of one object for boxes (M, K, 4), both (M, K)."""
+    """Return the two charges of one object for boxes (M, K, 4), both (M, K)."""
     away, moved = motion.deviations(boxes), motion.moved(len(boxes))[:, None]
     share = np.minimum(away / (settings.slack + settings.course_drift * moved), 1.0)
     off_course = settings.course * share
@@ -61,7 +61,7 @@ def _object_motion_costs(
 
 
 def node_costs(likeness: Floats, places: ObservationArrays, settings: CostSettings) -> Floats:
-    """Give what every arc into a state costs, (n, M, S): `likeness` (n, M, K) to it, or the occlusion."""
+    """Return what every arc into a state costs, (n, M, S): `likeness` (n, M, K) to it, or the occlusion."""
     objects, frames, width = likeness.shape
     costs = np.empty((objects, frames, width + 1))
     doubt = settings.confidence * (1.0 - places.scores)
@@ -78,7 +78,7 @@ def source_costs(
     places: ObservationArrays,
     settings: CostSettings,
 ) -> Floats:
-    """Give what the arcs from the source cost besides the node, (n, S); `likeness` is (n, M, K)."""
+    """Return what the arcs from the source cost besides the node, (n, S); `likeness` is (n, M, K)."""
     width = places.present.shape[2]
     costs = np.full((len(templates), width + 1), settings.change)
     costs[:, width] = 0.0
@@ -95,7 +95,7 @@ def source_costs(
 
 
 def pair_costs(charges: MotionCosts | None, places: ObservationArrays, settings: CostSettings) -> Floats:
-    """Give what the arcs between two frames cost besides the node, (Q, M - 1, S, S).
+    """Return what the arcs between two frames cost besides the node, (Q, M - 1, S, S).
 
     Q is the number of sets of observations, or n where somebody's motion is known.
     """
@@ -116,12 +116,12 @@ def pair_costs(charges: MotionCosts | None, places: ObservationArrays, settings:
 
 
 def sink_costs(objects: int, places: ObservationArrays, settings: CostSettings) -> Floats:
-    """Give what the arcs into the sink cost, (n, S): one constant."""
+    """Return what the arcs into the sink cost, (n, S): one constant."""
     return np.full((objects, places.present.shape[2] + 1), settings.change + settings.occlusion)
 
 
 def _displacement_costs(before: Floats, after: Floats, settings: CostSettings) -> Floats:
-    """Give the cost of moving from boxes (..., I, 4) to boxes (..., J, 4), (..., I, J)."""
+    """Return the cost of moving from boxes (..., I, 4) to boxes (..., J, 4), (..., I, J)."""
     before, after = before[..., :, None, :], after[..., None, :, :]
     moved = displacement(before, after)
     if settings.displacement_unit == "heights":

@@ -32,7 +32,7 @@ class MotionModel:
 
     @classmethod
     def of(cls, frames: Sequence[int], boxes: Floats, first: int) -> MotionModel:
-        """Give the motion of an object seen at `boxes` (F, 4) in `frames` (F,), for a window from `first`.
+        """Return the motion of an object seen at `boxes` (F, 4) in `frames` (F,), for a window from `first`.
 
         The velocity is the slope of the least-squares line through the middles, drawn towards zero by
         V / (V + 3), V the sum of the squared times: a ridge regression.
@@ -44,7 +44,7 @@ class MotionModel:
         return cls(boxes[-1], velocity, first - frames[-1])
 
     def moved(self, frames: int) -> Floats:
-        """Give for how many frames it has moved on in each of the window's frames, (M,): 20 at most.
+        """Return for how many frames it has moved on in each of the window's frames, (M,): 20 at most.
 
         Every frame counts less than the one before, since people turn and stop: 20 (1 - exp(-t / 20)).
         """
@@ -52,9 +52,9 @@ class MotionModel:
         return np.asarray(_VELOCITY_DECAY_FRAMES * (1.0 - np.exp(-elapsed / _VELOCITY_DECAY_FRAMES)))
 
     def predicted(self, frames: int) -> Floats:
-        """Give where it is expected in each of the window's frames, (M, 4)."""
+        """Return where it is expected in each of the window's frames, (M, 4)."""
         return np.asarray(self.box + self.moved(frames)[:, None] * np.tile(self.velocity, 2))
 
     def deviations(self, boxes: Floats) -> Floats:
-        """Give how far boxes (M, K, 4) are from where it is expected, in heights, (M, K)."""
+        """Return how far boxes (M, K, 4) are from where it is expected, in heights, (M, K)."""
         return normalized_distance(self.predicted(len(boxes))[:, None], boxes)

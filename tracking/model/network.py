@@ -106,13 +106,13 @@ class Network:
         return None if self.shared else np.repeat(np.arange(self.objects), self.places)
 
     def exclusions(self) -> Bools:
-        """Say which places of each frame two objects cannot both take, (M, P K, P K)."""
+        """Return which places of each frame two objects cannot both take, (M, P K, P K)."""
         if self.conflict_rows == "clique":
             return self.conflicts
         return star_exclusions(self.conflicts, len(self.boxes), self.objects)
 
     def rows(self, frame: int) -> Bools:
-        """Give the conflict rows of a frame, (R, n, K): through each, at most one path goes."""
+        """Return the conflict rows of a frame, (R, n, K): through each, at most one path goes."""
         relation = self.conflicts[frame]
         places = self.places
         if self.objects < 2 or not relation.size:  # noqa: PLR2004 — one object conflicts with nobody
@@ -123,7 +123,7 @@ class Network:
         return self._stars(frame)
 
     def _stars(self, frame: int) -> Bools:
-        """Give one row for each place of each object: itself, and what conflicts of the others."""
+        """Return one row for each place of each object: itself, and what conflicts of the others."""
         sets, n, places = self.sets, self.objects, self.places
         relation = self.conflicts[frame].reshape(len(self.boxes), places, len(self.boxes), places)
         rows = relation[sets][:, :, sets].copy()
@@ -133,7 +133,7 @@ class Network:
         return np.asarray(rows.reshape(n * places, n, places)[used])
 
     def only(self, objects: Sequence[int]) -> Network:
-        """Give the network of some of the objects, in the order given."""
+        """Return the network of some of the objects, in the order given."""
         chosen = np.asarray(objects, dtype=np.int64)
         if self.shared:
             boxes, present = self.boxes, self.present
@@ -216,7 +216,7 @@ def _build(
 
 
 def _locations(places: ObservationArrays, centre: tuple[float, float] | None) -> Floats:
-    """Give the location vectors r of II.D, (P, M, S, 4); occlusion is a box without size at `centre`."""
+    """Return the location vectors r of II.D, (P, M, S, 4); occlusion is a box without size at `centre`."""
     sets, frames, width = places.present.shape
     if centre is None:
         seen = places.boxes[places.present]

@@ -83,14 +83,14 @@ class TrackedObject:
         self.present = False
 
     def copy(self) -> TrackedObject:
-        """Give what is remembered now, to go back to."""
+        """Return what is remembered now, to go back to."""
         other = TrackedObject(self.id, self.histogram, self.box, self.frame)
         other._past.extend(self._past)
         other.confirmed, other.present = self.confirmed, self.present
         return other
 
     def template(self, first: int) -> Template:
-        """Give the source node of a window that begins with the frame `first`.
+        """Return the source node of a window that begins with the frame `first`.
 
         It has no place where the object is hidden in the last final frame.
         """
@@ -119,12 +119,12 @@ class TrackedObject:
         self._past.clear()
 
     def hidden_for(self, frame: int) -> int:
-        """Give for how many frames it has not been seen at `frame`."""
+        """Return for how many frames it has not been seen at `frame`."""
         return max(frame - self.frame, 0)
 
 
 def mean_histogram(histograms: Floats) -> Floats:
-    """Give the mean of histograms `(K, B)`, `(B,)`, summing to 1."""
+    """Return the mean of histograms `(K, B)`, `(B,)`, summing to 1."""
     mean = histograms.mean(axis=0)
     total = float(mean.sum())
     return np.asarray(mean / total) if total > 0.0 else np.asarray(mean)

@@ -61,7 +61,7 @@ def stack_observations(sets: Sequence[Sequence[Detections]]) -> ObservationArray
 
 
 def _common_bin_count(sets: Sequence[Sequence[Detections]]) -> int:
-    """Give the number of bins that all frames with observations have."""
+    """Return the number of bins that all frames with observations have."""
     bins = {seen.histograms.shape[1] for frames in sets for seen in frames if len(seen)}
     if len(bins) > 1:
         raise ValueError(f"all histograms of a window need the same number of bins, not {sorted(bins)}")

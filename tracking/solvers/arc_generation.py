@@ -121,7 +121,7 @@ class ArcGeneration:
         return False
 
     def _priced(self, point: ArcMasterSolution) -> Floats:
-        """Give the node costs with the prices of conflict rows and what moves earn."""
+        """Return the node costs with the prices of conflict rows and what moves earn."""
         network = self._network
         node = add_conflict_prices(network, self._master.rows, point.prices)
         if not network.layout:
@@ -130,14 +130,14 @@ class ArcGeneration:
 
 
 def start_arc_generation(network: Network, pricing: PathPricer, finder: ConflictSeparator) -> ArcGeneration:
-    """Give a search that starts from a guess at the duals; the finder is a new one."""
+    """Return a search that starts from a guess at the duals; the finder is a new one."""
     search = ArcGeneration(network, path_arcs(np.arange(network.objects), pricing.alone.nodes), [], finder)
     search.enter_guess(guess_duals(network, pricing, finder))
     return search
 
 
 def _cheapest_arcs(owner: Ints, costs: Floats, objects: int, most: int) -> Bools:
-    """Say which arcs are among the cheapest of their object; whole paths, since equal costs go together."""
+    """Return which arcs are among the cheapest of their object; whole paths, since equal costs go together."""
     kept = np.ones(len(owner), dtype=np.bool_)
     for n in range(objects):
         own = owner == n

@@ -39,11 +39,11 @@ class ArcSet:
         return len(self.owner)
 
     def only(self, chosen: Bools) -> ArcSet:
-        """Give some of the arcs."""
+        """Return some of the arcs."""
         return ArcSet(self.owner[chosen], self.frame[chosen], self.origin[chosen], self.target[chosen])
 
     def and_also(self, more: ArcSet) -> ArcSet:
-        """Give these arcs and more."""
+        """Return these arcs and more."""
         return ArcSet(
             np.concatenate([self.owner, more.owner]),
             np.concatenate([self.frame, more.frame]),
@@ -53,7 +53,7 @@ class ArcSet:
 
 
 def path_arcs(owners: Ints, nodes: Ints) -> ArcSet:
-    """Give the arcs on paths, `nodes` (P, M), of the objects `owners` (P,), each arc once."""
+    """Return the arcs on paths, `nodes` (P, M), of the objects `owners` (P,), each arc once."""
     path, frame = (index.ravel() for index in np.indices(nodes.shape))
     before = np.zeros_like(nodes)
     before[:, 1:] = nodes[:, :-1]
@@ -111,7 +111,7 @@ class ArcMaster:
         return np.arange(first, first + len(lower))
 
     def add_arcs(self, arcs: ArcSet) -> int:
-        """Add the arcs that are new; give their number."""
+        """Add the arcs that are new; return their numbers."""
         fresh = ~self._known[arcs.frame, arcs.owner, arcs.origin, arcs.target]
         arcs = arcs.only(fresh)
         if not len(arcs):
@@ -138,7 +138,7 @@ class ArcMaster:
         return len(arcs)
 
     def _costs(self, arcs: ArcSet) -> Floats:
-        """Give the costs of arcs; the sink's is on the arcs into the last frame."""
+        """Return the costs of arcs; the sink's is on the arcs into the last frame."""
         network = self._network
         n, m, i, j = arcs.owner, arcs.frame, arcs.origin, arcs.target
         costs = network.node[n, m, j]
@@ -162,7 +162,7 @@ class ArcMaster:
             self._node_rows[touched] = self._empty_rows(zeros, zeros)
 
     def _entries(self, arcs: ArcSet) -> tuple[Ints, Ints, Floats]:
-        """Give columns (counted from the first of these arcs), rows and values."""
+        """Return columns (counted from the first of these arcs), rows and values."""
         n, m, i, j = arcs.owner, arcs.frame, arcs.origin, arcs.target
         every = np.arange(len(arcs))
         first, inner, going = m == 0, m > 0, m < self._network.frames - 1
@@ -205,7 +205,7 @@ class ArcMaster:
         return ArcMasterSolution(found.objective, prices, pulls, found.duals[:objects], charge)
 
     def usage(self) -> Floats:
-        """Give y (n, M, S)."""
+        """Return y (n, M, S)."""
         usage = np.zeros(self._network.node.shape)
         arcs = self._arcs
         np.add.at(usage, (arcs.owner, arcs.frame, arcs.target), self._values)
@@ -215,7 +215,7 @@ class ArcMaster:
 def find_improving_arcs(
     trellis: Trellis, passes: MinMarginals, worths: Floats, most: int
 ) -> tuple[ArcSet, Floats]:
-    """Give the arcs (A,) whose best path costs less than `worths` (n,) of its object, and that cost (A,).
+    """Return the arcs (A,) whose best path costs less than `worths` (n,) of its object, and that cost (A,).
 
     Only arcs between the `most` cheapest states of each frame and object are looked at.
     """

@@ -130,7 +130,7 @@ class ArcProgramSolver(TimedSolver):
 
 
 def solve_arc_relaxation(network: Network) -> RelaxedSolution:
-    """Give the optimum of the full relaxation of a network with at least one object; no prices.
+    """Return the optimum of the full relaxation of a network with at least one object; no prices.
 
     The program is that of II.D with y replaced by the sums of arcs that define it: half the simplex
     iterations, the fastest way that is known to solve all arcs at once.

@@ -90,19 +90,19 @@ class Solver(Protocol):
         """The name in the registry."""
 
     def solve(self, network: Network, hint: WarmStart | None = None) -> Solution:
-        """Give the states of all objects in all frames; the same network and hint give the same answer.
+        """Return the states of all objects in all frames; the same network and hint give the same answer.
 
         A hint, `Solution.hint.later(...)` of the window before, makes it quicker, whatever it says.
         """
 
 
 def solver_names() -> tuple[str, ...]:
-    """Give the names of all solvers, sorted."""
+    """Return the names of all solvers, sorted."""
     return tuple(sorted(_SOLVERS))
 
 
 def create_solver(name: str) -> Solver:
-    """Give the solver of that name.
+    """Return the solver of that name.
 
     Raises:
         ValueError: there is none; the message lists the names.
@@ -119,7 +119,7 @@ class TimedSolver(ABC):
     name: ClassVar[str]
 
     def solve(self, network: Network, hint: WarmStart | None = None) -> Solution:
-        """Give the states of all objects in all frames; a hint only makes it quicker."""
+        """Return the states of all objects in all frames; a hint only makes it quicker."""
         start = time.perf_counter()
         solution = self._answer(network, hint)
         seconds = time.perf_counter() - start

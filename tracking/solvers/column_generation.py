@@ -134,7 +134,7 @@ class PathGeneration:
         return concerned
 
     def _largest_group(self) -> int:
-        """Give the size of the largest group of objects that meet, directly or through others."""
+        """Return the size of the largest group of objects that meet, directly or through others."""
         return int(np.bincount(group_objects(self._meets)).max())
 
     def _bind(self, rows: list[ConflictRow]) -> None:
@@ -209,7 +209,7 @@ class ColumnGenerationSolver(TimedSolver):
 
 
 def solve_relaxation(network: Network, hint: WarmStart | None = None) -> RelaxedSolution:
-    """Give the optimum of the relaxation of a network with at least one object.
+    """Return the optimum of the relaxation of a network with at least one object.
 
     Paths are the columns where only conflicts couple the objects; under the layout term, which whole
     paths fit badly, arcs are.

@@ -39,7 +39,7 @@ class _ConflictComponent:
 def conflict_prices(
     network: Network, rows: Sequence[ConflictRow], prices: Floats
 ) -> tuple[ConflictPrice, ...]:
-    """Give the rows with a price, if all objects share them."""
+    """Return the rows with a price, if all objects share them."""
     if not network.shared or network.conflict_rows == "star":
         return ()
     return tuple(
@@ -60,7 +60,7 @@ class ConflictSeparator:
         self._given: set[tuple[int, bytes]] = set()
 
     def broken(self, usage: Floats) -> list[ConflictRow]:
-        """Give the rows that y = `usage` (n, M, S) breaks and that were not given before."""
+        """Return the rows that y = `usage` (n, M, S) breaks and that were not given before."""
         found = []
         visits = self._visits(usage)
         around = (self._relation @ visits[:, :, None])[:, :, 0]
@@ -77,7 +77,7 @@ class ConflictSeparator:
         return found
 
     def recalled(self, rows: Sequence[ConflictPrice]) -> tuple[list[ConflictRow], list[float]]:
-        """Give those rows, and their prices, that are rows of this network, given before or not."""
+        """Return those rows, and their prices, that are rows of this network, given before or not."""
         found: list[ConflictRow] = []
         prices: list[float] = []
         if not self._network.shared or self._stars:
@@ -98,7 +98,7 @@ class ConflictSeparator:
         return found, prices
 
     def fresh(self, rows: Sequence[ConflictRow]) -> list[ConflictRow]:
-        """Give those of the rows that were not given before; from now on they were."""
+        """Return those of the rows that were not given before; from now on they were."""
         keys = [(row.frame, self._entries(row).tobytes()) for row in rows]
         found = {key: row for key, row in zip(keys, rows, strict=True) if key not in self._given}
         self._given.update(found)
@@ -109,7 +109,7 @@ class ConflictSeparator:
         return np.asarray(members, dtype=np.float64).ravel()
 
     def _visits(self, usage: Floats) -> Floats:
-        """Give how much goes through each place, (M, P K)."""
+        """Return how much goes through each place, (M, P K)."""
         if self._network.shared:
             return np.asarray(usage[:, :, :-1].sum(axis=0))
         return np.swapaxes(usage[:, :, :-1], 0, 1).reshape(self._network.frames, -1)
@@ -121,7 +121,7 @@ class ConflictSeparator:
         return ConflictRow(frame, members)
 
     def _parts_at(self, frame: int, places: Ints) -> list[_ConflictComponent]:
-        """Give the parts that places of a frame are in, each once."""
+        """Return the parts that places of a frame are in, each once."""
         if self._stars:
             if (frame, 0) not in self._parts:
                 rows = self._network.rows(frame)
@@ -148,7 +148,7 @@ class ConflictSeparator:
 
 
 def group_objects(meets: Bools) -> Ints:
-    """Give the lowest object of the group of each, (n,); `meets` (n, n) is symmetric."""
+    """Return the lowest object of the group of each, (n,); `meets` (n, n) is symmetric."""
     reached = meets | np.eye(len(meets), dtype=np.bool_)
     while True:
         further = reached @ reached

@@ -29,7 +29,7 @@ class AdamSteps:
         self._weight = self._weight_of_size = 0.0
 
     def along(self, slope: Floats) -> Floats:
-        """Give the next step, about 1 where the slopes agree with each other and near 0 where not."""
+        """Return the next step, about 1 where the slopes agree with each other and near 0 where not."""
         if len(self._way) < len(slope):
             joined = np.zeros((len(slope) - len(self._way), *slope.shape[1:]))
             self._way = np.concatenate([self._way.reshape(-1, *slope.shape[1:]), joined])
@@ -43,7 +43,7 @@ class AdamSteps:
 
 
 def add_layout_prices(node: Floats, where: Floats, pulls: Floats) -> Floats:
-    """Give the costs of nodes `node` (n, M, S) at `where` (n, M, S, 4) with what moves earn.
+    """Return the costs of nodes `node` (n, M, S) at `where` (n, M, S, 4) with what moves earn.
 
     `pulls` (n, M - 1, 4) is what a move by a pixel earns.
     """
@@ -65,7 +65,7 @@ class LayoutDuals:
         self._steps = AdamSteps()
 
     def pulls(self) -> Floats:
-        """Give what a move by a pixel earns each object, (n, M - 1, 4)."""
+        """Return what a move by a pixel earns each object, (n, M - 1, 4)."""
         pulls = np.zeros((self._objects, *self._forces.shape[1:]))
         np.add.at(pulls, self._pairs[:, 0], self._forces)
         np.add.at(pulls, self._pairs[:, 1], -self._forces)
@@ -81,7 +81,7 @@ class LayoutDuals:
         return True
 
     def _slope(self, where: Floats) -> Floats:
-        """Give how much less the first of a pair moves than the second."""
+        """Return how much less the first of a pair moves than the second."""
         moves: Floats = np.diff(where, axis=1)
         first, second = self._pairs.T
         return np.asarray(moves[second] - moves[first])
@@ -111,7 +111,7 @@ class ConflictDuals:
         self.rows.extend(rows)
 
     def on(self, node: Floats) -> Floats:
-        """Give the costs of nodes, `node` (n, M, W), with the prices."""
+        """Return the costs of nodes, `node` (n, M, W), with the prices."""
         if not len(self.prices):
             return node
         at = (self._frame == np.arange(self._frames)[:, None]) * self.prices
@@ -215,7 +215,7 @@ def guess_duals(network: Network, pricing: PathPricer, finder: ConflictSeparator
 
 
 def _typical_price(through: Floats, least: Floats) -> float:
-    """Give what it costs on average to be in the second best state of a frame; (n, M, W) and (n,)."""
+    """Return what it costs on average to be in the second best state of a frame; (n, M, W) and (n,)."""
     if through.shape[2] == 1:
         return 0.0
     regret = np.partition(through, 1, axis=2)[:, :, 1] - least[:, None]

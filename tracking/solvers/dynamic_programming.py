@@ -26,7 +26,7 @@ class SeparateDpSolver(TimedSolver):
     name = "separate-dp"
 
     def _answer(self, network: Network, _hint: WarmStart | None) -> Solution:
-        """Give the cheapest paths; the sum of their costs is the bound."""
+        """Return the cheapest paths; the sum of their costs is the bound."""
         paths = best_paths(Trellis.of(network))
         conflicts = conflict_count(network, paths.nodes)
         cost = total_cost(network, paths.nodes)
@@ -82,7 +82,7 @@ class GreedyDpSolver(TimedSolver):
     name = "greedy-dp"
 
     def _answer(self, network: Network, _hint: WarmStart | None) -> Solution:
-        """Give the greedy paths; the bound is the cost of all cheapest paths, conflicts ignored."""
+        """Return the greedy paths; the bound is the cost of all cheapest paths, conflicts ignored."""
         paths = greedy_paths(network)
         cost, conflicts = total_cost(network, paths.nodes), conflict_count(network, paths.nodes)
         attained = math.isfinite(cost) and cost - paths.bound <= 1e-9 * max(1.0, abs(cost))

@@ -69,7 +69,7 @@ class JointStateSearch:
         self._charges = np.append(np.cumsum(found.charges[::-1])[::-1][1:], 0.0)
 
     def cheaper_than(self, cost: float) -> Ints | None:
-        """Give the cheapest nodes (n, M) if they cost less than `cost`; None: nothing does.
+        """Return the cheapest nodes (n, M) if they cost less than `cost`; None: nothing does.
 
         Raises:
             TooManyStatesError: finding out would take too long.
@@ -89,7 +89,7 @@ class JointStateSearch:
         return self._traced(frontiers, cost)
 
     def _candidates(self, frame: int, limit: float) -> Ints:
-        """Give the joint states (J, n) without conflicts that the bound leaves possible."""
+        """Return the joint states (J, n) without conflicts that the bound leaves possible."""
         network = self._network
         joint, excess = np.empty((1, 0), dtype=np.int64), np.zeros(1)
         for n in range(network.objects):
@@ -106,7 +106,7 @@ class JointStateSearch:
         return joint
 
     def _barred(self, frame: int, pair: tuple[int, int]) -> Bools:
-        """Say which states of two objects conflict, (S, S)."""
+        """Return which states of two objects conflict, (S, S)."""
         places, sets = self._network.places, self._network.sets
         barred = np.zeros((places + 1, places + 1), dtype=np.bool_)
         first, second = (slice(sets[n] * places, (sets[n] + 1) * places) for n in pair)
@@ -121,7 +121,7 @@ class JointStateSearch:
         return _Frontier(frontier.nodes[kept], frontier.costs[kept], frontier.origin[kept])
 
     def _arrived(self, frame: int, before: _Frontier, nodes: Ints) -> _Frontier:
-        """Give the cheapest way into each of the joint states `nodes` (J, n) of a frame."""
+        """Return the cheapest way into each of the joint states `nodes` (J, n) of a frame."""
         network = self._network
         best, origin = np.full(len(nodes), np.inf), np.zeros(len(nodes), dtype=np.int64)
         leaving, entering = self._apart(frame - 1, before.nodes), self._apart(frame, nodes)
@@ -140,7 +140,7 @@ class JointStateSearch:
         return _Frontier(nodes, best + own, origin)
 
     def _apart(self, frame: int, nodes: Ints) -> Floats:
-        """Give the differences of the locations of all pairs of objects, (J, pairs * 4)."""
+        """Return the differences of the locations of all pairs of objects, (J, pairs * 4)."""
         where = self._where[np.arange(self._network.objects), frame, nodes]
         first, second = np.triu_indices(self._network.objects, 1)
         return np.asarray((where[:, first] - where[:, second]).reshape(len(nodes), len(first) * BOX_SIDES))
@@ -173,7 +173,7 @@ class ExactSolver(TimedSolver):
     name = "exact"
 
     def _answer(self, network: Network, _hint: WarmStart | None) -> Solution:
-        """Give the cheapest states without conflicts; the bound is their cost."""
+        """Return the cheapest states without conflicts; the bound is their cost."""
         if not network.objects:
             return empty_solution(self.name, network)
         found = solve_relaxation(network)
@@ -187,7 +187,7 @@ class ExactSolver(TimedSolver):
 
 
 def _integer_optimum(network: Network, found: RelaxedSolution, nodes: Ints) -> Ints:
-    """Give the cheapest states; `nodes` are some without conflicts."""
+    """Return the cheapest states; `nodes` are some without conflicts."""
     if network.layout:
         with suppress(TooManyStatesError):
             better = JointStateSearch(network, found).cheaper_than(total_cost(network, nodes))
@@ -196,7 +196,7 @@ def _integer_optimum(network: Network, found: RelaxedSolution, nodes: Ints) -> I
 
 
 def branch_and_bound(network: Network, found: RelaxedSolution, nodes: Ints) -> Ints:
-    """Give the cheapest states by branch and bound, first among the arcs that are tight, then the rest."""
+    """Return the cheapest states by branch and bound, first among the arcs that are tight, then the rest."""
     excess = arc_excess(network, found)
     tight = _TOLERANCE * max(1.0, abs(total_cost(network, nodes)))
     nodes = _cheaper_nodes(network, nodes, _solve_restricted(network, nodes, excess <= tight))
@@ -205,7 +205,7 @@ def branch_and_bound(network: Network, found: RelaxedSolution, nodes: Ints) -> I
 
 
 def arc_excess(network: Network, found: RelaxedSolution) -> Floats:
-    """Give how much the best path through each arc costs above its object's best path, priced.
+    """Return how much the best path through each arc costs above its object's best path, priced.
 
     Shape (n, M - 1, S, S); infinite where there is no arc.
     """
@@ -222,7 +222,7 @@ def arc_excess(network: Network, found: RelaxedSolution) -> Floats:
 
 
 def _solve_restricted(network: Network, nodes: Ints, allowed: Bools) -> Ints:
-    """Give the cheapest states on the arcs allowed and those of `nodes`."""
+    """Return the cheapest states on the arcs allowed and those of `nodes`."""
     each, steps = np.indices(nodes[:, 1:].shape)
     allowed = allowed.copy()
     allowed[each, steps, nodes[:, :-1], nodes[:, 1:]] = True

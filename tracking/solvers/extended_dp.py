@@ -26,7 +26,7 @@ class ExtendedDpSolver(TimedSolver):
     name = "extended-dp"
 
     def _answer(self, network: Network, _hint: WarmStart | None) -> Solution:
-        """Give the cheapest states without conflicts; the bound is their cost.
+        """Return the cheapest states without conflicts; the bound is their cost.
 
         Raises:
             ValueError: the joint states of the objects are too many to hold.
@@ -74,7 +74,7 @@ class _JointStates:
         return total
 
     def _bars(self, frame: int) -> Floats:
-        """Give infinity for joint states in conflict, else 0."""
+        """Return infinity for joint states in conflict, else 0."""
         network = self._network
         objects, places = network.objects, network.places
         bars = np.zeros((places + 1,) * objects)
@@ -111,7 +111,7 @@ class _JointStates:
         return arriving
 
     def _into(self, step: int, target: Ints) -> Floats:
-        """Give the costs of the arcs from every joint state into one, n axes."""
+        """Return the costs of the arcs from every joint state into one, n axes."""
         network = self._network
         sets = network.sets
         total = self._sum(network.pair[network.pair_sets, step, :, target])

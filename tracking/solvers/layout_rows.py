@@ -88,22 +88,22 @@ class LayoutConstraints:
             raise RuntimeError("the solver does not take the squares of the layout term")
 
     def entries(self, owner: Ints, step: Ints, origin: Ints, target: Ints) -> tuple[Ints, Floats]:
-        """Give the rows and values, both (A, 4), of arcs from frame `step` to the next."""
+        """Return the rows and values, both (A, 4), of arcs from frame `step` to the next."""
         where, sets = self._network.locations, self._network.sets[owner]
         return self._moves[owner, step], where[sets, step + 1, target] - where[sets, step, origin]
 
     def forces(self, duals: Floats) -> Floats:
-        """Give what a pixel of difference costs each pair, (pairs, M - 1, 4), exactly feasible duals."""
+        """Return what a pixel of difference costs each pair, (pairs, M - 1, 4), exactly feasible duals."""
         forces = duals[self._differences]
         return forces if self._squared else np.clip(forces, -self._network.layout, self._network.layout)
 
     def pulls(self, forces: Floats) -> Floats:
-        """Give what a move by a pixel earns each object, (n, M - 1, 4)."""
+        """Return what a move by a pixel earns each object, (n, M - 1, 4)."""
         pulls = np.zeros(self._moves.shape)
         np.add.at(pulls, self._pairs[:, 0], forces)
         np.add.at(pulls, self._pairs[:, 1], -forces)
         return pulls
 
     def slack(self, forces: Floats) -> float:
-        """Give what the bound loses to the forces: the conjugate of the square, nothing for the L1 norm."""
+        """Return what the bound loses to the forces: the conjugate of the square, nothing for the L1 norm."""
         return float((forces**2).sum() / (4.0 * self._network.layout)) if self._squared else 0.0

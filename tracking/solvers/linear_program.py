@@ -42,7 +42,7 @@ _DUAL, _CHOOSE = 1, 0
 
 
 def create_highs(*, growing: bool = False, presolve: bool = False) -> highspy.Highs:
-    """Give a solver that is deterministic and says nothing; `growing`: for a program that gets columns.
+    """Return a solver that is deterministic and says nothing; `growing`: for a program that gets columns.
 
     With `presolve` the program is made smaller before it is solved for the first time; after that it
     goes on from its last basis.
@@ -148,14 +148,14 @@ class LinearProgramBuilder:
         self._rows = 0
 
     def columns(self, costs: Floats, lower: float = 0.0) -> NDArray[np.int64]:
-        """Add columns without upper bound; give their numbers."""
+        """Add columns without upper bound; return their numbers."""
         first, self._columns = self._columns, self._columns + len(costs)
         self._costs.append(costs)
         self._lower.append(np.full(len(costs), lower))
         return np.arange(first, self._columns)
 
     def rows(self, count: int, lower: float, upper: float) -> NDArray[np.int64]:
-        """Add `count` empty rows; give their numbers."""
+        """Add `count` empty rows; return their numbers."""
         first, self._rows = self._rows, self._rows + count
         self._row_lower.append(np.full(count, lower))
         self._row_upper.append(np.full(count, upper))
@@ -173,7 +173,7 @@ class LinearProgramBuilder:
         )
 
     def program(self) -> LinearProgram:
-        """Give the program as collected."""
+        """Return the program as collected."""
         rows, columns, values = (np.concatenate(part) for part in zip(*self._entries, strict=True))
         matrix = sparse.csc_array(
             sparse.coo_array((values, (rows, columns)), shape=(self._rows, self._columns))

@@ -13,17 +13,17 @@ Ints = NDArray[np.int64]
 
 
 def nodes_from_states(network: Network, states: Ints) -> Ints:
-    """Give node numbers for states: the occlusion node is the last one instead of -1."""
+    """Return node numbers for states: the occlusion node is the last one instead of -1."""
     return np.where(states == OCCLUDED, network.places, states)
 
 
 def states_from_nodes(network: Network, nodes: Ints) -> Ints:
-    """Give states for node numbers: occluded is -1."""
+    """Return states for node numbers: occluded is -1."""
     return np.where(nodes == network.places, OCCLUDED, nodes)
 
 
 def path_costs(network: Network, nodes: Ints) -> Floats:
-    """Give the cost of each object's path through `nodes` (n, M), (n,); infinite where an arc is missing."""
+    """Return the cost of each object's path through `nodes` (n, M), (n,); infinite where an arc is missing."""
     each = np.arange(network.objects)
     frames = np.arange(network.frames)
     visited = network.node[each[:, None], frames, nodes].sum(axis=1)
@@ -33,7 +33,7 @@ def path_costs(network: Network, nodes: Ints) -> Floats:
 
 
 def path_cost(network: Network, nodes: Ints, owner: int) -> float:
-    """Give the cost of one object's path through `nodes` (M,); infinite where an arc is missing."""
+    """Return the cost of one object's path through `nodes` (M,); infinite where an arc is missing."""
     frames = np.arange(network.frames)
     visited = network.node[owner, frames, nodes].sum()
     between = network.pair[network.sets[owner], frames[:-1], nodes[:-1], nodes[1:]].sum()
@@ -41,7 +41,7 @@ def path_cost(network: Network, nodes: Ints, owner: int) -> float:
 
 
 def layout_cost(network: Network, nodes: Ints, power: int = 1) -> float:
-    """Give the layout term of II.C without its weight μ, over all pairs of objects.
+    """Return the layout term of II.C without its weight μ, over all pairs of objects.
 
     `power` 1: the L1 norm, pixels; 2: the square of the L2 norm, square pixels.
     """
@@ -51,12 +51,12 @@ def layout_cost(network: Network, nodes: Ints, power: int = 1) -> float:
 
 
 def locations_at(network: Network, nodes: Ints) -> Floats:
-    """Give the location vectors p of objects in `nodes`, (n, M, 4) pixels."""
+    """Return the location vectors p of objects in `nodes`, (n, M, 4) pixels."""
     return network.locations[network.sets[:, None], np.arange(network.frames), nodes]
 
 
 def total_cost(network: Network, nodes: Ints, power: int = 1) -> float:
-    """Give the cost of all paths together, the layout term with its `power` included (II.C)."""
+    """Return the cost of all paths together, the layout term with its `power` included (II.C)."""
     total = float(path_costs(network, nodes).sum())
     if network.layout:
         total += network.layout * layout_cost(network, nodes, power)

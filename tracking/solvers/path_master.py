@@ -56,7 +56,7 @@ class PathMaster:
         )
 
     def add_paths(self, owners: Ints, paths: Paths) -> int:
-        """Add the paths that are new; give their number."""
+        """Add the paths that are new; return their numbers."""
         new = []
         for k, (owner, nodes) in enumerate(zip(owners.tolist(), paths.nodes, strict=True)):
             key = (owner, nodes.tobytes())
@@ -82,7 +82,7 @@ class PathMaster:
         return np.array(list(self._object_rows.values()), dtype=np.int64)
 
     def _entries(self, owners: Ints, nodes: Ints) -> Bools:
-        """Say which paths are in which rows, (paths, object rows and then conflict rows)."""
+        """Return which paths are in which rows, (paths, object rows and then conflict rows)."""
         own = owners[:, None] == np.array(list(self._object_rows), dtype=np.int64)
         through = [row.members[owners, nodes[:, row.frame]] for row in self.rows]
         return np.column_stack([own, *through])
@@ -105,7 +105,7 @@ class PathMaster:
         return PathMasterSolution(found.objective, prices, worths)
 
     def used(self) -> tuple[Ints, Ints]:
-        """Give the paths in use: their objects (P,) and nodes (P, M)."""
+        """Return the paths in use: their objects (P,) and nodes (P, M)."""
         used = np.flatnonzero(self._values > 0.0)
         return self._owners[used], self._paths[used]
 

@@ -80,7 +80,7 @@ def try_warm_start(
 
 
 def add_conflict_prices(network: Network, rows: list[ConflictRow], prices: Floats) -> Floats:
-    """Give the costs of nodes (n, M, S) with the prices of conflict rows."""
+    """Return the costs of nodes (n, M, S) with the prices of conflict rows."""
     node = network.node.copy()
     for price, row in zip(prices, rows, strict=True):
         if price > 0.0:
@@ -91,7 +91,7 @@ def add_conflict_prices(network: Network, rows: list[ConflictRow], prices: Float
 def _follow_warm_start(
     network: Network, pricing: PathPricer, node: Floats, hint: WarmStart, nodes: Ints
 ) -> Ints:
-    """Give `nodes` (n, M), but for objects that the hint has elsewhere the best paths that follow it."""
+    """Return `nodes` (n, M), but for objects that the hint has elsewhere the best paths that follow it."""
     if len(hint.states) != network.objects:
         return nodes
     known = hint.states[:, : network.frames]

@@ -18,7 +18,7 @@ INTEGRALITY_TOLERANCE = 1e-6
 
 
 def is_integral(usage: Floats) -> bool:
-    """Say whether all of y are 0 or 1."""
+    """Return whether all of y are 0 or 1."""
     return bool((np.minimum(usage, 1.0 - usage) <= INTEGRALITY_TOLERANCE).all())
 
 
@@ -77,7 +77,7 @@ class LocalSearch:
         self.alone = trace_back(self._trellis, self._passes.ahead)
 
     def improved(self, nodes: Ints) -> Ints:
-        """Give nodes (n, M) without conflicts that cost no more, from nodes without conflicts.
+        """Return nodes (n, M) without conflicts that cost no more, from nodes without conflicts.
 
         Repairs what the rounding of II.D may leave, since it looks at each frame by itself: arcs that do
         not exist where arcs are gated, and jumps where the relaxation was split.
@@ -106,7 +106,7 @@ class _CoordinateDescent:
         self.nodes = np.empty((network.objects, network.frames), dtype=np.int64)
 
     def take(self, owner: int) -> bool:
-        """Give an object its best path around the others; say whether it moved."""
+        """Return an object its best path around the others; say whether it moved."""
         if self._settled[owner]:
             return False
         cost = self._own_cost(owner)
@@ -123,7 +123,7 @@ class _CoordinateDescent:
         return moved
 
     def _own_cost(self, owner: int) -> float:
-        """Give the part of the objective that depends on one object's path."""
+        """Return the part of the objective that depends on one object's path."""
         network = self._network
         cost = path_cost(network, self.nodes[owner], owner)
         if network.layout:
@@ -132,7 +132,7 @@ class _CoordinateDescent:
         return cost
 
     def _rerouted(self, owner: int, cost: float) -> Ints:
-        """Give the best path of one object while the others stay where they are; it has one at `cost`.
+        """Return the best path of one object while the others stay where they are; it has one at `cost`.
 
         The layout term takes nothing off a path, so states through which every path costs more than that
         can be left out before it is computed.
@@ -148,7 +148,7 @@ class _CoordinateDescent:
         return np.asarray(packed.named(best_paths(trellis).nodes)[0])
 
     def _barred(self, owner: int) -> Bools:
-        """Say which places of one object the others bar, (M, K)."""
+        """Return which places of one object the others bar, (M, K)."""
         network = self._network
         places, sets = network.places, network.sets
         others = np.delete(np.arange(network.objects), owner)
@@ -162,7 +162,7 @@ class _CoordinateDescent:
         return np.asarray(barred.any(axis=0))
 
     def _layout_of_arcs(self, owner: int, packed: PrunedStates) -> Floats:
-        """Give what each arc between states kept adds to the layout term without μ, (M - 1, W, W)."""
+        """Return what each arc between states kept adds to the layout term without μ, (M - 1, W, W)."""
         network = self._network
         where = packed.states(network.locations[network.sets[[owner]]], 0.0)[0]
         others = np.diff(np.delete(locations_at(network, self.nodes), owner, axis=0), axis=1)

@@ -19,7 +19,7 @@ from tracking.solvers.warm_start import ConflictPrice
 def solution_from_relaxation(
     solver: str, network: Network, found: RelaxedSolution, power: int = 1
 ) -> Solution:
-    """Give the answer for the optimum of the relaxation; `power` is that of the layout term."""
+    """Return the answer for the optimum of the relaxation; `power` is that of the layout term."""
     nodes = integer_nodes(network, found.usage, power)
     integral = is_integral(found.usage)
     proof = Certificate(solver, found.bound, integral, found.rounds, found.prices)
@@ -27,7 +27,7 @@ def solution_from_relaxation(
 
 
 def integer_nodes(network: Network, usage: Floats, power: int = 1) -> Ints:
-    """Give nodes (n, M) without conflicts for y = `usage` (n, M, S).
+    """Return nodes (n, M) without conflicts for y = `usage` (n, M, S).
 
     Where y is whole they are its paths. Where not, it is rounded (II.D) and improved, and so are the
     greedy paths; the cheaper are taken, the rounded ones where equal.
@@ -55,7 +55,7 @@ class Certificate:
 
 
 def build_solution(network: Network, nodes: Ints, proof: Certificate, power: int = 1) -> Solution:
-    """Give nodes (n, M) as the answer, with the report on it.
+    """Return nodes (n, M) as the answer, with the report on it.
 
     The bound is no better than the cost of an answer that attains it: rounding errors are cut off.
     """
@@ -72,6 +72,6 @@ def build_solution(network: Network, nodes: Ints, proof: Certificate, power: int
 
 
 def empty_solution(solver: str, network: Network) -> Solution:
-    """Give the answer for a network without objects."""
+    """Return the answer for a network without objects."""
     nodes = np.empty((0, network.frames), dtype=np.int64)
     return build_solution(network, nodes, Certificate(solver, 0.0, integral=True, rounds=0))

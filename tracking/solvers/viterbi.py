@@ -28,16 +28,16 @@ class Trellis:
 
     @classmethod
     def of(cls, network: Network) -> Trellis:
-        """Give the trellis of a network as it is."""
+        """Return the trellis of a network as it is."""
         return cls(network.source, network.node, network.pair, network.sink)
 
     def only(self, chosen: NDArray[np.int64]) -> Trellis:
-        """Give the trellis of some of the objects."""
+        """Return the trellis of some of the objects."""
         pair = self.pair if len(self.pair) == 1 else self.pair[chosen]
         return Trellis(self.source[chosen], self.node[chosen], pair, self.sink[chosen])
 
     def with_node(self, node: Floats) -> Trellis:
-        """Give the trellis with other costs of being in a state."""
+        """Return the trellis with other costs of being in a state."""
         return Trellis(self.source, node, self.pair, self.sink)
 
 
@@ -54,12 +54,12 @@ class Paths:
     costs: Floats
 
     def only(self, chosen: NDArray[np.int64]) -> Paths:
-        """Give the paths of some of the objects."""
+        """Return the paths of some of the objects."""
         return Paths(self.nodes[chosen], self.costs[chosen])
 
 
 def forward(trellis: Trellis, known: Floats | None = None) -> Floats:
-    """Give the cost of the best way from the source into each state, the state counted, (M, n, S).
+    """Return the cost of the best way from the source into each state, the state counted, (M, n, S).
 
     `known` (F, n, S), where given, is the answer for the first F frames.
     """
@@ -79,7 +79,7 @@ def forward(trellis: Trellis, known: Floats | None = None) -> Floats:
 
 
 def backward(trellis: Trellis) -> Floats:
-    """Give the cost of the best way from each state to the sink, the state not counted, (M, n, S)."""
+    """Return the cost of the best way from each state to the sink, the state not counted, (M, n, S)."""
     objects, frames, states = trellis.node.shape
     best = np.empty((frames, objects, states))
     best[-1] = trellis.sink
@@ -131,7 +131,7 @@ class MinMarginals:
 
 
 def best_paths(trellis: Trellis) -> Paths:
-    """Give the cheapest path of each object on its own."""
+    """Return the cheapest path of each object on its own."""
     return trace_back(trellis, forward(trellis))
 
 
@@ -165,14 +165,14 @@ class PrunedStates:
         return cls(index, np.ones(index.shape, dtype=np.bool_))
 
     def states(self, values: Floats, empty: float) -> Floats:
-        """Give values of states, (n, M, S, ...) to (n, M, W, ...); empty slots have `empty`."""
+        """Return values of states, (n, M, S, ...) to (n, M, W, ...); empty slots have `empty`."""
         objects, frames = self.index.shape[:2]
         packed = values[np.arange(objects)[:, None, None], np.arange(frames)[:, None], self.index]
         packed[~self.filled] = empty
         return packed
 
     def pairs(self, values: Floats) -> Floats:
-        """Give values of arcs, (n or 1, M - 1, S, S) to (n, M - 1, W, W)."""
+        """Return values of arcs, (n or 1, M - 1, S, S) to (n, M - 1, W, W)."""
         objects, frames = self.index.shape[:2]
         sets = np.arange(objects) if len(values) == objects else np.zeros(objects, dtype=np.int64)
         step = np.arange(frames - 1)[:, None, None]
@@ -180,7 +180,7 @@ class PrunedStates:
         return np.asarray(values[sets[:, None, None, None], step, origin, target])
 
     def trellis(self, trellis: Trellis) -> Trellis:
-        """Give the trellis of the states kept."""
+        """Return the trellis of the states kept."""
         each = np.arange(len(self.index))[:, None]
         return Trellis(
             trellis.source[each, self.index[:, 0]],
@@ -190,7 +190,7 @@ class PrunedStates:
         )
 
     def named(self, slots: Ints) -> Ints:
-        """Give the states in slots, both (n, M)."""
+        """Return the states in slots, both (n, M)."""
         return np.asarray(np.take_along_axis(self.index, slots[:, :, None], axis=2)[:, :, 0])
 
 
@@ -211,7 +211,7 @@ class PathPricer:
         self._paths = Paths(self.alone.nodes.copy(), self.alone.costs.copy())
 
     def best_paths(self, node: Floats, objects: Ints) -> Paths:
-        """Give the cheapest paths of `objects` at the costs `node` (n, M, S)."""
+        """Return the cheapest paths of `objects` at the costs `node` (n, M, S)."""
         touched = objects[(node[objects] != self._node[objects]).any(axis=(1, 2))]
         if len(touched):
             self._node[touched] = node[touched]

@@ -35,7 +35,7 @@ class WarmStart:
     states: NDArray[np.int64]
 
     def later(self, frames: int, objects: Sequence[int | None]) -> WarmStart:
-        """Give the hint for a window that begins `frames` later.
+        """Return the hint for a window that begins `frames` later.
 
         `objects` says for each object of that window which it was in this one; None: it was not.
         Observations must be numbered as they were.
@@ -63,6 +63,6 @@ class WindowWarmStart:
     hint: WarmStart
 
     def hint_for(self, first: int, ids: Sequence[int]) -> WarmStart:
-        """Give the hint for a window of the objects `ids` that begins with the frame `first`."""
+        """Return the hint for a window of the objects `ids` that begins with the frame `first`."""
         rows = {number: n for n, number in enumerate(self.ids)}
         return self.hint.later(first - self.first, [rows.get(number) for number in ids])
