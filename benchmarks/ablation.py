@@ -33,12 +33,12 @@ DEFAULT = Term("all of it")
 
 TERMS = (
     Term("no confidence in the cost", {"costs": {"confidence": 0.0}}),
-    Term("leaving is free", {"costs": {"leave": 0.0}}),
-    Term("off course is free", {"costs": {"course": 0.0}}),
-    Term("out of hiding anywhere", {"costs": {"comeback": 0.0}}),
+    Term("leaving is free", {"costs": {"disappearance": 0.0}}),
+    Term("off course is free", {"costs": {"motion": 0.0}}),
+    Term("out of hiding anywhere", {"costs": {"reappearance": 0.0}}),
     Term("steps of any length", {"costs": {"gate": None}}),
-    Term("new people from weak boxes alone", {"window": {"birth_sure": 0.0}}),
-    Term("hidden moments are left out", {"window": {"bridge": 0}}),
+    Term("new people from weak boxes alone", {"window": {"birth_min_peak_score": 0.0}}),
+    Term("hidden moments are left out", {"window": {"max_interpolated_gap": 0}}),
     Term("no displacement", {"costs": {"displacement": 0.0}}),
     Term(
         "displacement in pixels",
@@ -47,10 +47,13 @@ TERMS = (
     Term("no change of appearance", {"costs": {"appearance": 0.0}}),
     Term("conflicts by corners", {"costs": {"conflict_rule": "corners"}}),
     Term("conflict rows of II.D", {"costs": {"conflict_rows": "star"}}),
-    Term("anybody anywhere (no reach)", {"window": {"reach": 1e3, "reach_per_frame": 1e3, "grow": 1e3}}),
+    Term(
+        "anybody anywhere (no reach)",
+        {"window": {"gate_heights": 1e3, "gate_growth": 1e3, "max_height_ratio": 1e3}},
+    ),
     Term("boxes of one window: 5 frames", {"window": {"window": 5, "birth_window": 5}}),
-    Term("no return after long", {"window": {"same_distance": 0.0}}),
-    Term("templates stay as they were", {"window": {"template_rate": 0.0}}),
+    Term("no return after long", {"window": {"reidentify_max_distance": 0.0}}),
+    Term("templates stay as they were", {"window": {"template_update_rate": 0.0}}),
     Term("the paper's costs", {"costs": asdict(PAPER_COSTS)}),
 )
 """What is switched off, one at a time."""

@@ -21,7 +21,7 @@ MOST_GROWTH = 200_000
 
 @pytest.mark.slow
 def test_the_tracker_holds_no_more_after_hundreds_of_frames() -> None:
-    settings = WindowSettings(forget_after=50, most_objects=8)
+    settings = WindowSettings(forget_after=50, max_objects=8)
     tracker = OnlineTracker(settings, CostSettings(), create_solver("columns"))
     scene = crowd(2, seed=1)
     objects, held = 0, 0
@@ -29,7 +29,7 @@ def test_the_tracker_holds_no_more_after_hundreds_of_frames() -> None:
         for frame, seen in enumerate(itertools.islice(scene, FRAMES)):
             result = tracker.push(frame, seen)
             assert len(tracker._seen) <= settings.window
-            assert len(tracker._objects) <= settings.most_objects
+            assert len(tracker._objects) <= settings.max_objects
             if result is not None:
                 objects = max([objects, *(track.id for track in result.tracks)])
             if frame == WARM_UP:

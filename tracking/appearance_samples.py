@@ -29,12 +29,12 @@ def add_appearance_samples(
     """
     if not tracks:
         return ()
-    boxes = np.stack([track.bridged for track in tracks])[:, : len(final)]
+    boxes = np.stack([track.interpolated for track in tracks])[:, : len(final)]
     overlaps = np.nan_to_num(iou(boxes[:, None], boxes[None]))
     overlaps[np.arange(len(tracks)), np.arange(len(tracks))] = 0.0
     alone = overlaps.max(axis=1) <= _MAX_OVERLAP
     return tuple(
-        replace(track, looks=_samples_of_runs(mine, row, first, final))
+        replace(track, appearance_samples=_samples_of_runs(mine, row, first, final))
         for track, mine, row in zip(tracks, alone, states, strict=True)
     )
 

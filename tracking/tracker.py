@@ -50,7 +50,7 @@ class OnlineTracker:
         self._seen: dict[int, Detections] = {}
         self._objects: list[TrackedObject] = []
         self._next_id = 1
-        self._told: WindowWarmStart | None = None
+        self._warm_start: WindowWarmStart | None = None
         self._first: int | None = None
         self._last: int | None = None
 
@@ -95,7 +95,7 @@ class OnlineTracker:
         """
         result = self.flush()
         self._objects = []
-        self._told = None
+        self._warm_start = None
         self._seen = {frame: detections}
         self._first = self._last = frame
         return result
@@ -120,7 +120,7 @@ class OnlineTracker:
         if born:
             states, report = self._assign(first, frames)
         boxes = [select_boxes(row, frames) for row in states]
-        gone = terminated_ids(self._objects, boxes, self._window.duplicate)
+        gone = terminated_ids(self._objects, boxes, self._window.duplicate_overlap)
         shown = [
             n
             for n, (item, rows) in enumerate(zip(self._objects, boxes, strict=True))
@@ -155,8 +155,10 @@ class OnlineTracker:
             build_network(templates, frames, self._costs), [allowed[n] for n in inside]
         )
         network = self._weighed(network, first, ids)
-        solution = self._solver.solve(network, self._told.hint_for(first, ids) if self._told else None)
-        self._told = WindowWarmStart(first, ids, solution.hint)
+        solution = self._solver.solve(
+            network, self._warm_start.for_window(first, ids) if self._warm_start else None
+        )
+        self._warm_start = WindowWarmStart(first, ids, solution.warm_start)
         states[inside] = solution.states
         return states, solution.report
 
@@ -164,16 +166,16 @@ class OnlineTracker:
         self, item: TrackedObject, first: int, frames: Sequence[Detections]
     ) -> list[npt.NDArray[np.bool_]]:
         """Return for each frame which detections the object can be, `(K_m,)` bool; nothing: none in any."""
-        if item.hidden_for(first - 1) > self._window.long_hidden:
+        if item.frames_occluded(first - 1) > self._window.reidentify_after:
             return []
         return [gate_detections(item, first + m, seen, self._window) for m, seen in enumerate(frames)]
 
     def _weighed(self, network: Network, first: int, ids: list[int]) -> Network:  # noqa: ARG002
-        """Return the network of the objects `ids` as it is solved: here is where others add what they know."""
+        """Return the network to solve for the objects `ids`; subclasses override it to change costs."""
         return network
 
     def _number(self, birth: Birth, frame: int) -> int:  # noqa: ARG002
-        """Return somebody new, who begins in this frame, a number that nobody has had."""
+        """Return an unused id for an object born in this frame."""
         self._next_id += 1
         return self._next_id - 1
 
@@ -199,16 +201,18 @@ class OnlineTracker:
         return added
 
     def _come_back(self, first: int, frame: int, birth: Birth) -> bool:
-        """Return somebody new the entry of a long hidden object that looks the same, where there is one."""
-        away = [item for item in self._objects if item.hidden_for(first - 1) > self._window.long_hidden]
+        """Re-identify a birth as a long hidden object of the same appearance; return whether one matched."""
+        away = [
+            item for item in self._objects if item.frames_occluded(first - 1) > self._window.reidentify_after
+        ]
         if not away or not birth.histogram.size:
             return False
         looks = np.stack([item.histogram for item in away])
         distances = appearance_distance(birth.histogram[None], looks, self._costs.measure)[0]
         best = int(np.argmin(distances))
-        if distances[best] > self._window.same_distance:
+        if distances[best] > self._window.reidentify_max_distance:
             return False
-        away[best].return_at(birth.box, frame)
+        away[best].restart_at(birth.box, frame)
         return True
 
     def _make_room(self, frame: int, hidden: Collection[int]) -> bool:
@@ -216,12 +220,12 @@ class OnlineTracker:
 
         `hidden` has the ids of all who are in this window; who has come back in it is not any more.
         """
-        if len(self._objects) < self._window.most_objects:
+        if len(self._objects) < self._window.max_objects:
             return True
-        away = [item for item in self._objects if item.id in hidden and item.hidden_for(frame) > 0]
+        away = [item for item in self._objects if item.id in hidden and item.frames_occluded(frame) > 0]
         if away:
             # `max` takes the first of equals: the lowest id.
-            self._objects.remove(max(away, key=lambda item: item.hidden_for(frame)))
+            self._objects.remove(max(away, key=lambda item: item.frames_occluded(frame)))
         return bool(away)
 
     def _track(
@@ -233,7 +237,7 @@ class OnlineTracker:
         frames: Sequence[Detections],
     ) -> WindowTrack:
         last = (item.frame - first, item.box) if item.frame < first else None
-        filled = interpolate_gaps(boxes, last, self._window.bridge)
+        filled = interpolate_gaps(boxes, last, self._window.max_interpolated_gap)
         return WindowTrack(item.id, boxes, filled, item.histogram, mean_confidence(states, frames))
 
     def _finish(
@@ -250,8 +254,10 @@ class OnlineTracker:
                 if item.present:
                     alone = bool(np.count_nonzero(iou(seen.boxes[state], shown) > _MAX_OVERLAP) <= 1)
                     look = seen.histograms[state]
-                    item.see(Sighting(first + m, seen.boxes[state], look, alone), self._window.template_rate)
+                    item.update(
+                        Sighting(first + m, seen.boxes[state], look, alone), self._window.template_update_rate
+                    )
         forget_after = self._window.forget_after
-        self._objects = [item for item in self._objects if item.hidden_for(final_to) <= forget_after]
+        self._objects = [item for item in self._objects if item.frames_occluded(final_to) <= forget_after]
         self._seen = {number: seen for number, seen in self._seen.items() if number > final_to}
         self._first = final_to + 1

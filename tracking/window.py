@@ -24,22 +24,30 @@ class WindowSettings:
     window: int = 15  # M: frames of a window; a frame is final when this less the stride have followed it
     stride: int = 5  # s: frames between two windows, which end at the frames n where s divides n + 1
     birth_window: int = 15  # frames over which a new object is tested; at most the window
-    birth_visible: float = 0.5  # share of the test's frames in which a new object must be seen
-    birth_cost: float = 0.7  # mean cost per frame that its path may have: appearance, motion, confidence
-    birth_score: float = 0.3  # least score of the detections that a new object may begin with
-    birth_sure: float = 0.65  # least score of the best of them: somebody new is seen clearly once
-    birth_tests: int = 8  # tests per window at most, best detections first
-    apart: float = 0.35  # overlap (IoU) with a known object above which a detection is not somebody new
-    duplicate: float = 0.8  # mean overlap of two tracks above which they are one object
+    birth_min_visible: float = 0.5  # share of the test's frames in which a new object must be seen
+    birth_max_cost: float = 0.7  # mean cost per frame that its path may have: appearance, motion, confidence
+    birth_min_score: float = 0.3  # least score of the detections that a new object may begin with
+    birth_min_peak_score: float = 0.65  # least score of the best of them: somebody new is seen clearly once
+    birth_max_tests: int = 8  # tests per window at most, best detections first
+    birth_max_iou: float = (
+        0.35  # overlap (IoU) with a known object above which a detection is not somebody new
+    )
+    duplicate_overlap: float = 0.8  # mean overlap of two tracks above which they are one object
     forget_after: int = 1500  # F: frames hidden after which an object is forgotten and its number retired
-    most_objects: int = 24  # objects remembered at most; the longest hidden is forgotten first
-    template_rate: float = 0.05  # share of an object's template renewed by each final frame it is seen in
-    reach: float = 0.5  # box heights by which an object may jump between two frames
-    reach_per_frame: float = 0.3  # box heights added to that for each further frame since it was seen
-    grow: float = 1.5  # factor by which its height may change meanwhile
-    bridge: int = 20  # frames hidden at most between two sightings for the track to say where
-    long_hidden: int = 100  # frames hidden after which an object only comes back the way new ones are born
-    same_distance: float = 0.35  # largest appearance distance of somebody new who is one of those, 0..1
+    max_objects: int = 24  # objects remembered at most; the longest hidden is forgotten first
+    template_update_rate: float = (
+        0.05  # share of an object's template renewed by each final frame it is seen in
+    )
+    gate_heights: float = 0.5  # box heights by which an object may jump between two frames
+    gate_growth: float = 0.3  # box heights added to that for each further frame since it was seen
+    max_height_ratio: float = 1.5  # factor by which its height may change meanwhile
+    max_interpolated_gap: int = 20  # frames hidden at most between two sightings for the track to say where
+    reidentify_after: int = (
+        100  # frames hidden after which an object only comes back the way new ones are born
+    )
+    reidentify_max_distance: float = (
+        0.35  # largest appearance distance of somebody new who is one of those, 0..1
+    )
 
     def __post_init__(self) -> None:
         if not 1 <= self.stride <= self.window:
@@ -48,10 +56,10 @@ class WindowSettings:
             raise ValueError(
                 f"birth_window must be between 1 and the window of {self.window}, not {self.birth_window}"
             )
-        if not 0.0 < self.birth_visible <= 1.0:
-            raise ValueError(f"birth_visible is a share between 0 and 1, not {self.birth_visible}")
-        if self.forget_after < 1 or self.most_objects < 1:
-            raise ValueError("forget_after and most_objects must be at least 1")
+        if not 0.0 < self.birth_min_visible <= 1.0:
+            raise ValueError(f"birth_min_visible is a share between 0 and 1, not {self.birth_min_visible}")
+        if self.forget_after < 1 or self.max_objects < 1:
+            raise ValueError("forget_after and max_objects must be at least 1")
 
     @property
     def lag(self) -> int:
@@ -89,10 +97,10 @@ class WindowTrack:
 
     id: int
     boxes: Floats
-    bridged: Floats
+    interpolated: Floats
     histogram: Floats
     confidence: float
-    looks: tuple[AppearanceSample, ...] = ()
+    appearance_samples: tuple[AppearanceSample, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -107,7 +115,7 @@ class WindowResult:
         tracks: the objects that are seen in any of the frames, by ascending id.
         report: what the solver has proven about the last window.
         troubles: what the newest window foresees, the worst first; only where the tracker is set to.
-        mended_from: the first frame that was final and has changed after all, since somebody was pointed at:
+        revised_from: the first frame that was final and has changed after all, since somebody was pointed at:
             all frames from `first` on are to be taken anew. None: nothing that was final has changed.
     """
 
@@ -117,7 +125,7 @@ class WindowResult:
     tracks: tuple[WindowTrack, ...]
     report: SolveReport
     troubles: tuple[RiskEvent, ...] = ()
-    mended_from: int | None = None
+    revised_from: int | None = None
 
 
 def merge_results(results: list[WindowResult]) -> WindowResult | None:
@@ -135,11 +143,13 @@ def merge_results(results: list[WindowResult]) -> WindowResult | None:
         for track in result.tracks:
             nowhere = np.full((newest.last - first + 1, BOX_SIDES), np.nan)
             known = tracks.get(track.id)
-            boxes, bridges = (known.boxes, known.bridged) if known else (nowhere, nowhere.copy())
+            boxes, bridges = (known.boxes, known.interpolated) if known else (nowhere, nowhere.copy())
             boxes[window] = track.boxes[: kept - result.first + 1]
-            bridges[window] = track.bridged[: kept - result.first + 1]
-            looks = (*known.looks, *track.looks) if known else track.looks
-            tracks[track.id] = replace(track, boxes=boxes, bridged=bridges, looks=looks)
+            bridges[window] = track.interpolated[: kept - result.first + 1]
+            looks = (
+                (*known.appearance_samples, *track.appearance_samples) if known else track.appearance_samples
+            )
+            tracks[track.id] = replace(track, boxes=boxes, interpolated=bridges, appearance_samples=looks)
     seen = [tracks[id_] for id_ in sorted(tracks) if not np.isnan(tracks[id_].boxes).all()]
     return replace(newest, first=first, tracks=tuple(seen))
 

@@ -33,15 +33,15 @@ class Setup:
 
 FISH = Setup(
     WindowSettings(
-        grow=2.5,
-        reach=1.0,
-        reach_per_frame=0.4,
-        apart=0.05,
-        birth_sure=0.7,
-        birth_score=0.5,
-        birth_visible=0.8,
+        max_height_ratio=2.5,
+        gate_heights=1.0,
+        gate_growth=0.4,
+        birth_max_iou=0.05,
+        birth_min_peak_score=0.7,
+        birth_min_score=0.5,
+        birth_min_visible=0.8,
     ),
-    CostSettings(displacement=1.0, gate=1.2, slack=0.5, course_drift=0.1, comeback_drift=0.1),
+    CostSettings(displacement=1.0, gate=1.2, motion_slack=0.5, motion_drift=0.1, reappearance_drift=0.1),
     AssistSettings(enabled=True),
 )
 """What is counted in heights of a box, for bodies that are three times as long as high, and turn.
@@ -110,5 +110,5 @@ def _show(shown: dict[int, dict[int, Floats]], result: WindowResult | None) -> N
     if result is None:
         return
     for frame in range(result.first, result.last + 1):
-        rows = {track.id: track.bridged[frame - result.first] for track in result.tracks}
+        rows = {track.id: track.interpolated[frame - result.first] for track in result.tracks}
         shown[frame] = {number: box for number, box in rows.items() if not np.isnan(box[0])}

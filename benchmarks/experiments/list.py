@@ -16,12 +16,12 @@ PAPER_WINDOW = WindowSettings(
     window=19,
     stride=18,
     birth_window=19,
-    reach=_FOR_EVER,
-    reach_per_frame=_FOR_EVER,
-    grow=_FOR_EVER,
-    long_hidden=_FOR_EVER,
+    gate_heights=_FOR_EVER,
+    gate_growth=_FOR_EVER,
+    max_height_ratio=_FOR_EVER,
+    reidentify_after=_FOR_EVER,
     forget_after=_FOR_EVER,
-    template_rate=0.0,
+    template_update_rate=0.0,
 )
 """Segments of 20 frames with the templates' one. They move on by 18: so 1351 frames are 75 segments and
 2431 are 135, as in the paper. Anybody may be anywhere, and nobody is ever forgotten."""

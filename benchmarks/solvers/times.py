@@ -113,7 +113,7 @@ def live(size: Size, steps: int, *, told: bool) -> Live:
         start = time.process_time()
         solution = solver.solve(build_network(templates, frames, settings), hint)
         if told:
-            hint = solution.hint.later(1, range(size.objects))
+            hint = solution.warm_start.shift(1, range(size.objects))
         times.append(time.process_time() - start)
         rounds.append(solution.report.rounds)
     return Live(np.array(times), np.array(rounds))

@@ -13,20 +13,20 @@ def mended(result: WindowResult, anew: WindowResult) -> WindowResult:
     """Give what is to be told where a window's result has just been solved anew, by what somebody points at.
 
     It begins with the first frame that was told as final and has changed, or where nothing has with the first
-    frame that was not final; ``mended_from`` says which.
+    frame that was not final; ``revised_from`` says which.
 
     Args:
         result: of the window, which nobody was told of yet.
         anew: the same frames solved anew, and maybe more before them.
     """
-    changed = anew.mended_from
+    changed = anew.revised_from
     if changed is not None and changed < result.first:
         return _from(anew, changed)
     if anew.first <= result.first:
-        return replace(_from(anew, result.first), mended_from=None)
+        return replace(_from(anew, result.first), revised_from=None)
     both = merge_results([result, anew])
     assert both is not None  # noqa: S101 — two make one
-    return replace(both, mended_from=None)
+    return replace(both, revised_from=None)
 
 
 def _from(result: WindowResult, first: int) -> WindowResult:
@@ -39,6 +39,9 @@ def _from(result: WindowResult, first: int) -> WindowResult:
 
 
 def _cut(track: WindowTrack, begins: int, first: int) -> WindowTrack:
-    looks = tuple(replace(it, first=max(it.first, first)) for it in track.looks if it.last >= first)
+    samples = (it for it in track.appearance_samples if it.last >= first)
+    kept = tuple(replace(it, first=max(it.first, first)) for it in samples)
     rows = slice(first - begins, None)
-    return replace(track, boxes=track.boxes[rows], bridged=track.bridged[rows], looks=looks)
+    return replace(
+        track, boxes=track.boxes[rows], interpolated=track.interpolated[rows], appearance_samples=kept
+    )

@@ -80,7 +80,7 @@ class Reporter:
             tracks=[_track(track) for track in result.tracks],
             solve=_solve(result.report),
             troubles=[_trouble(it) for it in result.troubles[:TROUBLES_MOST]],
-            mended_from=result.mended_from,
+            mended_from=result.revised_from,
         )
 
 
@@ -95,9 +95,9 @@ def _track(track: WindowTrack) -> Track:
     # With short moments of hiding filled in: they are no reason to show somebody from elsewhere.
     return Track(
         id=track.id,
-        boxes=[_box(row) for row in track.bridged],
+        boxes=[_box(row) for row in track.interpolated],
         confidence=float(track.confidence),
-        looks=[_glimpse(look) for look in track.looks],
+        looks=[_glimpse(look) for look in track.appearance_samples],
     )
 
 

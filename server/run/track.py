@@ -153,6 +153,6 @@ def final_rows(result: WindowResult | None) -> Iterator[MotRow]:
         return
     for track in result.tracks:
         for number in range(result.first, result.final_to + 1):
-            left, top, right, bottom = (float(side) for side in track.bridged[number - result.first])
+            left, top, right, bottom = (float(side) for side in track.interpolated[number - result.first])
             if not np.isnan(left):
                 yield MotRow(number + 1, track.id, left, top, right - left, bottom - top)

@@ -46,7 +46,7 @@ CHANGES: dict[str, tuple[str, Any]] = {
     "cameras.c1.ground": (SITE, [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]),
     "detect.boxes.least_height": (ALL_CAMERAS, 0.3),
     "track.costs.occlusion": (ALL_CAMERAS, 0.9),
-    "track.window.birth_cost": (ALL_CAMERAS, 0.6),
+    "track.window.birth_max_cost": (ALL_CAMERAS, 0.6),
     "track.backlog_s": (SITE, 3.0),
     "site.fps": (SITE, 12.5),
     "encode.crf": (SITE, 30),

@@ -48,7 +48,7 @@ def test_somebody_is_one_person_however_few_frames_are_searched(rung: Rung) -> N
         it.last for it in followed(Rung())
     ]  # windows end when they do, and none is late
     final = {
-        result.first + place: (track.id, track.bridged[place])
+        result.first + place: (track.id, track.interpolated[place])
         for result in results
         for track in result.tracks
         for place in range(result.final_to - result.first + 1)

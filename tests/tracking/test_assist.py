@@ -52,7 +52,12 @@ def _whom(box: np.ndarray, frame: int) -> int:
 
 def _shown(results: Sequence[WindowResult]) -> list[object]:
     return [
-        (it.first, it.last, it.final_to, [(t.id, t.boxes.tobytes(), t.bridged.tobytes()) for t in it.tracks])
+        (
+            it.first,
+            it.last,
+            it.final_to,
+            [(t.id, t.boxes.tobytes(), t.interpolated.tobytes()) for t in it.tracks],
+        )
         for it in results
     ]
 
@@ -61,7 +66,7 @@ def test_without_a_pointing_its_tracks_are_those_of_the_plain_tracker() -> None:
     stream = _crossing()
     helped = follow(stream, _helped())
     assert _shown(helped) == _shown(follow(stream, _plain()))
-    assert all(it.mended_from is None for it in helped)
+    assert all(it.revised_from is None for it in helped)
     assert not any(it.troubles for it in follow(stream, _plain()))
 
 
@@ -101,8 +106,8 @@ def test_a_pointing_mends_the_past_back_to_where_the_two_met(frames: range) -> N
     assert mended is not None
     assert mended.last == 79
     assert mended.first <= 33
-    assert mended.mended_from is not None
-    assert 33 <= mended.mended_from <= 45
+    assert mended.revised_from is not None
+    assert 33 <= mended.revised_from <= 45
     for number, before, after in ((1, 0, 1), (2, 1, 0)):
         boxes = _boxes(mended, number)
         for frame in range(mended.first, 80):
@@ -138,7 +143,7 @@ def test_who_was_lost_and_got_another_number_gets_the_old_one_back_when_pointed_
     mended = tracked.point([_at(away[1], 120, 1)])
     assert mended is not None
     assert {track.id for track in mended.tracks if not np.isnan(track.boxes[-1, 0])} == {1}
-    assert mended.mended_from == pytest.approx(80, abs=2)
+    assert mended.revised_from == pytest.approx(80, abs=2)
 
 
 def test_a_pointing_before_the_memory_is_not_taken() -> None:
@@ -160,7 +165,7 @@ def test_a_small_doubt_that_is_forgotten_keeps_no_later_pointing_from_mending() 
             assert tracked._doubtful == [15]
     mended = tracked.point([_at(ALIKE[1], n, 1) for n in range(60, 70)])
     assert mended is not None
-    assert mended.mended_from is not None
+    assert mended.revised_from is not None
 
 
 def test_the_memory_is_bounded() -> None:

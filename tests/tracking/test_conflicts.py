@@ -104,6 +104,9 @@ def test_the_finder_gives_every_broken_row_once_and_no_other(case: Case) -> None
         if usage[:, m, :-1][row].sum() > 1.0 + 1e-9
     }
     finder = ConflictSeparator(network)
-    found = [(row.frame, np.ascontiguousarray(row.members[:, :-1]).tobytes()) for row in finder.broken(usage)]
+    found = [
+        (row.frame, np.ascontiguousarray(row.members[:, :-1]).tobytes())
+        for row in finder.find_violated(usage)
+    ]
     assert sorted(found) == sorted(expected)
-    assert not finder.broken(usage)
+    assert not finder.find_violated(usage)

@@ -94,7 +94,7 @@ def test_two_people_in_step_among_others_are_where_all_joint_states_say() -> Non
 
 
 def test_a_program_that_presolve_wrongly_calls_infeasible_is_solved() -> None:
-    costs = replace(PAPER_COSTS, leave=1.0, conflict_distance=120.0, conflict_rows="star")
+    costs = replace(PAPER_COSTS, disappearance=1.0, conflict_distance=120.0, conflict_rows="star")
     network = network_of(Case(6, 4, 8, shared=False, settings=costs, seed=304))
     found = solve_relaxation(network)
     rounded = integer_nodes(network, found.usage)

@@ -30,8 +30,8 @@ def test_frames_in_a_row_are_one_glimpse_and_a_crowd_or_a_hiding_ends_it() -> No
     states = [np.zeros(6, dtype=np.int64), np.array([1, 1, 1, 1, -1, 1])]
     frames = [seen(HERE, THERE), seen(HERE, THERE), seen(HERE, BESIDE)] + [seen(HERE, THERE)] * 3
     first, second = add_appearance_samples([one, two], states, 100, frames)
-    assert told(first.looks) == [(100, 101, [1, 0, 0, 0]), (103, 105, [1, 0, 0, 0])]
-    assert told(second.looks) == [
+    assert told(first.appearance_samples) == [(100, 101, [1, 0, 0, 0]), (103, 105, [1, 0, 0, 0])]
+    assert told(second.appearance_samples) == [
         (100, 101, [0, 1, 0, 0]),
         (103, 103, [0, 1, 0, 0]),
         (105, 105, [0, 1, 0, 0]),
@@ -43,6 +43,6 @@ def test_only_final_frames_tell_and_whoever_is_hidden_may_be_in_the_box() -> Non
     states = [np.zeros(3, dtype=np.int64), np.full(3, -1)]  # two is not seen, but known to be there
     frames = [seen(HERE)] * 2
     first, second = add_appearance_samples([one, two], states, 7, frames)
-    assert told(first.looks) == [(8, 8, [1, 0, 0, 0])]
-    assert second.looks == ()
+    assert told(first.appearance_samples) == [(8, 8, [1, 0, 0, 0])]
+    assert second.appearance_samples == ()
     assert add_appearance_samples([], [], 7, frames) == ()

@@ -36,18 +36,18 @@ def window(
 
 def test_somebody_goes_on_as_they_went_and_slower_the_longer_they_are_away() -> None:
     motion = walked()
-    steps = np.diff(motion.predicted(60)[:, 0])
+    steps = np.diff(motion.predict(60)[:, 0])
     assert 4.0 < steps[0] < 5.0
     assert np.all(np.diff(steps) < 0.0)
-    assert np.all(motion.moved(1000) <= 20.0)
-    assert np.ptp(motion.predicted(60)[:, [1, 3]], axis=0) == pytest.approx([0.0, 0.0])
+    assert np.all(motion.damped_elapsed(1000) <= 20.0)
+    assert np.ptp(motion.predict(60)[:, [1, 3]], axis=0) == pytest.approx([0.0, 0.0])
 
 
 def test_one_sighting_has_no_direction() -> None:
     motion = MotionModel.of([7], BOX[None], 9)
     assert motion.velocity == pytest.approx([0.0, 0.0])
     assert motion.elapsed == 2
-    assert motion.predicted(3) == pytest.approx(np.stack([BOX] * 3))
+    assert motion.predict(3) == pytest.approx(np.stack([BOX] * 3))
 
 
 @given(st.lists(st.integers(1, 5), min_size=1, max_size=11), st.integers(1, 50))
@@ -60,7 +60,7 @@ def test_a_velocity_is_never_overestimated_whatever_frames_it_is_seen_in(gaps: l
 
 def test_nobody_comes_out_of_hiding_far_from_where_they_should_be_or_as_somebody_else() -> None:
     settings, motion = CostSettings(), walked()
-    expected = motion.predicted(2)
+    expected = motion.predict(2)
     near = window(motion, settings, *expected)
     assert np.isfinite(near.source[0, 0])
     assert np.isfinite(near.pair[0, 0, 1, 0])
@@ -70,14 +70,14 @@ def test_nobody_comes_out_of_hiding_far_from_where_they_should_be_or_as_somebody
     assert np.isfinite(far.pair[0, 0, 0, 0]), "who is seen may go anywhere within a step"
     unlike = window(motion, settings, *expected, look=OTHER)
     assert np.isinf(unlike.pair[0, 0, 1, 0])
-    paper = replace(settings, comeback=0.0, course=0.0)
+    paper = replace(settings, reappearance=0.0, motion=0.0)
     assert np.isfinite(window(motion, paper, *(expected + 500.0)).pair[0, 0, 1, 0])
 
 
 def test_coming_back_costs_more_the_farther_off() -> None:
     motion = walked()
     costs = [
-        window(motion, CostSettings(), *(motion.predicted(2) + np.array([x, 0.0, x, 0.0]))).pair[0, 0, 1, 0]
+        window(motion, CostSettings(), *(motion.predict(2) + np.array([x, 0.0, x, 0.0]))).pair[0, 0, 1, 0]
         for x in (0.0, 5.0, 10.0, 15.0)
     ]
     assert np.all(np.diff(costs) > 0.0)

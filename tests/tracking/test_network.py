@@ -102,7 +102,7 @@ def test_own_observations_are_those_of_their_object() -> None:
 def test_some_objects_of_a_network_are_a_network() -> None:
     templates = [Template(n, DARK, LEFT + n) for n in range(3)]
     own = [[seen(LEFT + n), seen(LEFT + n, RIGHT)] for n in range(3)]
-    part = build_network_per_object(templates, own, SETTINGS).only([2, 0])
+    part = build_network_per_object(templates, own, SETTINGS).select([2, 0])
     alone = build_network_per_object([templates[2], templates[0]], [own[2], own[0]], SETTINGS)
     for name in ("boxes", "source", "node", "pair", "sink", "conflicts", "locations"):
         np.testing.assert_array_equal(getattr(part, name), getattr(alone, name))

@@ -52,7 +52,7 @@ def test_a_jump_that_gating_forbids_is_repaired() -> None:
     network = two_at_one_place(gate=50.0, frames=2)
     jump = np.array([[0, 1], [2, 2]])
     assert np.isinf(total_cost(network, jump))
-    better = LocalSearch(network).improved(jump)
+    better = LocalSearch(network).improve(jump)
     assert np.isfinite(total_cost(network, better))
     assert conflict_count(network, better) == 0
 
@@ -66,7 +66,7 @@ def test_any_shares_round_to_nodes_without_conflict_and_improving_never_costs(ca
     usage[:, :, :-1] *= network.present[network.sets]
     nodes = round_relaxation(network, usage)
     assert conflict_count(network, nodes) == 0
-    better = LocalSearch(network).improved(nodes)
+    better = LocalSearch(network).improve(nodes)
     assert conflict_count(network, better) == 0
     assert total_cost(network, better) <= total_cost(network, nodes)
 

@@ -160,7 +160,9 @@ def test_looks_are_those_of_the_detections_that_show_somebody_alone() -> None:
         seen = Detections(boxes, np.full(2, 0.9), np.eye(2))
         told.append(tracker.push(frame, seen, _picture(middles, frame)))
     results = [it for it in (*told, tracker.flush()) if it is not None]
-    looks = [(track.id, look) for result in results for track in result.tracks for look in track.looks]
+    looks = [
+        (track.id, look) for result in results for track in result.tracks for look in track.appearance_samples
+    ]
     assert {(number, int(look.histogram.argmax())) for number, look in looks} == {(1, 0), (2, 1)}
 
 

@@ -192,13 +192,13 @@ def test_after_a_long_gap_everything_begins_again_without_a_result_for_the_gap()
 
 
 def test_memory_is_bounded_by_the_window_and_the_list() -> None:
-    window = WindowSettings(forget_after=30, most_objects=3)
+    window = WindowSettings(forget_after=30, max_objects=3)
     tracked = tracker(window)
     for n in range(600):
         people = [Stroll(60.0 * k, 40.0, 0.0, (n // 40 + k) % 8) for k in range(5)]
         tracked.push(n, seen_at(people if n % 40 < 25 else [], n))
         assert len(tracked._seen) <= window.window + window.stride
-        assert len(tracked._objects) <= window.most_objects
+        assert len(tracked._objects) <= window.max_objects
 
 
 def test_where_the_list_is_full_only_who_is_hidden_makes_room() -> None:
@@ -207,14 +207,14 @@ def test_where_the_list_is_full_only_who_is_hidden_makes_room() -> None:
     left = [Stroll(100.0, 40.0, 0.0, 1, seen=range(20))]
     new = [Stroll(100.0 * k, 240.0, 0.0, k, seen=range(40, 100)) for k in (5, 6)]
     people = [there[0], *left, *there[2:], *new]
-    results = follow([seen_at(people, n) for n in range(100)], tracker(WindowSettings(most_objects=4)))
+    results = follow([seen_at(people, n) for n in range(100)], tracker(WindowSettings(max_objects=4)))
     assert {1, 3, 4} < set(final_boxes(results)[99])
     assert len(final_boxes(results)[99]) == 4
 
 
 def test_who_must_be_seen_in_every_frame_to_be_somebody_is_found_by_that() -> None:
     person = Stroll(20, 40, 2.0, 0)
-    window = WindowSettings(birth_visible=1.0)
+    window = WindowSettings(birth_min_visible=1.0)
     results = follow([seen_at([person], n) for n in range(40)], tracker(window))
     assert _ids(results) == {1}
 
@@ -237,7 +237,7 @@ def test_flush_without_frames_and_twice_gives_nothing() -> None:
 
 @pytest.mark.parametrize(
     "wrong",
-    [{"stride": 0}, {"stride": 16}, {"birth_window": 16}, {"birth_visible": 0.0}, {"most_objects": 0}],
+    [{"stride": 0}, {"stride": 16}, {"birth_window": 16}, {"birth_min_visible": 0.0}, {"max_objects": 0}],
 )
 def test_settings_that_make_no_sense_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(ValueError, match=next(iter(wrong))):

@@ -35,13 +35,13 @@ def same_optimum(network: Network, hint: WarmStart) -> None:
 @given(case=cases(objects=6, frames=6, places=6, layouts=(0.0, 0.0, 0.002)))
 def test_an_answer_as_its_own_hint_changes_nothing(case: Case) -> None:
     network = network_of(case)
-    same_optimum(network, create_solver("columns").solve(network).hint)
+    same_optimum(network, create_solver("columns").solve(network).warm_start)
 
 
 @bounded
 @given(case=cases(objects=6, frames=6, places=6), other=cases(objects=6, frames=6, places=6))
 def test_the_hint_of_another_window_changes_nothing(case: Case, other: Case) -> None:
-    same_optimum(network_of(case), create_solver("columns").solve(network_of(other)).hint)
+    same_optimum(network_of(case), create_solver("columns").solve(network_of(other)).warm_start)
 
 
 @bounded
@@ -67,7 +67,7 @@ def test_a_made_up_hint_changes_nothing(case: Case, seed: int) -> None:
 @given(case=cases(objects=6, frames=5, places=6))
 def test_the_same_hint_gives_the_same_answer(case: Case) -> None:
     columns, network = create_solver("columns"), network_of(case)
-    hint = columns.solve(network).hint
+    hint = columns.solve(network).warm_start
     first, second = columns.solve(network, hint), columns.solve(network, hint)
     np.testing.assert_array_equal(first.states, second.states)
     assert first.report == second.report
@@ -76,13 +76,16 @@ def test_the_same_hint_gives_the_same_answer(case: Case) -> None:
 @pytest.mark.parametrize("name", ["arcs", "exact", "extended-dp", "greedy-dp", "separate-dp", "l2"])
 def test_other_solvers_need_no_hint(name: str) -> None:
     network, solver = rivals(0), create_solver(name)
-    first, second = solver.solve(network), solver.solve(network, create_solver("columns").solve(network).hint)
+    first, second = (
+        solver.solve(network),
+        solver.solve(network, create_solver("columns").solve(network).warm_start),
+    )
     np.testing.assert_array_equal(first.states, second.states)
 
 
 def test_a_later_window_knows_its_frames_and_objects_by_their_new_numbers() -> None:
     rows = (ConflictPrice(0, (1, 2), 0.5), ConflictPrice(2, (0, 1), 0.25))
-    hint = WarmStart(rows, np.array([[0, 1, 2], [3, 4, -1]])).later(2, [1, None, 0])
+    hint = WarmStart(rows, np.array([[0, 1, 2], [3, 4, -1]])).shift(2, [1, None, 0])
     assert hint.rows == (ConflictPrice(0, (0, 1), 0.25),)
     assert hint.states.tolist() == [[-1], [UNKNOWN_STATE], [2]]
 
@@ -107,7 +110,7 @@ def test_where_the_old_prices_hold_no_program_is_solved() -> None:
     columns = create_solver("columns")
     before = columns.solve(rivals(0))
     assert before.report.rounds > 0, "the two have to want the same boxes for this test"
-    after = columns.solve(rivals(1), before.hint.later(1, [0, 1]))
+    after = columns.solve(rivals(1), before.warm_start.shift(1, [0, 1]))
     assert after.report.rounds == 0
     assert after.report.objective == pytest.approx(columns.solve(rivals(1)).report.objective, rel=CLOSE)
 

@@ -53,7 +53,7 @@ def ways(window: Solved, frames: int) -> dict[int, tuple[int, Floats]]:
         seen = np.flatnonzero(~np.isnan(window.trail[n, :, 0]))
         if len(seen) >= _RECENT:
             motion = _motion(window.trail[n], int(seen[-1]) + 1)
-            found[n] = window.trail.shape[1] - 1 - int(seen[-1]), motion.predicted(frames)
+            found[n] = window.trail.shape[1] - 1 - int(seen[-1]), motion.predict(frames)
     return found
 
 

@@ -95,7 +95,7 @@ class Foresight:
             b = int(covers.argmax())
             frame = window.last - hidden + 1
             differ = float(appearance_distance(looks[n, None], looks[b, None], self._costs.measure)[0, 0])
-            margin = length * max(differ - self._costs.unknown, 0.0)
+            margin = length * max(differ - self._costs.unknown_appearance, 0.0)
             if covers[b] > _TOUCH and margin < self._settings.alike:
                 pair = window.known[n], window.known[b]
                 found.append(_trouble("alike", pair, window, frame, margin, hidden))

@@ -148,7 +148,7 @@ class AssistedTracker(OnlineTracker):
         before = dict(self._memory.where)
         final_before = steps[-1].final_to
         self._objects = [item.copy() for item in steps[0].objects]
-        self._told, self._first = steps[0].told, steps[0].first
+        self._warm_start, self._first = steps[0].told, steps[0].first
         results = []
         for step in steps:
             first = self._first
@@ -162,12 +162,12 @@ class AssistedTracker(OnlineTracker):
         changed = [n for n, it in sorted(self._memory.where.items()) if it != before.get(n)]
         if result is None or not changed:
             return None
-        return replace(result, mended_from=changed[0] if changed[0] <= final_before else None)
+        return replace(result, revised_from=changed[0] if changed[0] <= final_before else None)
 
     def _solve(self, end: int, final_to: int) -> WindowResult:
         first = self._first if self._first is not None else end
         objects = tuple(item.copy() for item in self._objects)
-        self._memory.step(Step(first, end, final_to, objects, self._told))
+        self._memory.step(Step(first, end, final_to, objects, self._warm_start))
         result = super()._solve(end, final_to)
         self._memory.settle(first, {track.id for track in result.tracks})
         if self._solved is None or not self._foresees:
@@ -219,7 +219,7 @@ class AssistedTracker(OnlineTracker):
 
     def _weighed(self, network: Network, first: int, ids: list[int]) -> Network:
         network = with_places(network, first, ids, self._memory.places, self._costs.change)
-        comeback = self._costs.change + self._costs.course + self._costs.comeback
+        comeback = self._costs.change + self._costs.motion + self._costs.reappearance
         network = with_pointings(network, first, ids, self._pointings, self._assist, comeback)
         self._network = ids, network
         return network

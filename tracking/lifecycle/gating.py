@@ -33,8 +33,10 @@ def within_gate(box: Floats, boxes: Floats, elapsed: int, window: WindowSettings
     changed by a factor.
     """
     tall, other = float(heights(box)), heights(boxes)
-    far = window.reach + window.reach_per_frame * max(elapsed - 1, 0)
-    alike = (other <= window.grow * max(tall, 1.0)) & (tall <= window.grow * np.maximum(other, 1.0))
+    far = window.gate_heights + window.gate_growth * max(elapsed - 1, 0)
+    alike = (other <= window.max_height_ratio * max(tall, 1.0)) & (
+        tall <= window.max_height_ratio * np.maximum(other, 1.0)
+    )
     return np.asarray((normalized_distance(box, boxes) <= far) & (alike | (elapsed > window.window)))
 
 

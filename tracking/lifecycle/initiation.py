@@ -61,7 +61,7 @@ def find_births(
     tries = 0
     for last in range(len(frames) - 1, max(len(frames) - 1 - latest, -1), -1):
         tried = np.zeros(len(left[last]), dtype=np.bool_)
-        while tries < window.birth_tests and not tried.all():
+        while tries < window.birth_max_tests and not tried.all():
             seed = int(np.argmax(np.where(tried, -1.0, left[last].scores)))
             tried[seed] = True
             if not test.promising(left, last, seed):
@@ -81,14 +81,14 @@ def find_births(
 
 def _required_frames(window: WindowSettings) -> int:
     """Return in how many frames a new object must be seen."""
-    return int(np.ceil(window.birth_visible * window.birth_window))
+    return int(np.ceil(window.birth_min_visible * window.birth_window))
 
 
 def _unassigned_detections(seen: Detections, boxes: Floats, window: WindowSettings) -> Detections:
     """Return the sure detections of a frame that are not where somebody known is."""
-    sure = seen.scores >= window.birth_score
+    sure = seen.scores >= window.birth_min_score
     if len(boxes) and len(seen):
-        sure &= iou(seen.boxes[:, None], boxes[None]).max(axis=1) < window.apart
+        sure &= iou(seen.boxes[:, None], boxes[None]).max(axis=1) < window.birth_max_iou
     return Detections(seen.boxes[sure], seen.scores[sure], seen.histograms[sure])
 
 
@@ -125,7 +125,7 @@ class _BirthTest:
         if np.count_nonzero(path != OCCLUDED) < _required_frames(self.window):
             return None
         sure = max(seen.scores[k] for seen, k in zip(frames, path, strict=True) if k != OCCLUDED)
-        if sure < self.window.birth_sure:
+        if sure < self.window.birth_min_peak_score:
             return None
         return path if self._agree(frames[: last + 1], backward, path[: last + 1]) else None
 
@@ -146,7 +146,7 @@ class _BirthTest:
         constant = self.costs.change + self.costs.occlusion
         visible = len(rest) - hidden
         cost = solution.report.objective - constant * (hidden + 1)
-        if visible and cost / visible > self.window.birth_cost:
+        if visible and cost / visible > self.window.birth_max_cost:
             found[1:] = OCCLUDED
         return found
 

@@ -56,6 +56,6 @@ def terminated_ids(objects: Sequence[TrackedObject], boxes: Sequence[Floats], du
     """
     gone = set(duplicate_ids([item.id for item in objects], boxes, duplicate))
     for item, rows in zip(objects, boxes, strict=True):
-        if not item.confirmed and np.count_nonzero(~np.isnan(rows[:, 0])) < _MIN_VISIBLE_FRAMES:
+        if not item.is_confirmed and np.count_nonzero(~np.isnan(rows[:, 0])) < _MIN_VISIBLE_FRAMES:
             gone.add(item.id)
     return gone

@@ -24,8 +24,8 @@ class MotionCosts:
         returned: (n, M, K) coming out of hiding; infinite where nobody comes back so far off, or so unlike.
     """
 
-    off_course: Floats
-    returned: Floats
+    moving: Floats
+    reappearing: Floats
 
 
 def motion_costs(
@@ -33,13 +33,13 @@ def motion_costs(
 ) -> MotionCosts | None:
     """Charge all objects; `likeness` is (n, M, K). `None` where it costs nobody anything."""
     known = any(template.motion is not None for template in templates)
-    if not known or not (settings.course or settings.comeback):
+    if not known or not (settings.motion or settings.reappearance):
         return None
     boxes = np.broadcast_to(places.boxes, (len(templates), *places.boxes.shape[1:]))
     charges = MotionCosts(np.zeros(likeness.shape), np.zeros(likeness.shape))
     for n, template in enumerate(templates):
         if template.motion is not None:
-            charges.off_course[n], charges.returned[n] = _object_motion_costs(
+            charges.moving[n], charges.reappearing[n] = _object_motion_costs(
                 template.motion, boxes[n], likeness[n], settings
             )
     return charges
@@ -49,14 +49,14 @@ def _object_motion_costs(
     motion: MotionModel, boxes: Floats, likeness: Floats, settings: CostSettings
 ) -> tuple[Floats, Floats]:
     """Return the two charges of one object for boxes (M, K, 4), both (M, K)."""
-    away, moved = motion.deviations(boxes), motion.moved(len(boxes))[:, None]
-    share = np.minimum(away / (settings.slack + settings.course_drift * moved), 1.0)
-    off_course = settings.course * share
-    if not settings.comeback:
+    away, moved = motion.deviations(boxes), motion.damped_elapsed(len(boxes))[:, None]
+    share = np.minimum(away / (settings.motion_slack + settings.motion_drift * moved), 1.0)
+    off_course = settings.motion * share
+    if not settings.reappearance:
         return off_course, off_course
-    share = away / (settings.slack + settings.comeback_drift * moved)
-    returned = off_course + settings.comeback * share**2
-    returned[(share > 1.0) | (likeness > settings.alike)] = np.inf
+    share = away / (settings.motion_slack + settings.reappearance_drift * moved)
+    returned = off_course + settings.reappearance * share**2
+    returned[(share > 1.0) | (likeness > settings.reappearance_max_distance)] = np.inf
     return off_course, returned
 
 
@@ -87,9 +87,9 @@ def source_costs(
         if template.box is not None:
             moved = _displacement_costs(template.box[None], first_boxes[n], settings)[0]
             costs[n, :width] = settings.appearance * likeness[n, 0] + moved
-            costs[n, width] = settings.leave
+            costs[n, width] = settings.disappearance
         if charges is not None:
-            first = charges.returned if template.box is None else charges.off_course
+            first = charges.reappearing if template.box is None else charges.moving
             costs[n, :width] += first[n, 0]
     return costs
 
@@ -106,12 +106,12 @@ def pair_costs(charges: MotionCosts | None, places: ObservationArrays, settings:
     seen += settings.appearance * appearance_distance(before, after, settings.measure)
     seen += _displacement_costs(places.boxes[:, :-1], places.boxes[:, 1:], settings)
     costs[:, :, width, :width] = settings.change
-    costs[:, :, :width, width] = settings.leave
+    costs[:, :, :width, width] = settings.disappearance
     if charges is None:
         return costs
-    costs = np.broadcast_to(costs, (len(charges.returned), *costs.shape[1:])).copy()
-    costs[:, :, :width, :width] += charges.off_course[:, 1:, None]
-    costs[:, :, width, :width] += charges.returned[:, 1:]
+    costs = np.broadcast_to(costs, (len(charges.reappearing), *costs.shape[1:])).copy()
+    costs[:, :, :width, :width] += charges.moving[:, 1:, None]
+    costs[:, :, width, :width] += charges.reappearing[:, 1:]
     return costs
 
 
@@ -138,7 +138,7 @@ def template_distances(
 ) -> Floats:
     """Compare each template with each place: g(s_n, v), (n, M, K)."""
     sets, frames, width, bins = places.histograms.shape
-    distances = np.full((len(templates), frames, width), settings.unknown)
+    distances = np.full((len(templates), frames, width), settings.unknown_appearance)
     known = [n for n, template in enumerate(templates) if template.histogram.size and bins]
     if not known:
         return distances

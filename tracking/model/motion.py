@@ -43,7 +43,7 @@ class MotionModel:
         velocity = times @ middles / (times @ times + _VELOCITY_REGULARIZATION)
         return cls(boxes[-1], velocity, first - frames[-1])
 
-    def moved(self, frames: int) -> Floats:
+    def damped_elapsed(self, frames: int) -> Floats:
         """Return for how many frames it has moved on in each of the window's frames, (M,): 20 at most.
 
         Every frame counts less than the one before, since people turn and stop: 20 (1 - exp(-t / 20)).
@@ -51,10 +51,10 @@ class MotionModel:
         elapsed = self.elapsed + np.arange(frames, dtype=np.float64)
         return np.asarray(_VELOCITY_DECAY_FRAMES * (1.0 - np.exp(-elapsed / _VELOCITY_DECAY_FRAMES)))
 
-    def predicted(self, frames: int) -> Floats:
+    def predict(self, frames: int) -> Floats:
         """Return where it is expected in each of the window's frames, (M, 4)."""
-        return np.asarray(self.box + self.moved(frames)[:, None] * np.tile(self.velocity, 2))
+        return np.asarray(self.box + self.damped_elapsed(frames)[:, None] * np.tile(self.velocity, 2))
 
     def deviations(self, boxes: Floats) -> Floats:
         """Return how far boxes (M, K, 4) are from where it is expected, in heights, (M, K)."""
-        return normalized_distance(self.predicted(len(boxes))[:, None], boxes)
+        return normalized_distance(self.predict(len(boxes))[:, None], boxes)

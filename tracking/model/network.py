@@ -132,7 +132,7 @@ class Network:
         used = self.present[sets, frame].ravel()
         return np.asarray(rows.reshape(n * places, n, places)[used])
 
-    def only(self, objects: Sequence[int]) -> Network:
+    def select(self, objects: Sequence[int]) -> Network:
         """Return the network of some of the objects, in the order given."""
         chosen = np.asarray(objects, dtype=np.int64)
         if self.shared:

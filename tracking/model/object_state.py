@@ -56,7 +56,7 @@ class Sighting:
     frame: int
     box: Floats
     histogram: Floats
-    alone: bool
+    is_isolated: bool
 
 
 class TrackedObject:
@@ -71,7 +71,7 @@ class TrackedObject:
         present: it was seen in the last final frame.
     """
 
-    __slots__ = ("_past", "box", "confirmed", "frame", "histogram", "id", "present")
+    __slots__ = ("_past", "box", "frame", "histogram", "id", "is_confirmed", "present")
 
     def __init__(self, number: int, histogram: Floats, box: Floats, frame: int) -> None:
         self.id = number
@@ -79,14 +79,14 @@ class TrackedObject:
         self.box = box
         self.frame = frame
         self._past: deque[tuple[int, Floats]] = deque(maxlen=_HISTORY_LENGTH)
-        self.confirmed = False
+        self.is_confirmed = False
         self.present = False
 
     def copy(self) -> TrackedObject:
         """Return what is remembered now, to go back to."""
         other = TrackedObject(self.id, self.histogram, self.box, self.frame)
         other._past.extend(self._past)
-        other.confirmed, other.present = self.confirmed, self.present
+        other.is_confirmed, other.present = self.is_confirmed, self.present
         return other
 
     def template(self, first: int) -> Template:
@@ -100,7 +100,7 @@ class TrackedObject:
             motion = MotionModel.of(frames, np.stack(boxes), first)
         return Template(self.id, self.histogram, self.box if self.present else None, motion)
 
-    def see(self, sighting: Sighting, rate: float) -> None:
+    def update(self, sighting: Sighting, rate: float) -> None:
         """Take over what one final frame shows; `rate` is the template's share that it renews.
 
         Where others are close, the box holds some of them: it does not enter the template.
@@ -108,17 +108,17 @@ class TrackedObject:
         self.box = sighting.box
         self._past.append((sighting.frame, sighting.box))
         self.frame = sighting.frame
-        self.confirmed = True
-        if sighting.alone and self.histogram.size:
+        self.is_confirmed = True
+        if sighting.is_isolated and self.histogram.size:
             self.histogram = (1.0 - rate) * self.histogram + rate * sighting.histogram
 
-    def return_at(self, box: Floats, frame: int) -> None:
+    def restart_at(self, box: Floats, frame: int) -> None:
         """Begin anew at a place where it was recognised: how it went long ago says nothing there."""
         self.box = box
         self.frame = frame
         self._past.clear()
 
-    def hidden_for(self, frame: int) -> int:
+    def frames_occluded(self, frame: int) -> int:
         """Return for how many frames it has not been seen at `frame`."""
         return max(frame - self.frame, 0)
 

@@ -41,23 +41,23 @@ class CostSettings:
     # nothing of its own is nearly as dear as being hidden. 0 is the paper.
     confidence: float = 0.7
     # Added where somebody seen becomes hidden, once for however long it lasts. 0 is the paper.
-    leave: float = 1.0
+    disappearance: float = 1.0
     # Weight of the distance from where somebody known should be by now if they go on as they went: the
     # full weight from `slack + course_drift * frames elapsed` heights on. 0 is the paper.
-    course: float = 0.2
-    course_drift: float = 0.04
+    motion: float = 0.2
+    motion_drift: float = 0.04
     # Weight of the square of that distance where somebody comes out of hiding, in units of
     # `slack + comeback_drift * frames elapsed` heights; nobody comes back farther off. 0 is the paper:
     # anywhere.
-    comeback: float = 1.0
-    comeback_drift: float = 0.03
+    reappearance: float = 1.0
+    reappearance_drift: float = 0.03
     # Largest difference of appearance to their template at which somebody comes out of hiding, 0 to 1.
-    alike: float = 0.5
+    reappearance_max_distance: float = 0.5
     # How far somebody may be from there without having moved, heights.
-    slack: float = 0.2
+    motion_slack: float = 0.2
     # g of somebody or something whose appearance is not known: about what one object differs from
     # itself, so that the other costs weigh the same with pictures and without.
-    unknown: float = 0.3
+    unknown_appearance: float = 0.3
     # How histograms are compared: g(.), in [0, 1].
     measure: AppearanceMeasure = "bhattacharyya"
     # Longest displacement from one frame to the next, in displacement units; None: any.
@@ -82,16 +82,16 @@ class CostSettings:
             "change",
             "occlusion",
             "confidence",
-            "leave",
-            "course",
-            "comeback",
-            "unknown",
+            "disappearance",
+            "motion",
+            "reappearance",
+            "unknown_appearance",
             "layout",
         )
         for name in weights:
             if not getattr(self, name) >= 0.0:
                 raise ValueError(f"{name} must not be negative, not {getattr(self, name)}")
-        if not min(self.slack, self.course_drift, self.comeback_drift) > 0.0:
+        if not min(self.motion_slack, self.motion_drift, self.reappearance_drift) > 0.0:
             raise ValueError("slack, course_drift and comeback_drift must be positive")
         if self.gate is not None and not self.gate > 0.0:
             raise ValueError(f"gate must be positive, not {self.gate}")
@@ -108,12 +108,12 @@ PAPER_COSTS = CostSettings(
     displacement=0.01,
     displacement_unit="pixels",
     confidence=0.0,
-    leave=0.0,
-    course=0.0,
-    comeback=0.0,
+    disappearance=0.0,
+    motion=0.0,
+    reappearance=0.0,
     gate=None,
     occlusion=0.5,
-    unknown=0.0,
+    unknown_appearance=0.0,
     conflict_rule="corners",
 )
 """The costs as paper II.B has them, in pixels of a CIF picture (the defaults are free of its size)."""

@@ -35,8 +35,8 @@ class _PricedTrellis:
     """The trellis at the prices of a point, the forward pass over it, and the bound that they prove."""
 
     trellis: Trellis
-    ahead: Floats
-    worths: Floats
+    forward: Floats
+    reduced_cost_limits: Floats
     bound: float
 
 
@@ -66,7 +66,7 @@ class ArcGeneration:
         self._master.add_arcs(path_arcs(owners, np.concatenate(guess.paths)))
         anything = np.full(self._network.objects, np.inf)
         self._enter_better_arcs(
-            self._priced_by(ArcMasterSolution(0.0, guess.prices, guess.pulls, anything, 0.0))
+            self._priced_by(ArcMasterSolution(0.0, guess.prices, guess.layout_prices, anything, 0.0))
         )
 
     def run(self) -> RelaxedSolution:
@@ -90,14 +90,14 @@ class ArcGeneration:
             priced=priced.trellis.node,
             rounds=rounds,
             prices=conflict_prices(self._network, self._master.rows, point.prices),
-            pulls=point.pulls,
+            layout_prices=point.layout_prices,
             charges=charges,
         )
 
     def _settled(self) -> ArcMasterSolution:
         """Solve the program with all conflict rows that its solution breaks."""
         point = self._master.solve()
-        while rows := self._finder.broken(self._master.usage()):
+        while rows := self._finder.find_violated(self._master.usage()):
             self._master.add_rows(rows)
             point = self._master.solve()
         return point
@@ -107,16 +107,16 @@ class ArcGeneration:
         trellis = self._trellis.with_node(self._priced(point))
         ahead = forward(trellis)
         least = (ahead[-1] + trellis.sink).min(axis=1)
-        return _PricedTrellis(trellis, ahead, point.worths, float(least.sum()) - point.charge)
+        return _PricedTrellis(trellis, ahead, point.reduced_cost_limits, float(least.sum()) - point.charge)
 
     def _enter_better_arcs(self, priced: _PricedTrellis) -> bool:
         """Let in arcs whose best path betters the program; say whether there are any."""
         layout, objects = self._network.layout, self._network.objects
-        passes = MinMarginals.of(priced.trellis, priced.ahead)
+        passes = MinMarginals.of(priced.trellis, priced.forward)
         for states in (_STATES_WITH_LAYOUT if layout else _STATES, self._network.places + 1):
-            arcs, costs = find_improving_arcs(priced.trellis, passes, priced.worths, states)
+            arcs, costs = find_improving_arcs(priced.trellis, passes, priced.reduced_cost_limits, states)
             chosen = _cheapest_arcs(arcs.owner, costs, objects, _ARCS_WITH_LAYOUT if layout else _ARCS)
-            if self._master.add_arcs(arcs.only(chosen)):
+            if self._master.add_arcs(arcs.select(chosen)):
                 return True
         return False
 
@@ -126,7 +126,7 @@ class ArcGeneration:
         node = add_conflict_prices(network, self._master.rows, point.prices)
         if not network.layout:
             return node
-        return add_layout_prices(node, network.locations[network.sets], point.pulls)
+        return add_layout_prices(node, network.locations[network.sets], point.layout_prices)
 
 
 def start_arc_generation(network: Network, pricing: PathPricer, finder: ConflictSeparator) -> ArcGeneration:
@@ -137,7 +137,7 @@ def start_arc_generation(network: Network, pricing: PathPricer, finder: Conflict
 
 
 def _cheapest_arcs(owner: Ints, costs: Floats, objects: int, most: int) -> Bools:
-    """Return which arcs are among the cheapest of their object; whole paths, since equal costs go together."""
+    """Return which arcs are among the cheapest of their object; arcs of equal cost stay together."""
     kept = np.ones(len(owner), dtype=np.bool_)
     for n in range(objects):
         own = owner == n

@@ -38,11 +38,11 @@ class ArcSet:
     def __len__(self) -> int:
         return len(self.owner)
 
-    def only(self, chosen: Bools) -> ArcSet:
+    def select(self, chosen: Bools) -> ArcSet:
         """Return some of the arcs."""
         return ArcSet(self.owner[chosen], self.frame[chosen], self.origin[chosen], self.target[chosen])
 
-    def and_also(self, more: ArcSet) -> ArcSet:
+    def concatenate(self, more: ArcSet) -> ArcSet:
         """Return these arcs and more."""
         return ArcSet(
             np.concatenate([self.owner, more.owner]),
@@ -75,8 +75,8 @@ class ArcMasterSolution:
 
     objective: float
     prices: Floats
-    pulls: Floats
-    worths: Floats
+    layout_prices: Floats
+    reduced_cost_limits: Floats
     charge: float
 
 
@@ -113,7 +113,7 @@ class ArcMaster:
     def add_arcs(self, arcs: ArcSet) -> int:
         """Add the arcs that are new; return their numbers."""
         fresh = ~self._known[arcs.frame, arcs.owner, arcs.origin, arcs.target]
-        arcs = arcs.only(fresh)
+        arcs = arcs.select(fresh)
         if not len(arcs):
             return 0
         self._known[arcs.frame, arcs.owner, arcs.origin, arcs.target] = True
@@ -133,7 +133,7 @@ class ArcMaster:
             row[order].astype(np.int32),
             value[order],
         )
-        self._arcs = self._arcs.and_also(arcs)
+        self._arcs = self._arcs.concatenate(arcs)
         self._columns = np.concatenate([self._columns, np.arange(first, first + len(arcs))])
         return len(arcs)
 
@@ -201,7 +201,7 @@ class ArcMaster:
         pulls, charge = np.zeros((objects, frames - 1, BOX_SIDES)), float(prices.sum())
         if self._layout is not None:
             forces = self._layout.forces(found.duals)
-            pulls, charge = self._layout.pulls(forces), charge + self._layout.slack(forces)
+            pulls, charge = self._layout.layout_prices(forces), charge + self._layout.slack(forces)
         return ArcMasterSolution(found.objective, prices, pulls, found.duals[:objects], charge)
 
     def usage(self) -> Floats:
@@ -227,10 +227,10 @@ def find_improving_arcs(
     begin = ArcSet(n, zero, zero, packed.index[n, 0, j])
     begin_costs = through[n, 0, begin.target]
 
-    ahead, behind = (np.swapaxes(passed, 0, 1) for passed in (passes.ahead, passes.behind))
+    ahead, behind = (np.swapaxes(passed, 0, 1) for passed in (passes.forward, passes.backward))
     costs = packed.pairs(trellis.pair)
     costs += packed.states(ahead, np.inf)[:, :-1, :, None]
     costs += packed.states(behind + trellis.node, np.inf)[:, 1:, None, :]
     n, m, i, j = np.nonzero(costs < worths[:, None, None, None])
     between = ArcSet(n, m + 1, packed.index[n, m, i], packed.index[n, m + 1, j])
-    return begin.and_also(between), np.concatenate([begin_costs, costs[n, m, i, j]])
+    return begin.concatenate(between), np.concatenate([begin_costs, costs[n, m, i, j]])

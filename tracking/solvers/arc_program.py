@@ -53,24 +53,24 @@ def build_arc_program(network: Network, allowed: NDArray[np.bool_] | None = None
         usable &= allowed
     start = network.source + network.node[:, 0]
     from_source, between, to_sink = np.nonzero(np.isfinite(start)), np.nonzero(usable), _ends(network, exists)
-    source_arcs = build.columns(start[from_source])
-    pair_arcs = build.columns(pair[between])
-    sink_arcs = build.columns(network.sink[to_sink])
+    source_arcs = build.add_columns(start[from_source])
+    pair_arcs = build.add_columns(pair[between])
+    sink_arcs = build.add_columns(network.sink[to_sink])
     nodes = np.full(network.node.shape, -1, dtype=np.int64)
-    nodes[exists] = build.columns(np.zeros(int(exists.sum())))
+    nodes[exists] = build.add_columns(np.zeros(int(exists.sum())))
 
     count = int(exists.sum())
     into, out_of = np.full(nodes.shape, -1), np.full(nodes.shape, -1)
-    into[exists], out_of[exists] = build.rows(count, 0.0, 0.0), build.rows(count, 0.0, 0.0)
-    build.put(into[exists], nodes[exists], -1.0)
-    build.put(out_of[exists], nodes[exists], -1.0)
-    build.put(build.rows(network.objects, 1.0, 1.0)[from_source[0]], source_arcs, 1.0)
-    build.put(build.rows(network.objects, 1.0, 1.0)[to_sink[0]], sink_arcs, 1.0)
-    build.put(into[from_source[0], 0, from_source[1]], source_arcs, 1.0)
+    into[exists], out_of[exists] = build.add_rows(count, 0.0, 0.0), build.add_rows(count, 0.0, 0.0)
+    build.add_entries(into[exists], nodes[exists], -1.0)
+    build.add_entries(out_of[exists], nodes[exists], -1.0)
+    build.add_entries(build.add_rows(network.objects, 1.0, 1.0)[from_source[0]], source_arcs, 1.0)
+    build.add_entries(build.add_rows(network.objects, 1.0, 1.0)[to_sink[0]], sink_arcs, 1.0)
+    build.add_entries(into[from_source[0], 0, from_source[1]], source_arcs, 1.0)
     n, m, i, j = between
-    build.put(out_of[n, m, i], pair_arcs, 1.0)
-    build.put(into[n, m + 1, j], pair_arcs, 1.0)
-    build.put(out_of[to_sink[0], -1, to_sink[1]], sink_arcs, 1.0)
+    build.add_entries(out_of[n, m, i], pair_arcs, 1.0)
+    build.add_entries(into[n, m + 1, j], pair_arcs, 1.0)
+    build.add_entries(out_of[to_sink[0], -1, to_sink[1]], sink_arcs, 1.0)
 
     _add_conflicts(build, network, nodes)
     arcs = len(source_arcs) + len(pair_arcs) + len(sink_arcs)
@@ -88,7 +88,7 @@ def _add_conflicts(build: LinearProgramBuilder, network: Network, nodes: Ints) -
         rows = network.rows(m)
         row, n, place = np.nonzero(rows)
         column = nodes[n, m, place]
-        build.put(build.rows(len(rows), -np.inf, 1.0)[row[column >= 0]], column[column >= 0], 1.0)
+        build.add_entries(build.add_rows(len(rows), -np.inf, 1.0)[row[column >= 0]], column[column >= 0], 1.0)
 
 
 def _add_layout(build: LinearProgramBuilder, network: Network, nodes: Ints) -> Ints:
@@ -98,22 +98,22 @@ def _add_layout(build: LinearProgramBuilder, network: Network, nodes: Ints) -> I
     if not network.layout or not pairs or not steps:
         return np.empty((len(pairs), steps, BOX_SIDES, 0), dtype=np.int64)
     shape = (network.objects, network.frames, BOX_SIDES)
-    location = build.columns(np.zeros(int(np.prod(shape))), lower=-np.inf).reshape(shape)
-    tie = build.rows(location.size, 0.0, 0.0).reshape(shape)
-    build.put(tie, location, 1.0)
+    location = build.add_columns(np.zeros(int(np.prod(shape))), lower=-np.inf).reshape(shape)
+    tie = build.add_rows(location.size, 0.0, 0.0).reshape(shape)
+    build.add_entries(tie, location, 1.0)
     n, m, state = np.nonzero(nodes >= 0)
-    build.put(tie[n, m], nodes[n, m, state][:, None], -network.locations[network.sets[n], m, state])
+    build.add_entries(tie[n, m], nodes[n, m, state][:, None], -network.locations[network.sets[n], m, state])
 
     first, second = np.array(pairs).T
-    moves = build.columns(np.full(len(pairs) * steps * BOX_SIDES * 2, network.layout))
+    moves = build.add_columns(np.full(len(pairs) * steps * BOX_SIDES * 2, network.layout))
     moves = moves.reshape(len(pairs), steps, BOX_SIDES, 2)
-    change = build.rows(moves.size // 2, 0.0, 0.0).reshape(moves.shape[:3])
-    build.put(change, moves[..., 0], 1.0)
-    build.put(change, moves[..., 1], -1.0)
-    build.put(change, location[first, :-1], -1.0)
-    build.put(change, location[first, 1:], 1.0)
-    build.put(change, location[second, :-1], 1.0)
-    build.put(change, location[second, 1:], -1.0)
+    change = build.add_rows(moves.size // 2, 0.0, 0.0).reshape(moves.shape[:3])
+    build.add_entries(change, moves[..., 0], 1.0)
+    build.add_entries(change, moves[..., 1], -1.0)
+    build.add_entries(change, location[first, :-1], -1.0)
+    build.add_entries(change, location[first, 1:], 1.0)
+    build.add_entries(change, location[second, :-1], 1.0)
+    build.add_entries(change, location[second, 1:], -1.0)
     return moves
 
 
@@ -122,7 +122,7 @@ class ArcProgramSolver(TimedSolver):
 
     name = "arcs"
 
-    def _answer(self, network: Network, _hint: WarmStart | None) -> Solution:
+    def _solve(self, network: Network, _warm_start: WarmStart | None) -> Solution:
         """Solve the relaxation and round it where it is not whole."""
         if not network.objects:
             return empty_solution(self.name, network)

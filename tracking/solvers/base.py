@@ -77,7 +77,7 @@ class Solution:
     prices: tuple[ConflictPrice, ...] = ()
 
     @property
-    def hint(self) -> WarmStart:
+    def warm_start(self) -> WarmStart:
         """What this answer tells about a window with the same frames; see `WarmStart.later`."""
         return WarmStart(self.prices, self.states)
 
@@ -89,10 +89,10 @@ class Solver(Protocol):
     def name(self) -> str:
         """The name in the registry."""
 
-    def solve(self, network: Network, hint: WarmStart | None = None) -> Solution:
-        """Return the states of all objects in all frames; the same network and hint give the same answer.
+    def solve(self, network: Network, warm_start: WarmStart | None = None) -> Solution:
+        """Return the states of all objects in all frames; the same input gives the same answer.
 
-        A hint, `Solution.hint.later(...)` of the window before, makes it quicker, whatever it says.
+        A warm start (`Solution.warm_start.shift(...)` of the previous window) only makes it faster.
         """
 
 
@@ -118,13 +118,13 @@ class TimedSolver(ABC):
 
     name: ClassVar[str]
 
-    def solve(self, network: Network, hint: WarmStart | None = None) -> Solution:
+    def solve(self, network: Network, warm_start: WarmStart | None = None) -> Solution:
         """Return the states of all objects in all frames; a hint only makes it quicker."""
         start = time.perf_counter()
-        solution = self._answer(network, hint)
+        solution = self._solve(network, warm_start)
         seconds = time.perf_counter() - start
         return replace(solution, report=replace(solution.report, seconds=seconds))
 
     @abstractmethod
-    def _answer(self, network: Network, _hint: WarmStart | None) -> Solution:
+    def _solve(self, network: Network, warm_start: WarmStart | None) -> Solution:
         """Solve the network, which may be one without objects."""

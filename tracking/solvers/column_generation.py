@@ -66,24 +66,24 @@ class PathGeneration:
         each, frames = np.indices(self._alone.nodes.shape)
         self._usage[each, frames, self._alone.nodes] = 1.0
 
-    def run(self, hint: WarmStart | None = None) -> RelaxedSolution:
+    def run(self, warm_start: WarmStart | None = None) -> RelaxedSolution:
         """Find the optimum of the relaxation."""
         if not conflict_count(self._network, self._alone.nodes):
             return RelaxedSolution(self._usage, float(self._alone.costs.sum()), self._priced, 0)
-        return self._of_those_who_meet(hint)
+        return self._of_those_who_meet(warm_start)
 
-    def _of_those_who_meet(self, hint: WarmStart | None) -> RelaxedSolution:
-        rows = self._finder.broken(self._usage)
-        told = try_warm_start(self._network, self._pricing, self._finder, hint) if hint else None
+    def _of_those_who_meet(self, warm_start: WarmStart | None) -> RelaxedSolution:
+        rows = self._finder.find_violated(self._usage)
+        told = try_warm_start(self._network, self._pricing, self._finder, warm_start) if warm_start else None
         if told is not None and told.proven is not None:
             return told.proven
         self._meet(rows)
         if self._largest_group() > _MAX_PATH_GROUP:
             return start_arc_generation(self._network, self._pricing, ConflictSeparator(self._network)).run()
-        self._bind([*rows, *self._finder.fresh(told.rows)] if told else rows)
+        self._bind([*rows, *self._finder.drop_known(told.rows)] if told else rows)
         for paths in told.paths if told else ():
             active = np.flatnonzero(self._active)
-            self._master.add_paths(active, paths.only(active))
+            self._master.add_paths(active, paths.select(active))
         self._solve()
         self._keep_rows()
         rounds = 0
@@ -108,7 +108,7 @@ class PathGeneration:
 
     def _by_arcs(self, rounds: int) -> RelaxedSolution:
         """Go on from the arcs of the paths in use: many objects that meet want parts of paths combined."""
-        owners, nodes = self._master.used()
+        owners, nodes = self._master.used_paths()
         calm = np.flatnonzero(~self._active)
         starts = path_arcs(np.concatenate([owners, calm]), np.concatenate([nodes, self._alone.nodes[calm]]))
         found = ArcGeneration(self._network, starts, self._master.rows, self._finder).run()
@@ -116,11 +116,11 @@ class PathGeneration:
 
     def _solve(self) -> None:
         self._point = self._master.solve()
-        self._master.put_usage(self._usage)
+        self._master.write_usage(self._usage)
 
     def _keep_rows(self) -> None:
         """Bind the program by the rows it breaks until it breaks none."""
-        while rows := self._finder.broken(self._usage):
+        while rows := self._finder.find_violated(self._usage):
             self._bind(rows)
             self._solve()
 
@@ -147,8 +147,8 @@ class PathGeneration:
         self._master.add_rows(rows)
         # Occluded all along, an object keeps every row: the program always has a solution.
         hidden = np.full((self._network.objects, self._network.frames), self._network.places)
-        self._master.add_paths(new, Paths(hidden, path_costs(self._network, hidden)).only(new))
-        self._master.add_paths(new, self._alone.only(new))
+        self._master.add_paths(new, Paths(hidden, path_costs(self._network, hidden)).select(new))
+        self._master.add_paths(new, self._alone.select(new))
         self._enter_detours(np.flatnonzero(concerned))
 
     def _enter_detours(self, objects: Ints) -> None:
@@ -201,21 +201,21 @@ class ColumnGenerationSolver(TimedSolver):
 
     name = "columns"
 
-    def _answer(self, network: Network, hint: WarmStart | None) -> Solution:
+    def _solve(self, network: Network, warm_start: WarmStart | None) -> Solution:
         """Solve the relaxation and round it where it is not whole."""
         if not network.objects:
             return empty_solution(self.name, network)
-        return solution_from_relaxation(self.name, network, solve_relaxation(network, hint))
+        return solution_from_relaxation(self.name, network, solve_relaxation(network, warm_start))
 
 
-def solve_relaxation(network: Network, hint: WarmStart | None = None) -> RelaxedSolution:
+def solve_relaxation(network: Network, warm_start: WarmStart | None = None) -> RelaxedSolution:
     """Return the optimum of the relaxation of a network with at least one object.
 
     Paths are the columns where only conflicts couple the objects; under the layout term, which whole
     paths fit badly, arcs are.
     """
     if not network.layout:
-        return PathGeneration(network).run(hint)
+        return PathGeneration(network).run(warm_start)
     return start_arc_generation(network, PathPricer(Trellis.of(network)), ConflictSeparator(network)).run()
 
 
@@ -230,13 +230,13 @@ class SquaredLayoutSolver(TimedSolver):
 
     name = "l2"
 
-    def _answer(self, network: Network, _hint: WarmStart | None) -> Solution:
+    def _solve(self, network: Network, _warm_start: WarmStart | None) -> Solution:
         """Solve the relaxation and round it where it is not whole."""
         if not network.objects:
             return empty_solution(self.name, network)
         if not network.layout:
             return solution_from_relaxation(self.name, network, solve_relaxation(network))
-        start = LocalSearch(network, _SQUARED_POWER).improved(greedy_paths(network).nodes)
+        start = LocalSearch(network, _SQUARED_POWER).improve(greedy_paths(network).nodes)
         starts = path_arcs(np.arange(network.objects), start)
         found = _SquaredLayoutGeneration(network, starts, [], ConflictSeparator(network)).run()
         return solution_from_relaxation(self.name, network, found, _SQUARED_POWER)

@@ -59,7 +59,7 @@ class ConflictSeparator:
         self._parts: dict[tuple[int, int], _ConflictComponent] = {}
         self._given: set[tuple[int, bytes]] = set()
 
-    def broken(self, usage: Floats) -> list[ConflictRow]:
+    def find_violated(self, usage: Floats) -> list[ConflictRow]:
         """Return the rows that y = `usage` (n, M, S) breaks and that were not given before."""
         found = []
         visits = self._visits(usage)
@@ -76,7 +76,7 @@ class ConflictSeparator:
                         found.append(self._row(frame, row))
         return found
 
-    def recalled(self, rows: Sequence[ConflictPrice]) -> tuple[list[ConflictRow], list[float]]:
+    def match_prices(self, rows: Sequence[ConflictPrice]) -> tuple[list[ConflictRow], list[float]]:
         """Return those rows, and their prices, that are rows of this network, given before or not."""
         found: list[ConflictRow] = []
         prices: list[float] = []
@@ -97,7 +97,7 @@ class ConflictSeparator:
                     prices.append(row.price)
         return found, prices
 
-    def fresh(self, rows: Sequence[ConflictRow]) -> list[ConflictRow]:
+    def drop_known(self, rows: Sequence[ConflictRow]) -> list[ConflictRow]:
         """Return those of the rows that were not given before; from now on they were."""
         keys = [(row.frame, self._entries(row).tobytes()) for row in rows]
         found = {key: row for key, row in zip(keys, rows, strict=True) if key not in self._given}

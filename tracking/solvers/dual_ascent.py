@@ -28,7 +28,7 @@ class AdamSteps:
         self._way = self._size = np.empty(0)
         self._weight = self._weight_of_size = 0.0
 
-    def along(self, slope: Floats) -> Floats:
+    def step(self, slope: Floats) -> Floats:
         """Return the next step, about 1 where the slopes agree with each other and near 0 where not."""
         if len(self._way) < len(slope):
             joined = np.zeros((len(slope) - len(self._way), *slope.shape[1:]))
@@ -64,19 +64,19 @@ class LayoutDuals:
         self._most = network.layout
         self._steps = AdamSteps()
 
-    def pulls(self) -> Floats:
+    def layout_prices(self) -> Floats:
         """Return what a move by a pixel earns each object, (n, M - 1, 4)."""
         pulls = np.zeros((self._objects, *self._forces.shape[1:]))
         np.add.at(pulls, self._pairs[:, 0], self._forces)
         np.add.at(pulls, self._pairs[:, 1], -self._forces)
         return pulls
 
-    def climb(self, where: Floats, length: float) -> bool:
+    def ascend(self, where: Floats, length: float) -> bool:
         """Step by `length` of the largest force, for objects at `where` (n, M, 4); False: all in step."""
         slope = self._slope(where)
         if not slope.any():
             return False
-        self._forces += length * self._most * self._steps.along(slope)
+        self._forces += length * self._most * self._steps.step(slope)
         np.clip(self._forces, -self._most, self._most, out=self._forces)
         return True
 
@@ -99,7 +99,7 @@ class ConflictDuals:
         self.rows: list[ConflictRow] = []
         self.prices = np.empty(0)
 
-    def join(self, rows: Sequence[ConflictRow]) -> None:
+    def add_rows(self, rows: Sequence[ConflictRow]) -> None:
         """Let more rows have a price."""
         if not rows:
             return
@@ -110,7 +110,7 @@ class ConflictDuals:
         self.prices = np.concatenate([self.prices, np.zeros(len(rows))])
         self.rows.extend(rows)
 
-    def on(self, node: Floats) -> Floats:
+    def add_to(self, node: Floats) -> Floats:
         """Return the costs of nodes, `node` (n, M, W), with the prices."""
         if not len(self.prices):
             return node
@@ -118,7 +118,7 @@ class ConflictDuals:
         added = at @ self._members.reshape(len(self.prices), -1)
         return np.asarray(node + np.swapaxes(added.reshape(self._frames, *self._members.shape[1:]), 0, 1))
 
-    def climb(self, slots: Ints, length: float) -> bool:
+    def ascend(self, slots: Ints, length: float) -> bool:
         """Step by `length` for objects in `slots` (n, M); False: no row is broken and none costs."""
         if not len(self.prices):
             return False
@@ -127,7 +127,7 @@ class ConflictDuals:
         slope[(slope < 0.0) & (self.prices == 0.0)] = 0.0
         if not slope.any():
             return False
-        self.prices = np.maximum(0.0, self.prices + length * self._steps.along(slope))
+        self.prices = np.maximum(0.0, self.prices + length * self._steps.step(slope))
         return True
 
 
@@ -175,13 +175,13 @@ class DualGuess:
 
     rows: list[ConflictRow]
     prices: Floats
-    pulls: Floats
+    layout_prices: Floats
     paths: Ints
 
 
 def guess_duals(network: Network, pricing: PathPricer, finder: ConflictSeparator) -> DualGuess:
     """Guess the duals of a network."""
-    passes = MinMarginals.of(pricing.trellis, pricing.ahead)
+    passes = MinMarginals.of(pricing.trellis, pricing.forward)
     pace = _WITH_LAYOUT if network.layout else _BY_CONFLICTS
     packed = PrunedStates.cheapest(passes.through, pace.states)
     trellis = packed.trellis(pricing.trellis)
@@ -189,25 +189,25 @@ def guess_duals(network: Network, pricing: PathPricer, finder: ConflictSeparator
     where = packed.states(network.locations[network.sets], 0.0) if network.layout else None
     typical = _typical_price(packed.states(passes.through, np.inf), passes.least)
     each, frames = np.indices((network.objects, network.frames))
-    best, best_prices, best_pulls = -np.inf, prices.prices, forces.pulls()
+    best, best_prices, best_pulls = -np.inf, prices.prices, forces.layout_prices()
     met: list[Ints] = []
     for step in range(pace.steps):
-        node, pulls = prices.on(trellis.node), forces.pulls()
+        node, pulls = prices.add_to(trellis.node), forces.layout_prices()
         paths = best_paths(
             trellis.with_node(node if where is None else add_layout_prices(node, where, pulls))
         )
-        met = [*met, packed.named(paths.nodes)][-_KEPT_PATHS:]
+        met = [*met, packed.original_states(paths.nodes)][-_KEPT_PATHS:]
         bound = float(paths.costs.sum() - prices.prices.sum())
         if bound > best:
             best, best_prices, best_pulls = bound, prices.prices, pulls
         if step < _EARLY_STEPS or step % _SEPARATION_INTERVAL == 0:
             usage = np.zeros(network.node.shape)
             usage[each, frames, met[-1]] = 1.0
-            prices.join(finder.broken(usage))
+            prices.add_rows(finder.find_violated(usage))
         length = pace.shorter**step
-        moved = prices.climb(paths.nodes, length * pace.price * typical)
+        moved = prices.ascend(paths.nodes, length * pace.price * typical)
         if where is not None:
-            moved |= forces.climb(where[each, frames, paths.nodes], length * _FIRST_FORCE_STEP)
+            moved |= forces.ascend(where[each, frames, paths.nodes], length * _FIRST_FORCE_STEP)
         if not moved:
             break
     late = np.zeros(len(prices.prices) - len(best_prices))

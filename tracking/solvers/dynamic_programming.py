@@ -25,7 +25,7 @@ class SeparateDpSolver(TimedSolver):
 
     name = "separate-dp"
 
-    def _answer(self, network: Network, _hint: WarmStart | None) -> Solution:
+    def _solve(self, network: Network, _warm_start: WarmStart | None) -> Solution:
         """Return the cheapest paths; the sum of their costs is the bound."""
         paths = best_paths(Trellis.of(network))
         conflicts = conflict_count(network, paths.nodes)
@@ -71,7 +71,7 @@ def greedy_paths(network: Network, alone: Paths | None = None) -> GreedyPaths:
         # A cheapest path of which nothing is barred is still the cheapest.
         cut = np.flatnonzero(left & np.isinf(trellis.node[each, frames, nodes]).any(axis=1))
         if len(cut):
-            again = best_paths(trellis.only(cut))
+            again = best_paths(trellis.select(cut))
             nodes[cut], costs[cut] = again.nodes, again.costs
     return GreedyPaths(nodes, bound)
 
@@ -81,7 +81,7 @@ class GreedyDpSolver(TimedSolver):
 
     name = "greedy-dp"
 
-    def _answer(self, network: Network, _hint: WarmStart | None) -> Solution:
+    def _solve(self, network: Network, _warm_start: WarmStart | None) -> Solution:
         """Return the greedy paths; the bound is the cost of all cheapest paths, conflicts ignored."""
         paths = greedy_paths(network)
         cost, conflicts = total_cost(network, paths.nodes), conflict_count(network, paths.nodes)

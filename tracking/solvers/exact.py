@@ -64,8 +64,8 @@ class JointStateSearch:
         self._excess = passes.through - passes.least[:, None, None]
         self._where = network.locations[network.sets]
         # What the way from a state on costs at least: the part of a pull that acts at the cut is undone.
-        self._rest = np.swapaxes(passes.behind, 0, 1).copy()
-        self._rest[:, :-1] += np.einsum("nml,nmsl->nms", found.pulls, self._where[:, :-1])
+        self._rest = np.swapaxes(passes.backward, 0, 1).copy()
+        self._rest[:, :-1] += np.einsum("nml,nmsl->nms", found.layout_prices, self._where[:, :-1])
         self._charges = np.append(np.cumsum(found.charges[::-1])[::-1][1:], 0.0)
 
     def cheaper_than(self, cost: float) -> Ints | None:
@@ -172,7 +172,7 @@ class ExactSolver(TimedSolver):
 
     name = "exact"
 
-    def _answer(self, network: Network, _hint: WarmStart | None) -> Solution:
+    def _solve(self, network: Network, _warm_start: WarmStart | None) -> Solution:
         """Return the cheapest states without conflicts; the bound is their cost."""
         if not network.objects:
             return empty_solution(self.name, network)

@@ -25,7 +25,7 @@ class ExtendedDpSolver(TimedSolver):
 
     name = "extended-dp"
 
-    def _answer(self, network: Network, _hint: WarmStart | None) -> Solution:
+    def _solve(self, network: Network, _warm_start: WarmStart | None) -> Solution:
         """Return the cheapest states without conflicts; the bound is their cost.
 
         Raises:

@@ -97,7 +97,7 @@ class LayoutConstraints:
         forces = duals[self._differences]
         return forces if self._squared else np.clip(forces, -self._network.layout, self._network.layout)
 
-    def pulls(self, forces: Floats) -> Floats:
+    def layout_prices(self, forces: Floats) -> Floats:
         """Return what a move by a pixel earns each object, (n, M - 1, 4)."""
         pulls = np.zeros(self._moves.shape)
         np.add.at(pulls, self._pairs[:, 0], forces)

@@ -147,21 +147,21 @@ class LinearProgramBuilder:
         self._columns = 0
         self._rows = 0
 
-    def columns(self, costs: Floats, lower: float = 0.0) -> NDArray[np.int64]:
+    def add_columns(self, costs: Floats, lower: float = 0.0) -> NDArray[np.int64]:
         """Add columns without upper bound; return their numbers."""
         first, self._columns = self._columns, self._columns + len(costs)
         self._costs.append(costs)
         self._lower.append(np.full(len(costs), lower))
         return np.arange(first, self._columns)
 
-    def rows(self, count: int, lower: float, upper: float) -> NDArray[np.int64]:
+    def add_rows(self, count: int, lower: float, upper: float) -> NDArray[np.int64]:
         """Add `count` empty rows; return their numbers."""
         first, self._rows = self._rows, self._rows + count
         self._row_lower.append(np.full(count, lower))
         self._row_upper.append(np.full(count, upper))
         return np.arange(first, self._rows)
 
-    def put(self, rows: ArrayLike, columns: ArrayLike, values: ArrayLike) -> None:
+    def add_entries(self, rows: ArrayLike, columns: ArrayLike, values: ArrayLike) -> None:
         """Put values into the matrix; the three broadcast."""
         at_row, at_column, value = np.broadcast_arrays(rows, columns, values)
         self._entries.append(

@@ -23,7 +23,7 @@ def states_from_nodes(network: Network, nodes: Ints) -> Ints:
 
 
 def path_costs(network: Network, nodes: Ints) -> Floats:
-    """Return the cost of each object's path through `nodes` (n, M), (n,); infinite where an arc is missing."""
+    """Return the cost (n,) of each object's path through `nodes` (n, M); infinite where an arc is missing."""
     each = np.arange(network.objects)
     frames = np.arange(network.frames)
     visited = network.node[each[:, None], frames, nodes].sum(axis=1)

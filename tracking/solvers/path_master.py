@@ -28,7 +28,7 @@ class PathMasterSolution:
 
     objective: float
     prices: Floats
-    worths: Floats
+    reduced_cost_limits: Floats
 
 
 class PathMaster:
@@ -104,12 +104,12 @@ class PathMaster:
         prices = np.maximum(0.0, -found.duals[self._conflict_rows]) if self.rows else np.empty(0)
         return PathMasterSolution(found.objective, prices, worths)
 
-    def used(self) -> tuple[Ints, Ints]:
+    def used_paths(self) -> tuple[Ints, Ints]:
         """Return the paths in use: their objects (P,) and nodes (P, M)."""
         used = np.flatnonzero(self._values > 0.0)
         return self._owners[used], self._paths[used]
 
-    def put_usage(self, usage: Floats) -> None:
+    def write_usage(self, usage: Floats) -> None:
         """Write y of the objects added into `usage` (n, M, S)."""
         usage[list(self._object_rows)] = 0.0
         frames = np.arange(self._network.frames)

@@ -37,13 +37,13 @@ class RelaxedSolution:
     priced: Floats
     rounds: int
     prices: tuple[ConflictPrice, ...] = ()
-    pulls: Floats = field(default_factory=lambda: np.empty(0))
+    layout_prices: Floats = field(default_factory=lambda: np.empty(0))
     charges: Floats = field(default_factory=lambda: np.empty(0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WarmStartResult:
-    """What a hint is worth in a network.
+    """What a warm_start is worth in a network.
 
     Attributes:
         rows: the conflict rows of the hint that the network has.
@@ -57,16 +57,16 @@ class WarmStartResult:
 
 
 def try_warm_start(
-    network: Network, pricing: PathPricer, finder: ConflictSeparator, hint: WarmStart
+    network: Network, pricing: PathPricer, finder: ConflictSeparator, warm_start: WarmStart
 ) -> WarmStartResult:
     """Try a hint; of a network without layout term."""
-    rows, costs = finder.recalled(hint.rows)
+    rows, costs = finder.match_prices(warm_start.rows)
     prices = np.array(costs)
     node = add_conflict_prices(network, rows, prices)
     priced = pricing.best_paths(node, np.arange(network.objects))
     bound = float(priced.costs.sum() - prices.sum())
     paths = []
-    for nodes in (priced.nodes, _follow_warm_start(network, pricing, node, hint, priced.nodes)):
+    for nodes in (priced.nodes, _follow_warm_start(network, pricing, node, warm_start, priced.nodes)):
         true_costs = path_costs(network, nodes)
         paths.append(Paths(nodes, true_costs))
         cost = float(true_costs.sum())
@@ -89,12 +89,12 @@ def add_conflict_prices(network: Network, rows: list[ConflictRow], prices: Float
 
 
 def _follow_warm_start(
-    network: Network, pricing: PathPricer, node: Floats, hint: WarmStart, nodes: Ints
+    network: Network, pricing: PathPricer, node: Floats, warm_start: WarmStart, nodes: Ints
 ) -> Ints:
     """Return `nodes` (n, M), but for objects that the hint has elsewhere the best paths that follow it."""
-    if len(hint.states) != network.objects:
+    if len(warm_start.states) != network.objects:
         return nodes
-    known = hint.states[:, : network.frames]
+    known = warm_start.states[:, : network.frames]
     frames = known.shape[1]
     hinted = np.where(known == -1, network.places, known)
     usable = (hinted >= 0) & (hinted <= network.places)
@@ -104,7 +104,7 @@ def _follow_warm_start(
     bound = node[elsewhere].copy()
     off = np.arange(network.places + 1) != hinted[elsewhere, :, None]
     bound[:, :frames][off & usable[elsewhere, :, None]] = np.inf
-    found = best_paths(pricing.trellis.with_node(node).only(elsewhere).with_node(bound))
+    found = best_paths(pricing.trellis.with_node(node).select(elsewhere).with_node(bound))
     # Where the hint asks for arcs that do not exist, it is no help.
     there = np.isfinite(found.costs)
     answer = nodes.copy()

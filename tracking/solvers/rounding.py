@@ -74,9 +74,9 @@ class LocalSearch:
         self._power = power
         self._trellis = Trellis.of(network)
         self._passes = MinMarginals.of(self._trellis)
-        self.alone = trace_back(self._trellis, self._passes.ahead)
+        self.alone = trace_back(self._trellis, self._passes.forward)
 
-    def improved(self, nodes: Ints) -> Ints:
+    def improve(self, nodes: Ints) -> Ints:
         """Return nodes (n, M) without conflicts that cost no more, from nodes without conflicts.
 
         Repairs what the rounding of II.D may leave, since it looks at each frame by itself: arcs that do
@@ -86,7 +86,7 @@ class LocalSearch:
         turns.nodes = nodes.copy()
         cost = total_cost(self._network, nodes, self._power)
         for _ in range(_MAX_ROUNDS):
-            changed = [turns.take(owner) for owner in range(self._network.objects)]
+            changed = [turns.reroute(owner) for owner in range(self._network.objects)]
             before, cost = cost, total_cost(self._network, turns.nodes, self._power)
             if not any(changed) or not cost < before - _MIN_IMPROVEMENT * max(1.0, abs(cost)):
                 break
@@ -105,8 +105,8 @@ class _CoordinateDescent:
         self._settled = np.zeros(network.objects, dtype=np.bool_)
         self.nodes = np.empty((network.objects, network.frames), dtype=np.int64)
 
-    def take(self, owner: int) -> bool:
-        """Return an object its best path around the others; say whether it moved."""
+    def reroute(self, owner: int) -> bool:
+        """Move one object to its best path around the others; return whether it moved."""
         if self._settled[owner]:
             return False
         cost = self._own_cost(owner)
@@ -142,10 +142,10 @@ class _CoordinateDescent:
         node[:, :-1][self._barred(owner)] = np.inf
         limit = cost + _MIN_IMPROVEMENT * max(1.0, abs(cost)) if np.isfinite(cost) else np.inf
         packed = PrunedStates.of(((self._through[owner] <= limit) & np.isfinite(node))[None])
-        trellis = packed.trellis(self._trellis.only(np.array([owner])).with_node(node[None]))
+        trellis = packed.trellis(self._trellis.select(np.array([owner])).with_node(node[None]))
         if network.layout:
             trellis.pair[0] += network.layout * self._layout_of_arcs(owner, packed)
-        return np.asarray(packed.named(best_paths(trellis).nodes)[0])
+        return np.asarray(packed.original_states(best_paths(trellis).nodes)[0])
 
     def _barred(self, owner: int) -> Bools:
         """Return which places of one object the others bar, (M, K)."""

@@ -36,8 +36,8 @@ def integer_nodes(network: Network, usage: Floats, power: int = 1) -> Ints:
     if is_integral(usage):
         return nodes
     improver = LocalSearch(network, power)
-    nodes = improver.improved(nodes)
-    greedy = improver.improved(greedy_paths(network, improver.alone).nodes)
+    nodes = improver.improve(nodes)
+    greedy = improver.improve(greedy_paths(network, improver.alone).nodes)
     if conflict_count(network, greedy):
         return nodes
     return greedy if total_cost(network, greedy, power) < total_cost(network, nodes, power) else nodes

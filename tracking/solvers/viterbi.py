@@ -31,7 +31,7 @@ class Trellis:
         """Return the trellis of a network as it is."""
         return cls(network.source, network.node, network.pair, network.sink)
 
-    def only(self, chosen: NDArray[np.int64]) -> Trellis:
+    def select(self, chosen: NDArray[np.int64]) -> Trellis:
         """Return the trellis of some of the objects."""
         pair = self.pair if len(self.pair) == 1 else self.pair[chosen]
         return Trellis(self.source[chosen], self.node[chosen], pair, self.sink[chosen])
@@ -53,7 +53,7 @@ class Paths:
     nodes: NDArray[np.int64]
     costs: Floats
 
-    def only(self, chosen: NDArray[np.int64]) -> Paths:
+    def select(self, chosen: NDArray[np.int64]) -> Paths:
         """Return the paths of some of the objects."""
         return Paths(self.nodes[chosen], self.costs[chosen])
 
@@ -114,8 +114,8 @@ class MinMarginals:
         least: (n,) the costs of the cheapest paths.
     """
 
-    ahead: Floats
-    behind: Floats
+    forward: Floats
+    backward: Floats
     least: Floats
 
     @classmethod
@@ -127,7 +127,7 @@ class MinMarginals:
     @property
     def through(self) -> Floats:
         """The cost of the best path through each state, (n, M, S)."""
-        return np.swapaxes(self.ahead + self.behind, 0, 1)
+        return np.swapaxes(self.forward + self.backward, 0, 1)
 
 
 def best_paths(trellis: Trellis) -> Paths:
@@ -189,7 +189,7 @@ class PrunedStates:
             trellis.sink[each, self.index[:, -1]],
         )
 
-    def named(self, slots: Ints) -> Ints:
+    def original_states(self, slots: Ints) -> Ints:
         """Return the states in slots, both (n, M)."""
         return np.asarray(np.take_along_axis(self.index, slots[:, :, None], axis=2)[:, :, 0])
 
@@ -205,8 +205,8 @@ class PathPricer:
 
     def __init__(self, trellis: Trellis) -> None:
         self.trellis = trellis
-        self.ahead = forward(trellis)
-        self.alone = trace_back(trellis, self.ahead)
+        self.forward = forward(trellis)
+        self.alone = trace_back(trellis, self.forward)
         self._node = trellis.node.copy()
         self._paths = Paths(self.alone.nodes.copy(), self.alone.costs.copy())
 
@@ -215,11 +215,11 @@ class PathPricer:
         touched = objects[(node[objects] != self._node[objects]).any(axis=(1, 2))]
         if len(touched):
             self._node[touched] = node[touched]
-            trellis = self.trellis.with_node(node).only(touched)
+            trellis = self.trellis.with_node(node).select(touched)
             # Up to the first frame with a price the ways are those without prices.
             priced = (trellis.node != self.trellis.node[touched]).any(axis=(0, 2))
             first = int(priced.argmax()) if priced.any() else len(priced)
-            paths = trace_back(trellis, forward(trellis, self.ahead[:first, touched]))
+            paths = trace_back(trellis, forward(trellis, self.forward[:first, touched]))
             self._paths.nodes[touched] = paths.nodes
             self._paths.costs[touched] = paths.costs
-        return self._paths.only(objects)
+        return self._paths.select(objects)

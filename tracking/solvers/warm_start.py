@@ -34,7 +34,7 @@ class WarmStart:
     rows: tuple[ConflictPrice, ...]
     states: NDArray[np.int64]
 
-    def later(self, frames: int, objects: Sequence[int | None]) -> WarmStart:
+    def shift(self, frames: int, objects: Sequence[int | None]) -> WarmStart:
         """Return the hint for a window that begins `frames` later.
 
         `objects` says for each object of that window which it was in this one; None: it was not.
@@ -54,15 +54,15 @@ class WindowWarmStart:
 
     Attributes:
         first: the window's first frame.
-        ids: the numbers of its objects, in the order of the hint.
-        hint: the answer.
+        ids: the numbers of its objects, in the order of the warm_start.
+        warm_start: the answer.
     """
 
     first: int
     ids: Sequence[int]
-    hint: WarmStart
+    warm_start: WarmStart
 
-    def hint_for(self, first: int, ids: Sequence[int]) -> WarmStart:
+    def for_window(self, first: int, ids: Sequence[int]) -> WarmStart:
         """Return the hint for a window of the objects `ids` that begins with the frame `first`."""
         rows = {number: n for n, number in enumerate(self.ids)}
-        return self.hint.later(first - self.first, [rows.get(number) for number in ids])
+        return self.warm_start.shift(first - self.first, [rows.get(number) for number in ids])
