@@ -23,12 +23,12 @@ from numpy.typing import NDArray
 
 from benchmarks.report import Report
 from benchmarks.surroundings import parser
-from server.camera.encode import Encoder
+from server.camera.encoding.encoder import Encoder
 from server.camera.pipeline import CameraPipeline
-from server.camera.scene import Scene
-from server.wire.config import Config
-from server.wire.loading import build_config
-from server.wire.sections import Encode, Site
+from server.config.loader import build_config
+from server.config.sections import Encode, Site
+from server.config.site_config import Config
+from synthetic import Scene
 
 _MS = 1e3
 _START = 200

@@ -8,8 +8,8 @@ from collections.abc import AsyncIterator
 
 from playwright.async_api import Error, Page
 
-from server.run.demo import run_demo
-from server.run.setup import free_port
+from server.cli.demo import run_demo
+from server.cli.generated_config import free_port
 
 _AGAIN_MS = 1000
 

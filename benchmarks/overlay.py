@@ -17,16 +17,16 @@ from pathlib import Path
 
 from benchmarks.report import Report
 from benchmarks.surroundings import parser
-from server.camera.encode import Encoder
-from server.camera.scene import Scene
-from server.view.media.fmp4 import Sample, fragment
-from server.view.pictures.decided import Told, first_pulse
-from server.view.pictures.series import Series
-from server.view.pictures.source import Source
-from server.view.streams.channel import Channel, Chunk, Viewer
-from server.wire.drawing import Canvas
-from server.wire.h264 import nal_units, sample
-from server.wire.sections import Encode, Site
+from server.camera.encoding.encoder import Encoder
+from server.config.sections import Encode, Site
+from server.media.containers.fmp4 import Sample, fragment
+from server.media.h264.annexb import nal_units, sample
+from server.media.rendering_messages import Canvas
+from server.service.rendering.decided_boxes import Told, first_pulse
+from server.service.rendering.jpeg_series import Series
+from server.service.rendering.stream_source import Source
+from server.service.streaming.broadcaster import Channel, Chunk, Viewer
+from synthetic import Scene
 
 _MS = 1e3
 _DRAWN = 100

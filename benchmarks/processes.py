@@ -75,11 +75,11 @@ def _name(pid: int) -> str:
         words = (_PROC / str(pid) / "cmdline").read_bytes().decode(errors="replace").split("\0")
     except OSError:
         return "browser"
-    if "server.draw" in words:
+    if "server.service.rendering.worker" in words:
         return "drawing"
-    if "server.run.cli" not in words:
+    if "server.cli.main" not in words:
         return "browser"
-    command, *rest = words[words.index("server.run.cli") + 1 :]
+    command, *rest = words[words.index("server.cli.main") + 1 :]
     return f"camera {rest[1]}" if command == "camera" else command
 
 

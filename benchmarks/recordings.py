@@ -11,7 +11,7 @@ from typing import Any
 import yaml
 
 from benchmarks.surroundings import CannotRunError
-from server.run.track import track_one
+from server.cli.track.command import track_one
 from tracking.evaluation import Scores, evaluate
 from tracking.motchallenge import MotRow, read_rows
 

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.surroundings import CannotRunError
-from server.camera.scene import Scene, write_recording
 from server.camera.sources.opening import open_video
-from server.run.recorded import look_at
+from server.cli.render.video_info import look_at
+from synthetic import Scene, write_recording
 
 ROOM = "room"
 _ROOM_CAMERAS, _ROOM_PEOPLE, _ROOM_SEED = 3, 4, 1

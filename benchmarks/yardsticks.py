@@ -24,12 +24,12 @@ import matplotlib as mpl
 from benchmarks.peers.plot import plot
 from benchmarks.report import Report
 from benchmarks.surroundings import CannotRunError, finish, parser
-from server.run.track import Frame, final_rows, loaded_for, searched
+from server.cli.track.command import Frame, final_rows, loaded_for, searched
 from tracking import CostSettings, WindowSettings, create_solver
+from tracking.baselines import Preparing, tracker_named, tracker_names
 from tracking.evaluation import HEADINGS, Scores, cells, evaluate, perfect_association
 from tracking.motchallenge import MotRow, read_rows
 from tracking.solvers import DEFAULT_SOLVER
-from tracking.yardsticks import Preparing, tracker_named, tracker_names
 
 CEILING = "perfect association"
 _SHOWN = ("hota", "mota", "idf1", "recall", "precision", "switches", "tracks", "objects")

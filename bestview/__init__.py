@@ -1,14 +1,17 @@
 """View qualities in, view choices out: the sliding-window DP, identity across cameras, view quality."""
 
-from bestview.choice import NO_CAMERA, NO_VIEW_COST, Choices, choose_by_gops, choose_views
-from bestview.choice_expected import with_expected
-from bestview.choice_missed import LastSeen, with_missed
-from bestview.choice_program import Gops
-from bestview.choice_seen import SeenViews
-from bestview.corrections import Merge, Split
-from bestview.elsewhere import Bodies, bodies, boxes_seen, feet_seen
-from bestview.findable import Findable
-from bestview.ground import (
+from bestview.association.keys import EpisodeKey, TrackKey
+from bestview.association.registry.corrections import Merge, Split
+from bestview.association.registry.identity_registry import IdentityRegistry, IdentityUpdate
+from bestview.association.settings import IdentitySettings
+from bestview.association.sightings import Glimpse, LocalTrack
+from bestview.evaluation.object_matching import NOBODY, stands_for
+from bestview.evaluation.true_views import ViewTruth, best_views, true_views
+from bestview.evaluation.view_scores import ViewScore, cuts_of, score_views
+from bestview.geometry.box_contact import touching
+from bestview.geometry.cross_view import Findings, Vantage, WitnessSettings, overlook, witnessed
+from bestview.geometry.detection_probability import Findable
+from bestview.geometry.ground_plane import (
     camera_height,
     checked_homography,
     feet,
@@ -19,16 +22,13 @@ from bestview.ground import (
     to_ground,
     turns,
 )
-from bestview.identity import IdentityRegistry, IdentityUpdate
-from bestview.identity_settings import IdentitySettings
-from bestview.keys import EpisodeKey, TrackKey
+from bestview.geometry.projected_bodies import Bodies, bodies, boxes_seen, feet_seen
 from bestview.quality import HIDDEN_COST, QualitySettings, size_quality, view_cost
-from bestview.score import ViewScore, cuts_of, score_views
-from bestview.score_objects import NOBODY, stands_for
-from bestview.score_truth import ViewTruth, best_views, true_views
-from bestview.sightings import Glimpse, LocalTrack
-from bestview.touching import touching
-from bestview.witness import Findings, Vantage, WitnessSettings, overlook, witnessed
+from bestview.view_selection.dynamic_program import Gops
+from bestview.view_selection.expected_views import with_expected
+from bestview.view_selection.missed_detections import LastSeen, with_missed
+from bestview.view_selection.selection import NO_CAMERA, NO_VIEW_COST, Choices, choose_by_gops, choose_views
+from bestview.view_selection.sparse_costs import SeenViews
 
 __all__ = [
     "HIDDEN_COST",

@@ -1,9 +1,9 @@
 """Frame pulses over TCP: every camera takes frame n when pulse n comes."""
 
-from camsync.asking import clients_of
 from camsync.client import PulseClient
 from camsync.clock import steady_unix_clock
 from camsync.limits import ServerLimits
+from camsync.log_throttle import Ended, Spell
 from camsync.messages import Listener
 from camsync.peer import ClientInfo
 from camsync.proof import Login
@@ -17,8 +17,8 @@ from camsync.pulse import (
     SyncStatus,
     VersionError,
 )
+from camsync.query import clients_of
 from camsync.server import PulseServer
-from camsync.spell import Ended, Spell
 
 __all__ = [
     "VERSION",

@@ -8,12 +8,12 @@ from __future__ import annotations
 import logging
 from collections.abc import Collection
 
-from camsync.axis import PulseAxis
 from camsync.clock import Clock
 from camsync.limits import ServerLimits
+from camsync.log_throttle import Spell
 from camsync.messages import Hello
 from camsync.protocol import LAST_PULSE
-from camsync.spell import Spell
+from camsync.pulse_axis import PulseAxis
 
 _log = logging.getLogger(__name__)
 _ROOM = 2

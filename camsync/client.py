@@ -9,10 +9,11 @@ from types import TracebackType
 from typing import Self
 
 from camsync.clock import Clock, steady_unix_clock
+from camsync.clock_offset import ClockOffset
 from camsync.follower import Follower
 from camsync.link import Link
+from camsync.log_throttle import Spell
 from camsync.messages import Beat, Challenge, Greeting, Hello, Pong, Refusal, ServerLine, Wait
-from camsync.offset import ClockOffset
 from camsync.proof import Login
 from camsync.protocol import VERSION, is_name
 from camsync.pulse import (
@@ -24,7 +25,6 @@ from camsync.pulse import (
     SyncStatus,
     VersionError,
 )
-from camsync.spell import Spell
 
 _log = logging.getLogger(__name__)
 _STALLED = 0.02  # seconds that a timer may be late in a process that runs

@@ -9,13 +9,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
+from camsync.client_eviction import who_makes_room
 from camsync.clock import Clock
 from camsync.limits import ServerLimits
+from camsync.log_throttle import Spell
 from camsync.messages import Challenge, Prove
-from camsync.places import who_makes_room
 from camsync.protocol import ProtocolError, encode, parse_client_line
 from camsync.seal import SealError, Seals, new_nonce
-from camsync.spell import Spell
 
 _log = logging.getLogger(__name__)
 _REFUSED = "closed"  # the code of a refusal

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from camsync.axis import PulseAxis
 from camsync.messages import Known
+from camsync.pulse_axis import PulseAxis
 
 
 class Follower:

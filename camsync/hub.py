@@ -6,14 +6,14 @@ import logging
 from collections import defaultdict
 from collections.abc import Callable, Collection
 
+from camsync.client_eviction import who_makes_room
 from camsync.clock import Clock
 from camsync.door import Door
 from camsync.limits import ServerLimits
+from camsync.log_throttle import Spell
 from camsync.messages import Hello
 from camsync.peer import ClientInfo, Peer
-from camsync.places import who_makes_room
 from camsync.protocol import ProtocolError
-from camsync.spell import Spell
 
 _log = logging.getLogger(__name__)
 

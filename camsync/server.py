@@ -8,16 +8,16 @@ from collections.abc import Collection, Mapping
 from types import TracebackType
 from typing import Self
 
-from camsync.axis import PulseAxis
 from camsync.claims import INEXACT, Claims
 from camsync.clock import Clock, steady_unix_clock
 from camsync.door import Door
 from camsync.hub import Hub
 from camsync.limits import ServerLimits
+from camsync.log_throttle import Spell
 from camsync.messages import Beat, Greeting, Hello, Wait
 from camsync.peer import ClientInfo
 from camsync.protocol import MAX_FPS, MIN_FPS, VERSION, encode, is_name
-from camsync.spell import Spell
+from camsync.pulse_axis import PulseAxis
 
 _log = logging.getLogger(__name__)
 

@@ -6,8 +6,8 @@ from client.http import AwayError, ClientError, ContractError, HttpSettings, Not
 from client.model import Box, Camera, Cameras, Choice, Cut, Event, Flag, Gop, Objects, SeenObject, Site, Span
 from client.player import Watched, record, watch
 from client.session import Progress
-from client.status_asking import status
-from client.status_model import CameraNow, PersonNow, ServiceNow, SiteNow
+from client.status.model import CameraNow, PersonNow, ServiceNow, SiteNow
+from client.status.query import status
 
 __all__ = [
     "AwayError",

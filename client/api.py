@@ -6,7 +6,7 @@ from collections.abc import AsyncIterator
 
 from client.http import ContractError, HttpSettings, decoded, get, get_json, read_lines, server_url
 from client.model import Camera, Cameras, Choice, Gop, Objects, Past, SeenObject, Site, Span
-from client.sse import MAX_EVENT
+from client.sse_parser import MAX_EVENT
 
 _DEFAULT = HttpSettings()
 

@@ -9,7 +9,7 @@ from yarl import URL
 
 from client.http import AwayError, ContractError, HttpSettings, decoded, get, server_url
 from client.model import EVENTS, Event
-from client.sse import EventStreamError, SentEvent, SseParser
+from client.sse_parser import EventStreamError, SentEvent, SseParser
 
 _DEFAULT = HttpSettings()
 

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from client.api import site
-from client.commentary import Commentary, following
 from client.http import ClientError, HttpSettings, server_url
 from client.recording import Recording, recording
 from client.session import Report, Session
 from client.sidecar import write_sidecars
 from client.spool import Spool
+from client.stream_events import Commentary, following
 from client.webm_recording import WebmRecording
 
 _DEFAULT = HttpSettings()

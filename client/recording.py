@@ -7,11 +7,11 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from client.atomic_writer import Sink, WholeWriter
 from client.fmp4 import MAX_BOX, Mp4Box, Mp4Error, decode_time, sound_track, timescale, track_of
-from client.plain import write_plain
+from client.mp4_writer import write_plain
 from client.webm import WebmError
 from client.webm_recording import WebmRecording, write_indexed
-from client.whole_writer import Sink, WholeWriter
 
 _log = logging.getLogger(__name__)
 

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 from yarl import URL
 
-from client.commentary import Commentary
 from client.fmp4 import BoxReader, Mp4Error
 from client.http import AwayError, ContractError, HttpSettings, NotFoundError, RefusedError, get
 from client.recording import Recording, StreamChangedError
+from client.stream_events import Commentary
 from client.webm import ElementReader, WebmError
 from client.webm_recording import WebmChangedError, WebmRecording
 

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import msgspec
 
-from client.commentary import Frame
 from client.model import Box, Site
+from client.stream_events import Frame
 
 _ASS_HEAD = """[Script Info]
 ScriptType: v4.00+

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
 
+from client.atomic_writer import Sink
 from client.webm import (
     CLUSTER,
     INFO,
@@ -22,7 +23,6 @@ from client.webm import (
     made,
     number,
 )
-from client.whole_writer import Sink
 
 _DURATION = 0x4489
 _CUES, _CUE_POINT, _CUE_TIME, _CUE_PLACES = 0x1C53BB6B, 0xBB, 0xB3, 0xB7

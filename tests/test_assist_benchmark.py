@@ -16,9 +16,9 @@ from benchmarks.assist.school import school
 from benchmarks.assist.table import texts
 from benchmarks.assist.watch import FISH, Watched, watch
 from benchmarks.experiments.scene import Truth
-from server.wire.sections import Flags
+from server.config.sections import Flags
 from tracking import Detections
-from tracking.assist import RiskEvent, RiskReason
+from tracking.interactive import RiskEvent, RiskReason
 
 FRAMES = 200
 FPS = 25.0

@@ -25,8 +25,8 @@ from benchmarks.bestview.sweep import DEFAULT_SWITCH_COST_S, STRIDE, Setting, sw
 from benchmarks.bestview.watch import Rows
 from benchmarks.bestview.ways import Way, outcome, visible_rows
 from benchmarks.bestview.why import Losses, losses
-from server.run.evaluate_choices import Choice
-from server.wire.messages import CameraTracks, Track
+from server.cli.evaluate.choices_file import Choice
+from server.messaging.messages import CameraTracks, Track
 from tracking.motchallenge import MotRow
 
 FRAMES = 60

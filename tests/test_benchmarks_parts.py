@@ -20,7 +20,7 @@ from benchmarks.render import __main__ as render
 from benchmarks.stopwatch import Stopwatch
 from benchmarks.surroundings import SKIPPED, CannotRunError
 from benchmarks.views import find_views
-from server.wire.messages import CameraTracks, FrameHead, GopChoices
+from server.messaging.messages import CameraTracks, FrameHead, GopChoices
 
 FPS, GOP, LOOKAHEAD, STRIDE = 25.0, 10, 20, 5
 START = 1_000.0

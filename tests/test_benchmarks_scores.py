@@ -14,8 +14,8 @@ from benchmarks.peers import environment as peer_environment
 from benchmarks.peers.environment import PeersAwayError
 from benchmarks.recordings import Recording, find_recordings, track
 from benchmarks.surroundings import SKIPPED
-from server.run.track import track_one
-from server.wire.errors import UserError
+from server.cli.track.command import track_one
+from server.system.errors import UserError
 from tracking.evaluation import Scores
 from tracking.motchallenge import MotRow, read_rows, write_rows
 

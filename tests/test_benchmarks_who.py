@@ -10,8 +10,8 @@ import pytest
 
 from benchmarks.bestview.parts import own_parts
 from benchmarks.bestview.who import Agreement, Met
-from server.wire.loading import build_config
-from server.wire.messages import Box, CameraTracks, Track
+from server.config.loader import build_config
+from server.messaging.messages import Box, CameraTracks, Track
 from tracking.motchallenge import MotRow
 
 CROSSING = range(40, 50)

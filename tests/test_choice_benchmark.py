@@ -8,7 +8,7 @@ import numpy as np
 
 from benchmarks.choice.decisions import Crowd, decision_times
 from benchmarks.choice.program import Size, frame_time
-from server.wire.loading import build_config
+from server.config.loader import build_config
 
 
 def test_everybody_is_seen_by_as_many_cameras_as_asked_for() -> None:

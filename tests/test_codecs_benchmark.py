@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from benchmarks.codecs import WAYS, Cost, measure, middle, record
-from server.wire.sections import Site
+from server.config.sections import Site
 
 SITE = Site(width=160, height=96)
 FRAMES = 20

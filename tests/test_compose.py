@@ -13,8 +13,8 @@ from typing import Any
 import pytest
 import yaml
 
-from server.wire.config import Config
-from server.wire.loading import load_config
+from server.config.loader import load_config
+from server.config.site_config import Config
 
 ROOT = Path(__file__).resolve().parents[1]
 PLAIN, SECURE, SERVER, CAMERAS = (
@@ -99,7 +99,12 @@ def test_every_service_is_closed_watched_and_keeps_little_log() -> None:
         assert service["read_only"] is True, name
         assert service["cap_drop"] == ["ALL"], name
         assert service["security_opt"] == ["no-new-privileges:true"], name
-        assert service["healthcheck"]["test"][:4] == ["CMD", "python", "-m", "server.run.healthy"], name
+        assert service["healthcheck"]["test"][:4] == [
+            "CMD",
+            "python",
+            "-m",
+            "server.supervisor.healthcheck",
+        ], name
         assert set(service["logging"]["options"]) == {"max-size", "max-file"}, name
         assert service["init"] is True, name
 

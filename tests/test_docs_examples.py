@@ -21,13 +21,13 @@ import typer.main
 from patience import PATIENCE
 from prometheus_client import CollectorRegistry
 
-from server.run.cli import app as command_line
-from server.view.service import BestViewService
-from server.web.app import make_app, serving
-from server.web.keys import METRICS
-from server.web.schema import CameraInfo, Choice, ObjectInfo, SiteInfo
-from server.wire import messages
-from server.wire.sections import Http
+from server.cli.main import app as command_line
+from server.config.sections import Http
+from server.http.api.schema import CameraInfo, Choice, ObjectInfo, SiteInfo
+from server.http.app import make_app, serving
+from server.http.app_keys import METRICS
+from server.messaging import messages
+from server.service.service import BestViewService
 
 ROOT = Path(__file__).parents[1]
 DOCS = sorted((ROOT / "docs").rglob("*.md"))

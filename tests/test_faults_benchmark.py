@@ -24,7 +24,7 @@ from benchmarks.faults.table import kept
 from benchmarks.faults.viewer import Picture, Told
 from benchmarks.report import Report
 from client import Box, Gop
-from tracking.detectors.onnx import OnnxDetector, OnnxSettings
+from tracking.detectors.neural.onnx import OnnxDetector, OnnxSettings
 
 GOP = 10
 SIDES = (10, 20, 30, 60)

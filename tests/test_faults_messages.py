@@ -9,7 +9,7 @@ import pytest
 from benchmarks.faults.bus import Crossing, Way
 from benchmarks.faults.messages import _pointing
 from client import Box, Gop
-from server.wire.inbox import Message
+from server.messaging.inbox import Message
 
 
 class Heard:

@@ -11,7 +11,7 @@ from benchmarks.occupancy.level import levelled
 from benchmarks.occupancy.paths import Path
 from benchmarks.occupancy.walks import WalkSettings, rows_of_walks, smoothed, walk_of
 from bestview import to_ground
-from tracking.detectors.heightline import HeightLine
+from tracking.detectors.background.height_model import HeightLine
 from tracking.motchallenge import MotRow
 
 LINE = HeightLine(slope=0.5, offset=20.0, smallest=10.0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 
 from benchmarks.overlay import Stage, Wish, measure
-from server.wire.sections import Encode, Site
+from server.config.sections import Encode, Site
 
 
 def test_boxes_cost_more_than_no_boxes_and_no_more_for_another_viewer() -> None:

@@ -13,8 +13,8 @@ from benchmarks.scaling.hall import STRIDE, WINDOW, Hall, Tracker
 from benchmarks.scaling.service import REST, STAGES, Times
 from benchmarks.scaling.site import carry
 from bestview import feet, to_ground
-from server.view.sense import makes_sense
-from server.wire.messages import CameraTracks
+from server.messaging.messages import CameraTracks
+from server.service.ingest.validation import makes_sense
 
 
 @pytest.mark.parametrize("cameras", [4, 25])

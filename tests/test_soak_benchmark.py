@@ -25,8 +25,8 @@ from benchmarks.soak.samples import (
 from benchmarks.soak.site import CAMERAS, HEIGHT, WIDTH, Filmed, Tempo
 from benchmarks.soak.tasks import FOLDER_VARIABLE, hooked_environment, note_tasks, read_held
 from benchmarks.soak.visitors import Seen, Visitors, shown_by
-from server.view.media import fmp4
-from server.wire.loading import build_config
+from server.config.loader import build_config
+from server.media.containers import fmp4
 
 HOURS = np.linspace(0.1, 24.0, 200)
 

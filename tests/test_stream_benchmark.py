@@ -26,11 +26,11 @@ from benchmarks.stream.site import running, viewers
 from benchmarks.stream.splice import encode_again, splice
 from benchmarks.stream.stalled import Beside, Turn, beside_stalled, stalling
 from benchmarks.stream.tables import Found, describe, per_core, plot
-from server.camera.encode import AccessUnit
-from server.view.media.fmp4 import Sample, fragment, ticks
-from server.view.media.picture import Picture
-from server.view.media.ts import Counters
-from server.view.streams.footage import Footage
+from server.camera.encoding.encoder import AccessUnit
+from server.media.containers.fmp4 import Sample, fragment, ticks
+from server.media.containers.mpegts import Counters
+from server.media.picture import Picture
+from server.service.streaming.media_chunk import Footage
 
 GOP = 10
 Films = Sequence[Sequence[AccessUnit]]

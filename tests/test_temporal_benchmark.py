@@ -8,7 +8,7 @@ import pytest
 from benchmarks.temporal.__main__ import follow, main
 from benchmarks.temporal.merges import NOBODY, events, merged, mistaken
 from benchmarks.temporal.room import Clip, played
-from tracking.temporal import TemporalSettings
+from tracking.baselines.temporal_consistency import TemporalSettings
 
 # Two people meet at the third stage and part at the fifth; the third person is by themselves.
 _BLOBS = np.array([[0, 1, 2], [0, 1, 2], [0, 0, 1], [0, 0, 1], [0, 1, 2], [0, 1, 2]])

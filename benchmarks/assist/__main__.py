@@ -29,7 +29,7 @@ from benchmarks.assist.operator import Person
 from benchmarks.assist.watch import Watched, watch
 from benchmarks.report import Report
 from benchmarks.surroundings import parser
-from server.wire.sections import Flags
+from server.config.sections import Flags
 
 _ANY = 600
 """Flags a minute: as many as there are."""

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from benchmarks.assist.failures import Failure, Kind, involved, kind_of, matches
 from benchmarks.assist.operator import Flag, Person
 from benchmarks.assist.watch import Watched
-from tracking.assist import RiskEvent
+from tracking.interactive import RiskEvent
 
 Outcome = Literal["helped", "not needed", "harmed", "no help"]
 Cause = Literal[

@@ -12,8 +12,8 @@ from benchmarks.assist.cases import tells
 from benchmarks.assist.desk import Desk
 from benchmarks.assist.operator import Person
 from benchmarks.assist.watch import Watched
-from server.wire.sections import Flags
-from tracking.assist import RiskEvent
+from server.config.sections import Flags
+from tracking.interactive import RiskEvent
 
 RISKS = (0.6, 0.5, 0.45, 0.4, 0.35, 0.3, 0.25, 0.2, 0.15, 0.1, 0.0)
 """Risks from which a flag is raised."""

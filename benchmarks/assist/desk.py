@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from server.view.helping.flag_budget import Budget
-from server.wire.sections import Flags
-from tracking.assist import RiskEvent
+from server.config.sections import Flags
+from server.service.operator_assist.flag_budget import Budget
+from tracking.interactive import RiskEvent
 
 _MOST = 1000
 """Numbers that people of one clip have at most."""

@@ -20,12 +20,12 @@ from numpy.typing import NDArray
 from benchmarks.assist.clips import Clip
 from benchmarks.assist.colours import FamiliarColours
 from benchmarks.experiments.scene import Truth
-from server.camera.scene import Scene
+from synthetic import Scene
 from tracking import Detections
 from tracking.boxes import BOX_SIDES, Floats
 from tracking.detectors import BackgroundDetector, Image
 from tracking.detectors.base import Mask, Plane
-from tracking.detectors.looks import Looks
+from tracking.detectors.color_histogram import Looks
 
 _AHEAD, _EVERY = 31, 20
 """Pictures of which the background is the median, and frames between them."""

@@ -12,8 +12,8 @@ import numpy as np
 
 from benchmarks.assist.desk import Desk
 from benchmarks.experiments.scene import Truth
-from tracking.assist import Pointing, RiskEvent
 from tracking.boxes import Floats, iou
+from tracking.interactive import Pointing, RiskEvent
 
 _SEEN = 0.15
 """Share of a body that must be visible for anybody to point at it."""

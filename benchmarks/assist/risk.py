@@ -1,4 +1,4 @@
-"""Learn how likely what is foreseen goes wrong: the weights of `tracking/assist/risk.py`.
+"""Learn how likely what is foreseen goes wrong: the weights of `tracking/interactive/risk.py`.
 
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.assist.risk --out out/bench
 
@@ -23,8 +23,8 @@ from benchmarks.assist.operator import Person
 from benchmarks.assist.watch import Watched, watch
 from benchmarks.report import Report
 from benchmarks.surroundings import parser
-from tracking.assist import RiskReason, Signs
 from tracking.boxes import Floats
+from tracking.interactive import RiskReason, Signs
 
 _MARGIN, _GONE = 4.0, 5
 """What is foreseen here: more than anybody would be asked about, so that the risk of that is known, too."""

@@ -11,10 +11,10 @@ from benchmarks.assist.clips import Clip
 from benchmarks.assist.desk import Desk
 from benchmarks.assist.failures import Failure, failures
 from benchmarks.assist.operator import Flag, Operator, Person
-from server.wire.sections import Flags
+from server.config.sections import Flags
 from tracking import CostSettings, WindowResult, WindowSettings, create_solver
-from tracking.assist import AssistedTracker, AssistSettings, Pointing, RiskEvent
 from tracking.boxes import Floats
+from tracking.interactive import AssistedTracker, AssistSettings, Pointing, RiskEvent
 from tracking.solvers import DEFAULT_SOLVER
 
 _ALL = Flags(per_minute=600, risk=0.0)

@@ -35,7 +35,7 @@ def calibrated(case: Case, own: Rows, folder: Path) -> Case:
     words += ["--size", f"{width}x{height}", "--fps", str(case.content["site"]["fps"])]
     try:
         done = subprocess.run(
-            [sys.executable, "-m", "server.run.cli", *words],
+            [sys.executable, "-m", "server.cli.main", *words],
             cwd=ROOT,
             env=one_thread_environment(),
             capture_output=True,

@@ -10,11 +10,11 @@ from typing import Any
 from benchmarks.bestview.watch import Rows, Watched, in_file, in_pictures, sure_rows
 from benchmarks.surroundings import CannotRunError
 from benchmarks.views import Views, find_views
-from server.camera.scene import Scene, write_recording
-from server.run.evaluate_truth import Truth, truth_of
-from server.run.recorded import Size
-from server.wire.config import Config
-from server.wire.loading import build_config
+from server.cli.evaluate.ground_truth import Truth, truth_of
+from server.cli.render.video_info import Size
+from server.config.loader import build_config
+from server.config.site_config import Config
+from synthetic import Scene, write_recording
 from tracking.motchallenge import read_rows
 
 _AUDITORIUM = ("HC3", "HC4", "IP2", "IP5")

@@ -13,13 +13,13 @@ import numpy as np
 
 from benchmarks.bestview.watch import Messages, Rows
 from bestview import NO_CAMERA, EpisodeKey, IdentityUpdate, LocalTrack, size_quality
-from server.run.evaluate_choices import Choice, read_choices
-from server.view.align import Aligner
-from server.view.choice.decide import Decider, homographies
-from server.view.record import Recorder
-from server.wire.config import Config
-from server.wire.epochs import closing_epoch
-from server.wire.messages import Box, CameraTracks, Track
+from server.cli.evaluate.choices_file import Choice, read_choices
+from server.config.site_config import Config
+from server.messaging.epochs import closing_epoch
+from server.messaging.messages import Box, CameraTracks, Track
+from server.service.decision_files.recorder import Recorder
+from server.service.ingest.epoch_aligner import Aligner
+from server.service.view_selection.decider import Decider, homographies
 from tracking.boxes import Floats
 from tracking.motchallenge import MotRow, read_rows
 

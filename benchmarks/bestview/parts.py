@@ -7,12 +7,12 @@ from itertools import chain, zip_longest
 import numpy as np
 
 from benchmarks.bestview.watch import Messages
-from bestview.episodes import Episodes
-from bestview.sightings import FootError, line_up
-from server.view.align import Aligner
-from server.view.choice.decide import homographies
-from server.view.who.reading import Reader
-from server.wire.config import Config
+from bestview.association.sightings import FootError, line_up
+from bestview.association.tracklet_splitter import Episodes
+from server.config.site_config import Config
+from server.service.identity.camera_window import Reader
+from server.service.ingest.epoch_aligner import Aligner
+from server.service.view_selection.decider import homographies
 from tracking.motchallenge import MotRow
 
 

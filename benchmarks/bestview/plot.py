@@ -15,7 +15,7 @@ from benchmarks.bestview.sweep import (
     Swept,
 )
 from benchmarks.bestview.ways import Outcome
-from server.run.plots import new_figure, save_figure
+from server.cli.render.plots import new_figure, save_figure
 
 
 def plot_ways(found: Mapping[str, Sequence[Outcome]], out: Path) -> None:

@@ -12,9 +12,9 @@ from benchmarks.bestview.decide import decide_given
 from benchmarks.bestview.ways import visible_rows
 from benchmarks.report import Report
 from bestview import NO_CAMERA, ViewScore, choose_views, score_views
-from server.run.evaluate_choices import views_of
-from server.run.evaluate_truth import Truth
-from server.wire.sections import Encode, View
+from server.cli.evaluate.choices_file import views_of
+from server.cli.evaluate.ground_truth import Truth
+from server.config.sections import Encode, View
 
 STRIDE = 5
 """Frames between two windows of the tracker, as by default; its delay is that of the true site."""

@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.observations.observers import SURE, rows_of
+from server.camera.peers.cross_view_scorer import Witness
 from server.camera.pipeline import CameraPipeline
-from server.camera.report import Reporter
 from server.camera.sources import SourceEnded
-from server.camera.witness import Witness
-from server.wire.config import Config
-from server.wire.messages import CameraTracks
+from server.camera.track_messages import Reporter
+from server.config.site_config import Config
+from server.messaging.messages import CameraTracks
 from tracking import Detections, OnlineTracker, create_solver
 from tracking.detectors import MotFileDetector
 from tracking.motchallenge import MotRow

@@ -23,11 +23,11 @@ from benchmarks.occupancy.masks import CannotMapError
 from benchmarks.occupancy.rows import occupancy_rows
 from benchmarks.peers.environment import PEERS, PeerEnvironment
 from bestview import ViewScore
-from server.run.evaluate_choices import Choice
-from server.run.evaluate_truth import Truth, people_of_objects
-from server.run.evaluate_views import judge
-from server.run.site_file import SiteFacts
-from server.view.choice.decide import homographies
+from server.cli.evaluate.choices_file import Choice
+from server.cli.evaluate.ground_truth import Truth, people_of_objects
+from server.cli.evaluate.view_scores import judge
+from server.cli.render.site_file import SiteFacts
+from server.service.view_selection.decider import homographies
 from tracking.evaluation import CameraScores, Recording, evaluate_cameras
 from tracking.motchallenge import MotRow, format_rows
 

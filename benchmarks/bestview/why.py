@@ -9,8 +9,8 @@ import numpy as np
 
 from benchmarks.bestview.cases import Case
 from benchmarks.bestview.ways import LEAST_IOU, Way
-from server.run.evaluate_choices import views_of
-from server.run.evaluate_truth import Truth, people_of_objects
+from server.cli.evaluate.choices_file import views_of
+from server.cli.evaluate.ground_truth import Truth, people_of_objects
 from tracking.boxes import iou
 from tracking.evaluation import Recording
 from tracking.motchallenge import MotRow

@@ -22,16 +22,16 @@ from benchmarks.recordings import Recording, track
 from benchmarks.report import Report
 from benchmarks.surroundings import CannotRunError, parser
 from benchmarks.views import Views, find_views
-from bestview.calibrate import CalibrationError, Track, Walk, WalkCalibration, calibrate_walks
-from server.camera.scene import Scene, write_recording
-from server.run.calibrate_tracks import Picture, walks_from_tracks
-from server.run.evaluate import evaluate_recordings, read_recordings
-from server.run.render import render
-from server.run.setup import config_for_videos
-from server.run.track import track_one
-from server.view.calibrate.file import ground_file
-from server.view.calibrate.plan import plan_of, plot_plan
-from server.view.calibrate.walked import walk_settings
+from bestview.calibration import CalibrationError, Track, Walk, WalkCalibration, calibrate_walks
+from server.cli.calibrate.walk_input import Picture, walks_from_tracks
+from server.cli.evaluate.track_scores import evaluate_recordings, read_recordings
+from server.cli.generated_config import config_for_videos
+from server.cli.render.renderer import render
+from server.cli.track.command import track_one
+from server.service.calibration.floor_plan import plan_of, plot_plan
+from server.service.calibration.ground_file import ground_file
+from server.service.calibration.walk_comparison import walk_settings
+from synthetic import Scene, write_recording
 from tracking.motchallenge import write_rows
 
 _PERSON = 1.75

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bestview import feet, person_heights, to_ground
-from bestview.calibrate import Walk, WalkCalibration, fit_homography
-from bestview.calibrate.homography import mapped
+from bestview.calibration import Walk, WalkCalibration, fit_homography
+from bestview.calibration.homography import mapped
 from tracking.motchallenge import read_rows
 
 Floats = NDArray[np.float64]

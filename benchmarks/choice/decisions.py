@@ -10,18 +10,18 @@ import numpy as np
 
 from benchmarks.stopwatch import Stopwatch, Watched
 from bestview import EpisodeKey, IdentityUpdate, LocalTrack, QualitySettings
-from server.view.align import Epoch
-from server.view.board import Board
-from server.view.choice import decide
-from server.view.choice.decide import Decider
-from server.view.choice.outlook import Outlook, Part
-from server.view.choice.sight import Sight
-from server.view.who.people import People
-from server.view.who.reading import Reader
-from server.wire.config import Config
-from server.wire.epochs import end_of_epoch
-from server.wire.loading import build_config
-from server.wire.messages import CameraTracks, Glimpse, Track
+from server.config.loader import build_config
+from server.config.site_config import Config
+from server.messaging.epochs import end_of_epoch
+from server.messaging.messages import CameraTracks, Glimpse, Track
+from server.service.decision_state import Board
+from server.service.identity.camera_window import Reader
+from server.service.identity.people import People
+from server.service.ingest.epoch_aligner import Epoch
+from server.service.view_selection import decider as decider_module
+from server.service.view_selection.decider import Decider
+from server.service.view_selection.lookahead_window import Outlook, Part
+from server.service.view_selection.view_quality_buffer import Sight
 
 _SEED, _WIDTH, _HEIGHT = 5, 1280, 720
 _WARM = 6
@@ -116,7 +116,7 @@ def decision_times(crowd: Crowd, gop: int, epochs: int, *, all_terms: bool) -> S
         (Outlook, "__init__", "costs"),
         (Outlook, "part", "costs"),
         (Part, "gops", "costs"),
-        (decide, "choose_by_gops", "choice"),
+        (decider_module, "choose_by_gops", "choice"),
         (Decider, "step", "rest"),
         (People, "update", "people"),
         (People, "boxes", "telling"),

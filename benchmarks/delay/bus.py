@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import msgspec
 import zenoh
 
-from server.wire.messages import CameraTracks, FrameHead, GopChoices, camera_of
+from server.messaging.messages import CameraTracks, FrameHead, GopChoices, camera_of
 
 
 @dataclass(frozen=True, slots=True)

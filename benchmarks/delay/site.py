@@ -14,7 +14,7 @@ import aiohttp
 import yaml
 
 from benchmarks.surroundings import one_thread_environment
-from server.run.setup import free_port
+from server.cli.generated_config import free_port
 
 CONFIG = "site.yaml"
 LOG = "up.log"
@@ -80,7 +80,7 @@ async def running_site(
     config.write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
     with (folder / LOG).open("w", encoding="utf-8") as log:
         process = await asyncio.create_subprocess_exec(
-            *(sys.executable, "-m", "server.run.cli", "up", str(config)),
+            *(sys.executable, "-m", "server.cli.main", "up", str(config)),
             env={**one_thread_environment(), **(environment or {})},
             stdout=log,
             stderr=log,

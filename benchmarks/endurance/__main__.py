@@ -65,7 +65,7 @@ def run_pipeline(frames: int) -> Run:
     """Put so many frames through a camera's source, encoder, detector and tracker."""
     # Loaded only now: the tracker's memory is measured without the server's libraries.
     from server.camera.pipeline import CameraPipeline  # noqa: PLC0415
-    from server.wire.loading import build_config  # noqa: PLC0415
+    from server.config.loader import build_config  # noqa: PLC0415
 
     pipeline = CameraPipeline(build_config(_SITE, where="endurance", folder=Path()), "c0")
     run = Run("camera pipeline", Samples())

@@ -15,7 +15,7 @@ from benchmarks.faults.film import CAMERAS, Views
 from benchmarks.faults.pairs import BESTVIEW, DRAWING, names, title, turns
 from benchmarks.faults.site import SETTINGS, Fault, Inject, Stand, listening, told_to_end
 from benchmarks.surroundings import one_thread_environment
-from server.run.setup import free_port
+from server.cli.generated_config import free_port
 
 NAMES = ("bestview", "sync", *CAMERAS)
 
@@ -33,7 +33,7 @@ class Apart:
         """Start a process."""
         words = ["camera", str(self._config), name] if name in CAMERAS else [name, str(self._config)]
         self.processes[name] = await asyncio.create_subprocess_exec(
-            *(sys.executable, "-m", "server.run.cli", *words),
+            *(sys.executable, "-m", "server.cli.main", *words),
             env={**one_thread_environment(), "MYVIEW_SUPERVISED": "1", **self._own.get(name, {})},
             stdout=self._log,
             stderr=self._log,

@@ -19,11 +19,11 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import Protocol
 
-from server.run.ending import end_with_parent, run_process
-from server.wire.bus import Bus
-from server.wire.inbox import Message
-from server.wire.messages import Keys, camera_of
-from server.wire.sections import Zenoh
+from server.config.sections import Zenoh
+from server.messaging.bus import Bus
+from server.messaging.inbox import Message
+from server.messaging.messages import Keys, camera_of
+from server.supervisor.shutdown import end_with_parent, run_process
 
 SITE = "faults"
 SHARE = 0.3

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.surroundings import ROOT, CannotRunError
-from server.run.setup import free_port
+from server.cli.generated_config import free_port
 
 PLAIN = (ROOT / "docker-compose.yml",)
 _BUILD_S = 900.0

@@ -35,7 +35,7 @@ async def on_small_disk(views: Views, folder: Path) -> AsyncIterator[Stand]:
     config, url = await asyncio.to_thread(configured, views, folder)
     kept = folder / "kept"
     await asyncio.to_thread(kept.mkdir)
-    command = [sys.executable, "-m", "server.run.cli", "up", str(config), "--out", str(kept / _DECIDED)]
+    command = [sys.executable, "-m", "server.cli.main", "up", str(config), "--out", str(kept / _DECIDED)]
     with (folder / "up.log").open("w", encoding="utf-8") as log:
         process = await asyncio.create_subprocess_exec(
             *(unshare, "-m", "sh", "-c", _MOUNTED, "sh", f"{_MB}m", str(kept), *command),

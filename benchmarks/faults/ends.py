@@ -31,7 +31,7 @@ async def right_after_start(views: Views, folder: Path) -> list[Ended]:
     with (folder / "site.log").open("w", encoding="utf-8") as log:
         for moment in _MOMENTS_S:
             site = await asyncio.create_subprocess_exec(
-                *(sys.executable, "-m", "server.run.cli", "up", str(config)),
+                *(sys.executable, "-m", "server.cli.main", "up", str(config)),
                 env=one_thread_environment(),
                 stdout=log,
                 stderr=log,

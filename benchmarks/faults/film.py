@@ -21,7 +21,7 @@ from av.video.frame import VideoFrame
 from numpy.typing import NDArray
 
 from client import Box
-from server.camera.scene import Scene
+from synthetic import Scene
 
 FPS = 25
 WIDTH, HEIGHT = 256, 144

@@ -14,7 +14,7 @@ from benchmarks.faults.film import FPS, FRAMES
 _WAY_S = 0.5
 """So long a picture may be on its way; so late a pulse may be taken, when newer pictures have come."""
 _STALE_S = 1.5
-"""So old a picture may be besides: after that its camera counts as away (`server.camera.sources.stream`)."""
+"""So old a picture may be besides: after that its camera counts as away (`live_stream`)."""
 MOST_BEHIND = round((_WAY_S + _STALE_S) * FPS)
 MOST_AHEAD = round(_WAY_S * FPS)
 

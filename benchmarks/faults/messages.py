@@ -22,8 +22,8 @@ from benchmarks.faults.film import CAMERAS, Views
 from benchmarks.faults.site import Fault, Inject, Stand
 from benchmarks.surroundings import one_thread_environment
 from client import Gop
-from server.run.setup import free_port
-from server.web.access.other_sites import CHANGES
+from server.cli.generated_config import free_port
+from server.http.access.csrf import CHANGES
 
 _GONE_S = 30.0
 _FAULTY_S = 8.0

@@ -13,7 +13,7 @@ from benchmarks.faults.film import CAMERAS, Views, make_smaller, make_unattracti
 from benchmarks.faults.reader import write_reader
 from benchmarks.faults.site import LEASE_S, Fault, Inject, Stand, with_up
 from client import site
-from server.run.setup import free_port
+from server.cli.generated_config import free_port
 
 LIVE = CAMERAS[-1]
 _BROKEN_S = 4.0

@@ -14,11 +14,11 @@ import numpy as np
 
 from benchmarks.faults.film import FPS, Stamp, read_stamp
 from client import Cameras, ClientError, Event, Gop, HttpSettings, events
-from client.commentary import Commentary
 from client.fmp4 import BoxReader, decode_time
 from client.http import server_url
 from client.recording import Recording
 from client.session import Session
+from client.stream_events import Commentary
 
 _TICKS = 90_000
 _AGAIN_S = 0.2

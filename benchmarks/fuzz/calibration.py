@@ -16,14 +16,14 @@ from matplotlib.cbook import is_math_text
 
 from benchmarks.fuzz.mutate import as_json, damaged, otherwise
 from benchmarks.fuzz.target import Target, folder, refused
-from bestview.calibrate import CalibrationError, fit_cameras
-from server.run import calibrate
-from server.run.calibrate_points import COLUMNS, read_points
-from server.view.calibrate import plan
-from server.view.calibrate.plan import PlanView
-from server.view.floor import covered
-from server.wire.errors import UserError
-from server.wire.loading import build_config, with_files
+from bestview.calibration import CalibrationError, fit_cameras
+from server.cli.calibrate import calibration
+from server.cli.calibrate.points_file import COLUMNS, read_points
+from server.config.loader import build_config, with_files
+from server.service.calibration import floor_plan
+from server.service.calibration.floor_map import covered
+from server.service.calibration.floor_plan import PlanView
+from server.system.errors import UserError
 
 WORDS = (
     b",", b'"', b"\n", b"\r", b"\x00", b"\xff", b"\xef\xbb\xbf", b"nan", b"NaN", b"Infinity", b"-Infinity",
@@ -138,8 +138,8 @@ class Plans(_Files):
         out = self._path / "ground.json"
         drawn = zlib.crc32(data) % _DRAWN_EVERY == 0
         try:
-            with nullcontext() if drawn else patch.object(calibrate, "plot_plan", _laid_out):
-                lines = calibrate.calibrate_points(self.written(data), out, self._path / "plan.png", None)
+            with nullcontext() if drawn else patch.object(calibration, "plot_plan", _laid_out):
+                lines = calibration.calibrate_points(self.written(data), out, self._path / "plan.png", None)
         except UserError as error:
             return refused(error)
         for line in lines:
@@ -152,9 +152,9 @@ class Plans(_Files):
 def _laid_out(views: Sequence[PlanView], unit: str, _: object) -> None:
     """Lay out what is to be drawn, and see that no word of it would be read as a formula."""
     for view in views:
-        plan._area(view)
+        floor_plan._area(view)
     for text in (unit, *(view.camera for view in views)):
-        assert not is_math_text(plan._plain(text)), text
+        assert not is_math_text(floor_plan._plain(text)), text
 
 
 class Ground(_Files):

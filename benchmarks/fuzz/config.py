@@ -15,12 +15,12 @@ from pydantic import TypeAdapter
 from benchmarks.fuzz.mutate import as_json, damaged, odd, otherwise
 from benchmarks.fuzz.site import site
 from benchmarks.fuzz.target import Target, folder, refused
-from server.view.service import BestViewService
-from server.web.operator.settings import settings_of
-from server.wire.config import Config
-from server.wire.errors import UserError
-from server.wire.loading import build_config, changed_view, load_config
-from server.wire.tokens import read_tokens
+from server.config.loader import build_config, changed_view, load_config
+from server.config.site_config import Config
+from server.config.tokens_file import read_tokens
+from server.http.operator.settings import settings_of
+from server.service.service import BestViewService
+from server.system.errors import UserError
 
 WORDS = (
     b":", b": ", b"- ", b"\n", b"\n  ", b"\t", b"\x00", b"\xff", b"&a ", b"*a", b"!!int ''", b"!!float ''",

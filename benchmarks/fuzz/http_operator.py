@@ -7,7 +7,7 @@ from typing import Any
 
 from benchmarks.fuzz.http_site import Asked
 from benchmarks.fuzz.mutate import as_json, damaged, otherwise
-from server.web.access.other_sites import CHANGES
+from server.http.access.csrf import CHANGES
 
 _ASKED: tuple[tuple[str, str, Any], ...] = (
     ("POST", "/api/operator/people", {"object": 1, "name": "Ada"}),

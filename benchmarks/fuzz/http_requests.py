@@ -7,7 +7,7 @@ from random import Random
 from benchmarks.fuzz.http_asked import METHODS, WORDS, address, some_range
 from benchmarks.fuzz.http_site import Asked
 from benchmarks.fuzz.mutate import as_json, damaged, otherwise
-from server.web.access.other_sites import CHANGES
+from server.http.access.csrf import CHANGES
 
 _CHANGES_SHARE = 0.8
 _BODIES = (

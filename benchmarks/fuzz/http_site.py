@@ -18,8 +18,8 @@ from aiohttp import web
 from benchmarks.fuzz.loop import HurryingLoop, leaves_no_trace
 from benchmarks.fuzz.site import Fed, Word, feed_epoch, site, word
 from benchmarks.fuzz.target import Target
-from server.web.app import make_app, serving
-from server.web.openapi import describe
+from server.http.api.openapi import describe
+from server.http.app import make_app, serving
 
 _WELL_EVERY = 100
 EPOCHS = 6

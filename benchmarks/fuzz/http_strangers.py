@@ -21,10 +21,10 @@ from benchmarks.fuzz.http_site import EPOCHS, Served, judged
 from benchmarks.fuzz.mutate import as_json, damaged
 from benchmarks.fuzz.site import STRIDE, one_each, pictures
 from benchmarks.fuzz.target import Target, folder
-from server.web.access.access import ACCESS
-from server.web.access.sessions import _Session
-from server.web.keys import SERVICE
-from server.wire.tokens import digest_of
+from server.config.tokens_file import digest_of
+from server.http.access.access_control import ACCESS
+from server.http.access.sessions import _Session
+from server.http.app_keys import SERVICE
 
 _WHO = ("hall", "family", "door", "night", "void")
 SECRETS = {who: f"{who}-{Random(who).randbytes(24).hex()}" for who in _WHO}

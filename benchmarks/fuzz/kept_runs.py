@@ -14,12 +14,12 @@ from benchmarks.fuzz.media_made import WORDS as MEDIA
 from benchmarks.fuzz.mutate import as_json, damaged, otherwise
 from benchmarks.fuzz.site import CAMERAS, Fed, feed_epoch, site
 from benchmarks.fuzz.target import Scripts, folder
-from server.view.past.kept import kept_from, kept_until, known, shown
-from server.view.past.past import Past
-from server.view.past.play import CameraPast, ObjectPast, Source, last_before, play, sounds
-from server.view.past.retention import Bounds, Retention
-from server.view.past.run import HEAD
-from server.view.past.told import told
+from server.service.recording.available_range import kept_from, kept_until, known, shown
+from server.service.recording.decision_log import told
+from server.service.recording.playback import CameraPast, ObjectPast, Source, last_before, play, sounds
+from server.service.recording.recorder import Past
+from server.service.recording.recording_session import HEAD
+from server.service.recording.retention import Bounds, Retention
 
 WORDS = (
     b"\n", b"\x00", b"\xff", b"..", b"../../../precious", b"/", b"9" * 15, b"99999999999", b"-1", b"0",

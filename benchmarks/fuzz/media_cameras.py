@@ -14,12 +14,12 @@ import numpy as np
 from benchmarks.fuzz.media_made import wrong
 from benchmarks.fuzz.site import FPS, HEIGHT, STRIDE, WIDTH, pictures
 from benchmarks.fuzz.target import Target, folder, refused
-from server.camera.own.annexb import packing_of
-from server.camera.own.fitting import MisfitError, Wanted
-from server.camera.own.recording import OwnRecording
+from server.camera.passthrough.access_units import packing_of
+from server.camera.passthrough.compatibility import MisfitError, Wanted
+from server.camera.passthrough.recording_source import OwnRecording
 from server.camera.sources.base import Source, SourceEnded
 from server.camera.sources.recording import Recording
-from server.wire.errors import UserError
+from server.system.errors import UserError
 
 
 def _take(source: Source) -> None:

@@ -13,9 +13,9 @@ from benchmarks.fuzz.media_made import stream, wrong
 from benchmarks.fuzz.mutate import damaged
 from benchmarks.fuzz.target import Target, folder, refused
 from client.fmp4 import BoxReader, Mp4Error
-from client.plain import write_plain
+from client.mp4_writer import write_plain
 from client.recording import Recording
-from client.sse import EventStreamError, SseParser
+from client.sse_parser import EventStreamError, SseParser
 from client.webm import ElementReader, WebmError
 from client.webm_recording import WebmRecording, write_indexed
 

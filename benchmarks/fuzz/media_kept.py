@@ -9,12 +9,12 @@ from random import Random
 from benchmarks.fuzz.media_made import stream, wrong
 from benchmarks.fuzz.site import FPS, HEIGHT, STRIDE, WIDTH
 from benchmarks.fuzz.target import Target, folder
-from server.draw.studio import Studio
-from server.view.past.media import gops
-from server.view.past.playlist import Playlist
-from server.view.past.sounds import frames_in
-from server.wire.drawing import Canvas, Draw
-from server.wire.sound import SoundFormat
+from server.media.audio.audio_format import SoundFormat
+from server.media.rendering_messages import Canvas, Draw
+from server.service.recording.audio_file import frames_in
+from server.service.recording.media_files import gops
+from server.service.recording.playlist_file import Playlist
+from server.service.rendering.worker.stream_renderer import Studio
 
 _DRAWN = STRIDE + 1
 """Frames: a GOP, and the beginning of the next."""

@@ -15,13 +15,13 @@ from av.video.stream import VideoStream
 from benchmarks.fuzz.media_made import wrong
 from benchmarks.fuzz.site import FPS, HEIGHT, STRIDE, WIDTH
 from benchmarks.fuzz.target import Scripts, folder, refused
-from server.camera.own.fitting import MisfitError, Wanted
-from server.camera.own.stream import OwnStream
-from server.camera.sound.live import LiveSound
+from server.camera.audio.live_source import LiveSound
+from server.camera.passthrough.compatibility import MisfitError, Wanted
+from server.camera.passthrough.stream_source import OwnStream
+from server.camera.sources.live_stream import Stream
 from server.camera.sources.opening import Opened
-from server.camera.sources.stream import Stream
-from server.wire.errors import UserError
-from server.wire.sections import Sound
+from server.config.sections import Sound
+from server.system.errors import UserError
 
 _FRAMES = 2 * STRIDE + 3
 """What is looked at before it is passed on, and what waits meanwhile."""

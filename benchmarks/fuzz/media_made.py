@@ -7,11 +7,11 @@ from typing import Literal
 
 from benchmarks.fuzz.mutate import damaged
 from benchmarks.fuzz.site import FPS, HEIGHT, WIDTH, pictures
-from server.view.media.agreement import Agreement
-from server.view.media.mp4_sound import sound_fragment
-from server.view.media.vp8 import Vp8Agreement
-from server.wire.sections import Site
-from server.wire.sound import SoundFormat
+from server.config.sections import Site
+from server.media.audio.audio_format import SoundFormat
+from server.media.containers.mp4_audio import sound_fragment
+from server.media.stream_format import Agreement
+from server.media.vp8.stream_format import Vp8Agreement
 
 WORDS = (
     b"\x00\x00\x01", b"\x00\x00\x00\x01", b"\x00\x00\x01\x67", b"\x00\x00\x01\x68", b"\x00\x00\x01\x65",

@@ -13,10 +13,10 @@ from benchmarks.fuzz.media_made import wrong
 from benchmarks.fuzz.site import CAMERAS, STRIDE, Fed, pictures, site, tracks, video, word
 from benchmarks.fuzz.target import Scripts
 from benchmarks.fuzz.zenoh import ask, drink
-from server.camera.encode import AccessUnit
-from server.view.choice.decide import GopDecision, ObjectChoice
-from server.wire.config import Config
-from server.wire.epochs import end_of_epoch
+from server.camera.encoding.encoder import AccessUnit
+from server.config.site_config import Config
+from server.messaging.epochs import end_of_epoch
+from server.service.view_selection.decider import GopDecision, ObjectChoice
 
 _EPOCHS = 4
 _FRAMES = _EPOCHS * STRIDE

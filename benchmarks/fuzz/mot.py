@@ -10,9 +10,9 @@ import numpy as np
 
 from benchmarks.fuzz.mutate import damaged
 from benchmarks.fuzz.target import Target, folder, refused
-from server.run.calibrate_tracks import Picture, walks_from_tracks
-from server.wire.errors import UserError
-from tracking.detectors.motfile import MotFileDetector
+from server.cli.calibrate.walk_input import Picture, walks_from_tracks
+from server.system.errors import UserError
+from tracking.detectors.mot_file import MotFileDetector
 from tracking.motchallenge import MotRow, format_rows, parse_rows, read_rows
 
 WORDS = (

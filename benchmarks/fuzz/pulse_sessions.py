@@ -13,7 +13,7 @@ from benchmarks.fuzz.target import Scripts
 from camsync import ClientSettings, PulseClient, PulseServer
 from camsync.link import Link
 from camsync.protocol import parse_client_line, parse_server_line
-from server.wire.numbers import Pulse
+from server.messaging.number_types import Pulse
 
 _pulse = msgspec.json.Decoder(Pulse)
 Script = list[tuple[int, bytes]]

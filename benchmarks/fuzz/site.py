@@ -10,14 +10,13 @@ from typing import Any, Literal
 import msgspec
 import numpy as np
 
-from server.camera.encode import AccessUnit, Encoder
-from server.view.service import BestViewService
-from server.wire.config import Config
-from server.wire.epochs import end_of_epoch
-from server.wire.help import Trouble
-from server.wire.inbox import Message
-from server.wire.loading import build_config
-from server.wire.messages import (
+from server.camera.encoding.encoder import AccessUnit, Encoder
+from server.config.loader import build_config
+from server.config.sections import Encode, Site
+from server.config.site_config import Config
+from server.messaging.epochs import end_of_epoch
+from server.messaging.inbox import Message
+from server.messaging.messages import (
     CameraStatus,
     CameraTracks,
     FrameHead,
@@ -28,7 +27,8 @@ from server.wire.messages import (
     ThumbHead,
     Track,
 )
-from server.wire.sections import Encode, Site
+from server.messaging.operator_messages import Trouble
+from server.service.service import BestViewService
 
 WIDTH, HEIGHT, FPS = 64, 48, 25
 GOP = STRIDE = 5

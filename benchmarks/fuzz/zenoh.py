@@ -29,23 +29,23 @@ from benchmarks.fuzz.site import (
 from benchmarks.fuzz.target import Scripts, Target
 from benchmarks.fuzz.zenoh_remembered import Memories
 from benchmarks.fuzz.zenoh_wrong import wrong
-from server.camera.earshot import Earshot
-from server.camera.exchange import Exchange
-from server.camera.pointed import Pointed as PointedAt
-from server.view.align import Aligner
-from server.view.intake import Intake
-from server.view.media.agreement import Agreement
-from server.view.streams.footage import Footage
-from server.view.streams.shelf import Shelf
-from server.view.streams.sound import SoundShelf
-from server.web.app import make_app
-from server.web.keys import METRICS
-from server.web.views import cameras_info, choice_info, objects_info, site_info
-from server.wire.epochs import end_of_epoch
-from server.wire.help import POINTS_MOST, Pointed, Pointings
-from server.wire.inbox import Message
-from server.wire.messages import Found
-from server.wire.sound import SoundFormat
+from server.camera.operator_corrections import Pointed as PointedAt
+from server.camera.peers.detection_buffer import Earshot
+from server.camera.peers.detection_exchange import Exchange
+from server.http.api.responses import cameras_info, choice_info, objects_info, site_info
+from server.http.app import make_app
+from server.http.app_keys import METRICS
+from server.media.audio.audio_format import SoundFormat
+from server.media.stream_format import Agreement
+from server.messaging.epochs import end_of_epoch
+from server.messaging.inbox import Message
+from server.messaging.messages import Found
+from server.messaging.operator_messages import POINTS_MOST, Pointed, Pointings
+from server.service.ingest.epoch_aligner import Aligner
+from server.service.ingest.ingest import Intake
+from server.service.streaming.audio_buffer import SoundShelf
+from server.service.streaming.frame_buffer import Shelf
+from server.service.streaming.media_chunk import Footage
 
 _EPOCHS = 3
 """Two GOPs are decided, and one is looked ahead to."""

@@ -9,13 +9,13 @@ import msgspec
 from benchmarks.fuzz.site import CAMERAS, FPS, HEIGHT, KEYS, STRIDE, WIDTH, site, word
 from benchmarks.fuzz.target import Scripts
 from benchmarks.fuzz.zenoh_wrong import wrong
-from server.view.align import Epoch
-from server.view.who.people import People
-from server.view.who.remembering import Remembering
-from server.wire.epochs import end_of_epoch
-from server.wire.inbox import Message
-from server.wire.messages import UNREADABLE
-from server.wire.remembered import Known, Remembered
+from server.messaging.epochs import end_of_epoch
+from server.messaging.inbox import Message
+from server.messaging.messages import UNREADABLE
+from server.messaging.retained_state import Known, Remembered
+from server.service.identity.people import People
+from server.service.identity.state_replication import Remembering
+from server.service.ingest.epoch_aligner import Epoch
 
 _SAID = 12
 _EPOCHS = 2

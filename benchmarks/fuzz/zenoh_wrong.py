@@ -7,7 +7,7 @@ from random import Random
 import msgspec
 
 from benchmarks.fuzz.mutate import as_json, damaged, otherwise
-from server.wire.inbox import Message
+from server.messaging.inbox import Message
 
 
 def wrong(rng: Random, message: Message) -> Message:

@@ -106,9 +106,9 @@ class ThreadWatch:
 def time_camera(folder: str, camera: str) -> None:
     """Time the stages of this process, which is about to be a camera's."""
     # What is timed is imported here: the benchmark itself need not load it.
+    from server.camera.peers.cross_view_scorer import Witness  # noqa: PLC0415
     from server.camera.pipeline import CameraPipeline  # noqa: PLC0415
-    from server.camera.witness import Witness  # noqa: PLC0415
-    from server.wire.bus import Bus  # noqa: PLC0415
+    from server.messaging.bus import Bus  # noqa: PLC0415
     from tracking import DEFAULT_SOLVER, OnlineTracker, create_solver  # noqa: PLC0415
     from tracking.detectors import BackgroundDetector  # noqa: PLC0415
 

@@ -9,7 +9,7 @@ from typing import Any
 from benchmarks.experiments.scene import HEIGHT, WIDTH
 from benchmarks.surroundings import CannotRunError
 from benchmarks.views import ROOM, Views, find_views
-from server.camera.scene import Scene, write_recording
+from synthetic import Scene, write_recording
 
 CROWD = "crowd"
 FPS = 25.0

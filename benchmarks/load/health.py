@@ -26,9 +26,9 @@ import yaml
 
 from benchmarks.report import Report
 from benchmarks.surroundings import ROOT, one_thread_environment, parser
-from server.camera.scene import Scene, write_recording
-from server.run.setup import free_port
-from server.web.lag import Lag
+from server.cli.generated_config import free_port
+from server.http.event_loop_lag import Lag
+from synthetic import Scene, write_recording
 
 _FPS, _WIDTH, _HEIGHT = 25.0, 192, 108
 _FILMS, _PEOPLE, _SEED, _FILM_S = 4, 3, 1, 20.0
@@ -91,7 +91,7 @@ async def ask(config: Path, port: int, niceness: int, seconds: float, log: Path)
     url, asked = f"http://127.0.0.1:{port}/", Asked(seconds)
     with log.open("ab") as said:
         site = await asyncio.create_subprocess_exec(
-            *(sys.executable, "-m", "server.run.cli", "up", str(config)),
+            *(sys.executable, "-m", "server.cli.main", "up", str(config)),
             cwd=ROOT,
             env=environment,
             stdout=said,

@@ -16,8 +16,8 @@ import yaml
 
 from benchmarks.stream.site import end
 from benchmarks.surroundings import ROOT, one_thread_environment
-from server.camera.scene import Scene, write_recording
-from server.run.setup import free_port
+from server.cli.generated_config import free_port
+from synthetic import Scene, write_recording
 
 FPS = 25.0
 WIDTH, HEIGHT = 352, 288
@@ -84,7 +84,7 @@ def running(most: int, folder: Path) -> Iterator[Crowded]:
 
 def _start(log: IO[bytes], *words: str) -> subprocess.Popen[bytes]:
     environment = {**one_thread_environment(), "MYVIEW_SUPERVISED": "1"}
-    command = [sys.executable, "-m", "server.run.cli", *words]
+    command = [sys.executable, "-m", "server.cli.main", *words]
     return subprocess.Popen(command, cwd=ROOT, env=environment, stdout=log, stderr=log)
 
 

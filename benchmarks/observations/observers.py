@@ -20,7 +20,7 @@ from tracking.detectors import (
     Image,
     paper_boxes,
 )
-from tracking.detectors.ignore import visible_mask
+from tracking.detectors.ignore_mask import visible_mask
 from tracking.motchallenge import MotRow
 
 SURE = 0.4

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bestview import person_heights, to_ground
-from bestview.ground import from_ground
+from bestview.geometry.ground_plane import from_ground
 from tracking.boxes import Floats
-from tracking.detectors.heightline import HeightLine
+from tracking.detectors.background.height_model import HeightLine
 
 Ints = NDArray[np.int64]
 _BEYOND = 0.25

@@ -9,7 +9,7 @@ import numpy as np
 
 from benchmarks.bestview.watch import Rows
 from bestview import feet, to_ground
-from bestview.ground import feet_cut_off
+from bestview.geometry.ground_plane import feet_cut_off
 from tracking.boxes import Floats
 from tracking.motchallenge import MotRow
 

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from benchmarks.occupancy.masks import Masks
 from server.camera.pipeline import CameraPipeline
 from server.camera.sources import SourceEnded
-from server.wire.config import Config
+from server.config.site_config import Config
 from tracking.boxes import Floats
-from tracking.detectors.looks import LooksSettings, colour_histograms
+from tracking.detectors.color_histogram import LooksSettings, colour_histograms
 
 _EVERY = 2
 """Of so many frames one is looked at."""

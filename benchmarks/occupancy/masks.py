@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from server.camera.pipeline import CameraPipeline
 from server.camera.sources import SourceEnded
-from server.wire.config import Config
+from server.config.site_config import Config
 from tracking.boxes import Floats
 from tracking.detectors import BackgroundDetector
+from tracking.detectors.background.foreground_fit import Explanation
+from tracking.detectors.background.grid import Grid
+from tracking.detectors.background.height_model import HeightLine
 from tracking.detectors.base import Mask
-from tracking.detectors.explain import Explanation
-from tracking.detectors.grid import Grid
-from tracking.detectors.heightline import HeightLine
 
 CELL = 2
 """Pixels of the detector's working picture per cell, on each axis."""

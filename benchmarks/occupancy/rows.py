@@ -22,8 +22,8 @@ from benchmarks.occupancy.map import OccupancyMap, OccupancySettings, Sight
 from benchmarks.occupancy.masks import Masks, masks_of
 from benchmarks.occupancy.paths import Lattice, shortest_paths
 from benchmarks.occupancy.walks import Walk, WalkSettings, rows_of_walks, walk_of
-from server.view.choice.decide import homographies
-from server.wire.config import Config
+from server.config.site_config import Config
+from server.service.view_selection.decider import homographies
 from tracking.boxes import Floats
 from tracking.motchallenge import MotRow
 

@@ -14,11 +14,11 @@ import numpy as np
 from aiohttp import web
 
 from benchmarks.surroundings import ROOT
-from server.camera.encode import Encoder
-from server.view.media.agreement import Agreement
-from server.view.media.fmp4 import init_segment, rebased, ticks
-from server.view.streams.shelf import Shelf
-from server.wire.sections import Encode, Site
+from server.camera.encoding.encoder import Encoder
+from server.config.sections import Encode, Site
+from server.media.containers.fmp4 import init_segment, rebased, ticks
+from server.media.stream_format import Agreement
+from server.service.streaming.frame_buffer import Shelf
 
 _PAGE = ROOT / "client" / "page"
 _WIDTH, _HEIGHT = 160, 96

@@ -69,7 +69,7 @@ async def demo() -> AsyncIterator[str]:
         RuntimeError: it did not become ready.
     """
     process = await asyncio.create_subprocess_exec(
-        *(sys.executable, "-m", "server.run.cli", "demo", "--no-browser", "--port", "0"),
+        *(sys.executable, "-m", "server.cli.main", "demo", "--no-browser", "--port", "0"),
         env={**one_thread_environment(), "PYTHONUNBUFFERED": "1"},
         stdout=asyncio.subprocess.PIPE,
         stderr=asyncio.subprocess.DEVNULL,

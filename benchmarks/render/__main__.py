@@ -43,7 +43,7 @@ class Run:
 
 def time_command(views: Views, config: Path, folder: Path) -> Run:
     """Run `myview render` on the views into a new folder."""
-    command = [sys.executable, "-m", "server.run.cli", "render", *map(str, views.videos)]
+    command = [sys.executable, "-m", "server.cli.main", "render", *map(str, views.videos)]
     command += ["--config", str(config), "--out", str(folder)]
     if views.ground is not None:
         command += ["--ground", str(views.ground)]

@@ -7,15 +7,15 @@ from pathlib import Path
 
 from benchmarks.stopwatch import Stopwatch
 from benchmarks.views import Views
+from server.camera.peers.cross_view_scorer import Witness
 from server.camera.pipeline import CameraPipeline
-from server.camera.witness import Witness
-from server.run.offline import run_cameras
-from server.run.render import Renderer
-from server.run.setup import config_for_videos
-from server.view.align import Aligner
-from server.view.choice.decide import Decider
-from server.wire.config import Config
-from server.wire.loading import read_content
+from server.cli.generated_config import config_for_videos
+from server.cli.render.camera_workers import run_cameras
+from server.cli.render.renderer import Renderer
+from server.config.loader import read_content
+from server.config.site_config import Config
+from server.service.ingest.epoch_aligner import Aligner
+from server.service.view_selection.decider import Decider
 from tracking import OnlineTracker, create_solver
 from tracking.detectors import BackgroundDetector
 

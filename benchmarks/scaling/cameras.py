@@ -18,12 +18,12 @@ import numpy as np
 
 from benchmarks.scaling.hall import HEIGHT, STRIDE, WIDTH, WINDOW, Hall, Tracker
 from camsync import PulseClient
-from server.camera.encode import AccessUnit, Encoder
-from server.run.ending import end_with_parent
-from server.wire.bus import Bus
-from server.wire.config import Config
-from server.wire.loading import load_config
-from server.wire.messages import CameraTracks, FrameHead, Keys, ThumbHead
+from server.camera.encoding.encoder import AccessUnit, Encoder
+from server.config.loader import load_config
+from server.config.site_config import Config
+from server.messaging.bus import Bus
+from server.messaging.messages import CameraTracks, FrameHead, Keys, ThumbHead
+from server.supervisor.shutdown import end_with_parent
 
 _THUMBS_EVERY = 5
 """Epochs."""

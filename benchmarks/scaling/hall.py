@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from server.wire.messages import CameraTracks, Glimpse, Track
+from server.messaging.messages import CameraTracks, Glimpse, Track
 from tracking.boxes import Floats
 
 WIDTH, HEIGHT = 640, 360

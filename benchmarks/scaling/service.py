@@ -18,18 +18,18 @@ from typing import Any
 
 from benchmarks.live.stages import ThreadWatch
 from bestview import IdentityRegistry
-from server.run.cli import main as command_line
-from server.view.align import Aligner
-from server.view.board import Board
-from server.view.choice.decide import Decider
-from server.view.choice.outlook import Outlook
-from server.view.choice.sight import Sight
-from server.view.intake import Intake
-from server.view.service import BestViewService
-from server.view.streams.splice import Splicer
-from server.view.who.people import People
-from server.web.events import Events
-from server.wire.bus import Bus
+from server.cli.main import main as command_line
+from server.http.api.events import Events
+from server.messaging.bus import Bus
+from server.service.decision_state import Board
+from server.service.identity.people import People
+from server.service.ingest.epoch_aligner import Aligner
+from server.service.ingest.ingest import Intake
+from server.service.service import BestViewService
+from server.service.streaming.splicer import Splicer
+from server.service.view_selection.decider import Decider
+from server.service.view_selection.lookahead_window import Outlook
+from server.service.view_selection.view_quality_buffer import Sight
 
 LISTS = "lists"
 STAGES = {

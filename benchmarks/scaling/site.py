@@ -17,7 +17,7 @@ import yaml
 from benchmarks.scaling.hall import HEIGHT, STRIDE, WIDTH, Hall
 from benchmarks.scaling.service import LISTS, REST, STAGES, Times
 from benchmarks.surroundings import ROOT, one_thread_environment
-from server.run.setup import free_port
+from server.cli.generated_config import free_port
 
 _PATIENCE_S = 120.0
 _POLL_S = 0.2
@@ -129,7 +129,7 @@ def _running(hall: Hall, fps: float, folder: Path, services: int) -> Iterator[li
     config.write_text(yaml.safe_dump(content), encoding="utf-8")
     halves = [range(hall.cameras // 2), range(hall.cameras // 2, hall.cameras)]
     with (folder / _LOG).open("wb") as log:
-        started = [_start(log, "server.run.cli", "sync", str(config))]
+        started = [_start(log, "server.cli.main", "sync", str(config))]
         running = []
         for index, port in enumerate(https):
             times = folder / f"times{index}.json"

@@ -9,7 +9,7 @@ from typing import Any
 
 import av
 
-from server.camera.scene import Scene, write_recording
+from synthetic import Scene, write_recording
 
 WIDTH, HEIGHT = 128, 72
 NOMINAL = 3.0

@@ -31,7 +31,7 @@ from benchmarks.stream.splice import encode_again, splice
 from benchmarks.stream.stalled import Beside, beside_stalled, describe_stalled
 from benchmarks.stream.tables import Found, describe, plot
 from benchmarks.surroundings import parser
-from server.camera.encode import AccessUnit
+from server.camera.encoding.encoder import AccessUnit
 
 PARTS = ("splice", "objects", "viewers", "first", "right", "drift", "hls", "stalled")
 _OBJECTS = 50

@@ -16,8 +16,8 @@ from benchmarks.stream.cameras import ENCODE, SITE
 from benchmarks.stream.crowd import Heard
 from benchmarks.stream.load import send_delays
 from benchmarks.stream.site import viewers
-from server.camera.encode import AccessUnit
-from server.view.media.fmp4 import Sample, fragment
+from server.camera.encoding.encoder import AccessUnit
+from server.media.containers.fmp4 import Sample, fragment
 
 _BACKLOG = 1000
 

@@ -17,14 +17,14 @@ import msgspec
 
 from benchmarks.scaling.hall import STRIDE, WINDOW, Hall, Tracker
 from camsync import PulseClient
-from server.camera.encode import AccessUnit, Encoder
-from server.camera.scene import Scene
-from server.run.ending import end_with_parent
-from server.wire.bus import Bus
-from server.wire.config import Config
-from server.wire.loading import load_config
-from server.wire.messages import FrameHead, Keys
-from server.wire.sections import Encode, Site
+from server.camera.encoding.encoder import AccessUnit, Encoder
+from server.config.loader import load_config
+from server.config.sections import Encode, Site
+from server.config.site_config import Config
+from server.messaging.bus import Bus
+from server.messaging.messages import FrameHead, Keys
+from server.supervisor.shutdown import end_with_parent
+from synthetic import Scene
 
 CAMERAS = 4
 SITE = Site(name="stream", width=352, height=288, fps=25)

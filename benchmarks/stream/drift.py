@@ -10,15 +10,15 @@ import msgspec
 
 from benchmarks.scaling.hall import STRIDE, WINDOW, Hall, Tracker
 from benchmarks.stream.cameras import CAMERAS, ENCODE, SITE
-from server.camera.encode import AccessUnit
-from server.view.media.fmp4 import ticks
-from server.view.service import BestViewService
-from server.view.streams.channel import Piece
-from server.view.streams.footage import Footage
-from server.wire.config import Config
-from server.wire.inbox import Message
-from server.wire.messages import FrameHead, GopChoices, Keys
-from server.wire.sections import Camera
+from server.camera.encoding.encoder import AccessUnit
+from server.config.sections import Camera
+from server.config.site_config import Config
+from server.media.containers.fmp4 import ticks
+from server.messaging.inbox import Message
+from server.messaging.messages import FrameHead, GopChoices, Keys
+from server.service.service import BestViewService
+from server.service.streaming.broadcaster import Piece
+from server.service.streaming.media_chunk import Footage
 
 _PER_CAMERA = 2
 """People in a camera's view, on average: few, so that an hour passes in minutes."""

@@ -13,12 +13,12 @@ import numpy as np
 from benchmarks.scaling.hall import Hall
 from benchmarks.stream.cameras import CAMERAS, ENCODE, SITE
 from benchmarks.stream.drift import Source
-from server.camera.encode import AccessUnit
-from server.view.service import BestViewService
-from server.web.app import make_app, serving
-from server.wire.config import Config
-from server.wire.messages import GopChoices
-from server.wire.sections import Camera, Http
+from server.camera.encoding.encoder import AccessUnit
+from server.config.sections import Camera, Http
+from server.config.site_config import Config
+from server.http.app import make_app, serving
+from server.messaging.messages import GopChoices
+from server.service.service import BestViewService
 
 _PER_CAMERA = 2
 _BEFORE_S = 8.0

@@ -19,8 +19,8 @@ from benchmarks.stream.crowd import Heard
 from benchmarks.stream.service import Given
 from benchmarks.stream.site import StreamSite, Viewers
 from benchmarks.stream.splice import encode_again
-from server.camera.encode import AccessUnit
-from server.wire.drawing import TIMESCALE
+from server.camera.encoding.encoder import AccessUnit
+from server.media.rendering_messages import TIMESCALE
 
 _SETTLE_S = 2.0
 _PAUSE_S = 0.037

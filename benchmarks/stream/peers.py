@@ -15,8 +15,8 @@ from pathlib import Path
 
 from benchmarks.stream.cameras import ENCODE, SITE
 from benchmarks.stream.site import StreamSite, end
-from server.camera.encode import AccessUnit
-from server.run.setup import free_port
+from server.camera.encoding.encoder import AccessUnit
+from server.cli.generated_config import free_port
 
 _CUT_S = 2.0
 _START_S = 10.0

@@ -12,11 +12,11 @@ import av
 import numpy as np
 
 from benchmarks.stream.splice import Cut
-from server.camera.encode import AccessUnit, Encoder
-from server.view.streams.channel import Piece
-from server.view.streams.footage import Footage
-from server.wire.config import Config
-from server.wire.sections import Camera, Encode, Site
+from server.camera.encoding.encoder import AccessUnit, Encoder
+from server.config.sections import Camera, Encode, Site
+from server.config.site_config import Config
+from server.service.streaming.broadcaster import Piece
+from server.service.streaming.media_chunk import Footage
 
 _SITE = Site(name="right", width=64, height=48, fps=25)
 _ENCODE = Encode()

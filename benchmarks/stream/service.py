@@ -13,9 +13,9 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from server.run.cli import main as command_line
-from server.view.choice.decide import GopDecision
-from server.view.streams.splice import Splicer
+from server.cli.main import main as command_line
+from server.service.streaming.splicer import Splicer
+from server.service.view_selection.decider import GopDecision
 
 
 def note(path: Path) -> None:

@@ -22,8 +22,8 @@ from benchmarks.stream import service as stream_service
 from benchmarks.stream.cameras import CAMERAS, ENCODE, SITE, save
 from benchmarks.stream.crowd import Heard
 from benchmarks.surroundings import ROOT, one_thread_environment
-from server.camera.encode import AccessUnit
-from server.run.setup import free_port
+from server.camera.encoding.encoder import AccessUnit
+from server.cli.generated_config import free_port
 
 PER_CAMERA = 20
 """People in a camera's view, on average: some sixty in the hall."""
@@ -114,7 +114,7 @@ def running(films: Sequence[Sequence[AccessUnit]], folder: Path) -> Iterator[Str
     }
     config.write_text(yaml.safe_dump(content), encoding="utf-8")
     with (folder / _LOG).open("wb") as log:
-        started = [_start(log, "server.run.cli", "sync", str(config))]
+        started = [_start(log, "server.cli.main", "sync", str(config))]
         service = _start(log, "benchmarks.stream.service", str(folder / "sent"), "bestview", str(config))
         cameras = [str(config), str(folder / "films"), f"{PER_CAMERA}"]
         started += [service, _start(log, "benchmarks.stream.cameras", *cameras)]

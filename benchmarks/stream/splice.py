@@ -13,15 +13,15 @@ import numpy as np
 from av.codec.context import Flags
 
 from benchmarks.stream.cameras import CAMERAS, ENCODE, SITE
-from server.camera.encode import AccessUnit, Encoder
-from server.view.choice.decide import GopDecision, ObjectChoice
-from server.view.choice.why import Why
-from server.view.media.codec import agreement_for
-from server.view.streams.channel import Piece
-from server.view.streams.shelf import Shelf
-from server.view.streams.splice import Splicer
-from server.wire.config import Config
-from server.wire.sections import Camera
+from server.camera.encoding.encoder import AccessUnit, Encoder
+from server.config.sections import Camera
+from server.config.site_config import Config
+from server.media.codec import agreement_for
+from server.service.streaming.broadcaster import Piece
+from server.service.streaming.frame_buffer import Shelf
+from server.service.streaming.splicer import Splicer
+from server.service.view_selection.decider import GopDecision, ObjectChoice
+from server.service.view_selection.explanation import Why
 
 _NAMES = tuple(f"c{number}" for number in range(CAMERAS))
 _NO_REASON = cast("Why", None)

@@ -15,7 +15,7 @@ from benchmarks.report import Report
 from benchmarks.stream.cameras import ENCODE, SITE
 from benchmarks.stream.load import send_delays
 from benchmarks.stream.site import StreamSite, Viewers
-from server.wire.drawing import TIMESCALE
+from server.media.rendering_messages import TIMESCALE
 
 STALLED_SHARE = 0.1
 """Of all viewers."""

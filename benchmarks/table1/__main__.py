@@ -30,10 +30,10 @@ from benchmarks.table1.measure import REAL_TIME, Measured, Row, measured, summed
 from benchmarks.table1.plot import plot
 from benchmarks.table1.words import WORDS, Words
 from benchmarks.yardsticks import View
-from server.camera.scene import Scene, write_recording
-from server.run.track import loaded_for, searched
+from server.cli.track.command import loaded_for, searched
+from synthetic import Scene, write_recording
+from tracking.baselines import tracker_names
 from tracking.motchallenge import read_rows
-from tracking.yardsticks import tracker_names
 
 _RECORDED = (("pets09", "view1", 7.0), ("terrace", "c0", 25.0))
 """Scene, view, frames a second."""

@@ -28,11 +28,11 @@ from benchmarks.surroundings import parser
 from benchmarks.temporal.merges import events, merged, mistaken
 from benchmarks.temporal.plot import THEIR_EDGES, THEIRS, plot
 from benchmarks.temporal.room import SIZE, Clip, Played, played
-from tracking.temporal import TemporalSettings
-from tracking.temporal.edges import cheapest_by_edges
-from tracking.temporal.graph import Graph, all_edges, edges, ways
-from tracking.temporal.groups import joint_path
-from tracking.temporal.window import Commitment, TemporalWindow
+from tracking.baselines.temporal_consistency import TemporalSettings
+from tracking.baselines.temporal_consistency.edge_search import cheapest_by_edges
+from tracking.baselines.temporal_consistency.graph import Graph, all_edges, edges, ways
+from tracking.baselines.temporal_consistency.groups import joint_path
+from tracking.baselines.temporal_consistency.window import Commitment, TemporalWindow
 
 STAGES = (1, 2, 5, 10)
 STAGE_S = 0.5

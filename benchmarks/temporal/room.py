@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from benchmarks.temporal.merges import NOBODY
 from bestview import to_ground
-from server.camera.scene import CameraTruth, Scene
+from synthetic import CameraTruth, Scene
+from tracking.baselines.temporal_consistency import BlobSettings
+from tracking.baselines.temporal_consistency.blobs import Blob, Blobs
+from tracking.baselines.temporal_consistency.window import Stage
 from tracking.boxes import Floats
 from tracking.detectors import Image
-from tracking.temporal import BlobSettings
-from tracking.temporal.blobs import Blob, Blobs
-from tracking.temporal.window import Stage
 
 SIZE = (320, 240)
 _EMPTY = 25

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bestview.ground import feet, person_heights, to_ground
+from bestview.geometry.ground_plane import feet, person_heights, to_ground
 from bestview.quality.boxes import Floats
 
 _STROLL = 0.15

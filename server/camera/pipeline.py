@@ -6,25 +6,25 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from server.camera.ahead import ready_detector
-from server.camera.encode import AccessUnit, Encoder
-from server.camera.floor import check_floor
-from server.camera.following import ready_tracker
-from server.camera.mending import mended
-from server.camera.observe import make_detector
-from server.camera.own import Passing, open_own
-from server.camera.report import Reporter
+from server.camera.audio import LiveSound
+from server.camera.background_warmup import ready_detector
+from server.camera.corrected_windows import mended
+from server.camera.detector_setup import make_detector
+from server.camera.encoding.encoder import AccessUnit, Encoder
+from server.camera.floor_check import check_floor
+from server.camera.load.frame_skipper import Stepping
+from server.camera.passthrough import Passing, open_own
+from server.camera.peers.cross_view_scorer import Heard, Witness
 from server.camera.sharpness import Sharpness
-from server.camera.sound import LiveSound
 from server.camera.sources import Image, Source, open_source
-from server.camera.stepping import Stepping
-from server.camera.witness import Heard, Witness
-from server.wire.config import Config
-from server.wire.fit import Fit
-from server.wire.help import POINTS_MOST
-from server.wire.messages import CameraTracks, Found
+from server.camera.track_messages import Reporter
+from server.camera.tracker_setup import ready_tracker
+from server.config.site_config import Config
+from server.media.letterbox import Fit
+from server.messaging.messages import CameraTracks, Found
+from server.messaging.operator_messages import POINTS_MOST
 from tracking import Detections, create_solver
-from tracking.assist import Pointing
+from tracking.interactive import Pointing
 
 _BY_ITSELF = Heard()
 _TOLD_MOST = 50_000

@@ -15,20 +15,28 @@ from typing import TypeVar
 import msgspec
 
 from camsync import ClientSettings, Pulse, PulseClient, steady_unix_clock
-from server.camera.exchange import Exchange
-from server.camera.keeping import Keeping
-from server.camera.load import Load
-from server.camera.meter import Meter
+from server.camera.audio import LiveSound, open_sound, runs
+from server.camera.load.load_monitor import Load
+from server.camera.operator_corrections import Pointed
+from server.camera.peers.detection_exchange import Exchange
 from server.camera.pipeline import CameraPipeline
-from server.camera.pointed import Pointed
-from server.camera.sound import LiveSound, open_sound, runs
+from server.camera.retained_state import Keeping
 from server.camera.sources import Image, SourceEnded
-from server.camera.thumbs import thumbnails
-from server.wire.addresses import shown_endpoint
-from server.wire.bus import Bus
-from server.wire.config import Config
-from server.wire.messages import CameraStatus, CameraTracks, CameraWord, FrameHead, Keys, SoundHead, ThumbHead
-from server.wire.pulse_users import pulse_login
+from server.camera.status_meter import Meter
+from server.camera.thumbnails import thumbnails
+from server.config.pulse_passwords import pulse_login
+from server.config.site_config import Config
+from server.messaging.bus import Bus
+from server.messaging.messages import (
+    CameraStatus,
+    CameraTracks,
+    CameraWord,
+    FrameHead,
+    Keys,
+    SoundHead,
+    ThumbHead,
+)
+from server.system.address_redaction import shown_endpoint
 
 log = logging.getLogger(__name__)
 

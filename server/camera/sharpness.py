@@ -7,7 +7,7 @@ import msgspec
 import numpy as np
 
 from server.camera.sources import Image
-from server.wire.messages import Box, CameraTracks
+from server.messaging.messages import Box, CameraTracks
 
 _WIDTH, _HEIGHT = 32, 64
 """Everybody is brought to this size first, so that what counts is detail of the person, not of the pixels."""

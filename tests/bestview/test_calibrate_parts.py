@@ -9,16 +9,16 @@ from hypothesis import strategies as st
 from walkers import SIZE, Noise, camera_at, seen, stroll
 
 from bestview import foot_spread, to_ground
-from bestview.calibrate import Track, Walk, WalkSettings, make_walk
-from bestview.calibrate.agreement import apart, matched, placed, score, tally
-from bestview.calibrate.hypotheses import guesses
-from bestview.calibrate.pinhole import Pinhole
-from bestview.calibrate.refine import Matches, Rig
-from bestview.calibrate.samples import meetings, sample
-from bestview.calibrate.timing import offset_errors
-from bestview.calibrate.two import breadth
-from bestview.calibrate.wrong_times import backwards, late
-from bestview.ground import feet
+from bestview.calibration import Track, Walk, WalkSettings, make_walk
+from bestview.calibration.bundle_adjustment import Matches, Rig
+from bestview.calibration.camera_pairs import breadth
+from bestview.calibration.chance_agreement import backwards, late
+from bestview.calibration.floor_agreement import apart, matched, placed, score, tally
+from bestview.calibration.pair_hypotheses import guesses
+from bestview.calibration.pinhole import Pinhole
+from bestview.calibration.samples import meetings, sample
+from bestview.calibration.time_offsets import offset_errors
+from bestview.geometry.ground_plane import feet
 
 seeds = st.integers(0, 10_000).map(np.random.default_rng)
 SETTINGS = WalkSettings()

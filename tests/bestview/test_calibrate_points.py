@@ -10,7 +10,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bestview import to_ground
-from bestview.calibrate import CalibrationError, Floats, MarkedPoints, fit_cameras, fit_homography, fit_points
+from bestview.calibration import (
+    CalibrationError,
+    Floats,
+    MarkedPoints,
+    fit_cameras,
+    fit_homography,
+    fit_points,
+)
 
 
 def camera_over_floor(random: np.random.Generator) -> Floats:

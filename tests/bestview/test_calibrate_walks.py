@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from walkers import SIZE, camera_at, error_on_floor, seen, stroll
 
-from bestview.calibrate import CalibrationError, Floats, Track, Walk, WalkSettings, calibrate_walks
-from bestview.calibrate.pinhole import Pinhole
+from bestview.calibration import CalibrationError, Floats, Track, Walk, WalkSettings, calibrate_walks
+from bestview.calibration.pinhole import Pinhole
 
 WEST, SOUTH = camera_at(-4, -1), camera_at(1, -4.5, focal=0.7)
 PERSON = 1.75

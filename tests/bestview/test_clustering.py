@@ -10,9 +10,15 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from bestview.clustering import cluster
-from bestview.likelihood import CameraLooks, LookScale, LookWeights, look_distances, look_evidence
-from bestview.naming import named
+from bestview.association.appearance.likelihood import (
+    CameraLooks,
+    LookScale,
+    LookWeights,
+    look_distances,
+    look_evidence,
+)
+from bestview.association.clustering import cluster
+from bestview.association.registry.id_assignment import named
 
 WEIGHTS = LookWeights(look=3.0, cap=4.0, frames=8)
 JOIN = 0.5

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from test_identity import CALIBRATED, STRIDE, VIEWS, Stay, both, play
 
 from bestview import IdentityRegistry, IdentitySettings
-from bestview.doubt import in_full_view
+from bestview.association.ghost_check import in_full_view
 
 WIDE, HIGH, TALL = 640, 440, 1.75
 SPEAKING = dict.fromkeys(VIEWS, (WIDE, HIGH))

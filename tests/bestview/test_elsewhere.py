@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from walkers import SIZE, camera_at
 
 from bestview import Bodies, bodies, boxes_seen, feet_seen
-from bestview.calibrate.pinhole import Pinhole
+from bestview.calibration.pinhole import Pinhole
 
 EAST, SOUTH = camera_at(4.0, 0.0), camera_at(0.0, -3.0)
 CAMERAS = (EAST, SOUTH)

@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bestview import Glimpse, IdentitySettings, LocalTrack, TrackKey
-from bestview.episodes import Episodes
-from bestview.sightings import FootError, line_up
+from bestview.association.sightings import FootError, line_up
+from bestview.association.tracklet_splitter import Episodes
 
 FEET = FootError(0.05, 0.15)
 LEFT, RIGHT, ONTO_LEFT = (0.0, 0.0, 10.0, 20.0), (100.0, 0.0, 110.0, 20.0), (2.0, 0.0, 12.0, 20.0)

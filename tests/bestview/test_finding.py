@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bestview.appearance import Appearances
-from bestview.finding import clearly_least, find_again, unlike
-from bestview.likelihood import LookScale, LookWeights, look_evidence
-from bestview.looks import Look, Looks
-from bestview.weighing import comparable
+from bestview.association.affinity.affinity_fusion import comparable
+from bestview.association.appearance.equalized_histograms import Appearances
+from bestview.association.appearance.likelihood import LookScale, LookWeights, look_evidence
+from bestview.association.appearance.mean_histograms import Look, Looks
+from bestview.association.registry.reidentification import clearly_least, find_again, unlike
 
 BINS, RATIO = 16, 1.5
 

@@ -22,7 +22,7 @@ from bestview import (
     to_ground,
     turns,
 )
-from bestview.ground import as_standing, feet_cut_off, from_ground
+from bestview.geometry.ground_plane import as_standing, feet_cut_off, from_ground
 
 
 def looking_along(height: float = 3.0, focal: float = 400.0) -> NDArray[np.float64]:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from test_identity import HOWEVER_MANY, both, known, numbers, play, registry
 
 from bestview import Split, TrackKey
-from bestview.identity import IdentityUpdate
+from bestview.association.registry.identity_registry import IdentityUpdate
 
 WEST = TrackKey("west", 1)
 TRACKS = [TrackKey(camera, local) for camera in ("south", "west") for local in (1, 2, 3)]

@@ -9,15 +9,21 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bestview import IdentitySettings
-from bestview.clustering import cluster
-from bestview.episode import End, Episode
-from bestview.evidence import Evidence
-from bestview.keys import EpisodeKey
-from bestview.likelihood import CameraLooks, LookScale, LookWeights, look_distances, look_evidence
-from bestview.links import Links, batches
-from bestview.looks import Look, Looks
-from bestview.pairs import PairTables
-from bestview.persons import Person
+from bestview.association.affinity.affinity_matrix import PairTables
+from bestview.association.affinity.candidate_links import Links, batches
+from bestview.association.affinity.evidence import Evidence
+from bestview.association.appearance.likelihood import (
+    CameraLooks,
+    LookScale,
+    LookWeights,
+    look_distances,
+    look_evidence,
+)
+from bestview.association.appearance.mean_histograms import Look, Looks
+from bestview.association.clustering import cluster
+from bestview.association.keys import EpisodeKey
+from bestview.association.registry.person import Person
+from bestview.association.tracklet import End, Episode
 
 CAMERAS = {"c0": True, "c1": True, "c2": False}
 SETTINGS = IdentitySettings(crowd_frames=1)

@@ -7,11 +7,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bestview import IdentitySettings
-from bestview.keys import EpisodeKey, TrackKey
-from bestview.meeting import Standing, at_once, near
-from bestview.pairs import PairTables, Row
-from bestview.presence import Presence
-from bestview.sightings import Sightings
+from bestview.association.affinity.affinity_matrix import PairTables, Row
+from bestview.association.co_occurrence import Standing, at_once, near
+from bestview.association.keys import EpisodeKey, TrackKey
+from bestview.association.presence import Presence
+from bestview.association.sightings import Sightings
 
 FRAMES = 4
 SETTINGS = IdentitySettings(ground_cap=5.0, ground_frames=2.0, recent=100)

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from bestview import QualitySettings, size_quality
 from bestview.quality import Looks, Seen, compared, compared_views, view_cost, view_quality
-from bestview.quality.central import central
+from bestview.quality.centering import central
 from bestview.quality.facing import facing
-from bestview.quality.unhidden import unhidden
-from bestview.quality.whole import whole
+from bestview.quality.occlusion import unhidden
+from bestview.quality.truncation import whole
 
 WIDTH, HEIGHT, FPS = 100.0, 80.0, 25.0
 PICTURE = np.array([0.0, 0.0, WIDTH, HEIGHT])

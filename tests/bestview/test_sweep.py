@@ -8,9 +8,9 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bestview.ranges import distinct, pairs_within, written_out
-from bestview.runs import runs_of
-from bestview.sweep import overlapping
+from bestview.association.index_ranges import distinct, pairs_within, written_out
+from bestview.association.runs import runs_of
+from bestview.geometry.rectangle_overlap import overlapping
 
 
 @settings(deadline=None, max_examples=100)

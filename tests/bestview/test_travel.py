@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bestview import IdentitySettings
-from bestview.travel import Sight, TravelTimes, time_bins
+from bestview.association.affinity.travel_times import Sight, TravelTimes, time_bins
 
 CAMERAS = ("c0", "c1", "c2")
 SETTINGS = IdentitySettings(travel_frames=1000, travel_known=5.0, travel_cap=4.0)

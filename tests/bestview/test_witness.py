@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from bestview import Findings, Vantage, WitnessSettings, overlook, witnessed
-from bestview.ground import feet, foot_spread, from_ground, person_heights, to_ground
+from bestview.geometry.ground_plane import feet, foot_spread, from_ground, person_heights, to_ground
 
 SIZE = (640.0, 480.0)
 FOCAL, TALL, ABOVE = 400.0, 1.75, 3.0

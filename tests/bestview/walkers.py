@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from bestview import to_ground
-from bestview.calibrate import Floats, Track, Walk
-from bestview.calibrate.pinhole import ASPECT, EAST, FOCAL, HIGH, NORTH, PAN, ROLL, TILT, Pinhole
+from bestview.calibration import Floats, Track, Walk
+from bestview.calibration.pinhole import ASPECT, EAST, FOCAL, HIGH, NORTH, PAN, ROLL, TILT, Pinhole
 
 SIZE = (640, 360)
 STEP = 0.032  # person heights a frame: 1.4 m/s at 25 frames a second

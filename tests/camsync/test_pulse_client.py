@@ -26,10 +26,10 @@ from camsync import (
     SyncError,
     VersionError,
 )
-from camsync.axis import PulseAxis
 from camsync.clock import steady_unix_clock
 from camsync.messages import Beat, Greeting
 from camsync.protocol import encode
+from camsync.pulse_axis import PulseAxis
 
 FPS = 400.0
 QUICK = ClientSettings(backoff_first=0.01, backoff_most=0.05, ping_interval=0.05, silence=0.3)

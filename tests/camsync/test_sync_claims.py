@@ -12,12 +12,12 @@ from patience import PATIENCE
 from pulses_by_hand import BUSY, ByHand, Connect
 
 from camsync import ClientSettings, Login, PulseClient, PulseServer, ServerLimits, SyncError
-from camsync.axis import PulseAxis
 from camsync.claims import Claims
 from camsync.messages import Hello, Known, Pong
 from camsync.proof import Proof
 from camsync.protocol import LAST_PULSE, ProtocolError, parse_client_line, parse_server_line
-from server.wire import numbers
+from camsync.pulse_axis import PulseAxis
+from server.messaging import number_types
 
 FPS = 200.0
 HERE = "127.0.0.1"
@@ -199,4 +199,4 @@ def test_a_number_beyond_the_last_pulse_is_no_pulse(number: int) -> None:
 
 
 def test_the_last_pulse_is_the_same_on_the_bus() -> None:
-    assert numbers.LAST_PULSE == LAST_PULSE < 2**53
+    assert number_types.LAST_PULSE == LAST_PULSE < 2**53

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from camsync.axis import PulseAxis
+from camsync.clock_offset import ClockOffset
 from camsync.follower import Follower
-from camsync.offset import ClockOffset
+from camsync.pulse_axis import PulseAxis
 
 rates = st.sampled_from([1.0, 12.5, 25.0, 30000 / 1001, 60.0, 500.0])
 epochs = st.floats(1.7e9, 1.9e9)

@@ -11,8 +11,8 @@ from patience import PATIENCE
 from pulses_by_hand import ByHand, Connect
 
 from camsync import ClientSettings, Login, PulseClient, PulseServer, ServerLimits, clients_of
+from camsync.client_eviction import who_makes_room
 from camsync.messages import Challenge, Greeting, Pong
-from camsync.places import who_makes_room
 from camsync.proof import Proof
 from camsync.protocol import parse_server_line
 

@@ -17,7 +17,7 @@ from site_by_hand import OBJECTS, box, fragment, header
 import client
 from client.fmp4 import MAX_BOX, BoxReader, Mp4Error
 from client.recording import Recording
-from client.sse import EventStreamError, SseParser
+from client.sse_parser import EventStreamError, SseParser
 from client.webm import LARGEST, ElementReader, WebmError, made
 from client.webm_recording import WebmRecording
 
@@ -249,7 +249,7 @@ def take_often(record: Recording | WebmRecording, part: object) -> None:
 
 
 def test_lines_of_nothing_are_something_to_keep(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("client.sse.MAX_EVENT", 1000)
+    monkeypatch.setattr("client.sse_parser.MAX_EVENT", 1000)
     SseParser().feed(b"data:\n" * 900)
     with pytest.raises(EventStreamError):
         SseParser().feed(b"data:\n" * 1100)

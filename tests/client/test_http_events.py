@@ -12,7 +12,7 @@ from patience import PATIENCE
 from site_by_hand import CAMERAS, OBJECTS, SITE, HandMadeSite, gop, nothing_more, sent
 
 import client
-from client.sse import MAX_EVENT, EventStreamError, SentEvent, SseParser
+from client.sse_parser import MAX_EVENT, EventStreamError, SentEvent, SseParser
 
 FLAG = {"id": 1, "objects": [7, 9], "cameras": ["c0"], "reason": "alike", "pulse": 80} | {
     "raised": 50,

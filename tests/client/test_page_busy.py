@@ -9,7 +9,7 @@ from page_site import FakeSite
 from playwright.async_api import Browser, expect
 from programs import needs_chromium
 
-from server.camera.ladder import rungs
+from server.camera.load.load_shedder import rungs
 
 pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="session")]
 

@@ -14,7 +14,7 @@ from running_site import PATIENT_CAMERAS, RunningSite, running
 from spliced import FPS
 
 from benchmarks.browser import chromium
-from server.run.setup import DEMO, free_port
+from server.cli.generated_config import DEMO, free_port
 
 GOP = 10
 PLACE = """(wanted) => {

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from spliced import FPS
 
-from server.camera.scene import Scene, write_recording
+from synthetic import Scene, write_recording
 
 SECONDS = 20.0
 

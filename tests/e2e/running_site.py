@@ -19,11 +19,11 @@ from patience import PATIENCE
 from spliced import FPS
 
 from client import Cameras, Gop, HttpSettings, Objects, events
-from server.run.setup import free_port
+from server.cli.generated_config import free_port
 
 PATIENT_CAMERAS = {"backlog_s": 60}
 """For sites that leave nothing out, however late they are: how busy the machine is decides nothing."""
-MYVIEW = [sys.executable, "-m", "server.run.cli"]
+MYVIEW = [sys.executable, "-m", "server.cli.main"]
 CAMERAS = ("c0", "c1", "c2")
 
 
@@ -80,8 +80,8 @@ class RunningSite:
             with contextlib.suppress(OSError, ValueError):
                 words = (folder / "cmdline").read_bytes().decode().split("\0")[:-1]
                 parent = int((folder / "stat").read_text().rpartition(")")[2].split()[1])
-                if parent == self.process.pid and "server.run.cli" in words:
-                    command = words[words.index("server.run.cli") + 1 :]
+                if parent == self.process.pid and "server.cli.main" in words:
+                    command = words[words.index("server.cli.main") + 1 :]
                     found[command[2] if command[0] == "camera" else command[0]] = int(folder.name)
         return found
 

@@ -14,7 +14,7 @@ from playwright.async_api import Page
 from programs import needs_chromium
 from running_site import RunningSite
 
-from server.run.setup import DEMO
+from server.cli.generated_config import DEMO
 
 pytestmark = [
     pytest.mark.live,

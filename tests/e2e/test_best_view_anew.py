@@ -17,12 +17,12 @@ from patience import PATIENCE
 from running_site import RunningSite, bounded, running
 
 from client import Gop
-from server.run.setup import DEMO, free_port
-from server.view.who.locals import Followed
-from server.wire.bus import Bus
-from server.wire.inbox import Message
-from server.wire.messages import CameraTracks, Keys
-from server.wire.sections import Zenoh
+from server.cli.generated_config import DEMO, free_port
+from server.config.sections import Zenoh
+from server.messaging.bus import Bus
+from server.messaging.inbox import Message
+from server.messaging.messages import CameraTracks, Keys
+from server.service.identity.local_numbers import Followed
 
 pytestmark = [
     pytest.mark.live,

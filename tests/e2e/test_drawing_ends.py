@@ -30,7 +30,7 @@ async def test_drawing_ends_within_two_seconds_of_sigterm(tmp_path: Path) -> Non
             for answer in (plain, boxed):
                 assert answer.status == 200
                 await bounded(answer.content.readexactly(10_000))
-            drawing = processes("server.draw", started.children()["bestview"])
+            drawing = processes("server.service.rendering.worker", started.children()["bestview"])
             assert len(drawing) == 2
             started.process.send_signal(signal.SIGTERM)
             told = time.monotonic()

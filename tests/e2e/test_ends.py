@@ -21,8 +21,8 @@ import yaml
 from patience import PATIENCE
 from running_site import MYVIEW
 
-from server.camera.sources.stream import OPEN_S
-from server.run.setup import free_port
+from server.camera.sources.live_stream import OPEN_S
+from server.cli.generated_config import free_port
 
 pytestmark = [pytest.mark.live]
 
@@ -143,7 +143,7 @@ async def test_the_demo_ends_while_it_starts(tmp_path: Path) -> None:
     async with asyncio.timeout(PATIENCE):
         for number in (signal.SIGTERM, signal.SIGHUP):
             demo = await asyncio.create_subprocess_exec(
-                *(sys.executable, "-m", "server.run.cli", "demo", "--no-browser", "--port", "0"),
+                *(sys.executable, "-m", "server.cli.main", "demo", "--no-browser", "--port", "0"),
                 stdout=PIPE,
                 stderr=DEVNULL,
                 env=environment,

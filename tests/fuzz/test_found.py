@@ -14,26 +14,26 @@ import pytest
 from benchmarks.fuzz.site import KEYS, STRIDE, Fed, pictures, site, video
 from bestview import checked_homography
 from client.fmp4 import Mp4Error
-from client.plain import write_plain
+from client.mp4_writer import write_plain
 from client.webm import ElementReader, WebmError, cluster_time
-from server.camera.exchange import Exchange
-from server.run.calibrate_points import read_points
-from server.view.media.agreement import Agreement
-from server.view.media.mp4_sound import sound_fragment
-from server.view.media.skip import UnfitError, continuing
-from server.view.past.playlist import Playlist
-from server.view.past.retention import Bounds
-from server.view.past.run import Headers, Run, RunHead
-from server.view.past.sounds import frames_in
-from server.view.past.store import Store
-from server.web.app import make_app, serving
-from server.wire.errors import UserError
-from server.wire.h264 import ParameterSets, nal_units, parameter_sets
-from server.wire.inbox import Message
-from server.wire.loading import build_config, changed_view, load_config
-from server.wire.sections import View
-from server.wire.sound import SoundFormat
-from server.wire.tokens import read_tokens
+from server.camera.peers.detection_exchange import Exchange
+from server.cli.calibrate.points_file import read_points
+from server.config.loader import build_config, changed_view, load_config
+from server.config.sections import View
+from server.config.tokens_file import read_tokens
+from server.http.app import make_app, serving
+from server.media.audio.audio_format import SoundFormat
+from server.media.containers.mp4_audio import sound_fragment
+from server.media.h264.annexb import ParameterSets, nal_units, parameter_sets
+from server.media.h264.repeat_picture import UnfitError, continuing
+from server.media.stream_format import Agreement
+from server.messaging.inbox import Message
+from server.service.recording.audio_file import frames_in
+from server.service.recording.playlist_file import Playlist
+from server.service.recording.recording_session import Headers, Run, RunHead
+from server.service.recording.retention import Bounds
+from server.service.recording.store import Store
+from server.system.errors import UserError
 
 CAMERA = {"id": "c0", "source": "scene:room"}
 

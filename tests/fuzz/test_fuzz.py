@@ -15,8 +15,8 @@ from benchmarks.fuzz.http_strangers import SECRETS, Strangers
 from benchmarks.fuzz.run import Attempt, Crash, Plan, Runner, numbered
 from benchmarks.fuzz.target import Scripts, Target, UnclearError, refused
 from camsync import door, proof
-from server.web.access import access
-from server.web.access.grant import Need
+from server.http.access import access_control
+from server.http.access.grants import Need
 
 SECONDS = 0.25
 INPUTS = 1000
@@ -190,7 +190,7 @@ def test_a_site_that_lets_anybody_in_is_found_out(
     token = f"Authorization: Bearer {SECRETS[who]}\r\n" if who else ""
     request = f"\0GET {asked} HTTP/1.1\r\nHost: x\r\n{token}Connection: close\r\n\r\n".encode()
     assert strangers.feed(request) is False
-    monkeypatch.setattr(access, "need_of", lambda *_: Need.NOTHING)
+    monkeypatch.setattr(access_control, "need_of", lambda *_: Need.NOTHING)
     with pytest.raises(AssertionError, match=who or r"\[\]"):
         strangers.feed(request)
 

@@ -11,16 +11,25 @@ import msgspec
 import numpy as np
 
 from bestview import EpisodeKey, IdentityUpdate, LocalTrack
-from server.camera.encode import AccessUnit, Encoder
-from server.view.align import Epoch
-from server.view.choice.why import Why
-from server.view.service import BestViewService
-from server.wire.config import Config
-from server.wire.epochs import end_of_epoch
-from server.wire.inbox import Message
-from server.wire.loading import build_config
-from server.wire.messages import Box, CameraStatus, CameraTracks, FrameHead, Glimpse, Keys, ThumbHead, Track
-from server.wire.sections import Encode, Site
+from server.camera.encoding.encoder import AccessUnit, Encoder
+from server.config.loader import build_config
+from server.config.sections import Encode, Site
+from server.config.site_config import Config
+from server.messaging.epochs import end_of_epoch
+from server.messaging.inbox import Message
+from server.messaging.messages import (
+    Box,
+    CameraStatus,
+    CameraTracks,
+    FrameHead,
+    Glimpse,
+    Keys,
+    ThumbHead,
+    Track,
+)
+from server.service.ingest.epoch_aligner import Epoch
+from server.service.service import BestViewService
+from server.service.view_selection.explanation import Why
 
 WIDTH, HEIGHT, FPS = 64, 48, 25
 GOP = STRIDE = 5

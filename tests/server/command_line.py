@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import pytest
 
-from server.run.cli import main
+from server.cli.main import main
 
 BAD_INPUT = 2
 

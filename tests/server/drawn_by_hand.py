@@ -16,12 +16,12 @@ from halls import Hall
 from numpy.typing import NDArray
 from patience import PATIENCE
 
-from server.camera.encode import AccessUnit, Encoder
-from server.camera.scene import Scene
-from server.web.app import make_app, serving
-from server.wire.epochs import end_of_epoch
-from server.wire.messages import Box, GopChoices, Track
-from server.wire.sections import Http
+from server.camera.encoding.encoder import AccessUnit, Encoder
+from server.config.sections import Http
+from server.http.app import make_app, serving
+from server.messaging.epochs import end_of_epoch
+from server.messaging.messages import Box, GopChoices, Track
+from synthetic import Scene
 
 SIZE = (320, 180)
 CAMERAS = ("c0", "c1")

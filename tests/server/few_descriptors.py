@@ -16,7 +16,7 @@ from free_port import free
 from patience import PATIENCE
 
 FEW = 64  # descriptors: hardly more than a process needs for itself
-MYVIEW = f"{shlex.quote(sys.executable)} -m server.run.cli"
+MYVIEW = f"{shlex.quote(sys.executable)} -m server.cli.main"
 
 
 def written(folder: Path, port: int) -> Path:

@@ -11,8 +11,8 @@ import pytest
 from cameras_by_hand import CAMERAS, LARGE, SMALL, FedService, TrackNumbers, small_config
 from patience import PATIENCE
 
-from server.web.app import make_app, serving
-from server.wire.sections import Http
+from server.config.sections import Http
+from server.http.app import make_app, serving
 
 A, B = CAMERAS
 

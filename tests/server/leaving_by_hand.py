@@ -18,7 +18,7 @@ from halls import A, B, Hall
 from numpy.typing import NDArray
 from tokens_by_hand import bearer, locked
 
-from server.wire.messages import Box, GopChoices
+from server.messaging.messages import Box, GopChoices
 
 Picture = NDArray[np.uint8]
 Codec = Literal["h264", "vp8"]

@@ -9,7 +9,7 @@ from typing import Any
 from patience import PATIENCE
 
 from benchmarks.browser import chromium
-from server.view.streams.splice import Splicer
+from server.service.streaming.splicer import Splicer
 
 READ = """
   const video = document.createElement('video');

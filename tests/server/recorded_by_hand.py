@@ -12,15 +12,15 @@ import numpy as np
 from cameras_by_hand import CAMERAS, FPS, GOP, HEIGHT, WIDTH, encoded
 from numpy.typing import NDArray
 
-from server.view.media.agreement import Agreement
-from server.view.media.fmp4 import init_segment
-from server.view.past.age import MachineClocks
-from server.view.past.media import Gop, _fragments
-from server.view.past.retention import Bounds
-from server.view.past.run import Headers, RunHead
-from server.view.past.store import Piece, Store
-from server.view.streams.shelf import Shelf
-from server.wire.messages import GopChoices
+from server.media.containers.fmp4 import init_segment
+from server.media.stream_format import Agreement
+from server.messaging.messages import GopChoices
+from server.service.recording.media_files import Gop, _fragments
+from server.service.recording.recording_age import MachineClocks
+from server.service.recording.recording_session import Headers, RunHead
+from server.service.recording.retention import Bounds
+from server.service.recording.store import Piece, Store
+from server.service.streaming.frame_buffer import Shelf
 
 A, B = CAMERAS
 FRAMES = 200

@@ -9,8 +9,8 @@ import struct
 import threading
 from collections.abc import Iterator, Sequence
 
-from server.camera.encode import AccessUnit
-from server.wire.h264 import NAL_PPS, NAL_SPS, nal_type, nal_units
+from server.camera.encoding.encoder import AccessUnit
+from server.media.h264.annexb import NAL_PPS, NAL_SPS, nal_type, nal_units
 
 _PAYLOAD_TYPE = 96
 _MOST = 200

@@ -16,11 +16,11 @@ from av.video.stream import VideoStream
 from cameras_by_hand import GOP, FedService
 from numpy.typing import NDArray
 
-from server.camera.encode import AccessUnit, Encoder
-from server.camera.sound import Frame, RecordedSound, runs
-from server.wire.inbox import Message
-from server.wire.messages import Keys, SoundHead
-from server.wire.sections import Encode, Site
+from server.camera.audio import Frame, RecordedSound, runs
+from server.camera.encoding.encoder import AccessUnit, Encoder
+from server.config.sections import Encode, Site
+from server.messaging.inbox import Message
+from server.messaging.messages import Keys, SoundHead
 
 WIDTH, HEIGHT, FPS = 64, 48, 25
 EVERY = 20

@@ -14,7 +14,7 @@ from cameras_by_hand import LARGE, SMALL, tracks, word
 from halls import A, B, Hall, see
 from tokens_by_hand import bearer, locked, token_of
 
-from server.wire.help import Trouble
+from server.messaging.operator_messages import Trouble
 
 
 @pytest.fixture
@@ -101,7 +101,7 @@ async def test_events_are_of_one_camera_alone(site: Hall) -> None:
 
 async def test_flags_are_of_who_may_be_seen_alone(site: Hall, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
-        "server.view.helping.flag_budget._ONE_S", -1.0
+        "server.service.operator_assist.flag_budget._ONE_S", -1.0
     )  # both have a flag, though they are of one
     troubles = [
         Trouble(reason="alike", tracks=[1, 2], pulse=19, margin=0.5, risk=0.5),

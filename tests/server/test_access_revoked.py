@@ -17,17 +17,17 @@ from cameras_by_hand import CAMERAS, SMALL
 from halls import A, B, Hall
 from tokens_by_hand import LATER, bearer, line_of, locked, token_of, write_tokens
 
-from server.web.access.file import TokenFile
-from server.web.access.other_sites import CHANGES
-from server.wire.inbox import Message
-from server.wire.messages import Keys
-from server.wire.remembered import Remembered
-from server.wire.tokens import digest_of
+from server.config.tokens_file import digest_of
+from server.http.access.csrf import CHANGES
+from server.http.access.token_file import TokenFile
+from server.messaging.inbox import Message
+from server.messaging.messages import Keys
+from server.messaging.retained_state import Remembered
 
 
 @pytest.fixture(autouse=True)
 def _looks_often(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("server.web.access.access._LOOK_EVERY_S", 0.02)
+    monkeypatch.setattr("server.http.access.access_control._LOOK_EVERY_S", 0.02)
 
 
 @pytest.fixture
@@ -150,7 +150,9 @@ async def test_a_sign_in_ends_in_time_though_the_disk_with_the_tokens_hangs(
     monkeypatch.setattr(TokenFile, "look", look)
     try:
         await asyncio.to_thread(looked.wait, 10.0)
-        monkeypatch.setattr("server.web.access.sessions.Sessions.token", lambda *_: None)  # 12 hours are over
+        monkeypatch.setattr(
+            "server.http.access.sessions.Sessions.token", lambda *_: None
+        )  # 12 hours are over
         await asyncio.wait_for(ended(answer), 10.0)
     finally:
         hangs.set()

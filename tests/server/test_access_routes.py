@@ -12,9 +12,9 @@ from cameras_by_hand import LARGE, SMALL
 from halls import A, B, Hall, see
 from tokens_by_hand import EVERYBODY, bearer, locked
 
-from server.web.access.access import ACCESS, Access, only_who_may
-from server.web.access.other_sites import CHANGES
-from server.web.app import make_app
+from server.http.access.access_control import ACCESS, Access, only_who_may
+from server.http.access.csrf import CHANGES
+from server.http.app import make_app
 
 ALL = frozenset(EVERYBODY)
 NOBODY = "nobody"

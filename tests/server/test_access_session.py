@@ -15,12 +15,12 @@ from aiohttp.test_utils import make_mocked_request
 from halls import Hall, opened
 from tokens_by_hand import bearer, line_of, locked, token_of, write_tokens
 
-from server.web.access.access import COOKIE, Access, Holder
-from server.web.access.failures import Failures
-from server.web.access.here import is_from_here
-from server.web.access.other_sites import CHANGES
-from server.web.access.sessions import Sessions
-from server.wire.tokens import digest_of
+from server.config.tokens_file import digest_of
+from server.http.access.access_control import COOKIE, Access, Holder
+from server.http.access.csrf import CHANGES
+from server.http.access.local_requests import is_from_here
+from server.http.access.login_failures import Failures
+from server.http.access.sessions import Sessions
 
 SESSION = "/api/session"
 CAMERAS = "/api/operator/cameras"

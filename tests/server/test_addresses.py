@@ -7,8 +7,8 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from passwords_by_hand import HOST, PASSWORDS, PLACES, tells
 
-from server.wire.addresses import shown, shown_endpoint, without_addresses
-from server.wire.sources import SourceKind, kind_of
+from server.config.source_address import SourceKind, kind_of
+from server.system.address_redaction import shown, shown_endpoint, without_addresses
 
 
 @pytest.mark.parametrize(

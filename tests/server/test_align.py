@@ -5,9 +5,9 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from server.view.align import Aligner, Epoch
-from server.wire.epochs import end_of_epoch
-from server.wire.messages import CameraTracks
+from server.messaging.epochs import end_of_epoch
+from server.messaging.messages import CameraTracks
+from server.service.ingest.epoch_aligner import Aligner, Epoch
 
 STRIDE, GRACE = 5, 12
 CAMERAS = ("c0", "c1", "c2")

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import cast
 
 from bestview import Merge, Split
-from server.view.board import Board
-from server.view.choice.decide import GopDecision, ObjectChoice
-from server.view.choice.why import Explanation, Why
-from server.wire.messages import Cut, Merged, Parted
+from server.messaging.messages import Cut, Merged, Parted
+from server.service.decision_state import Board
+from server.service.view_selection.decider import GopDecision, ObjectChoice
+from server.service.view_selection.explanation import Explanation, Why
 
 _UNTOLD = cast("Why", None)
 

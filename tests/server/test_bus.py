@@ -13,11 +13,11 @@ import zenoh
 from patience import PATIENCE
 from pydantic import ValidationError
 
-from server.run.setup import free_port
-from server.wire.bus import Bus
-from server.wire.errors import UserError
-from server.wire.inbox import Inbox, Message
-from server.wire.sections import Zenoh
+from server.cli.generated_config import free_port
+from server.config.sections import Zenoh
+from server.messaging.bus import Bus
+from server.messaging.inbox import Inbox, Message
+from server.system.errors import UserError
 
 
 @pytest.fixture
@@ -166,7 +166,7 @@ async def test_two_that_hear_each_other_do_so_through_the_router_until_one_liste
 async def test_who_wants_to_hear_the_others_needs_the_router(
     settings: Zenoh, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("server.wire.bus._OPEN_WITHIN_MS", 100)
+    monkeypatch.setattr("server.messaging.bus._OPEN_WITHIN_MS", 100)
     with pytest.raises(UserError, match=r"zenoh\.connect: nobody is at tcp/127"):
         Bus.hearing(settings)
 
@@ -206,8 +206,8 @@ async def test_an_address_that_is_none_is_refused() -> None:
 
 SCRIPT = """
 import asyncio
-from server.wire.bus import Bus
-from server.wire.sections import Zenoh
+from server.messaging.bus import Bus
+from server.config.sections import Zenoh
 async def main():
     address = "tcp/127.0.0.1:{port}"
     settings = Zenoh(connect=address, listen=address)

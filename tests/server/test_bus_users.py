@@ -14,14 +14,14 @@ import pytest
 from patience import PATIENCE
 from programs import needs_openssl
 
-from server.run.setup import free_port
-from server.wire.bus import Bus
-from server.wire.bus_users import SETTING, access_rules
-from server.wire.errors import UserError
-from server.wire.inbox import Message
-from server.wire.messages import Keys
-from server.wire.sections import Zenoh, ZenohTls
-from server.wire.users import password_of, read_users
+from server.cli.generated_config import free_port
+from server.config.password_file import password_of, read_users
+from server.config.sections import Zenoh, ZenohTls
+from server.messaging.bus import Bus
+from server.messaging.bus_access import SETTING, access_rules
+from server.messaging.inbox import Message
+from server.messaging.messages import Keys
+from server.system.errors import UserError
 
 pytestmark = needs_openssl
 
@@ -129,7 +129,7 @@ async def test_sound_is_sent_by_whose_it_is(settings: Zenoh) -> None:
 async def test_strangers_fail_to_publish_and_to_listen(
     settings: Zenoh, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("server.wire.bus._OPEN_WITHIN_MS", 300)
+    monkeypatch.setattr("server.messaging.bus._OPEN_WITHIN_MS", 300)
     strangers = [
         settings.model_copy(update={"users": None}),
         settings.model_copy(update={"users": _users(tmp_path, "c0:guessed\n")}),

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from test_people import Dictated, boxes, people, said
 
 from bestview import IdentityUpdate, Merge, Split
-from server.view.who.by_hand import ByHand
-from server.view.who.people import People
+from server.service.identity.manual_overrides import ByHand
+from server.service.identity.people import People
 
 numbers = st.integers(1, 6)
 

@@ -10,7 +10,7 @@ import pytest
 from command_line import Run
 
 from bestview import to_ground
-from server.wire.loading import build_config
+from server.config.loader import build_config
 
 FLOOR = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 3.0], [0.0, 3.0], [2.0, 1.0], [1.0, 2.0], [3.0, 2.5]])
 TO_IMAGE = np.array([[90.0, 30.0, 120.0], [-6.0, 20.0, 330.0], [-0.01, 0.12, 1.0]])

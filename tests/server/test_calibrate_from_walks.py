@@ -11,7 +11,7 @@ import pytest
 from command_line import Run, refusal
 from videos_by_hand import write_video
 
-from server.wire.loading import build_config
+from server.config.loader import build_config
 from tracking.motchallenge import MotRow, write_rows
 
 OFFSET = 6

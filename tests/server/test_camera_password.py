@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from server.wire.camera_password import with_password
-from server.wire.config import Config
-from server.wire.errors import UserError
-from server.wire.loading import build_config
+from server.config.camera_password import with_password
+from server.config.loader import build_config
+from server.config.site_config import Config
+from server.system.errors import UserError
 
 SOURCE = "rtsp://viewer:{password}@192.0.2.11/stream1"
 

@@ -15,9 +15,9 @@ from free_port import free
 from patience import PATIENCE
 from videos_by_hand import write_video
 
-from server.run.camera import camera_process
-from server.wire.errors import AwayError
-from server.wire.running import Running
+from server.config.running_config import Running
+from server.supervisor.camera_process import camera_process
+from server.system.errors import AwayError
 
 
 class Lines(logging.Handler):

@@ -8,7 +8,7 @@ from itertools import product
 import pytest
 from patience import PATIENCE
 
-from server.view.streams.channel import Channel, Chunk, Piece
+from server.service.streaming.broadcaster import Channel, Chunk, Piece
 
 
 def gop(number: int) -> Chunk:

@@ -8,7 +8,7 @@ import numpy as np
 from av.video.frame import VideoFrame
 from av.video.reformatter import Colorspace
 
-from server.wire.colours import bgr, yuv
+from server.media.color_conversion import bgr, yuv
 
 SIZES = ((64, 48), (34, 18), (640, 360))
 

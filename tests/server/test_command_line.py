@@ -20,8 +20,8 @@ from free_port import free
 from patience import PATIENCE
 from videos_by_hand import write_video
 
-from server.camera.scene import scene_names
-from server.wire.errors import AwayError
+from server.system.errors import AwayError
+from synthetic import scene_names
 
 
 @pytest.fixture
@@ -316,7 +316,7 @@ def test_it_says_which_version_it_is(run: Run) -> None:
 
 
 def test_help_does_not_wait_for_what_only_commands_need() -> None:
-    look = "import sys, server.run.cli; print(*{'numpy', 'scipy', 'cv2', 'pydantic'} & set(sys.modules))"
+    look = "import sys, server.cli.main; print(*{'numpy', 'scipy', 'cv2', 'pydantic'} & set(sys.modules))"
     command = [sys.executable, "-c", look]
     loaded = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=True)
     assert loaded.stdout.split() == []

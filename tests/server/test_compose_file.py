@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 import yaml
 
-from server.wire.loading import load_config
+from server.config.loader import load_config
 
 ROOT = Path(__file__).resolve().parents[2]
 

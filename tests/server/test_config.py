@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 import yaml
 
-from server.run.setup import DEMO
-from server.wire.errors import UserError
-from server.wire.loading import build_config, load_config
+from server.cli.generated_config import DEMO
+from server.config.loader import build_config, load_config
+from server.system.errors import UserError
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -13,10 +13,10 @@ import pytest
 import yaml
 from pydantic import BaseModel
 
-from server.camera.scene import Scene
-from server.run.setup import DEMO
-from server.wire.config import Config
-from server.wire.loading import build_config, load_config
+from server.cli.generated_config import DEMO
+from server.config.loader import build_config, load_config
+from server.config.site_config import Config
+from synthetic import Scene
 from tracking import solver_names
 
 CONFIGS = Path(__file__).resolve().parents[2] / "configs"

@@ -19,9 +19,9 @@ from test_tls import make_certificate
 from test_tls import pytestmark as needs_openssl
 from tokens_by_hand import bearer, locked
 
-from server.web.access.networks import network_of
-from server.web.access.other_sites import CHANGES
-from server.web.connections.places import Bounds, Connection, Places
+from server.http.access.csrf import CHANGES
+from server.http.access.networks import network_of
+from server.http.connections.connection_pool import Bounds, Connection, Places
 
 Pair = tuple[asyncio.StreamReader, asyncio.StreamWriter]
 

@@ -12,9 +12,9 @@ from cameras_by_hand import CAMERAS, GOP, LARGE, SMALL, STRIDE, TrackNumbers, ep
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from server.view.board import Board, reason
-from server.view.choice.decide import Decider, GopDecision
-from server.wire.messages import Box
+from server.messaging.messages import Box
+from server.service.decision_state import Board, reason
+from server.service.view_selection.decider import Decider, GopDecision
 
 Seen = Mapping[str, Mapping[int, Box | None]]
 A, B = CAMERAS

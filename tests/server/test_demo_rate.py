@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 import yaml
 
-from server.run.demo import rate_for
-from server.run.processors import processors
-from server.run.setup import demo_config
+from server.cli.demo import rate_for
+from server.cli.generated_config import demo_config
+from server.system.processors import processors
 
 THERE = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 

@@ -18,9 +18,9 @@ from few_descriptors import FEW, MYVIEW, awaited, connected, running, written
 from free_port import free
 from patience import PATIENCE
 
-from server.run.doctor_findings import Level
-from server.run.doctor_machine import descriptor_findings
-from server.wire.descriptors import FOR_OPERATORS, limit, places, raise_limit
+from server.cli.doctor.findings import Level
+from server.cli.doctor.machine import descriptor_findings
+from server.system.descriptors import FOR_OPERATORS, limit, places, raise_limit
 
 
 @pytest.fixture

@@ -21,19 +21,19 @@ from rtsp_by_hand import RtspCamera
 from videos_by_hand import write_video
 
 from camsync import Login, PulseClient, PulseServer
-from server.run import doctor_machine
-from server.run.doctor import checked
-from server.run.doctor_cameras import camera_findings, probe_all, sound_findings
-from server.run.doctor_certificate import certificate_finding
-from server.run.doctor_disk import disk_findings, needed_mb
-from server.run.doctor_files import file_findings
-from server.run.doctor_findings import Finding, Level
-from server.run.doctor_machine import clock_findings, machine_findings
-from server.run.doctor_ports import port_findings
-from server.run.doctor_probe import Probe
-from server.run.doctor_stream import Sent
-from server.wire.config import Config
-from server.wire.loading import load_config
+from server.cli.doctor import machine
+from server.cli.doctor.camera_probe import Probe
+from server.cli.doctor.cameras import camera_findings, probe_all, sound_findings
+from server.cli.doctor.certificates import certificate_finding
+from server.cli.doctor.command import checked
+from server.cli.doctor.disk import disk_findings, needed_mb
+from server.cli.doctor.files import file_findings
+from server.cli.doctor.findings import Finding, Level
+from server.cli.doctor.machine import clock_findings, machine_findings
+from server.cli.doctor.ports import port_findings
+from server.cli.doctor.stream_probe import Sent
+from server.config.loader import load_config
+from server.config.site_config import Config
 
 SIZE = {"width": WIDTH, "height": HEIGHT}
 
@@ -345,7 +345,7 @@ def test_a_camera_without_a_place_among_those_that_have_one_is_told_of(tmp_path:
 def test_the_processors_are_those_that_this_process_may_use(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(doctor_machine, "processors", lambda: 0.5)
+    monkeypatch.setattr(machine, "processors", lambda: 0.5)
     said = only(machine_findings(config(tmp_path), {"c0": Probe(cores=0.2)}), "processor")
     assert (said.level, said.text.endswith("of 0.5 cores")) == (Level.WARNING, True)
 

@@ -13,13 +13,13 @@ from free_port import free
 from programs import needs_openssl
 from test_doctor import config, site
 
-from server.run import doctor, doctor_files, doctor_ports
-from server.run.doctor_cameras import camera_findings
-from server.run.doctor_files import file_findings
-from server.run.doctor_findings import Finding, Level
-from server.run.doctor_ports import port_findings
-from server.run.doctor_probe import Probe
-from server.run.doctor_ways import way_findings
+from server.cli.doctor import command, files, ports
+from server.cli.doctor.camera_probe import Probe
+from server.cli.doctor.cameras import camera_findings
+from server.cli.doctor.files import file_findings
+from server.cli.doctor.findings import Finding, Level
+from server.cli.doctor.ports import port_findings
+from server.cli.doctor.reachability import way_findings
 
 
 def of(findings: list[Finding], check: str) -> list[tuple[Level, str]]:
@@ -50,10 +50,10 @@ async def test_a_check_that_fails_loses_no_other_s_findings(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, check: str, lost: set[str]
 ) -> None:
     there = config(tmp_path)
-    before = {it.check async for it in doctor.checked(there, 1.0)}
+    before = {it.check async for it in command.checked(there, 1.0)}
     assert before >= {"http.port", "sync.host", "ground", "clock", "camera c0", "record", "memory"}
-    monkeypatch.setattr(doctor, check, broken)
-    found = [it async for it in doctor.checked(there, 1.0)]
+    monkeypatch.setattr(command, check, broken)
+    found = [it async for it in command.checked(there, 1.0)]
     (said,) = [it for it in found if (it.level, it.text) == BROKEN[0]]
     assert {it.check for it in found if it is not said} == before - lost
 
@@ -62,12 +62,12 @@ async def test_nor_does_one_of_several_ports_or_files(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     there = config(tmp_path)
-    monkeypatch.setattr(doctor_ports, "_is_ours", broken)
+    monkeypatch.setattr(ports, "_is_ours", broken)
     with socket.create_server(("127.0.0.1", there.http.port)):
         found, _ = await port_findings(there)
     assert of(found, "http.port") == BROKEN
     assert of(found, "zenoh.listen")[0][0] is Level.OK
-    monkeypatch.setattr(doctor_files, "_exposed", broken)
+    monkeypatch.setattr(files, "_exposed", broken)
     assert of(file_findings(there), "access") == BROKEN
     assert of(file_findings(there), "ground")[0][0] is Level.OK
 
@@ -76,8 +76,8 @@ async def test_a_mistake_is_told_without_a_password(tmp_path: Path, monkeypatch:
     def wrong(*_: object) -> None:
         raise RuntimeError("cannot be: rtsp://me:hunter2@door/live")
 
-    monkeypatch.setattr(doctor, "sound_findings", wrong)
-    found = [it async for it in doctor.checked(config(tmp_path), 1.0)]
+    monkeypatch.setattr(command, "sound_findings", wrong)
+    found = [it async for it in command.checked(config(tmp_path), 1.0)]
     text = "a mistake in MyView: RuntimeError: cannot be: ..."
     assert of(found, "sound") == [(Level.BAD, text)]
     assert of(found, "memory")
@@ -92,8 +92,8 @@ async def test_findings_are_told_as_they_are_found(
         told.append(capsys.readouterr().out)
         return {"c0": Probe("away")}
 
-    monkeypatch.setattr(doctor, "probe_all", probe_all)
-    await doctor._told(site(tmp_path), 1.0, as_json=False)
+    monkeypatch.setattr(command, "probe_all", probe_all)
+    await command._told(site(tmp_path), 1.0, as_json=False)
     (before,) = told
     after = capsys.readouterr().out
     assert " http.port " in before

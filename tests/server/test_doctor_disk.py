@@ -13,11 +13,11 @@ from typing import Any
 import pytest
 import yaml
 
-from server.run.doctor_disk import disk_findings, needed_mb
-from server.run.doctor_findings import Finding, Level
-from server.run.doctor_probe import Probe
-from server.wire.config import Config
-from server.wire.loading import load_config
+from server.cli.doctor.camera_probe import Probe
+from server.cli.doctor.disk import disk_findings, needed_mb
+from server.cli.doctor.findings import Finding, Level
+from server.config.loader import load_config
+from server.config.site_config import Config
 
 FREE_MB = 1000
 HOUR_S = 3600.0
@@ -99,8 +99,8 @@ def test_a_name_that_no_folder_can_have_is_one_line(tmp_path: Path) -> None:
 AS_SOMEBODY = """
 import os, sys
 from pathlib import Path
-from server.run.doctor_disk import disk_findings
-from server.wire.loading import load_config
+from server.cli.doctor.disk import disk_findings
+from server.config.loader import load_config
 config = load_config(Path(sys.argv[1]))
 if not os.geteuid():
     os.setgroups([])

@@ -16,14 +16,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from patience import PATIENCE
 
-from server.draw.__main__ import serve
-from server.draw.boxes import CHOSEN, OTHER, Image, draw_boxes
-from server.draw.studio import Studio
-from server.draw.unpack import frames
-from server.view.media.fmp4 import Sample, fragment
-from server.view.pictures.decided import first_pulse
-from server.wire.drawing import Canvas, Draw, Drawn, belongs, framed
-from server.wire.h264 import nal_units, sample
+from server.media.containers.fmp4 import Sample, fragment
+from server.media.h264.annexb import nal_units, sample
+from server.media.rendering_messages import Canvas, Draw, Drawn, belongs, framed
+from server.service.rendering.decided_boxes import first_pulse
+from server.service.rendering.worker.__main__ import serve
+from server.service.rendering.worker.box_overlay import CHOSEN, OTHER, Image, draw_boxes
+from server.service.rendering.worker.mp4_demuxer import frames
+from server.service.rendering.worker.stream_renderer import Studio
 
 CANVAS = Canvas(
     width=WIDTH, height=HEIGHT, fps=FPS, gop=GOP, preset="ultrafast", crf=18, max_kbps=None, jpeg_quality=90
@@ -179,7 +179,9 @@ def test_the_process_answers_until_its_input_ends() -> None:
 
 def test_the_process_itself_ends_when_nobody_is_left_to_ask() -> None:
     process = subprocess.Popen(
-        [sys.executable, "-m", "server.draw"], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+        [sys.executable, "-m", "server.service.rendering.worker"],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
     )
     out, _ = process.communicate(framed(CANVAS) + framed(Draw(fragments=fragments(0, 1))), timeout=PATIENCE)
     assert msgspec.msgpack.decode(out[4:], type=Drawn).newest == 0

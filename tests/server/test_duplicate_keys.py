@@ -11,12 +11,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from server.run.calibrate_points import read_points
-from server.wire.duplicate_keys import DuplicateKeyError, parse_json
-from server.wire.errors import UserError
-from server.wire.loading import build_config, load_config
-from server.wire.tokens import read_tokens
-from server.wire.yaml_file import read_yaml
+from server.cli.calibrate.points_file import read_points
+from server.config.duplicate_keys import DuplicateKeyError, parse_json
+from server.config.loader import build_config, load_config
+from server.config.tokens_file import read_tokens
+from server.config.yaml_file import read_yaml
+from server.system.errors import UserError
 
 SITE = """\
 cameras:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from server.camera.earshot import Earshot
-from server.wire.messages import Found
+from server.camera.peers.detection_buffer import Earshot
+from server.messaging.messages import Found
 
 PATIENCE, MOST = 0.2, 50
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from server.camera.encode import AccessUnit, Encoder
-from server.wire.h264 import nal_units, parameter_sets
-from server.wire.sections import Encode, Site
+from server.camera.encoding.encoder import AccessUnit, Encoder
+from server.config.sections import Encode, Site
+from server.media.h264.annexb import nal_units, parameter_sets
 
 SITE = Site(width=160, height=96, fps=25)
 FRAMES = 100

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 from patience import PATIENCE
 
-from server.run.ending import ending_later
+from server.supervisor.shutdown import ending_later
 
 
 @pytest.fixture(params=[signal.SIGTERM, signal.SIGINT])
@@ -71,7 +71,7 @@ def test_nothing_came_nothing_happens(handled: tuple[signal.Signals, list[int]])
 
 def test_a_child_inherits_the_mask_and_can_lift_it() -> None:
     code = (
-        "import signal; from server.run.ending import end_at_once_again as again\n"
+        "import signal; from server.supervisor.shutdown import end_at_once_again as again\n"
         "def blocked(): return {2, 15} & set(signal.pthread_sigmask(signal.SIG_BLOCK, ()))\n"
         "before = blocked(); again(); print(len(before), len(blocked()))"
     )
@@ -86,7 +86,7 @@ def test_a_process_that_is_held_up_ends_all_the_same(tmp_path: Path) -> None:
     started = tmp_path / "started"
     script = (
         "import asyncio, pathlib, sys, time\n"
-        "from server.run.ending import run_process\n"
+        "from server.supervisor.shutdown import run_process\n"
         "def held_up(): pathlib.Path(sys.argv[1]).touch(); time.sleep(60)\n"
         "async def main(): await asyncio.to_thread(held_up)\n"
         "run_process(main, let_go_s=0.3)\n"
@@ -98,7 +98,7 @@ def test_a_process_that_is_held_up_ends_all_the_same(tmp_path: Path) -> None:
 
 
 def test_a_process_that_is_told_to_end_while_it_loads_ends_with_0(tmp_path: Path) -> None:
-    hurried = subprocess.Popen([sys.executable, "-m", "server.run.cli", "sync", str(tmp_path / "none.yaml")])
+    hurried = subprocess.Popen([sys.executable, "-m", "server.cli.main", "sync", str(tmp_path / "none.yaml")])
     status = Path(f"/proc/{hurried.pid}/status")
     until_true(
         lambda: caught(status.read_text(encoding="ascii"), signal.SIGTERM) or hurried.poll() is not None
@@ -118,7 +118,7 @@ class CtrlC:
 sys.meta_path.insert(0, CtrlC())
 """
 """What presses Ctrl-C while a command still loads."""
-_COMMANDS, _WHAT_IT_NEEDS = "server.run.site_commands", "server.wire.loading"
+_COMMANDS, _WHAT_IT_NEEDS = "server.cli.site_commands", "server.config.loader"
 """Modules that are loaded before it is known what to do, and when it is."""
 
 
@@ -150,7 +150,7 @@ def pressed(
 ) -> subprocess.CompletedProcess[str]:
     (folder / "sitecustomize.py").write_text(_CTRL_C + before, encoding="ascii")
     return subprocess.run(
-        [sys.executable, "-m", "server.run.cli", *command],
+        [sys.executable, "-m", "server.cli.main", *command],
         env=os.environ
         | {
             "PYTHONPATH": os.pathsep.join([str(folder), os.environ.get("PYTHONPATH", "")]),
@@ -205,7 +205,7 @@ def test_what_waits_for_a_pipe_ends_without_a_word_when_it_is_told_to(
     (tmp_path / "site.yaml").write_text("cameras: [{id: c0, source: pipe}]", encoding="ascii")
     before = sorted(tmp_path.iterdir())
     environment = os.environ | {"PYTHONPATH": str(Path(__file__).resolve().parents[2])}
-    arguments = [sys.executable, "-m", "server.run.cli", *command.split()]
+    arguments = [sys.executable, "-m", "server.cli.main", *command.split()]
     with subprocess.Popen(
         arguments, cwd=tmp_path, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as process:

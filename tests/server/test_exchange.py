@@ -16,17 +16,17 @@ from hypothesis import strategies as st
 from patience import PATIENCE
 from test_process import Running, in_folder
 
-from server.camera.exchange import Exchange
+from server.camera.peers.cross_view_scorer import Heard, Witness
+from server.camera.peers.detection_exchange import Exchange
 from server.camera.pipeline import CameraPipeline
-from server.camera.scene import Scene, write_recording
-from server.camera.witness import Heard, Witness
-from server.run.offline import Batch, CameraWorkers, run_cameras
-from server.run.render import Renderer
-from server.run.setup import free_port
-from server.wire.bus import Bus
-from server.wire.config import Config
-from server.wire.loading import build_config
-from server.wire.messages import FOUND_MOST, Found, Keys
+from server.cli.generated_config import free_port
+from server.cli.render.camera_workers import Batch, CameraWorkers, run_cameras
+from server.cli.render.renderer import Renderer
+from server.config.loader import build_config
+from server.config.site_config import Config
+from server.messaging.bus import Bus
+from server.messaging.messages import FOUND_MOST, Found, Keys
+from synthetic import Scene, write_recording
 from tracking import Detections
 
 FRAMES = 60
@@ -154,7 +154,7 @@ async def pair(
     recording: Path, monkeypatch: pytest.MonkeyPatch
 ) -> AsyncIterator[tuple[Bus, Exchange, Exchange]]:
     """The router, and two of the three cameras on the bus."""
-    monkeypatch.setattr("server.camera.exchange._LISTENERS_S", WAIT / 4)
+    monkeypatch.setattr("server.camera.peers.detection_exchange._LISTENERS_S", WAIT / 4)
     config = config_of(recording, wait=WAIT)
     router = Bus.router(config.zenoh)
     exchanges = [

@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from bestview import TrackKey
-from server.view.history import Stretch
-from server.view.who.exchanged import Exchange, exchanged
-from server.view.who.reading import CameraWindow
-from server.wire.fit import Fit
+from server.media.letterbox import Fit
+from server.service.identity.camera_window import CameraWindow
+from server.service.identity.id_switches import Exchange, exchanged
+from server.service.ingest.window_history import Stretch
 
 FRAMES, FIRST = 20, 100
 PLACE = np.array([0.0, 0.0, 10.0, 30.0])

@@ -11,11 +11,11 @@ from cameras_by_hand import small_config
 from command_line import Run, refusal
 from tokens_by_hand import line_of, write_tokens
 
-from server.run.exposed import check_bus, check_pulses, check_viewers, is_loopback
-from server.run.setup import DEMO
-from server.wire.errors import UserError
-from server.wire.loading import load_config
-from server.wire.sections import Access
+from server.cli.generated_config import DEMO
+from server.config.loader import load_config
+from server.config.sections import Access
+from server.supervisor.exposure_checks import check_bus, check_pulses, check_viewers, is_loopback
+from server.system.errors import UserError
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 OUTSIDE = "0.0.0.0"  # noqa: S104 — what the tests are about

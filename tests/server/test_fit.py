@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from server.wire.fit import Fit
+from server.media.letterbox import Fit
 
 sides = st.integers(16, 4000)
 sizes = st.tuples(sides, sides)

@@ -6,8 +6,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from server.view.helping.flag_budget import Budget
-from server.wire.sections import Flags
+from server.config.sections import Flags
+from server.service.operator_assist.flag_budget import Budget
 
 FPS = 25.0
 MINUTE = round(60 * FPS)

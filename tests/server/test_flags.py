@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from server.view.helping.flags import Flag, Flags, Foreseen
-from server.wire.sections import Flags as FlagSettings
+from server.config.sections import Flags as FlagSettings
+from server.service.operator_assist.flags import Flag, Flags, Foreseen
 
 FPS = 25.0
 STRIDE = 5

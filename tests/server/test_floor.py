@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from bestview.ground import from_ground, to_ground
-from server.view.floor import FARTHEST, covered
-from server.wire.fit import Fit
+from bestview.geometry.ground_plane import from_ground, to_ground
+from server.media.letterbox import Fit
+from server.service.calibration.floor_map import FARTHEST, covered
 
 SITE = (640, 360)
 OWN = (320, 240)

@@ -14,8 +14,8 @@ from small_disk import files_of_at_most
 from videos_by_hand import write_video
 
 import client
-from server.run.watch import run_watch
-from server.wire.errors import UserError
+from server.cli.watch import run_watch
+from server.system.errors import UserError
 
 __all__ = ["myview"]
 

@@ -8,8 +8,8 @@ from cameras_by_hand import SMALL, word
 from hypothesis import given
 from hypothesis import strategies as st
 
-from server.view.gauge import Gauge, Spread
-from server.wire.messages import FrameHead, Solve
+from server.messaging.messages import FrameHead, Solve
+from server.service.metrics.camera_metrics import Gauge, Spread
 
 
 def head(pulse: int, late: float, due: float = 100.0) -> FrameHead:

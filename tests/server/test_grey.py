@@ -16,18 +16,18 @@ from numpy.typing import NDArray
 from test_own_parameters import MAKES, sent
 from test_skip import PRESETS, decoded, encoded, how
 
-from server.camera.encode import Encoder
-from server.view.media.agreement import Agreement, OwnParameters
-from server.view.media.bits import BitWriter, unit_of
-from server.view.media.fmp4 import init_segment
-from server.view.media.grey import grey_picture
-from server.view.media.picture import Picture
-from server.view.media.skip import UnfitError
-from server.view.media.vp8 import Vp8Agreement
-from server.view.media.vp8_grey import grey_frame
-from server.view.streams.shelf import Shelf
-from server.wire.h264 import ParameterSets, nal_units, parameter_sets, sample
-from server.wire.sections import Encode, Site
+from server.camera.encoding.encoder import Encoder
+from server.config.sections import Encode, Site
+from server.media.containers.fmp4 import init_segment
+from server.media.h264.annexb import ParameterSets, nal_units, parameter_sets, sample
+from server.media.h264.bitstream import BitWriter, unit_of
+from server.media.h264.grey_picture import grey_picture
+from server.media.h264.repeat_picture import UnfitError
+from server.media.picture import Picture
+from server.media.stream_format import Agreement, OwnParameters
+from server.media.vp8.grey_frame import grey_frame
+from server.media.vp8.stream_format import Vp8Agreement
+from server.service.streaming.frame_buffer import Shelf
 
 Sizes = st.tuples(st.integers(1, 40), st.integers(1, 24))
 """In macroblocks."""

@@ -11,10 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from server.camera.encode import AccessUnit, Encoder
-from server.view.media.fmp4 import Sample, fragment, init_segment, rebased, ticks
-from server.wire.h264 import NAL_AUD, nal_type, nal_units, parameter_sets, sample, units_of
-from server.wire.sections import Encode, Site
+from server.camera.encoding.encoder import AccessUnit, Encoder
+from server.config.sections import Encode, Site
+from server.media.containers.fmp4 import Sample, fragment, init_segment, rebased, ticks
+from server.media.h264.annexb import NAL_AUD, nal_type, nal_units, parameter_sets, sample, units_of
 
 SITE = Site(width=64, height=48, fps=25)
 GOP = 4

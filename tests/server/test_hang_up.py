@@ -14,9 +14,9 @@ import yaml
 from command_line import Run
 from patience import PATIENCE
 
-from server.run import site_commands
-from server.run.hang_up import hang_ups, mind_hang_ups
-from server.run.setup import free_port
+from server.cli import site_commands
+from server.cli.generated_config import free_port
+from server.supervisor.sighup import hang_ups, mind_hang_ups
 
 
 @pytest.fixture(autouse=True)

@@ -20,11 +20,11 @@ import pytest
 from programs import needs_openssl
 
 from camsync import PulseServer
-from server.run.healthy import main
-from server.run.setup import free_port
-from server.wire.pulse_users import SHORTEST
-from server.wire.tokens import digest_of, read_tokens
-from server.wire.users import read_users
+from server.cli.generated_config import free_port
+from server.config.password_file import read_users
+from server.config.pulse_passwords import SHORTEST
+from server.config.tokens_file import digest_of, read_tokens
+from server.supervisor.healthcheck import main
 
 ROOT = Path(__file__).resolve().parents[2]
 LIVE = {"camera": "c0", "state": "live", "fps": 25.0, "message": ""}
@@ -108,7 +108,12 @@ async def test_pulses_are_well_while_somebody_greets(
 async def _apart(*words: str) -> int:
     """Check as the engine does: in a process of its own."""
     process = await asyncio.create_subprocess_exec(
-        sys.executable, "-m", "server.run.healthy", *words, cwd=ROOT, stdout=asyncio.subprocess.DEVNULL
+        sys.executable,
+        "-m",
+        "server.supervisor.healthcheck",
+        *words,
+        cwd=ROOT,
+        stdout=asyncio.subprocess.DEVNULL,
     )
     return await process.wait()
 

@@ -10,7 +10,7 @@ from halls import A, Hall, opened
 from played_in_chromium import PLAY, seen_in_chromium
 from programs import needs_chromium
 
-from server.view.choice.decide import GopDecision, ObjectChoice
+from server.service.view_selection.decider import GopDecision, ObjectChoice
 
 GOPS = 12
 SILENT = (4, 5, 6, 9)

@@ -27,13 +27,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bestview import IdentitySettings
-from server.view.align import Aligner
-from server.view.intake import Intake
-from server.view.media.agreement import Agreement
-from server.view.streams.shelf import Shelf, Shelved
-from server.view.who.people import People
-from server.wire.inbox import Message
-from server.wire.messages import Keys
+from server.media.stream_format import Agreement
+from server.messaging.inbox import Message
+from server.messaging.messages import Keys
+from server.service.identity.people import People
+from server.service.ingest.epoch_aligner import Aligner
+from server.service.ingest.ingest import Intake
+from server.service.streaming.frame_buffer import Shelf, Shelved
 
 KEYS = Keys("hall")
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import pytest
 
-from server.view.keeping_up import KeepingUp
+from server.service.ingest.backlog import KeepingUp
 
 REACH = 100  # pulses
 

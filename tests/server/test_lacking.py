@@ -5,11 +5,11 @@ from __future__ import annotations
 import pytest
 from cameras_by_hand import CAMERAS, FPS, STRIDE, epoch_of, word
 
-from server.view.align import Epoch
-from server.view.intake import CameraState
-from server.view.lacking import Lacking
-from server.view.media.agreement import Agreement
-from server.view.streams.shelf import Shelf
+from server.media.stream_format import Agreement
+from server.service.ingest.epoch_aligner import Epoch
+from server.service.ingest.ingest import CameraState
+from server.service.ingest.loss_recorder import Lacking
+from server.service.streaming.frame_buffer import Shelf
 
 A, B = CAMERAS
 

@@ -10,8 +10,8 @@ from cameras_by_hand import small_config
 from hypothesis import given
 from hypothesis import strategies as st
 
-from server.camera.ladder import Bounds, Ladder, Rung, rungs
-from server.camera.load import Load
+from server.camera.load.load_monitor import Load
+from server.camera.load.load_shedder import Bounds, Ladder, Rung, rungs
 
 FPS, STRIDE, GOP = 25.0, 5, 10
 BOUNDS = Bounds(0.5, 0.2)

@@ -25,11 +25,11 @@ from decoded import decodes_without_errors
 from test_past_store import everything_that_plays
 from test_service_turns import noted
 
-from server.view.streams.footage import Footage
-from server.view.streams.sound import Following, SoundShelf
-from server.wire.aac import SAMPLES
-from server.wire.epochs import end_of_epoch
-from server.wire.sound import SoundFormat
+from server.media.audio.aac import SAMPLES
+from server.media.audio.audio_format import SoundFormat
+from server.messaging.epochs import end_of_epoch
+from server.service.streaming.audio_buffer import Following, SoundShelf
+from server.service.streaming.media_chunk import Footage
 
 HOUR = 3600 * FPS // STRIDE
 """Epochs."""
@@ -168,7 +168,7 @@ async def test_who_is_heard_first_and_counts_alone_does_not_say_where_to_begin(o
 
 
 async def test_a_site_without_a_pulse_server_is_decided_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("server.view.service._FIRST_PULSE_S", 0.0)
+    monkeypatch.setattr("server.service.service._FIRST_PULSE_S", 0.0)
     service = Started()
     decided = noted(service)
     running = asyncio.create_task(service.run())

@@ -17,22 +17,22 @@ from test_draw import CANVAS, fragments
 from videos_by_hand import write_video
 
 from camsync import Spell
-from server.camera.exchange import Exchange
+from server.camera.audio import LiveSound, RecordedSound, recorded_source
+from server.camera.peers.detection_exchange import Exchange
 from server.camera.process import CameraProcess
-from server.camera.sound import LiveSound, RecordedSound, recorded
 from server.camera.sources import recording
-from server.camera.sources.pictures import pictures
+from server.camera.sources.frame_reader import pictures
 from server.camera.sources.recording import Recording
-from server.draw import studio
-from server.run.up import _keep
-from server.view.pictures import source
-from server.view.pictures.decided import NOTHING
-from server.view.pictures.process import ProcessDiedError
-from server.view.streams.channel import Channel
-from server.wire.drawing import Draw
-from server.wire.inbox import Message
-from server.wire.messages import CameraStatus, Found, Keys
-from server.wire.sections import Sound
+from server.config.sections import Sound
+from server.media.rendering_messages import Draw
+from server.messaging.inbox import Message
+from server.messaging.messages import CameraStatus, Found, Keys
+from server.service.rendering import stream_source
+from server.service.rendering.decided_boxes import NOTHING
+from server.service.rendering.worker import stream_renderer
+from server.service.rendering.worker_process import ProcessDiedError
+from server.service.streaming.broadcaster import Channel
+from server.supervisor.site import _keep
 
 KEYS = Keys("hall")
 
@@ -131,7 +131,7 @@ def test_damaged_sound_that_repeats_is_told_of_once(
         raise av.error.InvalidDataError(1, "damaged")
 
     container = SimpleNamespace(demux=demux, close=lambda: None)
-    monkeypatch.setattr(recorded, "_open", lambda _: (container, None))
+    monkeypatch.setattr(recorded_source, "_open", lambda _: (container, None))
     sound = RecordedSound.__new__(RecordedSound)
     sound._path, sound._told = "hall.mp4", False
     for _ in range(5):
@@ -161,8 +161,8 @@ def test_frames_that_cannot_be_decoded_are_told_of_once_for_a_stream(
         def decode(self, _: Any) -> Any:
             raise av.error.InvalidDataError(1, "damaged")
 
-    monkeypatch.setattr(studio, "_decoder", lambda _: Damaged())
-    drawing = studio.Studio(CANVAS)
+    monkeypatch.setattr(stream_renderer, "_decoder", lambda _: Damaged())
+    drawing = stream_renderer.Studio(CANVAS)
     for gop in range(3):
         drawing.draw(Draw(fragments=fragments(gop * GOP, GOP)))
     assert len(caplog.messages) == 1
@@ -172,9 +172,9 @@ def test_frames_that_cannot_be_decoded_are_told_of_once_for_a_stream(
 async def test_drawing_processes_that_die_again_and_again_are_counted_and_told_of_once(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr(source, "_RETRY_FIRST_S", 0.0)
-    monkeypatch.setattr(source, "_RETRY_MAX_S", 0.0)
-    drawing = source.Source("object 1", Channel(), lambda _: NOTHING, CANVAS, live=True, queue_gops=4)
+    monkeypatch.setattr(stream_source, "_RETRY_FIRST_S", 0.0)
+    monkeypatch.setattr(stream_source, "_RETRY_MAX_S", 0.0)
+    drawing = stream_source.Source("object 1", Channel(), lambda _: NOTHING, CANVAS, live=True, queue_gops=4)
 
     async def dies() -> None:
         await asyncio.sleep(0)

@@ -20,15 +20,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from patience import PATIENCE
 
-from server.run.logs import say_failure
-from server.wire.errors import UserError
-from server.wire.log_lines import JsonLines, formatter
+from server.system.errors import UserError
+from server.system.log_format import JsonLines, formatter
+from server.system.log_setup import say_failure
 
 FIELDS = {"time", "level", "process", "logger", "event"}
 
 
 def record(message: str, *values: object, level: int = logging.INFO, error: Any = None) -> logging.LogRecord:
-    return logging.LogRecord("server.view.intake", level, __file__, 1, message, values, error)
+    return logging.LogRecord("server.service.ingest.ingest", level, __file__, 1, message, values, error)
 
 
 def line(message: str, *values: object, **more: Any) -> dict[str, Any]:
@@ -44,7 +44,7 @@ def test_a_line_says_when_how_bad_who_and_what() -> None:
     assert said == {
         "level": "WARNING",
         "process": "bestview",
-        "logger": "server.view.intake",
+        "logger": "server.service.ingest.ingest",
         "event": "camera c1 is gone",
         "camera": "c1",
     }
@@ -119,7 +119,7 @@ def site(folder: Path, **changes: Any) -> Path:
 
 
 def started(*arguments: object) -> subprocess.Popen[str]:
-    command = [sys.executable, "-m", "server.run.cli", *map(str, arguments)]
+    command = [sys.executable, "-m", "server.cli.main", *map(str, arguments)]
     environment = {**os.environ, "MYVIEW_LOG_FORMAT": "json", "MYVIEW_LOG": "DEBUG"}
     return subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=environment)
 

@@ -22,11 +22,11 @@ from halls import A, B, Hall
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from server.view.choice.decide import Decider, GopDecision
-from server.view.streams.channel import Piece
-from server.web.access.other_sites import CHANGES
-from server.wire.errors import UserError
-from server.wire.sections import View
+from server.config.sections import View
+from server.http.access.csrf import CHANGES
+from server.service.streaming.broadcaster import Piece
+from server.service.view_selection.decider import Decider, GopDecision
+from server.system.errors import UserError
 
 EPOCHS = 8  # as many as there are pictures of
 MINE = {CHANGES: "1"}

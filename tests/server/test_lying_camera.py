@@ -27,15 +27,23 @@ from cameras_by_hand import (
 )
 from prometheus_client import generate_latest
 
-from server.view.streams.footage import Footage
-from server.view.streams.sound import SoundShelf
-from server.web.app import make_app
-from server.web.keys import METRICS
-from server.web.operator.cameras import _camera
-from server.wire.epochs import end_of_epoch
-from server.wire.inbox import Message
-from server.wire.messages import SOUND_MOST, TRACKS_MOST, CameraTracks, GopChoices, Keys, SoundHead, Track
-from server.wire.sound import SoundFormat
+from server.http.app import make_app
+from server.http.app_keys import METRICS
+from server.http.operator.cameras import _camera
+from server.media.audio.audio_format import SoundFormat
+from server.messaging.epochs import end_of_epoch
+from server.messaging.inbox import Message
+from server.messaging.messages import (
+    SOUND_MOST,
+    TRACKS_MOST,
+    CameraTracks,
+    GopChoices,
+    Keys,
+    SoundHead,
+    Track,
+)
+from server.service.streaming.audio_buffer import SoundShelf
+from server.service.streaming.media_chunk import Footage
 
 KEYS = Keys("hall")
 LIAR, OTHER = CAMERAS

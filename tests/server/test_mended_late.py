@@ -7,10 +7,10 @@ import pytest
 from cameras_by_hand import HEIGHT, STRIDE, WIDTH, epoch_of, word
 
 from bestview import IdentitySettings
-from server.view.align import Epoch
-from server.view.who.people import People
-from server.wire.epochs import end_of_epoch
-from server.wire.messages import Box, CameraTracks
+from server.messaging.epochs import end_of_epoch
+from server.messaging.messages import Box, CameraTracks
+from server.service.identity.people import People
+from server.service.ingest.epoch_aligner import Epoch
 
 LEFT: Box = (10.0, 20.0, 40.0, 110.0)
 RIGHT: Box = (100.0, 20.0, 130.0, 110.0)

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from bestview import IdentitySettings, Split
-from server.camera.mending import mended
-from server.camera.report import Reporter
-from server.view.align import Epoch
-from server.view.helping.pointing import Place, pointings
-from server.view.who.people import People
-from server.wire.messages import CameraTracks
+from server.camera.corrected_windows import mended
+from server.camera.track_messages import Reporter
+from server.messaging.messages import CameraTracks
+from server.service.identity.people import People
+from server.service.ingest.epoch_aligner import Epoch
+from server.service.operator_assist.corrections import Place, pointings
 from tracking import CostSettings, Detections, WindowSettings, create_solver
-from tracking.assist import AssistedTracker, AssistSettings, Pointing
+from tracking.interactive import AssistedTracker, AssistSettings, Pointing
 
 WIDTH, HEIGHT = 640, 360
 WINDOW = WindowSettings()

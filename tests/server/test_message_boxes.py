@@ -7,8 +7,8 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from server.view.boxes import boxes_array
-from server.wire.messages import Box
+from server.messaging.messages import Box
+from server.service.ingest.box_arrays import boxes_array
 
 SIDE = st.floats(-1e6, 1e6)
 TOLD = st.lists(st.lists(st.tuples(SIDE, SIDE, SIDE, SIDE) | st.none(), max_size=20), max_size=6)

@@ -15,13 +15,13 @@ from monitoring_files import ALERTS
 from prometheus_client.parser import text_string_to_metric_families
 from promql_series import selectors
 
-from server.view.histogram import Histogram
-from server.view.ready import most_behind
-from server.view.streams.channel import Chunk, Viewer
-from server.web.lag import Lag
-from server.web.sent import Sent
-from server.wire.inbox import Message
-from server.wire.messages import FrameHead, Keys, Solve
+from server.http.event_loop_lag import Lag
+from server.http.traffic import Sent
+from server.messaging.inbox import Message
+from server.messaging.messages import FrameHead, Keys, Solve
+from server.service.metrics.histogram import Histogram
+from server.service.readiness import most_behind
+from server.service.streaming.broadcaster import Chunk, Viewer
 
 
 async def samples(hall: Hall) -> dict[tuple[str, ...], float]:

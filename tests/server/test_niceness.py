@@ -12,9 +12,9 @@ import pytest
 import yaml
 from patience import PATIENCE
 
-from server.run.setup import free_port
-from server.view.child import start_child
-from server.wire.niceness import make_nicer
+from server.cli.generated_config import free_port
+from server.system.child_process import start_child
+from server.system.niceness import make_nicer
 
 NOBODY = 2**22 + 1  # more than a process's number can be (proc(5), pid_max)
 BEFORE = os.getpriority(os.PRIO_PROCESS, 0)
@@ -29,7 +29,7 @@ def niceness(pid: int) -> int:
 def nicer_by(*steps: int) -> int:
     """Give how nice a process becomes that is told so many times to be nicer."""
     calls = "; ".join(f"be_nicer({by})" for by in steps)
-    script = f"import os; from server.wire.niceness import be_nicer; {calls}; print(os.nice(0))"
+    script = f"import os; from server.system.niceness import be_nicer; {calls}; print(os.nice(0))"
     return int(subprocess.run([sys.executable, "-c", script], capture_output=True, check=True).stdout)
 
 
@@ -49,7 +49,7 @@ def test_who_is_gone_already_is_no_trouble() -> None:
 
 
 async def test_what_the_service_starts_yields_to_it_and_goes_before_the_cameras() -> None:
-    process = await start_child("server.draw")
+    process = await start_child("server.service.rendering.worker")
     try:
         assert BEFORE < niceness(process.pid) < BEFORE + 10
     finally:
@@ -67,7 +67,7 @@ def test_a_camera_that_is_started_by_itself_is_nicer_too(tmp_path: Path) -> None
     }
     path = tmp_path / "site.yaml"
     path.write_text(yaml.safe_dump(content), encoding="utf-8")
-    camera = subprocess.Popen([sys.executable, "-m", "server.run.cli", "camera", str(path), "c0"])
+    camera = subprocess.Popen([sys.executable, "-m", "server.cli.main", "camera", str(path), "c0"])
     try:
         until = time.monotonic() + PATIENCE
         while niceness(camera.pid) != BEFORE + 3:

@@ -18,17 +18,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from passwords_by_hand import PASSWORDS, PLACES, tells
 
-from server.camera.own.opening import open_own
-from server.camera.sound import open_sound
+from server.camera.audio import open_sound
+from server.camera.passthrough.opening import open_own
 from server.camera.sources import open_source
-from server.web.operator.settings import settings_of
-from server.wire import yaml_file
-from server.wire.config import Config
-from server.wire.errors import UserError
-from server.wire.loading import build_config
-from server.wire.log_lines import JsonLines, TextLines
-from server.wire.sections import Camera, Site
-from server.wire.yaml_file import read_yaml
+from server.config import yaml_file
+from server.config.loader import build_config
+from server.config.sections import Camera, Site
+from server.config.site_config import Config
+from server.config.yaml_file import read_yaml
+from server.http.operator.settings import settings_of
+from server.system.errors import UserError
+from server.system.log_format import JsonLines, TextLines
 
 HARMLESS = "0000"
 NAIVE = ("QXZ/JKV7", "QXZ JKV7", "QXZ@JKV7", "QXZ#JKV7", "QXZ?JKV7", "QXZJKV7")

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from server.camera.observe import make_detector
-from server.wire.errors import UserError
-from server.wire.fit import Fit
-from server.wire.loading import build_config
+from server.camera.detector_setup import make_detector
+from server.config.loader import build_config
+from server.media.letterbox import Fit
+from server.system.errors import UserError
 from tracking.detectors import PAPER_BOXES, BackgroundDetector, HogDetector, MotFileDetector
 
 SIZE = (64, 48)

@@ -9,8 +9,8 @@ from cameras_by_hand import CAMERAS, status
 from halls import A, B, Hall, opened
 
 from camsync import Login, PulseClient, PulseServer
-from server.wire.inbox import Message
-from server.wire.messages import Keys
+from server.messaging.inbox import Message
+from server.messaging.messages import Keys
 
 
 async def test_every_camera_is_told_with_what_is_measured(busy: Hall) -> None:

@@ -26,9 +26,9 @@ from walk_by_hand import SITE, curved, errors_on_floor, words
 
 from benchmarks.browser import chromium
 from bestview import IdentityRegistry
-from server.run.calibrate_points import read_points
-from server.wire.help import Trouble
-from server.wire.messages import Keys
+from server.cli.calibrate.points_file import read_points
+from server.messaging.messages import Keys
+from server.messaging.operator_messages import Trouble
 
 PAGE = Path(__file__).parents[2] / "client" / "page"
 AXE = PAGE.parents[1] / "node_modules/axe-core/axe.min.js"

@@ -11,9 +11,9 @@ from cameras_by_hand import CAMERAS, LARGE, SMALL
 from halls import A, B, Hall, opened
 
 from bestview import IdentityRegistry
-from server.run.watch import run_watch
-from server.view.choice.decide import homographies
-from server.web.access.other_sites import CHANGES
+from server.cli.watch import run_watch
+from server.http.access.csrf import CHANGES
+from server.service.view_selection.decider import homographies
 
 PEOPLE = "/api/operator/people"
 

@@ -11,10 +11,10 @@ import pytest
 from cameras_by_hand import FPS, HEIGHT, LARGE, SMALL, STRIDE, WIDTH, tracks, word
 from halls import A, B, Hall, opened, see
 
-from server.camera.pointed import Pointed
-from server.web.access.other_sites import CHANGES
-from server.wire.help import Pointings, Trouble
-from server.wire.inbox import Message
+from server.camera.operator_corrections import Pointed
+from server.http.access.csrf import CHANGES
+from server.messaging.inbox import Message
+from server.messaging.operator_messages import Pointings, Trouble
 
 POINTING = "/api/operator/pointing"
 

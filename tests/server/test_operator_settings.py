@@ -13,11 +13,11 @@ from cameras_by_hand import CAMERAS, LARGE, SMALL, TrackNumbers, epoch_of, small
 from halls import A, B, Hall, opened
 
 from bestview.quality import QualitySettings
-from server.view.choice.decide import Decider
-from server.web.access.other_sites import CHANGES
-from server.web.operator.settings import settings_of
-from server.wire.config import Config
-from server.wire.sections import View
+from server.config.sections import View
+from server.config.site_config import Config
+from server.http.access.csrf import CHANGES
+from server.http.operator.settings import settings_of
+from server.service.view_selection.decider import Decider
 
 CHOOSING = "/api/operator/choosing"
 MINE = {CHANGES: "1"}

@@ -15,12 +15,12 @@ from cameras_by_hand import FPS, STRIDE
 from halls import A, B, Hall, opened
 from walk_by_hand import HEIGHT, SITE, WIDTH, curved, errors_on_floor, walk_config, words
 
-from server.view.calibrate import walking as walking_module
-from server.view.calibrate.process import calibrated
-from server.view.calibrate.task import Done, Seen, Task
-from server.view.calibrate.walking import State, Walking
-from server.web.access.other_sites import CHANGES
-from server.wire.loading import build_config
+from server.config.loader import build_config
+from server.http.access.csrf import CHANGES
+from server.service.calibration import walk_session as walking_module
+from server.service.calibration.walk_session import State, Walking
+from server.service.calibration.worker_messages import Done, Seen, Task
+from server.service.calibration.worker_process import calibrated
 
 WALK = "/api/operator/walk"
 MINE = {CHANGES: "1"}

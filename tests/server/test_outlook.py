@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from bestview import TrackKey
-from server.view.align import Epoch
-from server.view.choice.outlook import Outlook
-from server.view.choice.sight import Sight
-from server.view.who.people import People
-from server.wire.messages import Box, CameraTracks
+from server.messaging.messages import Box, CameraTracks
+from server.service.identity.people import People
+from server.service.ingest.epoch_aligner import Epoch
+from server.service.view_selection.lookahead_window import Outlook
+from server.service.view_selection.view_quality_buffer import Sight
 
 WINDOW, EPOCHS = 3 * STRIDE, 5
 BOX = st.tuples(*(st.integers(1, 20) for _ in "xywh")).map(

@@ -10,17 +10,17 @@ import pytest
 from numpy.typing import NDArray
 
 from bestview import IdentityRegistry, IdentitySettings, LocalTrack
-from server.camera.following import _measured
-from server.camera.observe import make_detector
-from server.camera.scene import Scene, write_recording
-from server.run.track import track_one
-from server.wire.config import Config
-from server.wire.fit import Fit
-from server.wire.loading import build_config
+from server.camera.detector_setup import make_detector
+from server.camera.tracker_setup import _measured
+from server.cli.track.command import track_one
+from server.config.loader import build_config
+from server.config.site_config import Config
+from server.media.letterbox import Fit
+from synthetic import Scene, write_recording
+from tracking.baselines.temporal_consistency import TemporalSettings
 from tracking.boxes import iou
 from tracking.detectors import BackgroundDetector
 from tracking.motchallenge import read_rows
-from tracking.temporal import TemporalSettings
 
 SIZE = (640, 480)
 _STRIDE = 5

@@ -26,21 +26,21 @@ from programs import needs_ffmpeg
 from rtsp_by_hand import RtspCamera
 from videos_by_hand import write_video
 
-from server.camera.encode import AccessUnit, Encoder
-from server.camera.own.fitting import wanted_by
-from server.camera.own.passing import Unit
-from server.camera.own.stream import OwnStream
-from server.camera.own.waiting import Waiting
+from server.camera.audio import LiveSound
+from server.camera.encoding.encoder import AccessUnit, Encoder
+from server.camera.passthrough.access_unit_queue import Waiting
+from server.camera.passthrough.compatibility import wanted_by
+from server.camera.passthrough.encoder import Unit
+from server.camera.passthrough.stream_source import OwnStream
 from server.camera.pipeline import CameraPipeline
 from server.camera.process import CameraProcess
-from server.camera.sound import LiveSound
 from server.camera.sources import SourceEnded
-from server.view.media.agreement import Agreement
-from server.view.media.ts import Counters, pack
-from server.view.streams.shelf import Shelf
-from server.wire.config import Config
-from server.wire.errors import AwayError, UserError
-from server.wire.h264 import NAL_AUD, nal_type, nal_units
+from server.config.site_config import Config
+from server.media.containers.mpegts import Counters, pack
+from server.media.h264.annexb import NAL_AUD, nal_type, nal_units
+from server.media.stream_format import Agreement
+from server.service.streaming.frame_buffer import Shelf
+from server.system.errors import AwayError, UserError
 
 FRAMES = 20
 
@@ -397,7 +397,7 @@ def test_a_network_camera_that_falls_silent_while_it_is_looked_at_is_away(
     network: NetworkCamera, monkeypatch: pytest.MonkeyPatch, h264: str
 ) -> None:
     """That says nothing of what it sends: it is neither refused for good nor encoded for good."""
-    monkeypatch.setattr("server.camera.own.stream.READ_S", 0.5)
+    monkeypatch.setattr("server.camera.passthrough.stream_source.READ_S", 0.5)
     network.let = 2
     camera = {"options": {"probesize": "2000", "analyzeduration": "1000"}}
     with pytest.raises(AwayError, match=r"stopped while it was looked at: no answer within 0\.5 s$"):

@@ -18,17 +18,17 @@ from numpy.typing import NDArray
 from played_in_chromium import READ, seen_in_chromium
 from programs import needs_chromium, needs_ffmpeg
 
-from server.camera.encode import AccessUnit, Encoder
-from server.view.choice.decide import GopDecision, ObjectChoice
-from server.view.media.agreement import ParameterMismatchError
-from server.view.media.codec import agreement_for
-from server.view.streams.channel import Piece
-from server.view.streams.footage import Footage
-from server.view.streams.shelf import Shelf
-from server.view.streams.splice import Splicer
-from server.wire.config import Config
-from server.wire.h264 import nal_units, parameter_sets
-from server.wire.sections import Encode, Site
+from server.camera.encoding.encoder import AccessUnit, Encoder
+from server.config.sections import Encode, Site
+from server.config.site_config import Config
+from server.media.codec import agreement_for
+from server.media.h264.annexb import nal_units, parameter_sets
+from server.media.stream_format import ParameterMismatchError
+from server.service.streaming.broadcaster import Piece
+from server.service.streaming.frame_buffer import Shelf
+from server.service.streaming.media_chunk import Footage
+from server.service.streaming.splicer import Splicer
+from server.service.view_selection.decider import GopDecision, ObjectChoice
 
 GOPS = 12
 OWN = {"encode": {"parameters": "own"}}

@@ -11,9 +11,9 @@ import pytest
 from cameras_by_hand import CAMERAS, FPS, GOP, FedService, small_config
 from recorded_by_hand import A, ClocksByHand, filled, head, piece
 
-from server.view.past.retention import Bounds
-from server.view.past.run import Headers
-from server.view.past.store import Store
+from server.service.recording.recording_session import Headers
+from server.service.recording.retention import Bounds
+from server.service.recording.store import Store
 
 KEEP_S = 20.0
 BOUNDS = Bounds(keep_s=KEEP_S, most_mb=1e6, segment_s=0.2)

@@ -9,10 +9,10 @@ from cameras_by_hand import CAMERAS, FPS, GOP, FedService, small_config
 from recorded_by_hand import AMPLE, PULSE0, A, ClocksByHand, filled, head, pictures, piece
 from small_disk import files_of_at_most
 
-from server.view.past.retention import Bounds
-from server.view.past.run import Headers, Run
-from server.view.past.store import Store
-from server.view.past.stretch import Stretch
+from server.service.recording.recording_session import Headers, Run
+from server.service.recording.retention import Bounds
+from server.service.recording.segment_index import Stretch
+from server.service.recording.store import Store
 
 BOUNDS = Bounds(keep_s=3.0, most_mb=1e6, segment_s=1.0)
 SEGMENT = 25  # pulses

@@ -15,9 +15,9 @@ from nobody_by_hand import nobodys_folder
 from recorded_by_hand import AMPLE, A, B, filled, head, pictures, piece
 from small_disk import files_of_at_most
 
-from server.view.past.retention import Bounds
-from server.view.past.run import Headers, Run
-from server.view.past.store import Store
+from server.service.recording.recording_session import Headers, Run
+from server.service.recording.retention import Bounds
+from server.service.recording.store import Store
 
 NOTHING = "of object 1 nothing is kept from p0 on; there is nothing"
 Harm = Callable[[Path, Path], None]

@@ -22,8 +22,8 @@ from sounds_by_hand import heard, sends, write_flashes
 from test_players import HLS_BY_ITSELF
 
 from benchmarks.browser import chromium
-from server.view.choice.decide import GopDecision, ObjectChoice
-from server.wire.messages import GopChoices
+from server.messaging.messages import GopChoices
+from server.service.view_selection.decider import GopDecision, ObjectChoice
 
 NOTHING = "of camera c0 nothing is kept from p999 on; there is p0 to p104"
 GOPS = 40

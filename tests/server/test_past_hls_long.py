@@ -13,10 +13,11 @@ from halls import Hall, opened
 from recorded_by_hand import PULSE0
 from test_past_hls import GOPS, HTTP, LENGTH, forget, numbers, shows, text, until_written
 
-from server.view.past.rewound import Listing
-from server.view.streams.reel import plan
-from server.web.hls import long, past
-from server.web.hls.long import MOST_GROWING, long_playlist, newest
+import server.http.hls.long_playlist as long_module
+from server.http.hls import time_shift_playlist
+from server.http.hls.long_playlist import MOST_GROWING, long_playlist, newest
+from server.service.recording.time_shift import Listing
+from server.service.streaming.hls_segmenter import plan
 
 PLAN = plan(FPS, LENGTH, LENGTH / FPS, 1.0)
 
@@ -24,10 +25,10 @@ PLAN = plan(FPS, LENGTH, LENGTH / FPS, 1.0)
 @pytest.fixture
 async def hall(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Hall]:
     """A site whose lists are short: eight segments that grow, twelve that do not, a time of day in four."""
-    for module in (long, past):
+    for module in (long_module, time_shift_playlist):
         monkeypatch.setattr(module, "MOST_GROWING", 8)
         monkeypatch.setattr(module, "MOST", 12)
-    monkeypatch.setattr(long, "_STEP", 4)
+    monkeypatch.setattr(long_module, "_STEP", 4)
     async for hall in opened(record={"folder": str(tmp_path / "kept"), "segment_s": 1.0}, http=HTTP):
         hall.service.past.open()
         hall.service.come(*CAMERAS)

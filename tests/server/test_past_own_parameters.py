@@ -15,7 +15,7 @@ from halls import Hall, opened
 from recorded_by_hand import PULSE0
 from test_own_parameters import GOPS, MISSING, OWN, decision, expected, put
 
-from server.wire.messages import GopChoices
+from server.messaging.messages import GopChoices
 
 FRAMES = GOPS * GOP
 

@@ -30,16 +30,16 @@ from sounds_by_hand import (
 )
 from test_ts import check_counters, taken_apart
 
-from server.view.choice.decide import GopDecision, ObjectChoice
-from server.view.media.heard import Heard
-from server.view.media.mp4_sound import sound_fragment
-from server.view.past.retention import Bounds
-from server.view.past.run import Headers
-from server.view.past.sounds import frames_in
-from server.view.past.store import Piece, Store
-from server.wire.aac import SAMPLES as FRAME
-from server.wire.messages import GopChoices
-from server.wire.sound import SoundFormat
+from server.media.audio.aac import SAMPLES as FRAME
+from server.media.audio.audio_chunk import Heard
+from server.media.audio.audio_format import SoundFormat
+from server.media.containers.mp4_audio import sound_fragment
+from server.messaging.messages import GopChoices
+from server.service.recording.audio_file import frames_in
+from server.service.recording.recording_session import Headers
+from server.service.recording.retention import Bounds
+from server.service.recording.store import Piece, Store
+from server.service.view_selection.decider import GopDecision, ObjectChoice
 
 FORM = SoundFormat(48_000, 2)
 PATIENT = {"viewer_queue_gops": 100}  # with who reads slowly
@@ -128,7 +128,7 @@ async def test_in_the_past_a_beep_is_with_its_flash_whatever_file_it_is_in(
 async def test_where_the_past_meets_the_present_the_sound_goes_on(
     hall: Hall, recording: Path, path: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("server.view.past.stream._LEAD_S", 60.0)
+    monkeypatch.setattr("server.service.recording.time_shift_stream._LEAD_S", 60.0)
     service, half = hall.service, GOPS // 2
     own = sends(service, recording)
     shows(hall, recording, range(half))

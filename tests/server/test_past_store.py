@@ -28,10 +28,10 @@ from recorded_by_hand import (
 )
 from small_disk import files_of_at_most
 
-from server.view.past.media import CameraFile, gops
-from server.view.past.retention import Bounds
-from server.view.past.run import Headers
-from server.view.past.store import Store
+from server.service.recording.media_files import CameraFile, gops
+from server.service.recording.recording_session import Headers
+from server.service.recording.retention import Bounds
+from server.service.recording.store import Store
 
 
 def only_run(folder: Path) -> Path:

@@ -31,24 +31,24 @@ from recorded_by_hand import (
     written,
 )
 
-from server.view.media.agreement import Agreement
-from server.view.media.picture import Picture as Shown
-from server.view.media.ts import Counters
-from server.view.past import stream as past_stream
-from server.view.past.kept import kept_from, kept_until, known
-from server.view.past.media import pulse_of
-from server.view.past.moment import MomentError, pulse_at
-from server.view.past.play import CameraPast, ObjectPast, Recorded
-from server.view.past.run import Headers
-from server.view.past.store import Store
-from server.view.past.stream import PastStream, Wish
-from server.view.past.stretch import Span
-from server.view.streams.channel import Channel
-from server.view.streams.footage import Footage
-from server.view.streams.timeline import Timeline
-from server.wire.inbox import Message
-from server.wire.messages import Box, Keys
-from server.wire.remembered import Remembered
+from server.media.containers.mpegts import Counters
+from server.media.picture import Picture as Shown
+from server.media.stream_format import Agreement
+from server.messaging.inbox import Message
+from server.messaging.messages import Box, Keys
+from server.messaging.retained_state import Remembered
+from server.service.recording import time_shift_stream as past_stream
+from server.service.recording.available_range import kept_from, kept_until, known
+from server.service.recording.media_files import pulse_of
+from server.service.recording.moments import MomentError, pulse_at
+from server.service.recording.playback import CameraPast, ObjectPast, Recorded
+from server.service.recording.recording_session import Headers
+from server.service.recording.segment_index import Span
+from server.service.recording.store import Store
+from server.service.recording.time_shift_stream import PastStream, Wish
+from server.service.streaming.broadcaster import Channel
+from server.service.streaming.media_chunk import Footage
+from server.service.streaming.timeline import Timeline
 
 MOMENT = "say seconds back (-60), a pulse (p1250) or a time (2026-11-21T16:13:36Z)"
 IN_A: Mapping[str, Mapping[int, Box | None]] = {A: {1: LARGE}, B: {1: SMALL}}

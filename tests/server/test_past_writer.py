@@ -12,9 +12,9 @@ from cameras_by_hand import CAMERAS, GOP, SMALL, FedService, TrackNumbers, encod
 from patience import PATIENCE
 from recorded_by_hand import A, B, pictures, piece
 
-from server.view.past.store import Piece
-from server.view.past.writer import Writer
-from server.wire.errors import UserError
+from server.service.recording.store import Piece
+from server.service.recording.writer_thread import Writer
+from server.system.errors import UserError
 
 
 class Disk:

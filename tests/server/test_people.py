@@ -12,10 +12,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bestview import EpisodeKey, IdentitySettings, IdentityUpdate, LocalTrack, Merge, Split, TrackKey
-from server.view.history import History
-from server.view.who.locals import LocalNumbers
-from server.view.who.people import People
-from server.wire.messages import Box
+from server.messaging.messages import Box
+from server.service.identity.local_numbers import LocalNumbers
+from server.service.identity.people import People
+from server.service.ingest.window_history import History
 
 
 def people(**settings: int) -> People:

@@ -15,17 +15,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 from test_draw import CANVAS, fragments, shown
 
-from server.view.pictures.decided import NOTHING, Decided
-from server.view.pictures.film import Film
-from server.view.pictures.pace import Pace
-from server.view.pictures.series import AllSeries, Series
-from server.view.pictures.stills import Stills
-from server.view.streams.channel import Viewer
-from server.view.streams.footage import Footage
-from server.view.streams.sound import SoundShelf
-from server.wire.drawing import Drawn, Jpeg, Unit
-from server.wire.messages import GopChoices, SoundHead
-from server.wire.sound import SoundFormat
+from server.media.audio.audio_format import SoundFormat
+from server.media.rendering_messages import Drawn, Jpeg, Unit
+from server.messaging.messages import GopChoices, SoundHead
+from server.service.rendering.decided_boxes import NOTHING, Decided
+from server.service.rendering.jpeg_series import AllSeries, Series
+from server.service.rendering.overlay_film import Film
+from server.service.rendering.pacing import Pace
+from server.service.rendering.stills import Stills
+from server.service.streaming.audio_buffer import SoundShelf
+from server.service.streaming.broadcaster import Viewer
+from server.service.streaming.media_chunk import Footage
 
 EVERY = Series(FPS, boxed=False)
 

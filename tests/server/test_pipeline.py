@@ -12,16 +12,16 @@ import pytest
 from videos_by_hand import HEIGHT, WIDTH, write_video
 
 from bestview import QualitySettings
-from server.camera.encode import AccessUnit
+from server.camera.encoding.encoder import AccessUnit
 from server.camera.pipeline import CameraPipeline
-from server.camera.scene import Scene, write_recording
 from server.camera.sources import SourceEnded
-from server.run.offline import Batch, run_camera
-from server.wire.config import Config
-from server.wire.errors import UserError
-from server.wire.loading import build_config
-from server.wire.messages import Box, CameraTracks
-from server.wire.sections import Site
+from server.cli.render.camera_workers import Batch, run_camera
+from server.config.loader import build_config
+from server.config.sections import Site
+from server.config.site_config import Config
+from server.messaging.messages import Box, CameraTracks
+from server.system.errors import UserError
+from synthetic import Scene, write_recording
 
 FRAMES = 48
 STRIDE = 5

@@ -21,7 +21,7 @@ from patience import PATIENCE
 from programs import needs_chromium, needs_ffmpeg, needs_mpv, needs_vlc
 
 from benchmarks.browser import chromium
-from server.wire.epochs import end_of_epoch
+from server.messaging.epochs import end_of_epoch
 
 EPOCHS = 48
 PATHS = ("/objects/1/best.mp4", "/objects/1/best.ts", "/cameras/c0/live.ts", "/objects/1/hls/index.m3u8")

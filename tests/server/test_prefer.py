@@ -9,12 +9,12 @@ import pytest
 from cameras_by_hand import CAMERAS, FPS, GOP, NO_REASON, encoded, small_config
 from patience import PATIENCE
 
-from server.view.choice.decide import GopDecision, ObjectChoice
-from server.view.media.agreement import Agreement
-from server.view.streams.channel import Viewer
-from server.view.streams.shelf import Shelf
-from server.view.streams.splice import Splicer
-from server.wire.messages import NumberedBox
+from server.media.stream_format import Agreement
+from server.messaging.messages import NumberedBox
+from server.service.streaming.broadcaster import Viewer
+from server.service.streaming.frame_buffer import Shelf
+from server.service.streaming.splicer import Splicer
+from server.service.view_selection.decider import GopDecision, ObjectChoice
 
 A, B = CAMERAS
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from cameras_by_hand import CAMERAS, GOP, NO_REASON
 
-from server.view.choice.decide import GopDecision
-from server.view.streams.presence import Presence, PresenceLog
+from server.service.streaming.presence import Presence, PresenceLog
+from server.service.view_selection.decider import GopDecision
 
 A, B = CAMERAS
 BOX = (1.0, 2.0, 3.0, 4.0)

@@ -15,14 +15,14 @@ from recorded_by_hand import AMPLE, A, filled, head, piece, written
 from test_record_films import decision
 from test_splice import choice
 
-from server.run.doctor_disk import disk_findings
-from server.run.doctor_findings import Level
-from server.view.past.run import Headers
-from server.view.past.store import Store
-from server.view.record import Recorder
-from server.view.record_live import LiveRecorder
-from server.wire.fit import Fit
-from server.wire.private_files import make_private_folder
+from server.cli.doctor.disk import disk_findings
+from server.cli.doctor.findings import Level
+from server.media.letterbox import Fit
+from server.service.decision_files.live_recorder import LiveRecorder
+from server.service.decision_files.recorder import Recorder
+from server.service.recording.recording_session import Headers
+from server.service.recording.store import Store
+from server.system.private_files import make_private_folder
 
 FITS = dict.fromkeys(CAMERAS, Fit((WIDTH, HEIGHT), (WIDTH, HEIGHT)))
 

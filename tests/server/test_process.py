@@ -16,19 +16,19 @@ from patience import PATIENCE
 from videos_by_hand import write_video
 
 from camsync import PulseServer, ServerLimits
-from server.camera.ladder import Bounds, Ladder, rungs
-from server.camera.load import Load
+from server.camera.load.load_monitor import Load
+from server.camera.load.load_shedder import Bounds, Ladder, rungs
 from server.camera.pipeline import CameraPipeline
 from server.camera.process import CameraProcess
-from server.camera.scene import Scene, write_recording
-from server.run.offline import run_camera
-from server.run.render import Renderer
-from server.run.setup import free_port
-from server.view.service import BestViewService
-from server.wire.config import Config
-from server.wire.loading import build_config
-from server.wire.messages import CameraStatus, CameraTracks, FrameHead, GopChoices, pulse_client
-from server.wire.pulse_users import pulse_users
+from server.cli.generated_config import free_port
+from server.cli.render.camera_workers import run_camera
+from server.cli.render.renderer import Renderer
+from server.config.loader import build_config
+from server.config.pulse_passwords import pulse_users
+from server.config.site_config import Config
+from server.messaging.messages import CameraStatus, CameraTracks, FrameHead, GopChoices, pulse_client
+from server.service.service import BestViewService
+from synthetic import Scene, write_recording
 
 FPS = 50
 FRAMES = 60

@@ -12,13 +12,13 @@ from command_line import Run, refusal
 from patience import PATIENCE
 
 from camsync import Login, PulseClient, clients_of
-from server.run.setup import free_port
-from server.run.sync import sync_process
-from server.wire.config import Config
-from server.wire.errors import UserError
-from server.wire.loading import load_config
-from server.wire.pulse_users import pulse_clients, pulse_login, pulse_users
-from server.wire.running import Running
+from server.cli.generated_config import free_port
+from server.config.loader import load_config
+from server.config.pulse_passwords import pulse_clients, pulse_login, pulse_users
+from server.config.running_config import Running
+from server.config.site_config import Config
+from server.supervisor.sync_process import sync_process
+from server.system.errors import UserError
 
 LONG = "0123456789abcdef" * 2
 RIGHT = f"c0:{LONG}\nbestview:{LONG}!\nauditor:{LONG}?\n"

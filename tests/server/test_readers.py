@@ -12,9 +12,9 @@ from halls import A, B, Hall, opened
 from hypothesis import given
 from hypothesis import strategies as st
 
-from server.web.access.grant import ShareHolder
-from server.web.readers import Reader, Readers
-from server.web.shares import Shares
+from server.http.access.grants import ShareHolder
+from server.http.connections.fair_shares import Shares
+from server.http.hls.sessions import Reader, Readers
 
 KEPT_S = 6.0
 PATHS = ["init.mp4", "index.m3u8", "0.m4s", "0.0.m4s"]

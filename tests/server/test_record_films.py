@@ -14,15 +14,15 @@ from sounds_by_hand import FRAMES as SOUNDING
 from test_splice import choice
 
 from bestview import Merge, Split
-from server.run.films import Films
-from server.run.soundtrack import Soundtrack
-from server.view.choice.decide import GopDecision, ObjectChoice
-from server.view.media.codec import agreement_for
-from server.view.record import Recorder
-from server.view.streams.shelf import Shelf
-from server.wire.fit import Fit
-from server.wire.messages import NumberedBox
-from server.wire.sections import Site
+from server.cli.render.films import Films
+from server.cli.render.soundtrack import Soundtrack
+from server.config.sections import Site
+from server.media.codec import agreement_for
+from server.media.letterbox import Fit
+from server.messaging.messages import NumberedBox
+from server.service.decision_files.recorder import Recorder
+from server.service.streaming.frame_buffer import Shelf
+from server.service.view_selection.decider import GopDecision, ObjectChoice
 
 A, B = CAMERAS
 SITE = Site(width=WIDTH, height=HEIGHT, fps=FPS)

@@ -12,8 +12,8 @@ from test_record_films import decision
 from test_service_turns import behind, noted
 from test_splice import choice
 
-from server.view.record_live import LiveRecorder
-from server.wire.fit import Fit
+from server.media.letterbox import Fit
+from server.service.decision_files.live_recorder import LiveRecorder
 
 A, B = CAMERAS
 FITS = dict.fromkeys(CAMERAS, Fit((WIDTH, HEIGHT), (WIDTH, HEIGHT)))

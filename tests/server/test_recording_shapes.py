@@ -20,13 +20,13 @@ from numpy.typing import NDArray
 from PIL import Image as Pillow
 from videos_by_hand import frame_in, write_timed, write_video
 
-from server.camera.own.fitting import MisfitError, Wanted
-from server.camera.own.recording import OwnRecording
-from server.camera.own.stream import OwnStream
+from server.camera.passthrough.compatibility import MisfitError, Wanted
+from server.camera.passthrough.recording_source import OwnRecording
+from server.camera.passthrough.stream_source import OwnStream
 from server.camera.sources import Folder, Recording
-from server.camera.sources.stream import Stream
-from server.run.recorded import look_at
-from server.run.setup import config_for_videos
+from server.camera.sources.live_stream import Stream
+from server.cli.generated_config import config_for_videos
+from server.cli.render.video_info import look_at
 from tracking.motchallenge import MotRow, read_rows, write_rows
 
 __all__ = ["myview"]

@@ -16,10 +16,10 @@ from videos_by_hand import HEIGHT, STEP, WIDTH, damage, frame_in, write_video
 
 from server.camera.sources import SourceEnded, open_source
 from server.camera.sources.base import Source
-from server.camera.sources.folder import Folder
+from server.camera.sources.image_folder import Folder
 from server.camera.sources.recording import Recording
-from server.wire.errors import UserError
-from server.wire.sections import Camera, Site
+from server.config.sections import Camera, Site
+from server.system.errors import UserError
 
 FRAMES = 25
 

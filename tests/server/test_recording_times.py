@@ -16,8 +16,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from videos_by_hand import STEP, damage, frame_in, write_timed, write_video
 
-from server.camera.own.fitting import MisfitError, Wanted
-from server.camera.own.recording import OwnRecording
+from server.camera.passthrough.compatibility import MisfitError, Wanted
+from server.camera.passthrough.recording_source import OwnRecording
 from server.camera.sources import SourceEnded
 from server.camera.sources.recording import Recording
 from tracking.motchallenge import MotRow, read_rows, write_rows

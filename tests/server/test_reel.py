@@ -13,12 +13,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from server.view.choice.decide import GopDecision, ObjectChoice
-from server.view.media.agreement import Agreement
-from server.view.media.fmp4 import init_segment
-from server.view.streams.reel import Reel, Segment, plan
-from server.view.streams.shelf import Shelf
-from server.view.streams.splice import Splicer
+from server.media.containers.fmp4 import init_segment
+from server.media.stream_format import Agreement
+from server.service.streaming.frame_buffer import Shelf
+from server.service.streaming.hls_segmenter import Reel, Segment, plan
+from server.service.streaming.splicer import Splicer
+from server.service.view_selection.decider import GopDecision, ObjectChoice
 
 GOPS = 40
 

@@ -20,15 +20,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from patience import PATIENCE
 
-from server.run.reload import reloaded
-from server.run.setup import free_port
-from server.web.app import make_app, serving
-from server.wire.config import Config
-from server.wire.differing import differing
-from server.wire.errors import UserError
-from server.wire.loading import build_config
-from server.wire.running import IN_FORCE, OnDisk, Running, written
-from server.wire.sections import Http
+from server.cli.generated_config import free_port
+from server.config.config_diff import differing
+from server.config.loader import build_config
+from server.config.running_config import IN_FORCE, OnDisk, Running, written
+from server.config.sections import Http
+from server.config.site_config import Config
+from server.http.app import make_app, serving
+from server.supervisor.reload import reloaded
+from server.system.errors import UserError
 
 LIVE, CAMERA, ALL_CAMERAS, BEST_VIEW, SITE = "live", "camera c1", "all cameras", "best view", "site"
 
@@ -212,7 +212,7 @@ async def sync_at_a_terminal(path: Path) -> AsyncIterator[tuple[asyncio.subproce
     write(path, sync={"port": port})
     ours, theirs = pty.openpty()
     process = await asyncio.create_subprocess_exec(
-        *(sys.executable, "-m", "server.run.cli", "sync", str(path)), stderr=theirs, start_new_session=True
+        *(sys.executable, "-m", "server.cli.main", "sync", str(path)), stderr=theirs, start_new_session=True
     )
     os.close(theirs)
     try:

@@ -9,8 +9,8 @@ import pytest
 import yaml
 from cameras_by_hand import small_config
 
-from server.run.reload import reloaded
-from server.wire.running import IN_FORCE, Running
+from server.config.running_config import IN_FORCE, Running
+from server.supervisor.reload import reloaded
 
 
 def test_whose_h264_passes_waits_for_a_codec_that_can() -> None:

@@ -13,14 +13,14 @@ from cameras_by_hand import CAMERAS, FPS, LARGE, SMALL, STRIDE, FedService, smal
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from server.camera.keeping import Keeping
-from server.view.who.remembering import PATIENCE_S, Remembering
-from server.view.who.returning import ALONE_MOST, LONGEST_S, Returning, believed
-from server.web.app import make_app
-from server.wire.epochs import end_of_epoch
-from server.wire.inbox import Message
-from server.wire.messages import Box, Keys
-from server.wire.remembered import NUMBER_MOST, REMEMBERED_MOST, Known, Remembered
+from server.camera.retained_state import Keeping
+from server.http.app import make_app
+from server.messaging.epochs import end_of_epoch
+from server.messaging.inbox import Message
+from server.messaging.messages import Box, Keys
+from server.messaging.retained_state import NUMBER_MOST, REMEMBERED_MOST, Known, Remembered
+from server.service.identity.state_recovery import ALONE_MOST, LONGEST_S, Returning, believed
+from server.service.identity.state_replication import PATIENCE_S, Remembering
 
 A, B = CAMERAS
 KEYS = Keys("hall")

@@ -20,10 +20,10 @@ from patience import PATIENCE
 from sounds_by_hand import EVERY, beeps, write_flashes
 from videos_by_hand import damage, write_video
 
-from server.camera.scene import Scene, write_recording
-from server.run.setup import camera_name, config_for_videos, free_port
+from server.cli.generated_config import camera_name, config_for_videos, free_port
+from synthetic import Scene, write_recording
 
-MYVIEW = [sys.executable, "-m", "server.run.cli"]
+MYVIEW = [sys.executable, "-m", "server.cli.main"]
 ROOT = Path(__file__).resolve().parents[2]
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import msgspec
 import numpy as np
 
-from server.camera.report import Reporter
-from server.wire.messages import Box, CameraTracks
+from server.camera.track_messages import Reporter
+from server.messaging.messages import Box, CameraTracks
 from tracking import WindowResult, WindowTrack
 
 SEEN: Box = (10.0, 20.0, 40.0, 110.0)

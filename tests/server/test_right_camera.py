@@ -7,9 +7,9 @@ from itertools import pairwise
 import pytest
 
 from benchmarks.stream.right import Right, judge, schedule
-from server.view.streams.footage import Footage
-from server.view.streams.kinds import Gop
-from server.wire.sections import Encode
+from server.config.sections import Encode
+from server.service.streaming.media_chunk import Footage
+from server.service.streaming.streams import Gop
 
 
 async def test_every_frame_is_the_chosen_cameras_to_the_pixel() -> None:

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from server.camera.scene import Scene, scene_names
-from server.camera.scene.hall import Hall
+from synthetic import Scene, scene_names
+from synthetic.room.hall import Hall
 
 SIZE = (320, 180)
 
@@ -39,7 +39,7 @@ def test_a_frame_is_the_same_to_the_byte_in_every_instance_and_order(room: Scene
 
 def test_a_frame_is_the_same_in_another_process(room: Scene) -> None:
     script = (
-        "import hashlib; from server.camera.scene import Scene;"
+        "import hashlib; from synthetic import Scene;"
         f"picture = Scene('room', 2, 4, 0, {SIZE[0]}, {SIZE[1]}).image(1, 777);"
         "print(hashlib.sha256(picture.tobytes()).hexdigest())"
     )

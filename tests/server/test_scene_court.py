@@ -6,17 +6,17 @@ import cv2
 import numpy as np
 import pytest
 
-from server.camera.scene import Scene
-from server.camera.scene.court import COURT, HALL
-from server.camera.scene.game import Game
-from server.camera.scene.gym import floor
-from server.camera.scene.hall import Hall
-from server.camera.scene.mingle import Mingle
-from server.camera.scene.outfits import shirt
-from server.camera.scene.skeleton import Joint, joints
-from server.camera.scene.stroll import Pose
-from server.camera.scene.truth import judge
-from server.camera.scene.way import ROUND
+from synthetic import Scene
+from synthetic.court.court import COURT, HALL
+from synthetic.court.game import Game
+from synthetic.court.gym_surfaces import floor
+from synthetic.drawing.clothing import shirt
+from synthetic.drawing.skeleton import Joint, joints
+from synthetic.ground_truth import judge
+from synthetic.room.hall import Hall
+from synthetic.walking.mingling import Mingle
+from synthetic.walking.paths import ROUND
+from synthetic.walking.stroll import Pose
 
 RATE = 10  # samples a second
 SIZE = (320, 180)

@@ -10,14 +10,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from server.camera.scene import Scene
-from server.camera.scene.gathering import Gatherings, gather
-from server.camera.scene.giveway import give_way
-from server.camera.scene.mingle import Mingle
-from server.camera.scene.outfits import casual
-from server.camera.scene.overhead import FREE, OVERHEAD
-from server.camera.scene.perspective import Perspective, Viewpoint
-from server.camera.scene.way import ROUND, compared
+from synthetic import Scene
+from synthetic.cameras.pinhole import Perspective, Viewpoint
+from synthetic.drawing.clothing import casual
+from synthetic.overhead.studio import FREE, OVERHEAD
+from synthetic.walking.collision_avoidance import give_way
+from synthetic.walking.gatherings import Gatherings, gather
+from synthetic.walking.mingling import Mingle
+from synthetic.walking.paths import ROUND, compared
 
 RATE = 10  # samples a second
 SIZE = (320, 180)

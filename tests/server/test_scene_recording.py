@@ -9,8 +9,8 @@ import av
 import numpy as np
 import pytest
 
-from server.camera.scene import Scene, write_recording
-from server.wire.errors import UserError
+from server.system.errors import UserError
+from synthetic import Scene, write_recording
 
 FRAMES = 30
 

@@ -11,15 +11,15 @@ import cv2
 import numpy as np
 import pytest
 
-from server.camera.scene import Scene
-from server.camera.scene.figure import Figure
-from server.camera.scene.perspective import Perspective
-from server.camera.scene.survey import Piece, survey
-from server.camera.scene.tank import VIEWPOINTS
-from server.camera.scene.tank.fish import LENGTH, shape
-from server.camera.scene.tank.paint import draw_fish
-from server.camera.scene.tank.shoal import ROUND, Shoal, Swimmers
-from server.camera.scene.tank.water import light_net, open_water, through
+from synthetic import Scene
+from synthetic.cameras.pinhole import Perspective
+from synthetic.drawing.figure import Figure
+from synthetic.tank import VIEWPOINTS
+from synthetic.tank.fish import LENGTH, shape
+from synthetic.tank.paint import draw_fish
+from synthetic.tank.shoal import ROUND, Shoal, Swimmers
+from synthetic.tank.water import light_net, open_water, through
+from synthetic.visibility import Piece, survey
 
 SIZE = (320, 180)
 RATE = 10  # samples a second
@@ -108,7 +108,7 @@ def test_a_frame_is_the_same_to_the_byte_in_every_order_and_process() -> None:
     backward = [again.image(camera, frame) for camera in (1, 0) for frame in reversed(frames)][::-1]
     assert all(np.array_equal(one, other) for one, other in zip(forward, backward, strict=True))
     script = (
-        "import hashlib; from server.camera.scene import Scene;"
+        "import hashlib; from synthetic import Scene;"
         f"picture = Scene('fish', 2, None, 1, {SIZE[0]}, {SIZE[1]}).image(1, 3000);"
         "print(hashlib.sha256(picture.tobytes()).hexdigest())"
     )

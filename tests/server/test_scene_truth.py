@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from server.camera.scene import CameraTruth, Scene
-from server.camera.scene.hall import Hall
-from server.camera.scene.outfits import outfit
-from server.camera.scene.room import ROOM
-from server.camera.scene.stroll import Pose
-from server.camera.scene.truth import judge
+from synthetic import CameraTruth, Scene
+from synthetic.drawing.clothing import outfit
+from synthetic.ground_truth import judge
+from synthetic.room.hall import Hall
+from synthetic.room.room import ROOM
+from synthetic.walking.stroll import Pose
 
 SIZE = (320, 180)
 

@@ -10,14 +10,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from server.camera.scene import Scene
-from server.camera.scene.courtesy import KEEP, sidestep
-from server.camera.scene.outfits import outfit
-from server.camera.scene.room import ROOM
-from server.camera.scene.skeleton import Joint, joints
-from server.camera.scene.solids import FAR, hit, may_hit
-from server.camera.scene.stroll import Pose
-from server.camera.scene.walkers import Walkers
+from synthetic import Scene
+from synthetic.drawing.clothing import outfit
+from synthetic.drawing.ray_casting import FAR, hit, may_hit
+from synthetic.drawing.skeleton import Joint, joints
+from synthetic.room.room import ROOM
+from synthetic.walking.sidestepping import KEEP, sidestep
+from synthetic.walking.stroll import Pose
+from synthetic.walking.walkers import Walkers
 
 RATE = 10  # samples a second
 

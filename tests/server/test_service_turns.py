@@ -19,11 +19,11 @@ from cameras_by_hand import (
     word,
 )
 
-from server.view.align import Epoch
-from server.view.choice.decide import GopDecision
-from server.view.keeping_up import KeepingUp
-from server.wire.epochs import end_of_epoch
-from server.wire.inbox import Inbox
+from server.messaging.epochs import end_of_epoch
+from server.messaging.inbox import Inbox
+from server.service.ingest.backlog import KeepingUp
+from server.service.ingest.epoch_aligner import Epoch
+from server.service.view_selection.decider import GopDecision
 
 EPOCHS = 8
 

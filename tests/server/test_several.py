@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from server.run.several import one_value_per_flag
-from server.wire.errors import UserError
+from server.cli.repeated_options import one_value_per_flag
+from server.system.errors import UserError
 
 SEVERAL = {"evaluate": ("--gt", "--tracks")}
 VALUES = st.lists(st.sampled_from(["a.txt", "b.txt", "c0", "-", "1"]), min_size=1, max_size=4)

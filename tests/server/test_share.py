@@ -27,15 +27,15 @@ from hypothesis import strategies as st
 from patience import PATIENCE
 
 from bestview import EpisodeKey, IdentityUpdate, LocalTrack, Merge
-from server.run.setup import free_port
-from server.view.choice.decide import Decider
-from server.view.service import BestViewService
-from server.view.who.share import index_of, served, server_of
-from server.web.app import make_app, serving
-from server.wire.bus import Bus
-from server.wire.errors import UserError
-from server.wire.messages import Box, Keys
-from server.wire.sections import Http, Share
+from server.cli.generated_config import free_port
+from server.config.sections import Http, Share
+from server.http.app import make_app, serving
+from server.messaging.bus import Bus
+from server.messaging.messages import Box, Keys
+from server.service.identity.sharding import index_of, served, server_of
+from server.service.service import BestViewService
+from server.service.view_selection.decider import Decider
+from server.system.errors import UserError
 
 
 def shared(index: int, of: int = 2, **more: Any) -> dict[str, Any]:

@@ -16,8 +16,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tokens_by_hand import bearer, locked
 
-from server.web.access.grant import ShareHolder
-from server.web.shares import Place, Shares
+from server.http.access.grants import ShareHolder
+from server.http.connections.fair_shares import Place, Shares
 
 DOOR = "/cameras/c0/hls/index.m3u8"
 """What the smallest token may see."""

@@ -10,7 +10,7 @@ from cameras_by_hand import word
 from numpy.typing import NDArray
 
 from server.camera.sharpness import Sharpness, sharpness
-from server.wire.messages import Box
+from server.messaging.messages import Box
 
 BOX: Box = (20.0, 10.0, 84.0, 138.0)
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 from cameras_by_hand import FPS, encoded
 
-from server.camera.encode import AccessUnit
-from server.view.media.agreement import Agreement, ParameterMismatchError
-from server.view.streams.shelf import Shelf
+from server.camera.encoding.encoder import AccessUnit
+from server.media.stream_format import Agreement, ParameterMismatchError
+from server.service.streaming.frame_buffer import Shelf
 
 
 def put(shelf: Shelf, unit: AccessUnit) -> None:

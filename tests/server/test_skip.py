@@ -12,11 +12,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from server.camera.encode import AccessUnit, Encoder
-from server.view.media.bits import BitReader, BitWriter, payload_of, unit_of
-from server.view.media.skip import Continuing, UnfitError, continuing
-from server.wire.h264 import ParameterSets, nal_units, parameter_sets, sample
-from server.wire.sections import Encode, Site
+from server.camera.encoding.encoder import AccessUnit, Encoder
+from server.config.sections import Encode, Site
+from server.media.h264.annexb import ParameterSets, nal_units, parameter_sets, sample
+from server.media.h264.bitstream import BitReader, BitWriter, payload_of, unit_of
+from server.media.h264.repeat_picture import Continuing, UnfitError, continuing
 
 PRESETS = ("ultrafast", "superfast", "medium")
 

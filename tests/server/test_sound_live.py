@@ -17,12 +17,12 @@ import pytest
 from patience import PATIENCE
 from sounds_by_hand import EVERY, FPS, beeps, write_flashes
 
-from server.camera.sound import Frame, LiveSound
-from server.camera.sources.stream import Stream
-from server.view.media.mp4_sound import sound_fragment, sound_init_segment
-from server.wire.aac import SAMPLES as FRAME
-from server.wire.sections import Sound
-from server.wire.sound import Coding, SoundFormat
+from server.camera.audio import Frame, LiveSound
+from server.camera.sources.live_stream import Stream
+from server.config.sections import Sound
+from server.media.audio.aac import SAMPLES as FRAME
+from server.media.audio.audio_format import Coding, SoundFormat
+from server.media.containers.mp4_audio import sound_fragment, sound_init_segment
 
 FRAMES = 3 * EVERY
 FORM = SoundFormat(48_000, 2)

@@ -34,16 +34,16 @@ from sounds_by_hand import (
 
 import client
 from benchmarks.browser import chromium
-from server.camera.sound import Frame, RecordedSound
-from server.camera.sound.encoding import Encoding
-from server.camera.sound.opus import samples_in
-from server.camera.sound.passing import Passing
-from server.view.choice.decide import GopDecision, ObjectChoice
-from server.view.media.mp4_sound import sound_fragment, sound_init_segment
-from server.wire.errors import UserError
-from server.wire.loading import build_config
-from server.wire.sections import Sound
-from server.wire.sound import SoundFormat
+from server.camera.audio import Frame, RecordedSound
+from server.camera.audio.encoder import Encoding
+from server.camera.audio.passthrough import Passing
+from server.config.loader import build_config
+from server.config.sections import Sound
+from server.media.audio.audio_format import SoundFormat
+from server.media.audio.opus import samples_in
+from server.media.containers.mp4_audio import sound_fragment, sound_init_segment
+from server.service.view_selection.decider import GopDecision, ObjectChoice
+from server.system.errors import UserError
 
 STEREO = Sound(source="here", codec="opus")
 FORM = SoundFormat(48_000, 2, "opus")

@@ -18,14 +18,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from sounds_by_hand import EVERY, FPS, beeps, write_flashes
 
-from server.camera.sound import Frame, LiveSound, RecordedSound, open_sound, runs
-from server.camera.sound.encoding import Encoding
-from server.camera.sound.passing import Passing
-from server.camera.sound.recorded import _in_order
-from server.wire.errors import UserError
-from server.wire.loading import build_config
-from server.wire.sections import Sound
-from server.wire.sound import SoundFormat
+from server.camera.audio import Frame, LiveSound, RecordedSound, open_sound, runs
+from server.camera.audio.encoder import Encoding
+from server.camera.audio.passthrough import Passing
+from server.camera.audio.recorded_source import _in_order
+from server.config.loader import build_config
+from server.config.sections import Sound
+from server.media.audio.audio_format import SoundFormat
+from server.system.errors import UserError
 
 FRAMES = 70
 STEREO = Sound(source="here")

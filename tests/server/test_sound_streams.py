@@ -30,11 +30,11 @@ from sounds_by_hand import (
 from test_ts import check_counters, taken_apart
 
 import client
-from server.camera.sound import RecordedSound
-from server.view.choice.decide import GopDecision, ObjectChoice
-from server.view.media.fmp4 import init_segment
-from server.wire.aac import SAMPLES as FRAME
-from server.wire.sections import Sound
+from server.camera.audio import RecordedSound
+from server.config.sections import Sound
+from server.media.audio.aac import SAMPLES as FRAME
+from server.media.containers.fmp4 import init_segment
+from server.service.view_selection.decider import GopDecision, ObjectChoice
 
 
 @pytest.fixture(scope="module")

@@ -9,15 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from server.camera.scene import Scene
 from server.camera.sources import Recording
 from server.camera.sources.opening import open_video
-from server.camera.sources.stage import Stage
-from server.run.scene_ground import with_scene_ground
-from server.wire.config import Config
-from server.wire.errors import UserError
-from server.wire.sections import Site
-from server.wire.sources import SourceKind, kind_of
+from server.camera.sources.synthetic import Stage
+from server.config.sections import Site
+from server.config.site_config import Config
+from server.config.source_address import SourceKind, kind_of
+from server.supervisor.scene_ground import with_scene_ground
+from server.system.errors import UserError
+from synthetic import Scene
 
 SITE = Site(width=128, height=72)
 

@@ -19,15 +19,15 @@ from rich.console import Console
 from tokens_by_hand import locked, token_of
 
 import client
-from client.status_metrics import Metrics, service_of
-from server.run import status as command
-from server.run.status import status_live, status_once
-from server.run.status_view import Rates, picture
-from server.view.service import BestViewService
-from server.web.app import make_app, serving
-from server.wire.errors import AwayError, UserError
-from server.wire.messages import Solve
-from server.wire.sections import Http
+from client.status.prometheus_text import Metrics, service_of
+from server.cli.status import command
+from server.cli.status.command import status_live, status_once
+from server.cli.status.display import Rates, picture
+from server.config.sections import Http
+from server.http.app import make_app, serving
+from server.messaging.messages import Solve
+from server.service.service import BestViewService
+from server.system.errors import AwayError, UserError
 
 
 def url(hall: Hall) -> str:

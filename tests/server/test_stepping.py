@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from benchmarks.endurance.crowd import crowd
-from server.camera.ladder import Rung, rungs
-from server.camera.stepping import Stepping
+from server.camera.load.frame_skipper import Stepping
+from server.camera.load.load_shedder import Rung, rungs
 from tracking import CostSettings, Detections, OnlineTracker, WindowResult, WindowSettings, create_solver
 
 WINDOW = WindowSettings()

@@ -22,12 +22,12 @@ from av.video.stream import VideoStream
 from patience import PATIENCE
 from videos_by_hand import HEIGHT, STEP, WIDTH, frame_in, write_video
 
-from server.camera.sound import LiveSound
-from server.camera.sources import open_source, stream
+from server.camera.audio import LiveSound
+from server.camera.sources import live_stream, open_source
+from server.camera.sources.live_stream import Stream
 from server.camera.sources.opening import Opened, open_video
-from server.camera.sources.stream import Stream
-from server.wire.errors import AwayError, UserError
-from server.wire.sections import Camera, Site, Sound
+from server.config.sections import Camera, Site, Sound
+from server.system.errors import AwayError, UserError
 
 
 class MotionJpeg:
@@ -110,8 +110,8 @@ def test_the_newest_picture_is_shown(camera: MotionJpeg) -> None:
 def test_a_camera_that_was_away_is_shown_again_and_nothing_old_meanwhile(
     camera: MotionJpeg, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(stream, "_STALE_S", 0.2)
-    monkeypatch.setattr(stream, "_RETRY_FIRST_S", 0.05)
+    monkeypatch.setattr(live_stream, "_STALE_S", 0.2)
+    monkeypatch.setattr(live_stream, "_RETRY_FIRST_S", 0.05)
     port = camera.plug_in()
     source = Stream(f"http://127.0.0.1:{port}/", {})
     try:
@@ -128,9 +128,9 @@ def test_a_camera_that_was_away_is_shown_again_and_nothing_old_meanwhile(
 def test_a_camera_that_is_away_for_long_is_told_of_once_and_when_it_is_back(
     camera: MotionJpeg, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    caplog.set_level("INFO", "server.camera.sources.stream")
-    monkeypatch.setattr(stream, "_RETRY_FIRST_S", 0.01)
-    monkeypatch.setattr(stream, "_RETRY_MAX_S", 0.01)
+    caplog.set_level("INFO", "server.camera.sources.live_stream")
+    monkeypatch.setattr(live_stream, "_RETRY_FIRST_S", 0.01)
+    monkeypatch.setattr(live_stream, "_RETRY_MAX_S", 0.01)
     port = camera.plug_in()
     source = Stream(f"http://me:hunter2@127.0.0.1:{port}/?p=hunter2", {})
     try:
@@ -192,7 +192,7 @@ class Frames:
 def test_a_picture_of_before_a_silence_is_not_shown_after_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(stream, "_STALE_S", 0.2)
+    monkeypatch.setattr(live_stream, "_STALE_S", 0.2)
     camera = Halting(write_video(tmp_path / "film.ts", 25), halt=20)
     frames = Frames()
     quick = {"analyzeduration": "100000", "probesize": "5000"}
@@ -215,7 +215,7 @@ def test_pictures_of_another_size_are_no_pictures_of_this_camera(
     camera: MotionJpeg, monkeypatch: pytest.MonkeyPatch, connected: bool
 ) -> None:
     """Where people stand goes by the size: the camera's process ends, and begins anew with the other one."""
-    monkeypatch.setattr(stream, "_RETRY_FIRST_S", 0.05)
+    monkeypatch.setattr(live_stream, "_RETRY_FIRST_S", 0.05)
     port = camera.plug_in()
     source = Stream(f"http://127.0.0.1:{port}/", {})
 
@@ -277,7 +277,7 @@ def test_a_picture_that_cannot_be_decoded_cuts_no_connection(
 def test_a_mistake_while_reading_ends_the_connection_and_not_the_camera(
     camera: MotionJpeg, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr(stream, "_RETRY_FIRST_S", 0.05)
+    monkeypatch.setattr(live_stream, "_RETRY_FIRST_S", 0.05)
 
     class Stumbling(LiveSound):
         connections = 0

@@ -12,11 +12,11 @@ import pytest
 from cameras_by_hand import CAMERAS, small_config
 from patience import PATIENCE
 
-from server.run import supervise
-from server.run.ending import OVER
-from server.run.starting import STARTED
-from server.run.supervise import Supervisor
-from server.wire.errors import UserError
+from server.supervisor import supervisor
+from server.supervisor.shutdown import OVER
+from server.supervisor.startup_signal import STARTED
+from server.supervisor.supervisor import Supervisor
+from server.system.errors import UserError
 
 NOBODY = 2**22 + 1  # more than a process's number can be (proc(5), pid_max)
 
@@ -97,7 +97,7 @@ class Machine:
 async def machine(monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Machine]:
     it = Machine()
     monkeypatch.setattr(asyncio, "create_subprocess_exec", it.start)
-    monkeypatch.setattr(supervise, "_RETRY_FIRST_S", 0.0)
+    monkeypatch.setattr(supervisor, "_RETRY_FIRST_S", 0.0)
     async with asyncio.timeout(PATIENCE):
         yield it
         if it.task is not None:
@@ -128,7 +128,7 @@ async def test_the_best_view_and_the_pulses_load_before_any_camera(machine: Mach
 async def test_no_more_cameras_load_at_a_time_than_there_are_processors(
     machine: Machine, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(supervise, "processors", lambda: 2.5)
+    monkeypatch.setattr(supervisor, "processors", lambda: 2.5)
     machine.run(cameras=("c0", "c1", "c2", "c3", "c4"))
     await machine.processes(2)
     machine.loads_at_once = False
@@ -162,7 +162,7 @@ async def test_a_best_view_that_died_waits_for_no_camera_that_loads(machine: Mac
 async def test_what_never_says_that_it_has_loaded_keeps_nobody_for_ever(
     machine: Machine, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(supervise, "_STARTS_WITHIN_S", 0.01)
+    monkeypatch.setattr(supervisor, "_STARTS_WITHIN_S", 0.01)
     machine.loads_at_once = False
     machine.run()
     assert len(await machine.processes(4)) == 4

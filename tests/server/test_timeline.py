@@ -15,14 +15,14 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from patience import PATIENCE
 
-from server.camera.encode import AccessUnit, Encoder
-from server.view.choice.decide import GopDecision, ObjectChoice
-from server.view.media.agreement import Agreement
-from server.view.media.fmp4 import init_segment
-from server.view.streams.channel import Viewer
-from server.view.streams.shelf import Shelf
-from server.view.streams.splice import Splicer
-from server.wire.sections import Encode, Site
+from server.camera.encoding.encoder import AccessUnit, Encoder
+from server.config.sections import Encode, Site
+from server.media.containers.fmp4 import init_segment
+from server.media.stream_format import Agreement
+from server.service.streaming.broadcaster import Viewer
+from server.service.streaming.frame_buffer import Shelf
+from server.service.streaming.splicer import Splicer
+from server.service.view_selection.decider import GopDecision, ObjectChoice
 
 FRAMES = 6 * GOP
 

@@ -19,11 +19,11 @@ from programs import needs_openssl
 from pydantic import ValidationError
 from tokens_by_hand import line_of, token_of, write_tokens
 
-from server.web.access.other_sites import CHANGES
-from server.web.tls import Certificate
-from server.wire.errors import UserError
-from server.wire.loading import build_config
-from server.wire.sections import Tls
+from server.config.loader import build_config
+from server.config.sections import Tls
+from server.http.access.csrf import CHANGES
+from server.http.tls import Certificate
+from server.system.errors import UserError
 
 pytestmark = needs_openssl
 
@@ -99,7 +99,7 @@ async def test_watching_trusts_what_the_usual_variable_names_and_sends_its_token
             (trusted, "myview: watch: watching needs a token"),
         ):
             process = await asyncio.create_subprocess_exec(
-                *(sys.executable, "-m", "server.run.cli", "watch", f"https://127.0.0.1:{hall.port}"),
+                *(sys.executable, "-m", "server.cli.main", "watch", f"https://127.0.0.1:{hall.port}"),
                 env=environment,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.STDOUT,
@@ -122,7 +122,7 @@ async def is_proven(port: int, trusted: Tls) -> bool:
 async def test_a_new_certificate_is_taken_for_new_connections(
     made: tuple[Tls, Tls], tls: Tls, caplog: pytest.LogCaptureFixture
 ) -> None:
-    caplog.set_level(logging.INFO, "server.web.tls")
+    caplog.set_level(logging.INFO, "server.http.tls")
     certificate = Certificate.of(tls)
     assert certificate is not None
     server = await asyncio.start_server(

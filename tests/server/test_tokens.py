@@ -9,8 +9,8 @@ import pytest
 from command_line import Run, refusal
 from tokens_by_hand import LATER, line_of, write_tokens
 
-from server.wire.errors import UserError
-from server.wire.tokens import digest_of, read_tokens
+from server.config.tokens_file import digest_of, read_tokens
+from server.system.errors import UserError
 
 SUM = digest_of("x")
 

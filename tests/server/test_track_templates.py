@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from av.video.stream import VideoStream
 
-from server.run.track_templates import boxes_from, track_templates
-from server.wire.errors import UserError
+from server.cli.track.templates import boxes_from, track_templates
+from server.system.errors import UserError
 from tracking.motchallenge import read_rows
 
 FRAMES, SPEED, SIDE = 12, 3, 32

@@ -15,11 +15,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from programs import needs_ffprobe
 
-from server.view.media.agreement import Agreement
-from server.view.media.fmp4 import Sample, fragment, ticks
-from server.view.media.picture import Picture
-from server.view.media.ts import COUNTERS, PACKET_BYTES, Counters, pack, packets
-from server.view.streams.shelf import Shelf
+from server.media.containers.fmp4 import Sample, fragment, ticks
+from server.media.containers.mpegts import COUNTERS, PACKET_BYTES, Counters, pack, packets
+from server.media.picture import Picture
+from server.media.stream_format import Agreement
+from server.service.streaming.frame_buffer import Shelf
 
 CLOCK = 1 << 33
 

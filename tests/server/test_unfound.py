@@ -12,13 +12,13 @@ from cameras_by_hand import CAMERAS, STRIDE, TrackNumbers, epoch_of, small_confi
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from server.view.board import reason
-from server.view.choice.decide import Decider, GopDecision
-from server.view.choice.elsewhere import Elsewhere
-from server.view.choice.sight import Sight
-from server.view.choice.unfound import Tested as Looked
-from server.view.choice.unfound import Unfound
-from server.wire.messages import Box
+from server.messaging.messages import Box
+from server.service.decision_state import reason
+from server.service.view_selection.cross_view_inference import Elsewhere
+from server.service.view_selection.decider import Decider, GopDecision
+from server.service.view_selection.undetected_views import Tested as Looked
+from server.service.view_selection.undetected_views import Unfound
+from server.service.view_selection.view_quality_buffer import Sight
 
 A, B = CAMERAS
 GROUND = {A: np.eye(3), B: np.diag([0.5, 0.5, 1.0])}

@@ -30,7 +30,7 @@ from sounds_by_hand import FRAMES as SOUNDING
 from sounds_by_hand import beeps, sends, write_flashes
 from tokens_by_hand import token_of
 
-from server.view.streams.channel import Piece
+from server.service.streaming.broadcaster import Piece
 
 HLS = {**PATIENT, "hls_segment_s": 0.4, "hls_window_s": 8.0}
 """Two GOPs in a segment, and all that there is in the playlist."""

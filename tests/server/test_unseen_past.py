@@ -29,7 +29,7 @@ from leaving_by_hand import (
 from sounds_by_hand import FRAMES as SOUNDING
 from sounds_by_hand import beeps, sends, write_flashes
 
-from server.wire.messages import GopChoices
+from server.messaging.messages import GopChoices
 
 Kept = tuple[Hall, list[GopChoices]]
 HLS = {**PATIENT, "hls_segment_s": 0.4, "hls_window_s": 0.8}

@@ -15,17 +15,17 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from programs import needs_ffprobe
 
-from server.camera.encode import AccessUnit, Encoder
-from server.draw.unpack_webm import webm_frames
-from server.view.media.agreement import ParameterMismatchError
-from server.view.media.picture import Picture
-from server.view.media.vp8 import Vp8Agreement, size_of
-from server.view.media.vp8_skip import repeat
-from server.view.media.webm import cluster, header, rebased
-from server.view.pictures.decided import first_pulse
-from server.view.streams.shelf import Shelf
-from server.view.streams.timeline import Timeline
-from server.wire.sections import Encode, Site
+from server.camera.encoding.encoder import AccessUnit, Encoder
+from server.config.sections import Encode, Site
+from server.media.containers.webm import cluster, header, rebased
+from server.media.picture import Picture
+from server.media.stream_format import ParameterMismatchError
+from server.media.vp8.repeat_frame import repeat
+from server.media.vp8.stream_format import Vp8Agreement, size_of
+from server.service.rendering.decided_boxes import first_pulse
+from server.service.rendering.worker.webm_demuxer import webm_frames
+from server.service.streaming.frame_buffer import Shelf
+from server.service.streaming.timeline import Timeline
 
 FPS, GOP, FRAMES = 25.0, 5, 20
 Pixels = NDArray[np.uint8]

@@ -13,10 +13,10 @@ from halls import Hall, opened
 from recorded_by_hand import A, B
 
 import client
-from client.commentary import Commentary, Frame
 from client.model import Box, Gop, Site
 from client.sidecar import sidecars, write_sidecars
 from client.spool import Spool
+from client.stream_events import Commentary, Frame
 
 SITE = Site("hall", 25.0, 320, 240, GOP, 25, None, None, 0.0, ("c0",))
 BOX = Box(1, 40.04, 60.0, 80.0, 160.0)

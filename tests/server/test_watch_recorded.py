@@ -21,10 +21,10 @@ from typer.testing import CliRunner
 
 import client
 from benchmarks.browser import chromium
-from client.commentary import Frame
 from client.model import Box, Site
 from client.sidecar import write_sidecars
-from server.run.cli import app
+from client.stream_events import Frame
+from server.cli.main import app
 
 FIRST = 2 * GOP  # of what is watched here
 

@@ -19,7 +19,7 @@ from vp8_by_hand import EPOCHS, feed, own
 import client
 from client.webm import CLUSTER, ElementReader, WebmError, at_time, made, number
 from client.webm_recording import WebmChangedError, WebmRecording, write_indexed
-from server.view.media.webm import cluster, header
+from server.media.containers.webm import cluster, header
 
 
 async def test_a_film_is_recorded_over_cuts_with_the_boxes_beside_it(free: Hall, tmp_path: Path) -> None:

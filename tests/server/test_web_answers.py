@@ -11,9 +11,9 @@ import pytest
 from cameras_by_hand import status, tracks, word
 from halls import A, B, Hall
 
-from server.view.streams.channel import Viewer
-from server.web import openapi
-from server.web.app import make_app
+from server.http.api import openapi
+from server.http.app import make_app
+from server.service.streaming.broadcaster import Viewer
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ import pytest
 from cameras_by_hand import CAMERAS, FPS, GOP, HEIGHT, LARGE, SMALL, WIDTH, encoded, status, thumbnail, video
 from halls import A, B, Hall
 
-from server.wire.inbox import Inbox
+from server.messaging.inbox import Inbox
 
 
 async def test_the_site_is_described(busy: Hall) -> None:

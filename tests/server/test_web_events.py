@@ -11,8 +11,8 @@ from cameras_by_hand import CAMERAS, GOP, LARGE, SMALL
 from halls import A, B, Hall
 from patience import PATIENCE
 
-from server.web.access.grant import ALL
-from server.web.events import Events
+from server.http.access.grants import ALL
+from server.http.api.events import Events
 
 
 async def events(answer: aiohttp.ClientResponse, count: int) -> list[tuple[str, Any]]:

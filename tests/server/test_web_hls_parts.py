@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from patience import PATIENCE
 from programs import needs_ffmpeg
 
-from server.view.choice.decide import GopDecision, ObjectChoice
-from server.view.streams.reel import Reel
-from server.web.hls.live import _newest
+from server.http.hls.live_playlist import _newest
+from server.service.streaming.hls_segmenter import Reel
+from server.service.view_selection.decider import GopDecision, ObjectChoice
 
 HTTP = {"hls_segment_s": 0.6, "hls_window_s": 6.0}
 PARTS = 3
@@ -205,7 +205,7 @@ async def test_what_never_comes_is_not_waited_for_for_ever(
     hall: Hall, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     shows(hall, range(PARTS + 1))
-    monkeypatch.setattr("server.web.hls.live._WAIT", 0.05)
+    monkeypatch.setattr("server.http.hls.live_playlist._WAIT", 0.05)
     async with hall.session.get(f"{STREAM}index.m3u8?_HLS_msn=2") as answer:
         assert (answer.status, bool(answer.headers["Retry-After"])) == (503, True)
 

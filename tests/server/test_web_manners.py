@@ -10,7 +10,7 @@ import pytest
 from cameras_by_hand import CAMERAS, GOP, SMALL
 from halls import A, B, Hall, opened
 
-from server.view.streams.channel import Chunk
+from server.service.streaming.broadcaster import Chunk
 
 STREAMS = {
     "/objects/1/best.mp4": "video/mp4",

@@ -15,9 +15,9 @@ import pytest
 from drawn_by_hand import CAMERAS, GOP, SIZE, Drawn, Image, decoded, drawn_room, parts, read_film
 from halls import B, Hall
 
-from server.draw.boxes import CHOSEN
-from server.view.pictures import CameraView, PersonView, Pictures
-from server.web.keys import PICTURES
+from server.http.app_keys import PICTURES
+from server.service.rendering.renderer import CameraView, PersonView, Pictures
+from server.service.rendering.worker.box_overlay import CHOSEN
 
 FPS = 25
 SOMEBODY = 1
@@ -177,7 +177,7 @@ async def test_one_process_draws_for_all_who_watch_one_stream(drawn: Drawn) -> N
 async def test_a_process_that_is_killed_is_replaced_and_the_streams_go_on(
     drawn: Drawn, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("server.view.pictures.process._ANSWER_S", 1000.0)  # nobody waits for that
+    monkeypatch.setattr("server.service.rendering.worker_process._ANSWER_S", 1000.0)  # nobody waits for that
     pictures: Pictures = drawn.app[PICTURES]
     going = asyncio.create_task(drawn.keep_going(GOP / FPS))
     async with (

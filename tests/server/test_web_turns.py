@@ -10,10 +10,10 @@ import pytest
 from cameras_by_hand import FedService, small_config
 from tokens_by_hand import line_of, write_tokens
 
-from server.web.access.access import Access
-from server.web.events import Events
-from server.web.tls import Certificate
-from server.web.turns import again_and_again
+from server.http.access.access_control import Access
+from server.http.api.events import Events
+from server.http.periodic import again_and_again
+from server.http.tls import Certificate
 
 
 class Failing:
@@ -54,7 +54,7 @@ async def runs_on(task: asyncio.Task[None], failing: Failing) -> bool:
 
 
 async def test_what_people_and_cameras_are_is_told_on(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("server.web.events._LIST_EVERY_S", 0.001)
+    monkeypatch.setattr("server.http.api.events._LIST_EVERY_S", 0.001)
     service, failing = FedService(small_config()), Failing(RuntimeError("nobody has thought of this"))
     events = Events(service)
     events._lines = {None: None}  # type: ignore[dict-item]
@@ -66,7 +66,7 @@ async def test_what_people_and_cameras_are_is_told_on(monkeypatch: pytest.Monkey
 async def test_tokens_are_looked_at_on_and_what_is_over_ends_meanwhile(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("server.web.access.access._LOOK_EVERY_S", 0.001)
+    monkeypatch.setattr("server.http.access.access_control._LOOK_EVERY_S", 0.001)
     failing, over = Failing(RuntimeError("nobody has thought of this")), Failing()
     access = Access(write_tokens(tmp_path / "tokens.yaml", line_of("desk")), lambda number: number, "hall")
     monkeypatch.setattr(access._file, "look", failing)
@@ -76,7 +76,7 @@ async def test_tokens_are_looked_at_on_and_what_is_over_ends_meanwhile(
 
 
 async def test_the_certificate_is_looked_at_on(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("server.web.tls._LOOK_EVERY_S", 0.001)
+    monkeypatch.setattr("server.http.tls._LOOK_EVERY_S", 0.001)
     certificate, failing = Certificate.__new__(Certificate), Failing(RuntimeError("not thought of"))
     monkeypatch.setattr(certificate, "look", failing)
     assert await runs_on(asyncio.create_task(certificate.run()), failing)

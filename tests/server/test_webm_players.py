@@ -30,8 +30,8 @@ from programs import needs_chromium, needs_ffmpeg, needs_mpv
 from vp8_by_hand import EPOCHS, feed, own
 
 from benchmarks.browser import chromium
-from server.view.choice.decide import GopDecision, ObjectChoice
-from server.wire.epochs import end_of_epoch
+from server.messaging.epochs import end_of_epoch
+from server.service.view_selection.decider import GopDecision, ObjectChoice
 
 PATHS = ("/objects/1/best.webm", "/cameras/c1/live.webm")
 

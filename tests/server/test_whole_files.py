@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from small_disk import files_of_at_most
 
-from server.view.whole_files import WholeFiles
+from server.service.decision_files.row_files import WholeFiles
 
 NAMES = ("a", "b", "c")
 rows = st.text(st.sampled_from("0123456789,\n"), max_size=30)

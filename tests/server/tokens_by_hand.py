@@ -10,7 +10,7 @@ from typing import Any
 import yaml
 from halls import Hall, opened
 
-from server.wire.tokens import digest_of
+from server.config.tokens_file import digest_of
 
 LATER = "2100-01-01T00:00:00Z"
 """When a token may have been made that is younger than any service of a test."""

@@ -10,12 +10,12 @@ from cameras_by_hand import STRIDE, small_config
 from numpy.typing import NDArray
 
 from bestview import to_ground
-from server.camera.scene import Scene
-from server.camera.scene.hall import Hall
-from server.camera.scene.perspective import Perspective
-from server.view.align import Epoch
-from server.wire.config import Config
-from server.wire.messages import Box, CameraTracks, Track
+from server.config.site_config import Config
+from server.messaging.messages import Box, CameraTracks, Track
+from server.service.ingest.epoch_aligner import Epoch
+from synthetic import Scene
+from synthetic.cameras.pinhole import Perspective
+from synthetic.room.hall import Hall
 
 Floats = NDArray[np.float64]
 

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from tracking.baselines.prediction_method import Method
 from tracking.boxes import Floats, iou
 from tracking.detectors.base import Image
-from tracking.yardsticks.method import Method
 
 SIZE = (120, 200)
 FRAMES = 58

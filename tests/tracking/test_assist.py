@@ -10,10 +10,10 @@ import pytest
 from strolls import TEST_COSTS, WIDTH, Stroll, final_boxes, follow, seen_at
 
 from tracking import Detections, OnlineTracker, WindowResult, WindowSettings, create_solver
-from tracking.assist import AssistedTracker, AssistSettings, Pointing
-from tracking.assist.carry import carried
+from tracking.baselines import tracker_named
 from tracking.boxes import iou
-from tracking.yardsticks import tracker_named
+from tracking.interactive import AssistedTracker, AssistSettings, Pointing
+from tracking.interactive.late_correction import carried
 
 ALIKE = [Stroll(0, 50, 4.0, 1), Stroll(300, 50, -4.0, 1)]
 """Two who look alike and cross in frame 37; nothing tells who is who after it but how they went."""

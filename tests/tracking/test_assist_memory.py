@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tracking.assist.memory import Memory, Step
+from tracking.interactive.window_memory import Memory, Step
 
 PLACE, ELSEWHERE = np.array([10.0, 10.0, 40.0, 90.0]), np.array([200.0, 10.0, 230.0, 90.0])
 

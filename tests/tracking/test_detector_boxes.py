@@ -6,10 +6,10 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from tracking.detectors.boxfilter import Band, BoxFilter, BoxFilterSettings, Peaks
-from tracking.detectors.explain import ExplainSettings, Search, explain
-from tracking.detectors.heightline import HeightLine
-from tracking.detectors.silhouette import BODIES, Body, corners_of
+from tracking.detectors.background.box_filter import Band, BoxFilter, BoxFilterSettings, Peaks
+from tracking.detectors.background.foreground_fit import ExplainSettings, Search, explain
+from tracking.detectors.background.height_model import HeightLine
+from tracking.detectors.background.silhouette import BODIES, Body, corners_of
 
 ROWS, COLUMNS = 90, 120
 Plane = npt.NDArray[np.float32]

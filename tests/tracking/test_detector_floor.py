@@ -13,7 +13,7 @@ import numpy.typing as npt
 import pytest
 from scipy.optimize import linear_sum_assignment
 
-from server.camera.scene import Scene
+from synthetic import Scene
 from tracking import DEFAULT_SOLVER, CostSettings, OnlineTracker, WindowSettings, create_solver
 from tracking.boxes import iou
 from tracking.detectors import BackgroundDetector, BackgroundSettings

@@ -8,10 +8,10 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from server.camera.scene import Scene
+from synthetic import Scene
 from tracking.boxes import iou
 from tracking.detectors import HogDetector, HogSettings, Looks, LooksSettings
-from tracking.detectors.suppress import best_apart
+from tracking.detectors.non_maximum_suppression import best_apart
 from tracking.types import Detections
 
 SETTINGS = HogSettings(least_height=0.25)

@@ -11,7 +11,7 @@ import pytest
 from tiny_networks import save, yolov5, yolov8
 
 from tracking.detectors import OnnxDetector, OnnxSettings
-from tracking.detectors.yolo import decoded
+from tracking.detectors.neural.yolo_output import decoded
 
 # The picture is twice as large as the input and has its proportions: no bars.
 WHITE = np.full((128, 192, 3), 255, dtype=np.uint8)

@@ -10,9 +10,15 @@ from hypothesis import strategies as st
 
 from tracking.boxes import iou
 from tracking.detectors import BackgroundDetector, BackgroundSettings, LooksSettings
-from tracking.detectors.anew import SeenAnew
-from tracking.detectors.heightline import Floor, HeightLineLearner, HeightLineSettings, fit_line, prior_of
-from tracking.detectors.isolated import Alone
+from tracking.detectors.background.height_model import (
+    Floor,
+    HeightLineLearner,
+    HeightLineSettings,
+    fit_line,
+    prior_of,
+)
+from tracking.detectors.background.isolated_people import Alone
+from tracking.detectors.background.sample_novelty import SeenAnew
 from tracking.types import Detections
 
 SURE = 0.4

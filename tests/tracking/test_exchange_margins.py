@@ -11,7 +11,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from random_networks import SETTINGS, Case, cases, network_of
 
-from tracking.assist import exchange_margins, exchanges
+from tracking.interactive import exchange_margins, exchanges
 from tracking.model.network import Network
 from tracking.solvers.base import OCCLUDED, create_solver
 from tracking.solvers.objective import conflict_count, nodes_from_states, total_cost

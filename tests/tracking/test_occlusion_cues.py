@@ -8,11 +8,11 @@ from crossings import BLUE, FRAMES, GREEN, GREY, RED, Crossing, ThreeMeet, WalkT
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tracking.yardsticks.mixture import COLOURS, MIDDLES, codes, fitted, posterior
-from tracking.yardsticks.occlusion_cues import CueSettings, OcclusionCues
-from tracking.yardsticks.particles import ParticleFilters, ParticleSettings
-from tracking.yardsticks.shares import Shares
-from tracking.yardsticks.window_sums import RING, WindowSums, ringed
+from tracking.baselines.center_surround import RING, WindowSums, ringed
+from tracking.baselines.color_mixture import COLOURS, MIDDLES, codes, fitted, posterior
+from tracking.baselines.occluder_particles import Shares
+from tracking.baselines.occlusion_cues import CueSettings, OcclusionCues
+from tracking.baselines.particle_filter import ParticleFilters, ParticleSettings
 
 SEEDS = range(4)
 

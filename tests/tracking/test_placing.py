@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 from random_networks import SETTINGS, Case, network_of
 
-from tracking.assist import Pointing
-from tracking.assist.placing import is_found, place_of, with_place, with_places
+from tracking.interactive import Pointing
+from tracking.interactive.hypothesis_insertion import is_found, place_of, with_place, with_places
 from tracking.solvers.base import OCCLUDED, create_solver
 from tracking.types import Detections
 

@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from random_networks import SETTINGS, Case, cases, network_of
 
-from tracking.assist import AssistSettings, Pointing
-from tracking.assist.pointing import farness, with_pointings
+from tracking.interactive import AssistSettings, Pointing
+from tracking.interactive.corrections import farness, with_pointings
 from tracking.solvers.base import create_solver
 
 ASSIST = AssistSettings(enabled=True)

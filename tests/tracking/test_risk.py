@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from benchmarks.assist.risk import fitted
-from tracking.assist import RiskReason, Signs
-from tracking.assist.risk import WEIGHTS, risk_of
+from tracking.interactive import RiskReason, Signs
+from tracking.interactive.risk import WEIGHTS, risk_of
 
 
 @pytest.mark.parametrize("reason", get_args(RiskReason))

@@ -8,10 +8,10 @@ from crossings import BLUE, RED, Clothes, Crossing, times_kept
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tracking.yardsticks.overlap_map import overlap_factors
-from tracking.yardsticks.part_field import CHANNELS, LEVELS, PartField, likeness, parts_of
-from tracking.yardsticks.particles import ParticleFilters, ParticleSettings
-from tracking.yardsticks.separated import SeparatedParticles, SeparatedSettings
+from tracking.baselines.part_histograms import CHANNELS, LEVELS, PartField, likeness, parts_of
+from tracking.baselines.particle_filter import ParticleFilters, ParticleSettings
+from tracking.baselines.particle_overlap import overlap_factors
+from tracking.baselines.separated_particles import SeparatedParticles, SeparatedSettings
 
 SEEDS = range(6)
 

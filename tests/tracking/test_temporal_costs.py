@@ -10,12 +10,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tracking.temporal import BlobSettings, TemporalSettings
-from tracking.temporal.background import YuvBackground
-from tracking.temporal.blobs import Blob, Blobs
-from tracking.temporal.colours import BINS, mismatch, uv_histogram
-from tracking.temporal.distance import distance_score, gap, penalties, penalty
-from tracking.temporal.places import Places
+from tracking.baselines.temporal_consistency import BlobSettings, TemporalSettings
+from tracking.baselines.temporal_consistency.background import YuvBackground
+from tracking.baselines.temporal_consistency.blobs import Blob, Blobs
+from tracking.baselines.temporal_consistency.color_histogram import BINS, mismatch, uv_histogram
+from tracking.baselines.temporal_consistency.distance import distance_score, gap, penalties, penalty
+from tracking.baselines.temporal_consistency.regional_appearance import Places
 
 METRE = 50.0
 SETTINGS = TemporalSettings()

@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tracking.temporal.edges import cheapest_by_edges
-from tracking.temporal.graph import Graph, all_edges, edges, merge_costs, ways
-from tracking.temporal.groups import joint_path
-from tracking.temporal.sweep import cheapest
+from tracking.baselines.temporal_consistency.edge_search import cheapest_by_edges
+from tracking.baselines.temporal_consistency.graph import Graph, all_edges, edges, merge_costs, ways
+from tracking.baselines.temporal_consistency.groups import joint_path
+from tracking.baselines.temporal_consistency.per_person_search import cheapest
 
 _MANY = 100_000
 

@@ -9,12 +9,12 @@ import pytest
 from strolls import final_boxes
 
 from tracking import CostSettings, Detections, WindowResult, WindowSettings, create_solver
+from tracking.baselines import needs_pictures, tracker_named
+from tracking.baselines.temporal_consistency import BlobSettings, TemporalSettings
+from tracking.baselines.temporal_consistency.blobs import Blobs
+from tracking.baselines.temporal_consistency.tracker import TemporalTracker
 from tracking.boxes import Floats, iou
 from tracking.detectors.base import Image
-from tracking.temporal import BlobSettings, TemporalSettings
-from tracking.temporal.blobs import Blobs
-from tracking.temporal.tracker import TemporalTracker
-from tracking.yardsticks import needs_pictures, tracker_named
 
 SIZE = (150, 200)
 WINDOW = WindowSettings(window=10, stride=5, birth_window=10)

@@ -13,10 +13,10 @@ from strolls import BINS, Stroll, final_boxes, look, seen_at
 
 from tracking import CostSettings, Detections, WindowSettings, create_solver
 from tracking.appearance import appearance_distance
+from tracking.baselines import Tracker, tracker_named
+from tracking.baselines.track_groups import GraphSettings
+from tracking.baselines.track_links import End, who_left
 from tracking.boxes import iou
-from tracking.yardsticks import Tracker, tracker_named
-from tracking.yardsticks.track_groups import GraphSettings
-from tracking.yardsticks.track_links import End, who_left
 
 CLOSE = 25
 

@@ -11,9 +11,7 @@ from hypothesis import strategies as st
 from strolls import Stroll, final_boxes, seen_at
 
 from tracking import CostSettings, Detections, WindowResult, WindowSettings, create_solver
-from tracking.boxes import Floats, iou
-from tracking.detectors.base import Image
-from tracking.yardsticks import (
+from tracking.baselines import (
     TEMPORAL,
     StepwiseSettings,
     Tracker,
@@ -21,7 +19,9 @@ from tracking.yardsticks import (
     tracker_named,
     tracker_names,
 )
-from tracking.yardsticks.colour_field import BINS, ColourField
+from tracking.baselines.color_histograms import BINS, ColourField
+from tracking.boxes import Floats, iou
+from tracking.detectors.base import Image
 
 WINDOW = WindowSettings(window=6, stride=3, birth_window=6)
 BY_DETECTIONS = [it for it in tracker_names() if it != TEMPORAL]

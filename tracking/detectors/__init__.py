@@ -1,24 +1,24 @@
 """Detectors: where objects might be in a frame."""
 
-from tracking.detectors.background import (
+from tracking.detectors.background.box_filter import BoxFilterSettings
+from tracking.detectors.background.detector import (
     PAPER_BOXES,
     BackgroundDetector,
     BackgroundSettings,
     paper_boxes,
     seen_from_above,
 )
+from tracking.detectors.background.foreground_fit import ExplainSettings
+from tracking.detectors.background.height_model import Floor, HeightLineSettings
+from tracking.detectors.background.median import MedianSettings
+from tracking.detectors.background.mog2 import Mog2Settings
+from tracking.detectors.background.static_foreground import GhostSettings
 from tracking.detectors.base import Detector, Image
-from tracking.detectors.boxfilter import BoxFilterSettings
-from tracking.detectors.explain import ExplainSettings
-from tracking.detectors.ghosts import GhostSettings
-from tracking.detectors.heightline import Floor, HeightLineSettings
+from tracking.detectors.color_histogram import Looks, LooksSettings, colour_histograms
 from tracking.detectors.hog import HogDetector, HogSettings
-from tracking.detectors.looks import Looks, LooksSettings, colour_histograms
-from tracking.detectors.median import MedianSettings
-from tracking.detectors.mog2 import Mog2Settings
-from tracking.detectors.motfile import MotFileDetector, MotFileSettings
-from tracking.detectors.onnx import OnnxDetector, OnnxSettings
-from tracking.detectors.subimage import SubimageSettings
+from tracking.detectors.mot_file import MotFileDetector, MotFileSettings
+from tracking.detectors.neural.onnx import OnnxDetector, OnnxSettings
+from tracking.detectors.subimage_appearance import SubimageSettings
 from tracking.detectors.template import TemplateDetector, TemplateSettings
 
 __all__ = [

@@ -9,10 +9,10 @@ import numpy as np
 
 from tracking.boxes import Floats
 from tracking.detectors.base import Image
-from tracking.detectors.checked import checked_image
-from tracking.detectors.ignore import Ignored, Polygons
-from tracking.detectors.looks import Looks
-from tracking.detectors.suppress import best_apart
+from tracking.detectors.color_histogram import Looks
+from tracking.detectors.ignore_mask import Ignored, Polygons
+from tracking.detectors.non_maximum_suppression import best_apart
+from tracking.detectors.validation import checked_image
 from tracking.types import Detections
 
 # The detector's window is 64x128 pixels, the person in its middle is 96 tall, with 16 above and below.

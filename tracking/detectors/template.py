@@ -11,9 +11,9 @@ import numpy.typing as npt
 
 from tracking.boxes import Floats
 from tracking.detectors.base import Image
-from tracking.detectors.checked import checked_image
-from tracking.detectors.looks import Looks, LooksSettings
-from tracking.detectors.subimage import SubimageSettings, subimages
+from tracking.detectors.color_histogram import Looks, LooksSettings
+from tracking.detectors.subimage_appearance import SubimageSettings, subimages
+from tracking.detectors.validation import checked_image
 from tracking.types import Detections
 
 _LEAST_SIDE = 4

@@ -3,11 +3,11 @@
 Needs the extra `evaluate` (`pip install myview[evaluate]`); the tracker itself does not use it.
 """
 
-from tracking.evaluation.cameras import CameraScores, Recording, average, evaluate_cameras
+from tracking.evaluation.formatting import HEADINGS, cells
+from tracking.evaluation.multi_camera import CameraScores, Recording, average, evaluate_cameras
 from tracking.evaluation.occlusions import Occlusion, occlusions, survived
-from tracking.evaluation.perfect import perfect_association
+from tracking.evaluation.oracle_association import perfect_association
 from tracking.evaluation.scores import Scores, evaluate
-from tracking.evaluation.shown import HEADINGS, cells
 
 __all__ = [
     "HEADINGS",

@@ -3,7 +3,7 @@
 import os
 import sys
 
-if "camera" in sys.orig_argv and "server.run.cli" in sys.orig_argv:
+if "camera" in sys.orig_argv and "server.cli.main" in sys.orig_argv:
     from benchmarks.live.stages import FOLDER_VARIABLE, time_camera
 
     time_camera(os.environ[FOLDER_VARIABLE], sys.orig_argv[-1])

@@ -3,7 +3,7 @@
 import os
 import sys
 
-if "server.run.cli" in sys.orig_argv:
+if "server.cli.main" in sys.orig_argv:
     from benchmarks.soak.tasks import FOLDER_VARIABLE, note_tasks
 
     note_tasks(os.environ[FOLDER_VARIABLE])

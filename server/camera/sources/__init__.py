@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from server.camera.sound import LiveSound
+from server.camera.audio import LiveSound
 from server.camera.sources.base import Image, Source, SourceEnded
-from server.camera.sources.folder import Folder
+from server.camera.sources.image_folder import Folder
+from server.camera.sources.live_stream import Stream
 from server.camera.sources.recording import Recording
-from server.camera.sources.stage import Stage
-from server.camera.sources.stream import Stream
-from server.wire.errors import AwayError, UserError
-from server.wire.sections import Camera, Site
-from server.wire.sources import SourceKind, kind_of
+from server.camera.sources.synthetic import Stage
+from server.config.sections import Camera, Site
+from server.config.source_address import SourceKind, kind_of
+from server.system.errors import AwayError, UserError
 
 __all__ = ["Folder", "Image", "Recording", "Source", "SourceEnded", "open_source"]
 

@@ -14,10 +14,10 @@ from av.stream import Disposition
 from av.video.codeccontext import VideoCodecContext
 from av.video.stream import VideoStream
 
-from server.camera.rates import rate_of
-from server.wire.addresses import ffmpeg_reason, shown
-from server.wire.errors import UserError
-from server.wire.sources import is_device
+from server.camera.sources.frame_timing import rate_of
+from server.config.source_address import is_device
+from server.system.address_redaction import ffmpeg_reason, shown
+from server.system.errors import UserError
 
 _TEXT = "tty"
 """The format of which FFmpeg takes any text to be: it would play it as letters."""

@@ -12,7 +12,7 @@ from av.video.frame import VideoFrame
 from av.video.stream import VideoStream
 
 from server.camera.sources.base import Image
-from server.wire.colours import bgr
+from server.media.color_conversion import bgr
 
 _MATRIX_NAME = "DISPLAYMATRIX"
 _MATRIX = struct.Struct("=9i")

@@ -8,16 +8,16 @@ from typing import Literal
 
 from av.video.frame import VideoFrame
 
-from server.camera.rates import length_of, place_of
 from server.camera.sources.base import Image, SourceEnded
-from server.camera.sources.gaps import Gaps
+from server.camera.sources.frame_reader import TimedPicture, pictures
+from server.camera.sources.frame_timing import length_of, place_of
+from server.camera.sources.missing_frames import Gaps
 from server.camera.sources.opening import open_video
 from server.camera.sources.orientation import INTERLACED, orientation_of, pixel_aspect_of
-from server.camera.sources.pictures import TimedPicture, pictures
-from server.wire.addresses import shown
-from server.wire.errors import UserError
-from server.wire.fit import Fit
-from server.wire.sources import is_missing
+from server.config.source_address import is_missing
+from server.media.letterbox import Fit
+from server.system.address_redaction import shown
+from server.system.errors import UserError
 
 log = logging.getLogger(__name__)
 

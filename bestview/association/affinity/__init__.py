@@ -1,0 +1,1 @@
+"""How likely two tracklets are one person: the evidence, weighed and added up."""

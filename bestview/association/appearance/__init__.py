@@ -1,0 +1,1 @@
+"""Appearance compared within a camera and between cameras."""

@@ -1,0 +1,113 @@
+"""A pinhole camera over the floor, in person heights: the model that a walk is explained by.
+
+The floor is z = 0 and everybody is 1 tall. Eight numbers are as many as a homography has: nothing that a
+plane's picture can show is left out, but each number means something and can be guessed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import cos, exp, sin
+
+import numpy as np
+
+from bestview.calibration.homography import Floats
+
+PARAMETERS = 8
+FOCAL, ASPECT, TILT, ROLL, HIGH, PAN, EAST, NORTH = range(PARAMETERS)
+"""Places in the array of parameters: log of the focal length in picture widths, log of how much taller than
+wide a pixel's picture is, angles of the optical axis below the horizon and about itself, log of the height
+above the floor, direction on the floor, and position there (person heights, radians)."""
+
+VIEW = slice(0, PAN)
+POSE = slice(PAN, PARAMETERS)
+
+
+_MOST_DEPTH = 1000.0
+"""Who is further off, in person heights, is too near the horizon to be anywhere."""
+_LEAST_DEPTH = 1e-3
+
+
+@dataclass(frozen=True, slots=True)
+class Pinhole:
+    """A camera.
+
+    Attributes:
+        parameters: (8,), see above.
+        size: width and height of the picture, pixels.
+    """
+
+    parameters: Floats
+    size: tuple[int, int]
+
+    def homography(self, person: float = 1.0) -> Floats:
+        """Give the map from pixels to the floor, (3, 3), in units of which a person is `person` tall."""
+        back = np.diag([person, person, 1.0]) @ self._back()
+        return np.asarray(back / np.abs(back).max())
+
+    def floor(self, feet: Floats) -> Floats:
+        """Where feet are: (..., 2) pixels -> (..., 2) person heights; NaN at or above the horizon."""
+        back = self._back()
+        through = feet @ back[:, :2].T + back[:, 2]
+        return np.asarray(through[..., :2] / _near(through[..., 2:]))
+
+    def floor_and_steps(self, feet: Floats) -> tuple[Floats, Floats]:
+        """Where feet are, and how far one pixel to the right and one down leads there.
+
+        (..., 2) pixels -> (..., 2) and (..., 2, 2) person heights. The last axis of the steps is the way in
+        the picture, the one before it east and north.
+        """
+        back = self._back()
+        through = feet @ back[:, :2].T + back[:, 2]
+        near = _near(through[..., 2:])
+        place = through[..., :2] / near
+        steps = (back[:2, :2] - place[..., None] * back[2, :2]) / near[..., None]
+        return place, steps
+
+    def picture(self, place: Floats) -> Floats:
+        """Where feet are in the picture: (..., 2) person heights -> (..., 2) pixels; NaN behind it."""
+        through = place @ self._projection()[:, :2].T + self._projection()[:, 3]
+        depth = np.where(through[..., 2:] > _LEAST_DEPTH, through[..., 2:], np.nan)
+        return np.asarray(through[..., :2] / depth)
+
+    def heights(self, feet: Floats) -> Floats:
+        """How tall people appear who stand there: (..., 2) pixels -> (...) pixels; NaN where nobody can."""
+        place = self.floor(feet)
+        head = np.concatenate(
+            [place, np.ones((*place.shape[:-1], 1)), np.ones((*place.shape[:-1], 1))], axis=-1
+        )
+        through = head @ self._projection().T
+        depth = np.where(through[..., 2] > _LEAST_DEPTH, through[..., 2], np.nan)
+        return np.asarray(feet[..., 1] - through[..., 1] / depth)
+
+    def _back(self) -> Floats:
+        """The (3, 3) matrix from pixels to the floor; its last row gives one over the depth."""
+        return np.asarray(np.linalg.inv(self._projection()[:, [0, 1, 3]]))
+
+    def _focal(self) -> tuple[float, float]:
+        focal = exp(self.parameters[FOCAL]) * self.size[0]
+        return focal, focal * exp(self.parameters[ASPECT])
+
+    def _axes(self) -> Floats:
+        """Right, down and forward, (3, 3) rows."""
+        tilt, roll, pan = self.parameters[[TILT, ROLL, PAN]].tolist()
+        cos_pan, sin_pan, cos_tilt, sin_tilt = cos(pan), sin(pan), cos(tilt), sin(tilt)
+        level = (sin_pan, -cos_pan, 0.0)
+        below = (-cos_pan * sin_tilt, -sin_pan * sin_tilt, -cos_tilt)
+        right = [cos(roll) * a + sin(roll) * b for a, b in zip(level, below, strict=True)]
+        down = [cos(roll) * b - sin(roll) * a for a, b in zip(level, below, strict=True)]
+        return np.array([right, down, [cos_pan * cos_tilt, sin_pan * cos_tilt, -sin_tilt]])
+
+    def _projection(self) -> Floats:
+        """The (3, 4) matrix from the world to pixels."""
+        axes, (focal_x, focal_y) = self._axes(), self._focal()
+        east, north, high = self.parameters[[EAST, NORTH, HIGH]].tolist()
+        shift = -axes @ np.array([east, north, exp(high)])
+        width, height = self.size
+        lens = np.array([[focal_x, 0, width / 2], [0, focal_y, height / 2], [0, 0, 1]])
+        return np.asarray(lens @ np.column_stack([axes, shift]))
+
+
+def _near(near: Floats) -> Floats:
+    """Leave out, as NaN, what has no depth or too much; `near` is one over the depth."""
+    return np.where(near > 1.0 / _MOST_DEPTH, near, np.nan)

@@ -1,0 +1,123 @@
+"""From marked points, a place in the picture and the same place on the floor, to a homography."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bestview.calibration.homography import LEAST_POINTS, Floats, fit_homography
+from bestview.calibration.inconsistent_points import contradiction, distances
+from bestview.calibration.marked_points import CalibrationError, MarkedPoints, PointSettings
+from bestview.geometry.ground_plane import checked_homography, to_ground
+
+
+@dataclass(frozen=True, slots=True)
+class PointFit:
+    """A camera's homography, and how far it is off at the marked points.
+
+    Attributes:
+        homography: image to floor, (3, 3).
+        floor_error: distance on the floor, (N,), in the floor's unit.
+        image_error: distance in the picture, (N,), pixels.
+    """
+
+    homography: Floats
+    floor_error: Floats
+    image_error: Floats
+
+
+def fit_points(points: MarkedPoints, settings: PointSettings | None = None) -> PointFit:
+    """Fit the homography of a camera to its marked points: least squares in the picture.
+
+    Raises:
+        CalibrationError: too few pairs, or on a line; some contradict the others, and are named (from one);
+            or the floor would be seen from below the horizon.
+    """
+    settings = settings or PointSettings()
+    _check(points)
+    backwards = _fitted(points.floor, points.image, points.camera)
+    errors = distances(backwards, points)
+    allowed = settings.tolerance * _spread(points.image)
+    if errors.max() > allowed:
+        raise CalibrationError(contradiction(points, errors, allowed, settings))
+    try:
+        homography = checked_homography(np.linalg.inv(backwards), f"camera {points.camera}")
+    except (ValueError, np.linalg.LinAlgError):
+        raise CalibrationError(_on_a_line(points.camera)) from None
+    homography = homography / np.abs(homography).max()
+    floor = to_ground(homography, points.image)
+    if not np.isfinite(floor).all():
+        pair = int(np.flatnonzero(~np.isfinite(floor).all(axis=1))[0]) + 1
+        raise CalibrationError(
+            f"camera {points.camera}: pair {pair} would be above the horizon; the points go round in another "
+            "order on the floor than in the picture, or the picture is upside down"
+        )
+    return PointFit(homography, np.hypot(*(floor - points.floor).T), errors)
+
+
+def fit_cameras(
+    cameras: Sequence[MarkedPoints], settings: PointSettings | None = None
+) -> dict[str, PointFit]:
+    """Fit every camera; they must all see one floor from above.
+
+    Raises:
+        CalibrationError: as `fit_points`; or one camera's floor is mirrored against the others'.
+    """
+    fits = {points.camera: fit_points(points, settings) for points in cameras}
+    mirrored = [points.camera for points in cameras if is_mirrored(fits[points.camera], points)]
+    if 0 < len(mirrored) < len(cameras):
+        others = [points.camera for points in cameras if points.camera not in mirrored]
+        few, many = sorted((mirrored, others), key=len)
+        raise CalibrationError(
+            f"camera {few[0]}: its floor is mirrored against that of {many[0]}: going round clockwise on the "
+            "floor must be the same way round in all cameras; are its floor's two coordinates exchanged?"
+        )
+    return fits
+
+
+def is_mirrored(fit: PointFit, points: MarkedPoints) -> bool:
+    """Say whether going round clockwise in the picture is anticlockwise on the floor at the points."""
+    middle = points.image.mean(axis=0)
+    corners = to_ground(fit.homography, middle + np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]))
+    across, down = corners[1] - corners[0], corners[2] - corners[0]
+    return bool(across[0] * down[1] - across[1] * down[0] < 0)
+
+
+def _check(points: MarkedPoints) -> None:
+    count = len(points.image)
+    if count < LEAST_POINTS:
+        pairs = "pair" if count == 1 else "pairs"
+        raise CalibrationError(f"camera {points.camera}: {count} {pairs}; at least {LEAST_POINTS} are needed")
+    for place, words in ((points.image, "in the picture"), (points.floor, "on the floor")):
+        if not np.isfinite(place).all():
+            raise CalibrationError(f"camera {points.camera}: a point {words} is not a finite number")
+    seen, stood = (list(map(tuple, it.tolist())) for it in (points.image, points.floor))
+    for here, there, words in (
+        (seen, stood, "in the picture and two on the floor"),
+        (stood, seen, "on the floor and two in the picture"),
+    ):
+        before: dict[tuple[float, ...], int] = {}
+        for second, spot in enumerate(here):
+            first = before.setdefault(spot, second)
+            if there[first] != there[second]:
+                raise CalibrationError(
+                    f"camera {points.camera}: pairs {first + 1} and {second + 1} are one point {words}"
+                )
+
+
+def _fitted(source: Floats, target: Floats, camera: str) -> Floats:
+    try:
+        return fit_homography(source, target)
+    except (ValueError, np.linalg.LinAlgError):
+        raise CalibrationError(_on_a_line(camera)) from None
+
+
+def _on_a_line(camera: str) -> str:
+    return f"camera {camera}: the points, or all but one of them, are on a line; mark some beside it"
+
+
+def _spread(image: Floats) -> float:
+    """The diagonal of the points' bounding box."""
+    return float(np.hypot(*np.ptp(image, axis=0)))

@@ -1,0 +1,119 @@
+"""Moments of a walk: everybody's boxes at the pulses at which cameras are compared, and who met whom."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bestview.calibration.homography import Floats
+from bestview.calibration.walk import Walk
+from bestview.geometry.ground_plane import feet
+
+Indices = NDArray[np.intp]
+
+LEAST_WEIGHT = 0.02
+"""What a moment counts in which nobody moves: who stands says little, however long."""
+
+
+@dataclass(frozen=True, slots=True)
+class Samples:
+    """One camera's boxes at some pulses.
+
+    Attributes:
+        times: the pulse of each, (S,), rising within a track.
+        track: the number of the track in the walk, (S,).
+        boxes: left, top, right, bottom in pixels, (S, 4).
+        speed: how the box moves per frame, (S, 4) pixels.
+        weight: how much of a new place each is, (S,), 0 to 1.
+    """
+
+    times: Floats
+    track: Indices
+    boxes: Floats
+    speed: Floats
+    weight: Floats
+
+    @property
+    def feet(self) -> Floats:
+        """Where they stand, (S, 2) pixels."""
+        return feet(self.boxes)
+
+    @property
+    def tall(self) -> Floats:
+        """How tall the boxes are, (S,) pixels."""
+        return np.asarray(self.boxes[:, 3] - self.boxes[:, 1])
+
+
+def sample(walk: Walk, pulses: Floats, offset: float, step: int, stride: float) -> Samples:
+    """Look at a walk at some pulses.
+
+    Args:
+        walk: what the camera saw.
+        pulses: when to look, (T,), rising.
+        offset: the pulse at which the camera's frame 0 was taken.
+        step: frames over which movement is measured, and between the pulses.
+        stride: the movement that is a new place, in box heights.
+    """
+    times, track, boxes, speed = [np.empty(0)], [np.empty(0, np.intp)], [np.empty((0, 4))], [np.empty((0, 4))]
+    for number, it in enumerate(walk.tracks):
+        at = pulses[
+            np.searchsorted(pulses, it.first + offset) : np.searchsorted(pulses, it.end - 1 + offset, "right")
+        ]
+        before, after = (np.clip(at - offset + way, it.first, it.end - 1) for way in (-step, step))
+        times.append(at)
+        track.append(np.full(len(at), number))
+        boxes.append(it.at(at - offset))
+        speed.append((it.at(after) - it.at(before)) / np.maximum(after - before, 1e-9)[:, None])
+    joined = np.concatenate(boxes)
+    rate = np.concatenate(speed)
+    moved = np.hypot(*feet(rate).T) * step / np.maximum(joined[:, 3] - joined[:, 1], 1e-9)
+    weight = np.clip(moved / stride, LEAST_WEIGHT, 1.0)
+    return Samples(np.concatenate(times), np.concatenate(track), joined, rate, weight)
+
+
+@dataclass(frozen=True, slots=True)
+class Meetings:
+    """All ways in which two cameras' samples of one pulse may be one person.
+
+    Attributes:
+        here: the sample of the one camera, (P,).
+        there: the sample of the other, (P,).
+        pair: which pair of tracks it belongs to, (P,), 0 to K - 1.
+        tracks: the two tracks of each pair, (K, 2).
+        weight: how much of a new place each is, (P,).
+    """
+
+    here: Indices
+    there: Indices
+    pair: Indices
+    tracks: Indices
+    weight: Floats
+
+
+def meetings(one: Samples, other: Samples) -> Meetings:
+    """Pair everybody in the one camera with everybody in the other at the same pulse."""
+    order = np.argsort(other.times, kind="stable")
+    sorted_times = other.times[order]
+    low = np.searchsorted(sorted_times, one.times, "left")
+    count = np.searchsorted(sorted_times, one.times, "right") - low
+    here = np.repeat(np.arange(len(one.times)), count)
+    within = np.arange(len(here)) - np.repeat(np.cumsum(count) - count, count)
+    there = order[np.repeat(low, count) + within]
+    both = np.column_stack([one.track[here], other.track[there]])
+    tracks, pair = np.unique(both, axis=0, return_inverse=True)
+    weight = np.maximum(one.weight[here], other.weight[there])
+    return Meetings(here, there, pair.reshape(-1), tracks.reshape(-1, 2), weight)
+
+
+def moments(samples: Samples, most: int) -> Indices:
+    """Choose samples of people who walk, evenly, (N,) indices; of all, where hardly anybody does."""
+    walking = np.flatnonzero(samples.weight >= _WALKING)
+    if len(walking) < _FEW:
+        walking = np.arange(len(samples.times))
+    return walking[:: max(1, -(-len(walking) // most))]
+
+
+_WALKING = 0.3
+_FEW = 30

@@ -1,0 +1,44 @@
+"""What one camera's boxes tell of it: how it looks down on the floor, but for its focal length."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy
+
+from bestview.calibration.homography import Floats
+from bestview.calibration.pinhole import FOCAL, HIGH, PARAMETERS, TILT, VIEW, Pinhole
+from bestview.calibration.priors import height_errors, prior_errors
+from bestview.calibration.samples import Samples, moments
+from bestview.calibration.walk_settings import WalkSettings
+
+_TILTS = (0.1, 0.35, 0.8)
+_HIGH = 1.7
+_MOMENTS = 600
+_FIXED = 0.01
+"""Spread of the focal length where it is given."""
+
+
+def view_of(samples: Samples, size: tuple[int, int], focal: float, settings: WalkSettings) -> Pinhole:
+    """Fit a camera of a given focal length (picture widths) to the heights of people, at the origin.
+
+    On a flat floor people of one height are as tall in the picture as they are near: where they would vanish
+    is the horizon, and how fast they grow towards the camera says how high it hangs.
+    """
+    chosen = moments(samples, _MOMENTS)
+    feet, tall, weight = samples.feet[chosen], samples.tall[chosen], samples.weight[chosen]
+    best, least = None, np.inf
+    for tilt in _TILTS:
+        start = np.zeros(PARAMETERS)
+        start[[FOCAL, TILT, HIGH]] = np.log(focal), tilt, np.log(_HIGH)
+
+        def errors(view: Floats, start: Floats = start) -> Floats:
+            camera = Pinhole(np.concatenate([view, start[VIEW.stop :]]), size)
+            given = (view[FOCAL] - np.log(focal)) / _FIXED
+            heights = height_errors(camera, feet, tall, weight, settings)
+            return np.concatenate([heights, prior_errors(camera, settings), [given]])
+
+        found = scipy.optimize.least_squares(errors, start[VIEW], x_scale="jac", ftol=1e-5, max_nfev=60)
+        if found.cost < least:
+            best, least = np.concatenate([found.x, start[VIEW.stop :]]), found.cost
+    assert best is not None  # noqa: S101 — priors are finite
+    return Pinhole(best, size)

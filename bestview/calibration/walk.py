@@ -1,0 +1,122 @@
+"""What one camera saw of the people who walked about: their boxes, track by track."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bestview.calibration.homography import Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Track:
+    """Somebody's boxes in successive frames.
+
+    Attributes:
+        first: the frame of the first box.
+        boxes: left, top, right, bottom in pixels, (F, 4); NaN where unseen or of no use.
+    """
+
+    first: int
+    boxes: Floats
+
+    @property
+    def end(self) -> int:
+        """The frame after the last."""
+        return self.first + len(self.boxes)
+
+    def at(self, times: Floats) -> Floats:
+        """Give the boxes at times that may lie between frames: (N,) -> (N, 4), NaN where there is none."""
+        place = np.asarray(times, dtype=np.float64) - self.first
+        inside = (place >= 0) & (place <= len(self.boxes) - 1)
+        low = np.clip(np.floor(place), 0, len(self.boxes) - 1).astype(np.intp)
+        high = np.minimum(low + 1, len(self.boxes) - 1)
+        share = np.clip(place - low, 0.0, 1.0)[:, None]
+        # Half of a box that is not there is none, unless nothing of it is asked for.
+        between = np.where(
+            share > 0, (1 - share) * self.boxes[low] + share * self.boxes[high], self.boxes[low]
+        )
+        return np.where(inside[:, None], between, np.nan)
+
+
+@dataclass(frozen=True, slots=True)
+class Walk:
+    """Everybody whom one camera saw.
+
+    Attributes:
+        camera: its name.
+        size: width and height of its picture, pixels.
+        tracks: who was seen.
+    """
+
+    camera: str
+    size: tuple[int, int]
+    tracks: tuple[Track, ...]
+
+    @property
+    def end(self) -> int:
+        """The frame after the last one in which somebody was seen."""
+        return max((it.end for it in self.tracks), default=0)
+
+
+def make_walk(
+    camera: str,
+    size: tuple[int, int],
+    frames: Sequence[int],
+    ids: Sequence[int],
+    boxes: Floats,
+    step: int = 5,
+) -> Walk:
+    """Put rows of a file together to tracks, without the boxes that the picture's edge cuts off.
+
+    Boxes are averaged over about a step: a foot that is lifted is no step aside.
+
+    Args:
+        camera: its name.
+        size: width and height of its picture, pixels.
+        frames: the frame of each row, (N,).
+        ids: the track of each row, (N,).
+        boxes: left, top, right, bottom of each row in pixels, (N, 4).
+        step: frames in which nobody walks far, as in `WalkSettings`. Somebody may be unseen for as many in
+            the middle of a track; the boxes between are drawn straight.
+    """
+    at, who = np.asarray(frames, dtype=np.intp), np.asarray(ids, dtype=np.intp)
+    whole = ~cut_off(boxes, size)
+    tracks = []
+    for number in np.unique(who):
+        mine = np.flatnonzero((who == number) & whole)
+        mine = mine[np.argsort(at[mine], kind="stable")]
+        # A gap that is long parts a track in two: who was hidden long may have come back as somebody else.
+        parts = np.split(mine, np.flatnonzero(np.diff(at[mine]) > step) + 1)
+        tracks += [_track(at[part], boxes[part], step) for part in parts if len(part) > 1]
+    return Walk(camera, size, tuple(sorted(tracks, key=lambda it: (it.first, it.end))))
+
+
+def cut_off(boxes: Floats, size: tuple[int, int]) -> np.ndarray:
+    """Tell which boxes reach the picture's edge, where neither foot nor height nor middle is known.
+
+    (N, 4) pixels of a picture of width and height -> (N,).
+    """
+    width, height = size
+    margin = max(1.0, 0.004 * height)
+    left, top, right, bottom = boxes.T
+    return np.asarray(
+        (left <= margin) | (top <= margin) | (right >= width - margin) | (bottom >= height - margin)
+    )
+
+
+def _track(frames: np.ndarray, boxes: Floats, step: int) -> Track:
+    every = np.arange(frames[0], frames[-1] + 1)
+    filled = np.column_stack([np.interp(every, frames, side) for side in boxes.T])
+    return Track(int(frames[0]), _smoothed(filled, step // 2))
+
+
+def _smoothed(boxes: Floats, half: int) -> Floats:
+    """Average over `half` frames before and after, over fewer at the ends."""
+    sums = np.concatenate([np.zeros((1, 4)), boxes.cumsum(axis=0)])
+    index = np.arange(len(boxes))
+    reach = np.minimum(half, np.minimum(index, len(boxes) - 1 - index))
+    low, high = index - reach, index + reach + 1
+    return np.asarray((sums[high] - sums[low]) / (high - low)[:, None])

@@ -1,0 +1,1 @@
+"""How good view choices are, against ground truth."""

@@ -1,0 +1,82 @@
+"""What the best view of everybody is in truth: every view's quality from the boxes that are really there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bestview.quality import compared, size_quality, view_cost
+from bestview.view_selection.selection import NO_CAMERA, choose_views
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ViewTruth:
+    """How well every camera shows every person at every frame, K people, N frames, C cameras.
+
+    Attributes:
+        cost: (K, N, C) float64, view cost in [0, 1]: the share of the best view's size quality that the view
+            lacks; 1 where the person is not visible.
+        visible: (K, N, C) bool, where the person really is visible.
+    """
+
+    cost: NDArray[np.float64]
+    visible: NDArray[np.bool_]
+
+    @property
+    def counted(self) -> NDArray[np.bool_]:
+        """(K, N) frames that count: those in which some camera could show the person."""
+        return np.asarray(self.visible.any(axis=2))
+
+
+def true_views(
+    boxes: NDArray[np.float64],
+    shown: NDArray[np.float64],
+    sizes: NDArray[np.float64],
+    least_shown: float,
+) -> ViewTruth:
+    """Derive the quality of every view from ground truth.
+
+    A person is visible in a camera where there is a box of which at least `least_shown` shows. Of several
+    such views the largest is worth 1, and the others are compared with it.
+
+    Args:
+        boxes: (K, N, C, 4) left, top, right, bottom in pixels of the camera's picture; NaN: there is none.
+        shown: (K, N, C) the share of each person that shows, in [0, 1]; negative where it is not known,
+            which counts as all of it.
+        sizes: (C, 2) width and height of each camera's picture, pixels.
+        least_shown: in [0, 1]; 0: whoever has a box is visible.
+
+    Raises:
+        ValueError: shapes that do not fit, or a picture without area.
+    """
+    if boxes.ndim != 4 or shown.shape != boxes.shape[:3] or sizes.shape != (boxes.shape[2], 2):  # noqa: PLR2004
+        raise ValueError(f"shapes do not fit: boxes {boxes.shape}, shown {shown.shape}, sizes {sizes.shape}")
+    quality = np.zeros(shown.shape)
+    for camera, (width, height) in enumerate(sizes.tolist()):
+        quality[:, :, camera] = size_quality(boxes[:, :, camera], width, height)
+    visible = (quality > 0.0) & ((shown < 0.0) | (shown >= least_shown))
+    return ViewTruth(view_cost(compared(np.where(visible, quality, 0.0), axis=2)), visible)
+
+
+def best_views(truth: ViewTruth, switch_cost: float) -> NDArray[np.int64]:
+    """Give the exact offline optimum of section III: the whole recording is known, a cut may be anywhere.
+
+    Frames that do not count are left out: those around such a gap are taken as neighbours.
+
+    Returns:
+        (K, N) camera indices; -1 in frames that do not count.
+
+    Raises:
+        ValueError: the switching cost is negative, or no number.
+    """
+    views = np.full(truth.visible.shape[:2], NO_CAMERA, dtype=np.int64)
+    for mine, counted, cost in zip(views, truth.counted, truth.cost, strict=True):
+        frames = int(np.count_nonzero(counted))
+        anywhere = np.ones(frames, dtype=bool)
+        mine[counted] = choose_views(cost[None, counted], _UNKNOWN, switch_cost, anywhere).views[0]
+    return views
+
+
+_UNKNOWN = np.array([NO_CAMERA])

@@ -1,0 +1,147 @@
+"""How good are given view choices, beside the best that could have been made knowing everything."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bestview.evaluation.true_views import ViewTruth, best_views
+from bestview.view_selection.selection import NO_CAMERA, NO_VIEW_COST
+
+_SECONDS_PER_MINUTE = 60.0
+_ROUNDING = 1e-9
+"""Frames: costs that differ by less are sums in another order."""
+
+
+@dataclass(frozen=True, slots=True)
+class ViewScore:
+    """Scores over all objects and all frames in which the object is visible in some camera.
+
+    Attributes:
+        frames: object-frames that count.
+        agreement: share of them in which the choice is the optimum's.
+        regret: extra cost over the optimum's, as a share of it (0: as good; infinite: the optimum is free).
+        visible: share of them in which the object is visible in the chosen camera.
+        chosen: share of them in which there is a choice at all.
+        cuts_per_minute: cuts per minute of an object's stream.
+        optimum_cuts_per_minute: the same for the optimum.
+        shortest_shot: frames between the closest two cuts; 0 where there are fewer than two.
+        cost: of the choice, in frames of not seeing the object; `regret` compares it with the next.
+        optimum_cost: of the optimum.
+    """
+
+    frames: int
+    agreement: float
+    regret: float
+    visible: float
+    chosen: float
+    cuts_per_minute: float
+    optimum_cuts_per_minute: float
+    shortest_shot: int
+    cost: float
+    optimum_cost: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Tally:
+    """Sums over the frames of one object that count."""
+
+    frames: int
+    agreed: int
+    chosen: int
+    cost: float
+    best_cost: float
+    seen: int
+    cuts: NDArray[np.int64]
+    best_cuts: NDArray[np.int64]
+
+
+def score_views(
+    cost: NDArray[np.float64],
+    visible: NDArray[np.bool_],
+    views: NDArray[np.int64],
+    switch_cost: float,
+    fps: float,
+) -> ViewScore:
+    """Score `views` against the exact offline optimum of section III over the whole recording.
+
+    Frames in which nobody could show the object are left out, of the choice and of the optimum alike;
+    the frames around such a gap are taken as neighbours. A frame without a choice costs 1, and no cut
+    is counted to it or from it to the camera before.
+
+    Args:
+        cost: (K, N, C) true view cost in [0, 1] per object, frame and camera.
+        visible: (K, N, C) where the object really is visible.
+        views: (K, N) the choice, a camera index or -1.
+        switch_cost: lambda, cost of a cut in units of one frame's view cost.
+        fps: frames per second.
+
+    Raises:
+        ValueError: shapes that do not fit, or a camera that does not exist.
+    """
+    if cost.ndim != 3 or visible.shape != cost.shape or views.shape != cost.shape[:2]:  # noqa: PLR2004 — K, N, C
+        raise ValueError(
+            f"shapes do not fit: cost {cost.shape}, visible {visible.shape}, views {views.shape}"
+        )
+    if views.size and not (views.min() >= NO_CAMERA and views.max() < cost.shape[2]):
+        raise ValueError(f"the choice names a camera outside -1 .. {cost.shape[2] - 1}")
+    truth = ViewTruth(cost, visible)
+    tallies = [
+        _tally(cost[k][on], visible[k][on], views[k][on], optimum[on], switch_cost)
+        for k, (on, optimum) in enumerate(zip(truth.counted, best_views(truth, switch_cost), strict=True))
+        if on.any()
+    ]
+    frames = sum(tally.frames for tally in tallies)
+    per_minute = _SECONDS_PER_MINUTE * fps / max(frames, 1)
+    best = sum(tally.best_cost for tally in tallies)
+    total = sum(tally.cost for tally in tallies)
+    shots = [int(np.diff(tally.cuts).min()) for tally in tallies if tally.cuts.size > 1]
+    return ViewScore(
+        frames=frames,
+        agreement=sum(tally.agreed for tally in tallies) / max(frames, 1),
+        regret=_share(total - best, best),
+        visible=sum(tally.seen for tally in tallies) / max(frames, 1),
+        chosen=sum(tally.chosen for tally in tallies) / max(frames, 1),
+        cuts_per_minute=sum(tally.cuts.size for tally in tallies) * per_minute,
+        optimum_cuts_per_minute=sum(tally.best_cuts.size for tally in tallies) * per_minute,
+        shortest_shot=min(shots, default=0),
+        cost=float(total),
+        optimum_cost=float(best),
+    )
+
+
+def _tally(
+    cost: NDArray[np.float64],
+    visible: NDArray[np.bool_],
+    views: NDArray[np.int64],
+    best: NDArray[np.int64],
+    switch_cost: float,
+) -> _Tally:
+    """Sum up one object's (F, C) costs, its (F,) views and the best ones, all of whose frames count."""
+    chosen, row = views >= 0, np.arange(len(cost))
+    cuts, best_cuts = cuts_of(views), cuts_of(best)
+    return _Tally(
+        frames=len(cost),
+        agreed=int(np.count_nonzero(views == best)),
+        chosen=int(np.count_nonzero(chosen)),
+        cost=float(np.where(chosen, cost[row, views], NO_VIEW_COST).sum() + switch_cost * cuts.size),
+        best_cost=float(cost[row, best].sum() + switch_cost * best_cuts.size),
+        seen=int(np.count_nonzero(chosen & visible[row, views])),
+        cuts=cuts,
+        best_cuts=best_cuts,
+    )
+
+
+def _share(extra: float, whole: float) -> float:
+    """Give a part of the whole; of a whole that is nothing but for rounding, nothing or infinitely much."""
+    if whole > _ROUNDING:
+        return float(extra / whole)
+    return float("inf") if extra > _ROUNDING else 0.0
+
+
+def cuts_of(views: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Give the frames at which (F,) views change the camera; to a frame without a choice is no change."""
+    shown = np.flatnonzero(views >= 0)
+    return np.asarray(shown[1:][views[shown[1:]] != views[shown[:-1]]])

@@ -1,0 +1,105 @@
+"""How people would look in cameras that do not find them, by where other cameras see them stand."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bestview.geometry.ground_plane import (
+    feet,
+    feet_cut_off,
+    foot_spread,
+    from_ground,
+    person_heights,
+    to_ground,
+)
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+
+_SIDEWAYS, _UPWARDS = 0.05, 0.15
+"""How well boxes find feet, in box heights: by it cameras are weighed that know of the same feet."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Bodies:
+    """Where people stand and how large they are: M moments, each one person in one frame.
+
+    Attributes:
+        place: (M, 2) ground units; NaN where no camera knows.
+        tall: (M,) height in ground units, likewise.
+        slim: (M,) width of the box over its height, likewise.
+        known_by: (M, C) whether that camera knows.
+    """
+
+    place: Floats
+    tall: Floats
+    slim: Floats
+    known_by: Mask
+
+
+def bodies(
+    boxes: Floats, camera: Ints, moment: Ints, moments: int, homographies: Floats, bottom: Floats
+) -> Bodies:
+    """Gather what boxes say of bodies: means over the cameras, each weighed by how well it knows the place.
+
+    That is 1 over the trace of the foot point's covariance on the ground: a camera that somebody is near to
+    says more. Feet that the picture's lower edge cuts off stand nowhere that is known.
+
+    Args:
+        boxes: (B, 4) pixels, nobody hidden.
+        camera: (B,) whose each is.
+        moment: (B,) who it is and when, as one index.
+        moments: M, how many there are.
+        homographies: (C, 3, 3) pixels -> ground.
+        bottom: (C,) where each camera's own picture ends, pixels.
+    """
+    matrix = homographies[camera]
+    place, tall = to_ground(matrix, feet(boxes)), person_heights(matrix, boxes)
+    spread = np.trace(foot_spread(matrix, boxes, _SIDEWAYS, _UPWARDS), axis1=-2, axis2=-1)
+    with np.errstate(divide="ignore", invalid="ignore"):  # a box may have no height: it is left out below
+        slim = (boxes[:, 2] - boxes[:, 0]) / (boxes[:, 3] - boxes[:, 1])
+    told = np.column_stack([place, tall, slim])
+    good = np.isfinite(told).all(axis=1) & (told[:, 2:] > 0.0).all(axis=1) & (spread > 0.0)
+    rows = np.flatnonzero(good & ~feet_cut_off(boxes, bottom[camera]))
+    of, weight = moment[rows], 1.0 / spread[rows]
+
+    def summed(values: Floats) -> Floats:
+        # bincount adds row after row, so that no sum depends on how many others there are.
+        return np.bincount(of, values, moments).astype(np.float64)
+
+    total = summed(weight)
+    total[total == 0.0] = np.nan
+    mean = [summed(weight * column[rows]) / total for column in told.T]
+    known_by = np.zeros((moments, len(homographies)), dtype=np.bool_)
+    known_by[of, camera[rows]] = True
+    return Bodies(np.stack(mean[:2], axis=1), mean[2], mean[3], known_by)
+
+
+def feet_seen(of: Bodies, homographies: Floats) -> Floats:
+    """Give where bodies stand in each camera's picture, (M, C, 2) pixels; NaN behind it, or where unknown.
+
+    Args:
+        of: M of them.
+        homographies: (C, 3, 3) pixels -> ground.
+    """
+    return from_ground(homographies, of.place[:, None])
+
+
+def boxes_seen(of: Bodies, moment: Ints, foot: Floats, homographies: Floats) -> Floats:
+    """Give the boxes of (V,) of the bodies in the pictures where they stand at (V, 2) pixels: (V, 4).
+
+    Args:
+        of: M of them.
+        moment: (V,) whose each is.
+        foot: (V, 2) pixels.
+        homographies: (V, 3, 3) pixels -> ground, of the camera that each is seen by.
+    """
+    x, y = foot[:, 0], foot[:, 1]
+    pixel = person_heights(homographies, np.stack([x, y - 1.0, x, y], axis=1))
+    tall = of.tall[moment] / pixel
+    half = tall * of.slim[moment] / 2.0
+    return np.stack([x - half, y - tall, x + half, y], axis=1)

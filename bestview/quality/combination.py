@@ -1,0 +1,142 @@
+"""All terms of view quality together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bestview.quality.boxes import Floats
+from bestview.quality.centering import central
+from bestview.quality.facing import NEUTRAL, facing
+from bestview.quality.occlusion import unhidden
+from bestview.quality.settings import QualitySettings
+from bestview.quality.size import size_quality
+from bestview.quality.truncation import whole
+
+_SIDES = 4
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Looks:
+    """The cameras of a site, as far as view quality asks. All pixels are those of the boxes.
+
+    Attributes:
+        size: width and height of the picture that viewers are shown, pixels.
+        pictures: (C, 4) where each camera's own picture lies in it: left, top, right, bottom.
+        homographies: from those pixels to the ground, None where it is not known; C of them.
+        fps: frames per second.
+    """
+
+    size: tuple[float, float]
+    pictures: Floats
+    homographies: Sequence[Floats | None]
+    fps: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Seen:
+    """T tracks, each of one camera, over a window of N frames.
+
+    Attributes:
+        boxes: (T, N, 4) pixels, NaN where hidden.
+        camera: (T,) whose each track is, by index.
+        sure: (T,) in [0, 1], how surely each track is there.
+        sharp: (T,) in [0, 1], how sharp its picture is; NaN where nobody has measured it: counts as 1.
+    """
+
+    boxes: Floats
+    camera: NDArray[np.int64]
+    sure: Floats
+    sharp: Floats
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Quality:
+    """How well each view shows whom it follows.
+
+    Attributes:
+        quality: (T, N) in [0, 1]; NaN where hidden.
+        names: the terms that weigh something.
+        terms: (terms, T, N) in [0, 1], each of them; NaN where hidden.
+    """
+
+    quality: Floats
+    names: tuple[str, ...]
+    terms: Floats
+
+
+def view_quality(seen: Seen, looks: Looks, settings: QualitySettings) -> Quality:
+    """Weigh all terms: the product over the terms *t* of ``1 - weight (1 - t)``.
+
+    A product, since what spoils a view is not made good by anything else: somebody covered is not seen,
+    however large. The weight says how far a term can spoil it: at most by the share `weight`.
+
+    Raises:
+        ValueError: shapes that do not fit.
+    """
+    _check(seen, looks)
+    # In memory sides are apart, and in each of them frames: it is how the terms read them.
+    sides = np.ascontiguousarray(seen.boxes.transpose(2, 1, 0))
+    rows = _Rows(seen, looks, sides.transpose(2, 1, 0))
+    weights = settings.weights
+    terms = np.empty((len(settings.terms), *sides.shape[1:])).transpose(0, 2, 1)
+    quality = np.ones(sides.shape[1:]).T
+    for place, name in enumerate(settings.terms):
+        terms[place] = _TERMS[name](rows)
+        quality *= 1.0 - weights[name] * (1.0 - terms[place])
+    hidden = np.isnan(rows.boxes[..., 0])
+    if hidden.any():
+        quality[hidden] = terms[:, hidden] = np.nan
+    return Quality(quality, settings.terms, terms)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Rows:
+    """What the terms are worked out from; `boxes` are those of `seen`."""
+
+    seen: Seen
+    looks: Looks
+    boxes: Floats
+
+    @property
+    def pictures(self) -> Floats:
+        """(T, 1, 4): where the picture of each track's camera lies."""
+        return self.looks.pictures[self.seen.camera][:, None]
+
+
+def _facing(rows: _Rows) -> Floats:
+    camera = rows.seen.camera
+    whole_window = np.full(len(camera), NEUTRAL)
+    for column, homography in enumerate(rows.looks.homographies):
+        if homography is not None:
+            mine = camera == column
+            whole_window[mine] = facing(rows.seen.boxes[mine], homography, rows.looks.fps)
+    return whole_window[:, None]
+
+
+_TERMS: dict[str, Callable[[_Rows], Floats]] = {
+    "size": lambda rows: size_quality(rows.boxes, *rows.looks.size),
+    "whole": lambda rows: whole(rows.boxes, rows.pictures),
+    "unhidden": lambda rows: unhidden(rows.boxes, rows.seen.camera),
+    "central": lambda rows: central(rows.boxes, rows.pictures),
+    "sharp": lambda rows: np.nan_to_num(rows.seen.sharp, nan=1.0)[:, None],
+    "facing": _facing,
+    "sure": lambda rows: rows.seen.sure[:, None],
+}
+"""Each (T, N), or (T, 1) where it is the same in all frames; anything where hidden."""
+
+
+def _check(seen: Seen, looks: Looks) -> None:
+    shape, cameras = seen.boxes.shape, len(looks.pictures)
+    if len(shape) != 3 or shape[2] != _SIDES:  # noqa: PLR2004 — tracks, frames, sides
+        raise ValueError(f"boxes have shape {shape}, not (tracks, frames, 4)")
+    for name, values in (("camera", seen.camera), ("sure", seen.sure), ("sharp", seen.sharp)):
+        if values.shape != shape[:1]:
+            raise ValueError(f"{name} has shape {values.shape}, not ({shape[0]},)")
+    if shape[0] and not 0 <= seen.camera.min() <= seen.camera.max() < cameras:
+        raise ValueError(f"a track is of a camera outside 0 .. {cameras - 1}")
+    if len(looks.homographies) != cameras:
+        raise ValueError(f"there are {len(looks.homographies)} homographies for {cameras} cameras")

@@ -1,0 +1,46 @@
+"""Views that show somebody as far as is known from elsewhere, beside those that are found or missed."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bestview.view_selection.sparse_costs import SeenViews
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+def with_expected(views: SeenViews, frame: Ints, camera: Ints, person: Ints, worth: Floats) -> SeenViews:
+    """Add V views that are expected to show somebody; where a view is only taken to, the larger worth counts.
+
+    Args:
+        views: those found, and then those that are only taken to be there.
+        frame: (V,) of each; none is found, or cannot be shown.
+        camera: (V,).
+        person: (V,).
+        worth: (V,) in [0, 1].
+    """
+    if not len(frame):
+        return views
+    cameras, found = views.shown.shape[1], len(views.frame) if views.found is None else views.found
+
+    def cells(frame: Ints, camera: Ints, person: Ints) -> Ints:
+        return np.asarray((frame * cameras + camera) * views.people + person)
+
+    best = np.zeros(views.shown.size * views.people)
+    best[cells(frame, camera, person)] = worth
+    taken = slice(found, None)
+    missed = cells(views.frame[taken], views.camera[taken], views.person[taken])
+    best[missed] = np.maximum(best[missed], views.worth[taken])
+    cell = np.flatnonzero(best)
+    moment, of = np.divmod(cell, views.people)
+    return SeenViews(
+        np.concatenate([views.frame[:found], moment // cameras]),
+        np.concatenate([views.camera[:found], moment % cameras]),
+        np.concatenate([views.person[:found], of]),
+        np.concatenate([views.worth[:found], best[cell]]),
+        views.shown,
+        views.people,
+        found=found,
+    )

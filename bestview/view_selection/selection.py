@@ -1,0 +1,181 @@
+"""Which camera shows each object at each frame: the sliding-window dynamic program of section III."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bestview.view_selection.dynamic_program import NO_CAMERA, NO_VIEW_COST, Gops, solve
+from bestview.view_selection.minimum_shot import solve_with_shots
+
+__all__ = ["NO_CAMERA", "NO_VIEW_COST", "Choices", "choose_by_gops", "choose_views"]
+
+
+@dataclass(frozen=True, slots=True)
+class Choices:
+    """The cameras chosen for a window of N frames and K objects.
+
+    Attributes:
+        views: (K, N) int64, the camera index b_n* per object and frame; -1 where no camera is possible. Fewer
+            frames where not all are asked for.
+        costs: (K,) float64, the cost of the whole window: the view costs, plus the switching cost for every
+            cut, plus ``NO_VIEW_COST`` for every frame without a camera.
+    """
+
+    views: NDArray[np.int64]
+    costs: NDArray[np.float64]
+
+
+def choose_views(
+    cost: NDArray[np.float64],
+    previous: NDArray[np.int64],
+    switch_cost: float,
+    cut_allowed: NDArray[np.bool_],
+    least_shot: int = 0,
+    held: NDArray[np.int64] | None = None,
+    weight: NDArray[np.float64] | None = None,
+    asked: int | None = None,
+) -> Choices:
+    """Minimise the sum of view costs and of cuts over the window, for all objects at once (section III).
+
+    The cost is ``sum_n c(n, b_n) + lambda * sum_n [b_n != b_(n-1)]``. A cut may only happen at a frame
+    where `cut_allowed` is true (a GOP start); with all of them true this is the paper's program.
+
+    * A camera that cannot be shown somewhere in a GOP cannot be shown in any of it. In a GOP that has
+      begun before the window, where there is nothing left to choose, the previous camera goes on until
+      the first frame in which it cannot be shown.
+    * Where no camera is possible, the view is -1. Such a hole is no cut: going on with the camera
+      from before the hole is free. An object without a previous camera starts, for free, at the
+      first frame where a cut is allowed.
+    * Between equally good sequences the one that stays longest with its camera wins, and then the
+      lowest camera index. There are no other ties, so the answer is the same on every machine.
+    * With a least shot no camera is left before it was shown for that many GOPs, unless it cannot be shown in
+      the GOP, or shows nobody in it (every frame costs at least ``NO_VIEW_COST``). A hole counts as shown.
+
+    It is fastest where the costs lie in memory as (N, C, K), objects innermost.
+
+    Args:
+        cost: (K, N, C) c(n, b) per object, frame and camera; infinite where it cannot be shown.
+        previous: (K,) b_(-1), the camera index just before the window; -1: none yet.
+        switch_cost: lambda, the cost of one cut, in units of one frame's view cost.
+        cut_allowed: (N,) where a cut may happen; entry 0 says whether frame 0 may differ from `previous`.
+        least_shot: GOPs that a shot lasts at least; up to 1 is the paper's program.
+        held: (K,) for how many GOPs `previous` has been shown, at least 1; None: long enough to be left.
+        weight: (N,) for how many frames each frame stands, above 0; None: one. Above 1 for the last ones, the
+            window is taken to go on as it ends: a view that stays better is worth a cut then.
+        asked: of how many GOPs the views are asked for, at least 1: all before the next GOP; None: of all. It
+            saves time where a window moves on by a GOP and the rest is decided again.
+
+    Raises:
+        ValueError: shapes that do not fit, a cost that is not a number, a negative switching cost, or a
+            previous camera that does not exist.
+    """
+    _check(cost, previous, switch_cost, cut_allowed)
+    objects, frames, cameras = cost.shape
+    if held is not None and held.shape != (objects,):
+        raise ValueError(f"held has shape {held.shape}, not ({objects},)")
+    if asked is not None and asked < 1:
+        raise ValueError(f"views of {asked} GOPs are asked for")
+    views = np.full((objects, frames), NO_CAMERA, dtype=np.int64)
+    lasting = np.ones(frames) if weight is None else weight
+    if lasting.shape != (frames,) or not (lasting > 0).all():
+        raise ValueError(f"weight has shape {lasting.shape}, not ({frames},), or is not above 0")
+    if not cameras or not frames:
+        return Choices(views, np.full(objects, NO_VIEW_COST * lasting.sum()))
+    starts = np.flatnonzero(cut_allowed)
+    running = int(starts[0]) if starts.size else frames
+    costs = _go_on(cost[:, :running], lasting[:running], previous, views) if running else np.zeros(objects)
+    if starts.size:
+        gops = _gops(cost, lasting, starts, blind=least_shot > 1)
+        shown, ahead = choose_by_gops(gops, previous, switch_cost, least_shot, held, asked)
+        lengths = np.diff(starts, append=frames)[: len(shown)]
+        views = views[:, : running + int(lengths.sum())]
+        views[:, running:] = np.repeat(shown, lengths, axis=0).T
+        costs += ahead
+    return Choices(views, costs)
+
+
+def choose_by_gops(
+    gops: Gops,
+    previous: NDArray[np.int64],
+    switch_cost: float,
+    least_shot: int = 0,
+    held: NDArray[np.int64] | None = None,
+    asked: int | None = None,
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Choose where the costs of whole GOPs are known; arguments as above.
+
+    Returns:
+        (asked, K) cameras of the first GOPs, -1 where none is possible, and (K,) what the window costs.
+    """
+    count = len(gops.cost) if asked is None else min(asked, len(gops.cost))
+    if least_shot > 1:
+        ages = np.full(len(previous), least_shot) if held is None else np.clip(held, 1, least_shot)
+        return solve_with_shots(gops, previous, ages, switch_cost, least_shot, count)
+    return solve(gops, previous, switch_cost, count)
+
+
+def _check(
+    cost: NDArray[np.float64],
+    previous: NDArray[np.int64],
+    switch_cost: float,
+    cut_allowed: NDArray[np.bool_],
+) -> None:
+    if cost.ndim != 3:  # noqa: PLR2004 — objects, frames, cameras
+        raise ValueError(f"cost has shape {cost.shape}, not (objects, frames, cameras)")
+    objects, frames, cameras = cost.shape
+    if previous.shape != (objects,):
+        raise ValueError(f"previous has shape {previous.shape}, not ({objects},)")
+    if cut_allowed.shape != (frames,):
+        raise ValueError(f"cut_allowed has shape {cut_allowed.shape}, not ({frames},)")
+    if previous.size and not (previous.min() >= NO_CAMERA and previous.max() < cameras):
+        raise ValueError(f"previous names a camera outside -1 .. {cameras - 1}")
+    if not 0 <= switch_cost < np.inf:
+        raise ValueError(f"the switching cost is {switch_cost}, not a number >= 0")
+    # min() is NaN when any entry is: one pass finds both defects.
+    if cost.size and not cost.min() > -np.inf:
+        raise ValueError("a view cost is not a number, or minus infinity")
+
+
+def _go_on(
+    cost: NDArray[np.float64],
+    lasting: NDArray[np.float64],
+    previous: NDArray[np.int64],
+    views: NDArray[np.int64],
+) -> NDArray[np.float64]:
+    """Fill in the GOP that began before the window: (K, R, C) costs of its rest; no choice is left.
+
+    Returns:
+        (K,) what those views cost.
+    """
+    running = cost.shape[1]
+    mine = np.take_along_axis(cost, np.maximum(previous, 0)[:, None, None], axis=2)[:, :, 0]
+    shown = np.logical_and.accumulate(np.isfinite(mine) & (previous >= 0)[:, None], axis=1)
+    views[:, :running] = np.where(shown, previous[:, None], NO_CAMERA)
+    return np.asarray((np.where(shown, mine, NO_VIEW_COST) * lasting).sum(axis=1))
+
+
+def _gops(
+    cost: NDArray[np.float64], lasting: NDArray[np.float64], starts: NDArray[np.int64], *, blind: bool
+) -> Gops:
+    """Sum the (K, N, C) costs, each frame as often as it lasts, over each GOP that starts in the window."""
+    by_frame = cost.transpose(1, 2, 0)
+    first = int(starts[0])
+    inside, starts, lasting = by_frame[first:], starts - first, lasting[first:]
+    cost_of_gops, blind_gops = [], []
+    for start, end in pairwise([*starts.tolist(), len(inside)]):
+        # Frame after frame, so that the order of the sums does not depend on how many objects there are.
+        total = _lasting(inside[start], lasting[start])
+        for n in range(start + 1, end):
+            total = total + _lasting(inside[n], lasting[n])
+        cost_of_gops.append(total)
+        nobody = inside[start:end].min(axis=0) >= NO_VIEW_COST if blind else None
+        blind_gops.append(nobody if nobody is None else nobody | np.isinf(total))
+    return Gops(cost_of_gops, np.add.reduceat(lasting, starts), blind_gops)
+
+
+def _lasting(cost: NDArray[np.float64], frames: float) -> NDArray[np.float64]:
+    return cost if frames == 1 else cost * frames

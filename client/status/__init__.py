@@ -1,0 +1,1 @@
+"""The status of a site, read over HTTP."""

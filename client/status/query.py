@@ -1,0 +1,119 @@
+"""How a site is now: what several addresses say, put together."""
+
+from __future__ import annotations
+
+import asyncio
+
+from yarl import URL
+
+from client.api import choice, objects
+from client.http import (
+    HttpSettings,
+    NotFoundError,
+    RefusedError,
+    get_any,
+    get_body,
+    get_json,
+    read_body,
+    server_url,
+)
+from client.model import SeenObject, Site
+from client.status.model import CameraNow, PersonNow, SiteNow
+from client.status.prometheus_text import Metrics, service_of
+
+_DEFAULT = HttpSettings()
+_ASKED_MOST = 12
+"""People of whom it is asked since when their camera shows them."""
+_WORDS_MOST = 64_000
+"""Bytes of the line that says whether a best view can be served."""
+
+
+async def status(url: str, settings: HttpSettings = _DEFAULT) -> SiteNow:
+    """Say how a site is.
+
+    Raises:
+        ValueError: ``url`` is no address.
+        RefusedError: the server asks for a token, or for another.
+        ClientError: it cannot be reached or is no MyView.
+    """
+    base = server_url(url)
+    site = await get_json(base / "api/site", Site, settings)
+    (ready, why), metrics, listed, people = await asyncio.gather(
+        _ready(base, settings), _metrics(base, settings), _cameras(base, settings), objects(url, settings)
+    )
+    service = None if metrics is None else service_of(metrics)
+    newest = None if metrics is None else metrics.get("myview_pulse")
+    return SiteNow(
+        name=site.name,
+        now=site.now,
+        ready=ready,
+        why=why,
+        pulse=None if newest is None or newest < 0 else int(newest),
+        cameras=tuple(_measured(it, metrics) for it in listed),
+        people=await _people(url, people, site.fps, settings),
+        service=service,
+    )
+
+
+async def _ready(base: URL, settings: HttpSettings) -> tuple[bool, str]:
+    """Ask whether a best view can be served: 503 is an answer, too."""
+    async with get_any(base / "readyz", settings, "text/plain") as answer:
+        return answer.ok, " ".join(_text(await read_body(answer, settings, _WORDS_MOST)).split())
+
+
+async def _metrics(base: URL, settings: HttpSettings) -> Metrics | None:
+    try:
+        return Metrics(_text(await get_body(base / "metrics", settings, "text/plain")))
+    except RefusedError:
+        return None  # a token for one person or camera
+
+
+def _text(body: bytes) -> str:
+    return body.decode(errors="replace")
+
+
+async def _cameras(base: URL, settings: HttpSettings) -> list[CameraNow]:
+    return list((await get_json(base / "api/cameras", dict[str, list[CameraNow]], settings))["cameras"])
+
+
+def _measured(camera: CameraNow, metrics: Metrics | None) -> CameraNow:
+    if metrics is None:
+        return camera
+    name = camera.camera
+    waiting = metrics.get("myview_camera_waiting_frames", camera=name)
+    return CameraNow(
+        camera=name,
+        state=camera.state,
+        message=camera.message,
+        fps=camera.fps,
+        missed=camera.missed,
+        shed=camera.shed,
+        late=camera.late,
+        in_step=camera.in_step,
+        sync_error_s=metrics.get("myview_camera_sync_error_seconds", camera=name, lately="median"),
+        tracking_delay_s=metrics.get("myview_camera_tracking_delay_seconds", camera=name, lately="median"),
+        certified=metrics.share(
+            "myview_camera_certified_windows_total", "myview_camera_windows_total", camera=name
+        ),
+        waiting=None if waiting is None else int(waiting),
+    )
+
+
+async def _people(
+    url: str, people: tuple[SeenObject, ...], fps: float, settings: HttpSettings
+) -> tuple[PersonNow, ...]:
+    asked = await asyncio.gather(*(_since(url, it, fps, settings) for it in people[:_ASKED_MOST]))
+    since = [*asked, *[None] * len(people)]
+    return tuple(
+        PersonNow(it.object, it.name, it.visible, it.camera, seconds, it.cameras)
+        for it, seconds in zip(people, since, strict=False)
+    )
+
+
+async def _since(url: str, person: SeenObject, fps: float, settings: HttpSettings) -> float | None:
+    """Give the seconds for which a person's camera shows them already."""
+    try:
+        told = await choice(url, person.object, settings)
+    except NotFoundError:
+        return None  # gone meanwhile
+    return None if told.since is None else (told.first + told.frames - told.since) / fps

@@ -1,0 +1,36 @@
+"""A site's sound from what a camera or a file has: frames on the clock of the pulses."""
+
+from __future__ import annotations
+
+from server.camera.audio.frames import Frame, runs
+from server.camera.audio.live_source import LiveSound
+from server.camera.audio.recorded_source import RecordedSound
+from server.config.site_config import Config
+from server.config.source_address import SourceKind, kind_of
+from server.system.address_redaction import shown
+from server.system.errors import UserError
+
+__all__ = ["Frame", "LiveSound", "RecordedSound", "open_sound", "runs"]
+
+
+def open_sound(config: Config, camera_id: str) -> RecordedSound | LiveSound | None:
+    """Open the site's sound, where this camera's process is to send it; None where it is not.
+
+    Raises:
+        UserError: it cannot be opened.
+    """
+    settings, fps = config.sound, config.site.fps
+    if settings.source is None or config.sounding != camera_id:
+        return None
+    path, offset, at_end = settings.source, settings.offset, settings.at_end
+    if settings.source in config.camera_ids:
+        camera = config.camera(camera_id)
+        path, offset, at_end = camera.source, camera.offset, camera.at_end
+        if kind_of(path) is SourceKind.STREAM:
+            return LiveSound(settings, fps, config.encode.gop / fps)
+        if kind_of(path) is not SourceKind.FILE:
+            raise UserError(f"sound: camera {camera_id} has none: {shown(path)}; name another, or a file")
+    try:
+        return RecordedSound(path, settings, fps, offset, at_end)
+    except UserError as error:
+        raise UserError(f"sound: {error}") from error

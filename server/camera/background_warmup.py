@@ -1,0 +1,27 @@
+"""A recording's scene is learned before its first frame is searched: people are found from the start."""
+
+from __future__ import annotations
+
+from server.camera.detector_setup import FittedDetections, Observer, make_detector
+from server.camera.sources import Recording, Source
+from server.config.sections import Camera
+from server.config.site_config import Config
+from server.media.letterbox import Fit
+from tracking.detectors import BackgroundDetector
+
+
+def ready_detector(config: Config, camera: Camera, source: Source, fit: Fit) -> Observer:
+    """Give a camera's detector, ready for the first frame where the source is a recording.
+
+    A live camera's learns as it goes.
+
+    Raises:
+        UserError: the detector's files or the recording cannot be read.
+    """
+    detector, settings = make_detector(config, camera, fit), config.detect
+    if isinstance(detector, FittedDetections) and isinstance(source, Recording):
+        detector.count_by(source.counted)
+    if isinstance(detector, BackgroundDetector):
+        places = range(0, settings.ahead_frames, settings.ahead_every)
+        detector.prepare((fit.image(image) for image in source.ahead(places)), settings.ahead_every)
+    return detector

@@ -1,0 +1,149 @@
+"""A camera's detector, chosen and set up from the configuration."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import Protocol
+
+import numpy as np
+
+from bestview import camera_height, horizon
+from server.config.ground_unit import METRES
+from server.config.sections import Camera
+from server.config.sections.detect import DetectSettings
+from server.config.site_config import Config
+from server.media.letterbox import Fit, Image
+from server.system.errors import UserError
+from tracking import Detections
+from tracking.detectors import (
+    BackgroundDetector,
+    Detector,
+    Floor,
+    HogDetector,
+    Looks,
+    MotFileDetector,
+    MotFileSettings,
+    OnnxDetector,
+    paper_boxes,
+    seen_from_above,
+)
+
+_NO_PICTURE = np.empty((0, 0, 3), dtype=np.uint8)
+
+
+class Observer(Detector, Protocol):
+    """A detector that says how long the rows of its histograms are, and when it cannot see."""
+
+    @property
+    def bins(self) -> int:
+        """Give that length: what a frame without a picture has to fit."""
+        ...
+
+    @property
+    def blind(self) -> bool:
+        """Whether the last frame could not be searched: that nobody was found in it says nothing."""
+        ...
+
+
+def make_detector(config: Config, camera: Camera, fit: Fit) -> Observer:
+    """Give the detector of a camera; its boxes are in the site's picture.
+
+    Raises:
+        UserError: the detection file or the network cannot be read, or the network cannot be run.
+    """
+    if camera.detections is not None:
+        with _told(f"camera {camera.id}: detections"):
+            file = MotFileDetector(camera.detections, MotFileSettings(first_frame=camera.offset))
+            return FittedDetections(file, fit, config.detect)
+    polygons = [fit.to_site(np.asarray(polygon, dtype=np.float64)) for polygon in camera.ignore]
+    ignore = tuple(tuple((float(x), float(y)) for x, y in polygon) for polygon in polygons)
+    with _told(f"camera {camera.id}: detect"):
+        settings = replace(config.detect, ignore=(*config.detect.ignore, *ignore))
+        if camera.kind == "overhead":
+            return _of_kind(seen_from_above(settings), None)
+        return _of_kind(settings, _floor(config, camera, fit))
+
+
+_PERSON_M = 1.7
+_LEAST_SLOPE, _MOST_SLOPE = 0.03, 1.5
+"""A person's height over the camera's: cameras at 1.1 to 57 metres. Beyond these the unit is another."""
+
+
+def _floor(config: Config, camera: Camera, fit: Fit) -> Floor | None:
+    """Give what the ground says about people's heights in the site's picture; None: nothing."""
+    per_metre = METRES.get(camera.ground_unit or "")
+    if camera.ground is None:
+        return None
+    homography = np.array(camera.ground, dtype=np.float64)
+    width, height = config.site.width, config.site.height
+    middle = float(fit.to_own(np.array([width / 2.0, 0.0]))[0])
+    row = horizon(homography, middle)
+    if row is None:
+        return None
+    seen = float(fit.to_site(np.array([middle, row]))[1])
+    # Below the middle of the picture it says where people do not stand rather than how tall they are.
+    if seen > height / 2.0:
+        return None
+    if per_metre is None:
+        # Far above the picture it is known badly, and there is no camera's height to check it by.
+        return Floor(seen, None) if seen >= -height else None
+    above = camera_height(homography, middle)
+    slope = _PERSON_M * per_metre / above if above else 0.0
+    return Floor(seen, slope) if _LEAST_SLOPE <= slope <= _MOST_SLOPE else None
+
+
+def _of_kind(settings: DetectSettings, floor: Floor | None) -> Observer:
+    """Give the detector that the settings name."""
+    looks = Looks(settings.looks, settings.bins)
+    match settings.kind:
+        case "hog":
+            return HogDetector(settings.hog, looks, settings.ignore)
+        case "onnx":
+            return OnnxDetector(settings.onnx, looks, settings.ignore)
+        case "boxes":
+            return BackgroundDetector(paper_boxes(settings))
+        case "background":
+            return BackgroundDetector(settings, floor)
+
+
+@contextmanager
+def _told(where: str) -> Iterator[None]:
+    """Turn what goes wrong into one line that begins with ``where``.
+
+    Raises:
+        UserError: something went wrong.
+    """
+    try:
+        yield
+    except OSError as error:
+        raise UserError(f"{where}: {error.filename}: {error.strerror}") from error
+    except (ValueError, ImportError) as error:
+        raise UserError(f"{where}: {error}") from error
+
+
+class FittedDetections:
+    """Detections from a file, which are in the camera's own pixels, moved into the site's picture."""
+
+    blind = False
+
+    def __init__(self, file: MotFileDetector, fit: Fit, settings: DetectSettings) -> None:
+        self._file, self._fit = file, fit
+        self._looks = Looks(settings.looks, settings.bins)
+        self._counted: Callable[[int], int] = int
+
+    def count_by(self, counted: Callable[[int], int]) -> None:
+        """Take the file's frames to be a recording's pictures one by one, whatever pulse each is shown at."""
+        self._counted = counted
+
+    @property
+    def bins(self) -> int:
+        """The length of a row of the histograms."""
+        return self._looks.bins
+
+    def detect(self, image: Image, frame: int | None = None) -> Detections:
+        """Give the detections of a frame, with the appearance that the site's picture shows."""
+        own = self._file.detect(_NO_PICTURE, None if frame is None else self._counted(frame))
+        boxes = self._fit.boxes_to_site(own.boxes)
+        return Detections(boxes, own.scores, self._looks.rows(image, boxes))

@@ -1,0 +1,1 @@
+"""Encoding frames into closed GOPs."""

@@ -1,0 +1,22 @@
+"""Whether a camera can see the floor that its homography is about."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bestview import shows_floor
+from server.config.sections import Camera
+from server.system.errors import UserError
+
+
+def check_floor(camera: Camera, size: tuple[int, int]) -> None:
+    """Refuse a homography by which nothing of the camera's own picture (width, height) is floor.
+
+    Raises:
+        UserError: it is such a one: nobody would ever stand anywhere.
+    """
+    if camera.ground is not None and not shows_floor(np.array(camera.ground, dtype=np.float64), size):
+        raise UserError(
+            f"camera {camera.id}: ground: all of its picture, {size[0]}x{size[1]}, lies above the horizon: "
+            "its homography is of a camera tilted past straight down, or of another picture; leave it out"
+        )

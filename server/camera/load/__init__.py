@@ -1,0 +1,1 @@
+"""How a camera sheds load on a busy machine."""

@@ -1,0 +1,53 @@
+"""Where an operator points in a camera's picture: what comes over the bus, until the tracker takes it."""
+
+from __future__ import annotations
+
+import logging
+from collections import deque
+
+import msgspec
+
+from camsync import Spell
+from server.messaging.inbox import Message
+from server.messaging.messages import UNREADABLE
+from server.messaging.operator_messages import POINTS_MOST, Pointings
+from tracking.interactive import Pointing
+
+log = logging.getLogger(__name__)
+
+_DECODER = msgspec.json.Decoder(Pointings)
+
+
+class Pointed:
+    """Keeps the newest that was pointed at in one run of a camera. What cannot be understood is counted."""
+
+    def __init__(self, camera: str, boot: int) -> None:
+        self._camera, self._boot = camera, boot
+        self._waiting: deque[Pointing] = deque(maxlen=POINTS_MOST)
+        self.taken = 0
+        """Places that the tracker was given."""
+        self.bad_messages = 0
+        self._bad = Spell()
+
+    def put(self, message: Message) -> None:
+        """Take a message in; what is said of another run's tracks is of nobody here."""
+        try:
+            said = _DECODER.decode(message.payload)
+        except UNREADABLE as error:
+            self.bad_messages += 1
+            if (more := self._bad.happened(str(error))) is not None:
+                told = "camera %s: a message on %s is none: %s%s"
+                log.warning(told, self._camera, message.key, error, more)
+            return
+        if ended := self._bad.over():
+            told = "camera %s: where somebody points is understood again; %d messages were not"
+            log.info(told, self._camera, ended.times)
+        if said.boot == self._boot:
+            self._waiting.extend(Pointing(it.pulse, it.track, it.x, it.y, it.reach) for it in said.points)
+
+    def take(self) -> list[Pointing]:
+        """Give what has come since this was last asked, in its order."""
+        taken = list(self._waiting)
+        self._waiting.clear()
+        self.taken += len(taken)
+        return taken

@@ -1,0 +1,77 @@
+"""Access units as the site's streams have them, whatever container they came in (H.264, Annex B)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from server.media.h264.annexb import NAL_IDR, NAL_PPS, NAL_SPS, nal_type, nal_units
+
+_START_CODE = b"\x00\x00\x00\x01"
+_AVCC_VERSION = 1
+_AVCC_HEAD = 6
+"""Bytes of an avcC box before the first parameter set's length."""
+
+
+@dataclass(frozen=True, slots=True)
+class Packing:
+    """How a container packs access units: what stands beside the pictures (its ``extradata``)."""
+
+    length_bytes: int
+    """Of the length before each NAL unit; 0: there are start codes."""
+    sets: tuple[bytes, ...]
+    """Parameter sets that may stand there alone."""
+
+    def annex_b(self, packet: bytes) -> bytes:
+        """Give the same NAL units behind start codes, in a key picture with the parameter sets before them.
+
+        Raises:
+            ValueError: the lengths do not fit.
+        """
+        data = packet
+        if self.length_bytes:
+            data = b"".join(_START_CODE + unit for unit in _behind_lengths(packet, self.length_bytes))
+        types = [nal_type(unit) for unit in nal_units(data)]
+        if NAL_IDR in types and NAL_SPS not in types:
+            return b"".join(_START_CODE + unit for unit in self.sets) + data
+        return data
+
+
+def packing_of(extradata: bytes | None) -> Packing:
+    """Read what stands beside the pictures: avcC (ISO/IEC 14496-15, 5.3.3.1) or NAL units.
+
+    Raises:
+        ValueError: it is damaged.
+    """
+    if not extradata or extradata[0] != _AVCC_VERSION:
+        units = nal_units(extradata or b"")
+        return Packing(0, tuple(unit for unit in units if nal_type(unit) in (NAL_SPS, NAL_PPS)))
+    if len(extradata) < _AVCC_HEAD + 1:
+        raise ValueError("its avcC box is damaged")
+    sets: list[bytes] = []
+    at = _AVCC_HEAD - 1
+    for mask in (0x1F, 0xFF):  # SPS, then PPS; the upper bits of the first number are reserved
+        if at >= len(extradata):
+            break
+        count, at = extradata[at] & mask, at + 1
+        for _ in range(count):
+            size = int.from_bytes(extradata[at : at + 2], "big")
+            sets.append(extradata[at + 2 : at + 2 + size])
+            at += 2 + size
+    return Packing(1 + (extradata[4] & 3), tuple(sets))
+
+
+def is_key(annex_b: bytes) -> bool:
+    """Tell whether an access unit is one that nothing before it is needed for."""
+    return any(nal_type(unit) == NAL_IDR for unit in nal_units(annex_b))
+
+
+def _behind_lengths(packet: bytes, length_bytes: int) -> Iterator[bytes]:
+    at = 0
+    while at < len(packet):
+        size = int.from_bytes(packet[at : at + length_bytes], "big")
+        at += length_bytes
+        if size == 0 or at + size > len(packet):
+            raise ValueError("a NAL unit that does not fit into its packet")
+        yield packet[at : at + size]
+        at += size

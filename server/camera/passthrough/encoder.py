@@ -1,0 +1,43 @@
+"""In the place of an encoder, where nothing is encoded."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Protocol
+
+from server.camera.encoding.encoder import AccessUnit
+from server.camera.sources import Source
+from server.camera.sources.base import Image
+
+
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """An access unit as it came, Annex B, and the picture that is decoded from it."""
+
+    key: bool
+    data: bytes
+    image: Image
+    time: Fraction | None = None
+    """When it was taken, seconds by the camera's clock; None: it does not say."""
+
+
+class OwnSource(Source, Protocol):
+    """A source that keeps the access units of its pictures."""
+
+    taken: Unit | None
+    """The one whose picture was taken last."""
+
+
+class Passing:
+    """Gives the access unit of the picture that was taken."""
+
+    def __init__(self, source: OwnSource) -> None:
+        self._source = source
+
+    def encode(self, pulse: int, image: Image) -> AccessUnit:
+        """Give the access unit of a pulse, whose picture was the last one taken."""
+        unit = self._source.taken
+        if unit is None or unit.image is not image:
+            raise RuntimeError("a picture was taken meanwhile")
+        return AccessUnit(pulse, unit.key, unit.data)

@@ -1,0 +1,125 @@
+"""A network camera whose own access units are passed on."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Mapping
+from fractions import Fraction
+
+import av
+from av.video.stream import VideoStream
+
+from server.camera.audio import LiveSound
+from server.camera.passthrough.access_unit_queue import Waiting
+from server.camera.passthrough.access_units import is_key, packing_of
+from server.camera.passthrough.compatibility import Fitting, MisfitError, Wanted
+from server.camera.passthrough.encoder import Unit
+from server.camera.passthrough.recording_source import at_once, decoded, packets, pictures_of
+from server.camera.sources.base import Image
+from server.camera.sources.live_stream import OPEN_S, READ_S, Stream
+from server.camera.sources.opening import Opened, no_answer, open_video
+from server.camera.sources.orientation import orientation_of, pixel_aspect_of
+from server.system.address_redaction import ffmpeg_reason, shown
+from server.system.errors import UserError
+
+_LOOKED_AT_GOPS = 2
+"""GOPs that a camera sends before it is known to fit."""
+
+
+class OwnStream(Stream):
+    """Reads the camera in a thread, as :class:`Stream` does; gives each access unit once, in order.
+
+    Raises:
+        UserError: it cannot be opened.
+        MisfitError: what it sends cannot stand in the site's streams.
+    """
+
+    def __init__(
+        self, url: str, options: Mapping[str, str], listener: LiveSound | None, wanted: Wanted
+    ) -> None:
+        _check(url, options, wanted)
+        self._wanted = wanted
+        self._waiting = Waiting(wanted.gop)
+        self._waiting_lock = threading.Lock()
+        self._frame_s = 1 / Fraction(wanted.fps).limit_denominator(1001)
+        self._unbroken = False
+        """Nothing has been lost since the last key unit."""
+        self.taken: Unit | None = None
+        super().__init__(url, options, listener)
+
+    def take(self, pulse: int) -> Image | None:
+        """Give the picture of the access unit that goes with a pulse; None where none can."""
+        with self._waiting_lock:
+            self.taken = taken = self._waiting.take(pulse)
+        if taken is None:
+            return None
+        if self._listener is not None and taken.time is not None:
+            # What is shown has waited. Sound is asked for at the next pulse, before its picture is taken.
+            self._listener.picture(taken.time + self._frame_s)
+        return taken.image
+
+    def _read(self, opened: Opened) -> bool:
+        try:
+            Fitting(self._wanted).opened(opened)
+        except MisfitError as misfit:
+            opened.container.close()
+            self._lost(f"{shown(self._url)}: what it sends does not fit any more: {misfit}")
+            return False
+        at_once(opened)
+        self._unbroken = False
+        return super()._read(opened)
+
+    def _decode(self, packet: av.Packet[VideoStream]) -> bool:
+        """Queue an access unit with its picture; tell whether there is one."""
+        if not packet.size:
+            return False
+        try:
+            data = packing_of(packet.stream.codec_context.extradata).annex_b(bytes(packet))
+        except ValueError:
+            data = b""
+        key, image = is_key(data), decoded(packet)
+        self._sized.set()  # how it lies was looked at, and it may not change
+        if image is not None and image.shape[1::-1] != self._wanted.size:
+            image = None  # it has changed since the connection began, which it may not
+        self._unbroken = image is not None and bool(data) and (self._unbroken or key)
+        if image is not None and self._unbroken:
+            time = None
+            if packet.pts is not None and packet.time_base is not None:
+                time = packet.pts * packet.time_base
+            with self._waiting_lock:
+                self._waiting.put(Unit(key, data, image, time))
+        return image is not None
+
+
+def _check(url: str, options: Mapping[str, str], wanted: Wanted) -> None:
+    """Look at what a camera sends, from its first key unit on.
+
+    Raises:
+        UserError: it cannot be opened, or stops meanwhile.
+        MisfitError: what it sends cannot stand in the site's streams.
+    """
+    opened, fitting = open_video(url, options, (OPEN_S, READ_S)), Fitting(wanted)
+    try:
+        fitting.opened(opened)
+        aspect = pixel_aspect_of(opened.stream)
+        packing, begun = packing_of(opened.stream.codec_context.extradata), -1
+        for frame, packet in enumerate(packets(opened)):
+            data = packing.annex_b(bytes(packet))
+            for picture in pictures_of(packet):
+                fitting.lies(orientation_of(picture, aspect))
+            if begun < 0 and is_key(data):
+                begun = frame
+            if begun >= 0:
+                fitting.unit(frame - begun, frame - begun, data, packet.pts, packet.dts)
+            if frame - max(begun, 0) >= _LOOKED_AT_GOPS * wanted.gop:
+                break
+        if begun < 0:
+            raise MisfitError(f"no GOP begins within {_LOOKED_AT_GOPS * wanted.gop} frames (encode.gop)")
+    except (av.error.InvalidDataError, ValueError) as error:
+        why = ffmpeg_reason(error) if isinstance(error, av.error.FFmpegError) else str(error)
+        raise MisfitError(f"it cannot be read: {why}") from None
+    except av.error.FFmpegError as error:  # it has gone, which says nothing of what it sends
+        why = no_answer(error, READ_S) or ffmpeg_reason(error)
+        raise UserError(f"{shown(url)}: it stopped while it was looked at: {why}") from None
+    finally:
+        opened.container.close()

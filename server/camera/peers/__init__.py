@@ -1,0 +1,1 @@
+"""Detections exchanged with the other cameras of a site."""

@@ -1,0 +1,29 @@
+"""What a camera keeps for the best-view service, which may be started anew: who its tracks are."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from server.messaging.inbox import Message
+from server.messaging.retained_state import REMEMBERED_MOST
+
+
+class Keeping:
+    """Keeps the newest word of the service, unread, and says it to every service that comes.
+
+    ``send`` sends it.
+    """
+
+    def __init__(self, send: Callable[[bytes], None]) -> None:
+        self._send = send
+        self._kept = b""
+
+    def put(self, message: Message) -> None:
+        """Take a word in the place of the one before; one that is too long is not kept."""
+        if len(message.payload) <= REMEMBERED_MOST:
+            self._kept = message.payload
+
+    def service(self, there: bool) -> None:
+        """Say what is kept to a service that has come; nothing, too, so that it need not wait."""
+        if there:
+            self._send(self._kept)

@@ -1,5 +1,0 @@
-"""A tank of fish that all look the same, after the thesis of Todor (2009), section 8.1."""
-
-from server.camera.scene.tank.tank import VIEWPOINTS, Tank
-
-__all__ = ["VIEWPOINTS", "Tank"]

@@ -1,0 +1,189 @@
+"""The pictures of a recording one by one, each at its own time however damaged the file is."""
+
+from __future__ import annotations
+
+import errno
+import logging
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Protocol
+
+import av
+from av.video.frame import VideoFrame
+from av.video.stream import VideoStream
+
+from server.camera.sources.opening import Opened
+from server.camera.sources.timestamp_repair import Continuous
+from server.system.address_redaction import shown
+
+log = logging.getLogger(__name__)
+
+_COUNTED_WHEN_REORDERED = frozenset({"avi"})
+"""Containers that number packets in the order of decoding: where pictures are shown in another, these are no
+times of pictures."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TimedPicture:
+    """A picture of a recording.
+
+    Attributes:
+        seconds: when it is shown, after the first one of the recording.
+        picture: None: it could not be decoded, and the one before it stands for it.
+    """
+
+    seconds: float
+    picture: VideoFrame | None
+
+
+def pictures(opened: Opened, *, again: bool = False) -> Iterator[TimedPicture]:
+    """Decode the pictures in the order in which they are shown, also those that cannot be decoded.
+
+    A file that cannot be read any further ends there, and that is said; not where it is read ``again``.
+    """
+    line: _Line | None = None
+    for packet in _packets(opened, again=again):
+        if line is None:
+            line = _counted_or_timed(opened, packet, again=again)
+        yield from line.after(packet)
+    if line is not None:
+        yield from line.rest()
+
+
+class _Line(Protocol):
+    def after(self, packet: av.Packet[VideoStream]) -> Iterator[TimedPicture]:
+        """Decode a packet; give what is known to come next."""
+        ...
+
+    def rest(self) -> Iterator[TimedPicture]:
+        """Give what never came at the end."""
+        ...
+
+
+def _counted_or_timed(opened: Opened, first: av.Packet[VideoStream], *, again: bool) -> _Line:
+    reordered = opened.stream.codec_context.reorder_depth > 0
+    if first.pts is None or (opened.container.format.name in _COUNTED_WHEN_REORDERED and reordered):
+        if first.pts is None and not again:
+            log.warning(
+                "%s: there are no times in this file: its pictures are counted, %g a second",
+                opened.container.name,
+                opened.fps,
+            )
+        return _CountedLine(opened)
+    return _TimedLine(opened)
+
+
+class _TimedLine:
+    """Which pictures are to come, by the packets' times, so that one that never comes leaves a gap.
+
+    After a damaged key frame a decoder keeps silent until the next one, without an error. ``_spacing`` tells
+    lost pictures from packets that never were pictures (VP8's invisible ones are stamped beside others).
+    """
+
+    def __init__(self, opened: Opened) -> None:
+        self._unit = float(opened.stream.time_base or 1)
+        self._frame = max(1, round(1 / (opened.fps * self._unit)))
+        self._spacing = max(1, self._frame // 2)
+        self._awaited: list[int] = []
+        self._origin: int | None = None
+        self._last: int | None = None
+
+    def after(self, packet: av.Packet[VideoStream]) -> Iterator[TimedPicture]:
+        if packet.pts is not None and not packet.is_discard:
+            if self._last is not None and packet.pts < self._last:
+                yield self._at(packet.pts, None)  # a later picture was shown: a decoder that lost its thread
+            else:
+                self._awaited.append(packet.pts)
+        for picture in _decoded(packet):
+            time = picture.pts
+            if time is None:
+                time = 0 if self._last is None else self._last + self._frame
+            if self._last is None or time > self._last:
+                yield from self._lost_before(time)
+                self._last = time
+                yield self._at(time, picture)
+
+    def rest(self) -> Iterator[TimedPicture]:
+        if self._awaited:
+            yield from self._lost_before(max(self._awaited) + self._spacing)
+
+    def _lost_before(self, time: int) -> Iterator[TimedPicture]:
+        earlier = sorted(awaited for awaited in self._awaited if awaited < time)
+        self._awaited = [awaited for awaited in self._awaited if awaited > time]
+        for lost in earlier:
+            after_last = self._last is None or lost - self._last >= self._spacing
+            if after_last and time - lost >= self._spacing:
+                self._last = lost
+                yield self._at(lost, None)
+
+    def _at(self, time: int, picture: VideoFrame | None) -> TimedPicture:
+        if self._origin is None:
+            self._origin = time
+        return TimedPicture((time - self._origin) * self._unit, picture)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _PacketNumber:
+    """Which packet it is. An object of its own: PyAV knows such by identity, which small numbers share."""
+
+    number: int
+
+
+class _CountedLine:
+    """The same of a file without times of pictures: they are counted, at the rate that it is taken to have.
+
+    Each picture says which packet it is from. A packet whose picture is overdue, by more than pictures can
+    change places, has lost it.
+    """
+
+    def __init__(self, opened: Opened) -> None:
+        self._context, self._fps = opened.stream.codec_context, opened.fps
+        self._context.copy_opaque = True
+        self._awaited: list[int] = []
+        self._packets = self._pictures = 0
+
+    def after(self, packet: av.Packet[VideoStream]) -> Iterator[TimedPicture]:
+        if packet.size:
+            packet.opaque = _PacketNumber(self._packets)
+            self._awaited.append(self._packets)
+            self._packets += 1
+        for picture in _decoded(packet):
+            if isinstance(picture.opaque, _PacketNumber):
+                number = picture.opaque.number
+                if number not in self._awaited:
+                    continue  # it was given up: after damage a decoder may lose its thread
+                overdue = [it for it in self._awaited if it < number - self._context.reorder_depth]
+                self._awaited = [it for it in self._awaited if it not in overdue and it != number]
+                if not picture.interlaced_frame:  # of which two packets may make one
+                    yield from (self._next(None) for _ in overdue)
+            yield self._next(picture)
+
+    def rest(self) -> Iterator[TimedPicture]:
+        return (self._next(None) for _ in self._awaited)
+
+    def _next(self, picture: VideoFrame | None) -> TimedPicture:
+        self._pictures += 1
+        return TimedPicture((self._pictures - 1) / self._fps, picture)
+
+
+def _decoded(packet: av.Packet[VideoStream]) -> list[VideoFrame]:
+    """Decode a packet; nothing comes of a damaged one."""
+    try:
+        return [picture for picture in packet.decode() if isinstance(picture, VideoFrame)]
+    except av.error.FFmpegError:
+        return []
+
+
+def _packets(opened: Opened, *, again: bool) -> Iterator[av.Packet[VideoStream]]:
+    times = Continuous(opened)
+    try:
+        for packet in opened.container.demux(opened.stream):
+            if times.leaps(packet) and not again:
+                log.warning("%s: its times leap: it is taken to go on there", shown(opened.container.name))
+                again = True  # once is enough
+            yield packet
+    except av.error.FFmpegError as error:
+        if error.errno == errno.EINTR:
+            raise  # a signal has cut a read short: the file is not over
+        if not again:
+            log.warning("%s: cannot be read any further: %s", shown(opened.container.name), error.strerror)

@@ -1,0 +1,102 @@
+"""A folder of images as a recording."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Literal
+
+import cv2
+import numpy as np
+
+from server.camera.sources.base import Image, SourceEnded
+from server.camera.sources.missing_frames import Gaps
+from server.media.letterbox import Fit
+from server.system.errors import UserError
+
+log = logging.getLogger(__name__)
+
+_ENDINGS = frozenset({".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".webp"})
+
+
+class Folder:
+    """Shows its image ``pulse - offset`` in the order of the file names, upright as EXIF says.
+
+    All are of the first one's size: others are fitted into that. One that cannot be read shows as the one
+    before it, and that is said.
+
+    Raises:
+        UserError: the folder cannot be read, there is no image in it, or the first cannot be read.
+    """
+
+    recorded = True
+
+    def __init__(self, path: str, offset: int, at_end: Literal["stop", "loop"]) -> None:
+        self._path, self._offset, self._loop = path, offset, at_end == "loop"
+        try:
+            self._files = sorted(file for file in Path(path).iterdir() if file.suffix.lower() in _ENDINGS)
+        except OSError as error:
+            raise UserError(f"{path}: cannot read this folder: {error.strerror}") from error
+        if not self._files:
+            raise UserError(f"{path}: there are no images in this folder ({', '.join(sorted(_ENDINGS))})")
+        first = _read(self._files[0])
+        if first is None:
+            raise UserError(f"{self._files[0]}: cannot read this image")
+        self._newest = first
+        self.size = (first.shape[1], first.shape[0])
+        self._gaps = Gaps(path)
+        self._resized = False
+        """That one has another size has been said."""
+
+    def take(self, pulse: int) -> Image | None:
+        """Return the image of a pulse; one that cannot be read shows as the one before it."""
+        index = pulse - self._offset
+        if index < 0:
+            return None
+        if index >= len(self._files):
+            self._say_gaps()
+            if not self._loop:
+                raise SourceEnded(self._path)
+            index %= len(self._files)
+        image = _read(self._files[index])
+        if image is None:
+            self._gaps.damaged(index)
+        else:
+            self._newest = self._fitted(image, self._files[index])
+        return self._newest
+
+    def ahead(self, places: Sequence[int]) -> Iterator[Image]:
+        """Read some of the images; one that cannot be read is left out."""
+        files = [self._files[place] for place in places if place < len(self._files)]
+        images = ((_read(file), file) for file in files)
+        return (self._fitted(image, file) for image, file in images if image is not None)
+
+    def close(self) -> None:
+        """Say what could not be read, if that was not said; nothing is held open."""
+        self._say_gaps()
+
+    def _fitted(self, image: Image, file: Path) -> Image:
+        size = (image.shape[1], image.shape[0])
+        if size == self.size:
+            return image
+        if not self._resized:
+            self._resized = True
+            log.warning(
+                "%s: is %dx%d, and the first image %dx%d: all are fitted into that",
+                *(file, *size, *self.size),
+            )
+        return Fit(size, self.size).image(image)
+
+    def _say_gaps(self) -> None:
+        self._gaps.say(len(self._files), 1.0)
+
+
+def _read(file: Path) -> Image | None:
+    try:
+        data = np.fromfile(file, dtype=np.uint8)
+    except OSError:
+        return None
+    # From memory: by its name OpenCV turns no TIFF.
+    image = cv2.imdecode(data, cv2.IMREAD_COLOR) if data.size else None
+    return None if image is None else np.asarray(image, dtype=np.uint8)

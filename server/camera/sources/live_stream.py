@@ -1,0 +1,227 @@
+"""A camera: RTSP, HTTP, V4L2 or whatever else FFmpeg opens; its newest picture at every pulse."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import cast
+
+import av
+from av.audio.stream import AudioStream
+from av.video.frame import VideoFrame
+from av.video.stream import VideoStream
+
+from camsync import Spell
+from server.camera.audio import LiveSound
+from server.camera.sources.base import Image
+from server.camera.sources.opening import Opened, no_answer, open_video
+from server.camera.sources.orientation import INTERLACED, Orientation, orientation_of, pixel_aspect_of
+from server.system.address_redaction import ffmpeg_reason, shown
+from server.system.errors import AwayError, UserError
+
+log = logging.getLogger(__name__)
+
+OPEN_S, READ_S = 10.0, 5.0
+"""Seconds in which a camera must answer, and send something."""
+_RETRY_FIRST_S, _RETRY_MAX_S = 0.5, 10.0
+_LET_GO_S = 0.5
+_FIRST_S = 2.0
+"""Seconds that are waited for the first picture, which says how all lie."""
+_STALE_S = 1.5
+"""A picture older than this is not shown again: the camera counts as away, and others have half a second
+to take over within the two that are promised."""
+_HELD_BACK = 2
+"""Pictures that wait for the next one's beginning: one in what takes a stream apart, one in what finds its
+pictures."""
+
+
+class Stream:
+    """Reads the camera in a thread, so that a pulse never waits for it; reconnects by itself."""
+
+    recorded = False
+
+    def __init__(self, url: str, options: Mapping[str, str], listener: LiveSound | None = None) -> None:
+        self._url, self._options, self._listener = url, options, listener
+        opened = open_video(url, options, (OPEN_S, READ_S))
+        self._stored = opened.size
+        self._orientation = Orientation(pixel_aspect=pixel_aspect_of(opened.stream))
+        self.size = self._orientation.size(self._stored)
+        self._sized = threading.Event()
+        """The first picture has come, and with it the size is known for good."""
+        self._resized: tuple[int, int] | None = None
+        """The size of its pictures, where it is another one since."""
+        self._lock = threading.Lock()
+        self._newest: VideoFrame | None = None
+        self._newest_at = 0.0
+        self._silence = _Silence()
+        self._closing = threading.Event()
+        self._away = Spell(calm=0.0)
+        self._thread = threading.Thread(target=self._run, args=(opened,), name="source", daemon=True)
+        self._thread.start()
+        self._sized.wait(_FIRST_S)
+        self._sized.set()
+
+    def take(self, pulse: int) -> Image | None:
+        """Give the newest picture; None while the camera is away.
+
+        Raises:
+            AwayError: its pictures have another size by now, and whoever takes them has to begin anew: the
+                floor, the boxes and the people's looks go by the one that it began with.
+        """
+        del pulse
+        if self._resized is not None:
+            raise AwayError(f"{shown(self._url)}: {self._other_size(self._resized)}")
+        with self._lock:
+            picture = self._newest if time.monotonic() - self._newest_at < _STALE_S else None
+        return None if picture is None else self._oriented(picture).image(picture)
+
+    def ahead(self, places: Sequence[int]) -> Iterator[Image]:  # noqa: ARG002 — Source
+        """Give nothing: what a camera will show nobody knows."""
+        return iter(())
+
+    def close(self) -> None:
+        """Stop reading."""
+        self._closing.set()
+        self._thread.join(_LET_GO_S)  # a silent camera holds it up for longer: it ends by itself
+
+    def _run(self, opened: Opened | None) -> None:
+        pause = _RETRY_FIRST_S
+        while not self._closing.is_set():
+            if opened is not None and self._read_alive(opened):
+                pause = _RETRY_FIRST_S
+            if self._closing.wait(pause):
+                return
+            pause = min(2 * pause, _RETRY_MAX_S)
+            try:
+                opened = open_video(self._url, self._options, (OPEN_S, READ_S))
+            except UserError as error:
+                opened = None
+                self._lost(str(error))
+
+    def _read(self, opened: Opened) -> bool:
+        """Read until the connection ends; tell whether any picture came."""
+        aspect = pixel_aspect_of(opened.stream)
+        size = replace(self._orientation, pixel_aspect=aspect).size(opened.size)
+        if size != self.size:
+            self._resized = size
+            opened.container.close()
+            return False
+        any_picture, why = False, "the connection has ended"
+        self._silence = _Silence()
+        try:
+            for packet in opened.container.demux(opened.stream, *self._listened_to(opened)):
+                if self._closing.is_set():
+                    break
+                if packet.stream is opened.stream:
+                    if self._decode(cast("av.Packet[VideoStream]", packet)):
+                        any_picture = True
+                        self._back()
+                elif self._listener is not None:
+                    self._listener.packet(cast("av.Packet[AudioStream]", packet))
+        except _OddSizeError as error:
+            why = str(error)  # by damage or for good: a new connection will tell
+        except (av.error.FFmpegError, OSError) as error:
+            why = f"reading stopped: {no_answer(error, READ_S) or ffmpeg_reason(error)}"
+        finally:
+            opened.container.close()
+        if not self._closing.is_set():
+            self._lost(f"{shown(self._url)}: {why}")
+        return any_picture
+
+    def _other_size(self, size: tuple[int, int]) -> str:
+        return "its pictures are {}x{} now, they were {}x{}".format(*size, *self.size)
+
+    def _lost(self, why: str, *, mistake: bool = False) -> None:
+        """Say that the camera is away; one that comes and goes, or stays away, is not told of each time."""
+        if (more := self._away.happened(why)) is not None:
+            log.warning("%s%s; it is tried again", why, more, exc_info=mistake)
+
+    def _back(self) -> None:
+        if ended := self._away.over():
+            log.info("%s: pictures come again, after %.0f s", shown(self._url), ended.seconds)
+
+    def _read_alive(self, opened: Opened) -> bool:
+        """Do the same, and outlive mistakes: nobody would begin this thread anew."""
+        try:
+            return self._read(opened)
+        except Exception as error:  # noqa: BLE001 — it is said, with its traceback
+            self._lost(f"{shown(self._url)}: a mistake of type {type(error).__name__}", mistake=True)
+            opened.container.close()
+            return False
+
+    def _listened_to(self, opened: Opened) -> tuple[AudioStream, ...]:
+        """Give what else is to be read than the pictures."""
+        if self._listener is None:
+            return ()
+        streams = opened.container.streams.audio[:1]
+        self._listener.opened(streams[0] if streams else None)
+        return streams
+
+    def _decode(self, packet: av.Packet[VideoStream]) -> bool:
+        old = self._silence.was_before(packet, time.monotonic())
+        try:
+            pictures = [picture for picture in packet.decode() if isinstance(picture, VideoFrame)]
+        except av.error.FFmpegError:  # damage; that nothing can be read any more is no matter of decoding
+            return False
+        if pictures and not self._sized.is_set():
+            self._lies_as(pictures[0])
+        for size in map(self._size_of, pictures):
+            if size != self.size:
+                raise _OddSizeError(self._other_size(size))
+        if pictures and not old:
+            with self._lock:
+                self._newest, self._newest_at = pictures[-1], time.monotonic()
+            newest = pictures[-1]
+            if self._listener is not None and newest.pts is not None and newest.time_base is not None:
+                self._listener.picture(newest.pts * newest.time_base)
+        return bool(pictures)
+
+    def _lies_as(self, first: VideoFrame) -> None:
+        """Learn from the first picture how all are turned, before anybody is told their size."""
+        if (first.width, first.height) == self._stored:
+            self._orientation = self._oriented(first)
+            self.size = self._size_of(first)
+        if first.interlaced_frame:
+            log.warning("%s: %s", shown(self._url), INTERLACED)
+        self._sized.set()
+
+    def _oriented(self, picture: VideoFrame) -> Orientation:
+        return orientation_of(picture, self._orientation.pixel_aspect)
+
+    def _size_of(self, picture: VideoFrame) -> tuple[int, int]:
+        return self._oriented(picture).size((picture.width, picture.height))
+
+
+class _OddSizeError(Exception):
+    """A picture has not the size that the camera's had at the beginning."""
+
+
+class _Silence:
+    """Knows when a camera was silent, and whether what comes first after that is of before.
+
+    In some formats, such as MPEG-TS, a picture ends where the next one begins. So the last ones before a
+    silence come when it is over, as if they were new.
+    """
+
+    def __init__(self) -> None:
+        self._at: float | None = None
+        self._time = 0.0
+        self._until, self._left = 0.0, 0
+
+    def was_before(self, packet: av.Packet[VideoStream], now: float) -> bool:
+        """Tell whether a packet was sent before a silence that has just ended, as far as its time says."""
+        if packet.pts is None or packet.time_base is None:
+            return False
+        at, last = self._at, self._time
+        self._at, self._time = now, float(packet.pts * packet.time_base)
+        if at is not None and now - at > _STALE_S:
+            # Times may have jumped, too: then a few new pictures are taken for old ones, and that is all.
+            self._until, self._left = last + (now - at) / 2, _HELD_BACK
+        if not self._left or self._time >= self._until:
+            self._left = 0
+            return False
+        self._left -= 1
+        return True

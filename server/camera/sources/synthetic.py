@@ -1,0 +1,68 @@
+"""The synthetic scene as a camera: ``scene:room?camera=0&cameras=3&objects=4&seed=1``."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from typing import Self
+from urllib.parse import parse_qsl
+
+from server.camera.sources.base import Image
+from server.config.sections import Site
+from server.system.errors import UserError
+from synthetic import Scene
+
+_WHOLE = re.compile(r"[0-9]{1,18}")
+_DEFAULTS = {"camera": 0, "cameras": None, "objects": None, "seed": 1}  # None: as many as suit the scene
+
+
+class Stage:
+    """Draws the picture of a pulse; endless.
+
+    Raises:
+        UserError: the scene is unknown, or its parameters are wrong.
+    """
+
+    recorded = True
+
+    def __init__(self, source: str, site: Site) -> None:
+        name, _, query = source.removeprefix("scene:").partition("?")
+        values: dict[str, int | None] = dict(_DEFAULTS)
+        for key, value in parse_qsl(query, keep_blank_values=True):
+            if key not in values or not _WHOLE.fullmatch(value):
+                raise UserError(
+                    f"{source}: {key}={value} is not a whole number for one of {', '.join(values)}"
+                )
+            values[key] = int(value)
+        camera, seed = values["camera"] or 0, values["seed"] or 0
+        size = (site.width, site.height)
+        try:
+            self._scene = Scene(name, values["cameras"], values["objects"], seed, *size, site.fps)
+        except ValueError as error:
+            raise UserError(f"{source}: {error}") from error
+        if camera >= self._scene.cameras:
+            raise UserError(f"{source}: camera {camera} of {self._scene.cameras}: they count from 0")
+        self._camera = camera
+        self.size = size
+
+    def warm_up(self) -> Self:
+        """Draw once: painting the room takes a second, which must not be while pulses go by."""
+        self._scene.image(self._camera, 0)
+        return self
+
+    def take(self, pulse: int) -> Image | None:
+        """Draw the picture of a pulse."""
+        return self._scene.image(self._camera, pulse)
+
+    def ahead(self, places: Sequence[int]) -> Iterator[Image]:
+        """Draw the pictures of some pulses."""
+        return (self._scene.image(self._camera, place) for place in places)
+
+    @property
+    def ground(self) -> list[list[float]] | None:
+        """The homography from the picture to the floor in metres, as in a configuration; None: no floor."""
+        homography = self._scene.homography(self._camera)
+        return None if homography is None else [[float(entry) for entry in row] for row in homography]
+
+    def close(self) -> None:
+        """Nothing is held open."""

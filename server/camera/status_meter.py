@@ -1,0 +1,63 @@
+"""Counting what a camera does, for its status message."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+
+from camsync import PulseClient
+from server.camera.load.load_monitor import Load
+from server.messaging.messages import CameraStatus, CameraWord
+
+_SPAN_S = 2.0
+"""The frame rate is measured over this long."""
+
+
+class Meter:
+    """Counts frames, missed pulses and shed frames."""
+
+    def __init__(self, fps: float) -> None:
+        self._times: deque[float] = deque(maxlen=max(2, round(2 * _SPAN_S * fps)))
+        self._pulse = -1
+        self._missed = 0
+        self._shed = 0
+        self._client: PulseClient | None = None
+
+    def watch(self, client: PulseClient) -> None:
+        """Take clock offset and round trip from this client."""
+        self._client = client
+
+    def frame(self, pulse: int, missed: int) -> None:
+        """Count a frame, and the pulses missed before it."""
+        self._pulse = pulse
+        self._missed += missed
+        self._times.append(time.monotonic())
+
+    def missed(self, pulse: int, count: int) -> None:
+        """Count pulses without a frame."""
+        self._pulse = pulse
+        self._missed += count
+
+    def shed(self) -> None:
+        """Count a frame that nobody is looked for in."""
+        self._shed += 1
+
+    def status(self, camera: str, boot: int, state: CameraWord, waiting: int, load: Load) -> CameraStatus:
+        """Give the camera's status; ``waiting`` frames are to be searched, ``load`` is what is left out."""
+        sync = self._client.status() if self._client is not None else None
+        since = time.monotonic() - _SPAN_S
+        return CameraStatus(
+            camera=camera,
+            boot=boot,
+            state=state,
+            pulse=self._pulse,
+            fps=sum(moment >= since for moment in self._times) / _SPAN_S,
+            missed=self._missed,
+            shed=self._shed,
+            waiting=waiting,
+            load_level=load.level,
+            load=load.words,
+            in_step=sync is not None and sync.connected,
+            clock_offset=(sync.offset if sync is not None else None) or 0.0,
+            round_trip=(sync.round_trip if sync is not None else None) or 0.0,
+        )

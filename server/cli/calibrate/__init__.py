@@ -1,0 +1,1 @@
+"""``myview calibrate``: homographies from marked points or from walks."""

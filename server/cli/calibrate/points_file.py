@@ -1,0 +1,145 @@
+"""Marked points from a file: JSON or CSV, as docs/reference/files.md has them."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bestview.calibration import MarkedPoints
+from server.config.duplicate_keys import DuplicateKeyError, parse_json
+from server.config.values import check_camera_name
+from server.system.errors import UserError
+
+COLUMNS = ("camera", "image_x", "image_y", "floor_x", "floor_y")
+ENDINGS = (".json", ".csv")
+_FARTHEST = 1e9
+"""Pixels, or the floor's units; beyond, squares of them say nothing any more."""
+_SHOWN = 40
+"""Characters of what is wrong that an error repeats."""
+
+
+@dataclass(frozen=True, slots=True)
+class PointFile:
+    """What a file of marked points says."""
+
+    unit: str | None
+    cameras: tuple[MarkedPoints, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class _Pair:
+    """One marked point: x and y in the picture, x and y on the floor."""
+
+    camera: str
+    numbers: tuple[float, float, float, float]
+
+
+def read_points(path: Path) -> PointFile:
+    """Read a file of marked points.
+
+    Raises:
+        UserError: it cannot be read, or is no such file; the line or pair is named.
+    """
+    try:
+        text = path.read_text(encoding="utf-8-sig")  # spreadsheets begin a CSV with a byte order mark
+    except OSError as error:
+        raise UserError(f"{path}: cannot be read: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise UserError(f"{path}: is not a text file") from error
+    if path.suffix.lower() == ".csv":
+        unit, pairs = None, list(_from_csv(text, str(path)))
+    else:
+        content = _json(text, str(path))
+        unit, pairs = _unit(content, str(path)), list(_from_json(content, str(path)))
+    if not pairs:
+        raise UserError(f"{path}: has no pairs of points")
+    names = dict.fromkeys(pair.camera for pair in pairs)
+    return PointFile(unit, tuple(_camera(name, pairs) for name in names))
+
+
+def _camera(name: str, pairs: Sequence[_Pair]) -> MarkedPoints:
+    numbers = np.array([pair.numbers for pair in pairs if pair.camera == name], dtype=np.float64)
+    return MarkedPoints(name, numbers[:, :2], numbers[:, 2:])
+
+
+def _from_csv(text: str, name: str) -> Iterator[_Pair]:
+    try:
+        yield from _from_rows(csv.DictReader(text.splitlines()), name)
+    except csv.Error as error:
+        raise UserError(f"{name}: is not CSV: {error}") from error
+
+
+def _from_rows(rows: csv.DictReader[str], name: str) -> Iterator[_Pair]:
+    missing = [column for column in COLUMNS if column not in (rows.fieldnames or ())]
+    if missing:
+        raise UserError(
+            f"{name}:1: has no column {missing[0]!r}; the first line names the columns: {','.join(COLUMNS)}"
+        )
+    twice = next((column for column in COLUMNS if (rows.fieldnames or []).count(column) > 1), None)
+    if twice is not None:
+        raise UserError(f"{name}:1: has two columns {twice!r}, and only the last would count: keep one")
+    for row in rows:
+        where = f"{name}:{rows.line_num}"
+        camera = (row["camera"] or "").strip()
+        if not camera:
+            raise UserError(f"{where}: names no camera")
+        check_camera_name(camera, where)
+        yield _Pair(camera, _four([row[column] for column in COLUMNS[1:]], where))
+
+
+def _json(text: str, name: str) -> dict[str, Any]:
+    try:
+        content = parse_json(text)
+    except json.JSONDecodeError as error:
+        raise UserError(f"{name}:{error.lineno}: is not JSON: {error.msg}") from error
+    except DuplicateKeyError as error:
+        raise UserError(f"{name}: {error}") from error
+    except (ValueError, RecursionError) as error:  # a number of thousands of digits, brackets in brackets
+        raise UserError(f"{name}: is not JSON that can be read: {error}") from error
+    if not isinstance(content, dict) or not isinstance(content.get("cameras"), dict):
+        raise UserError(
+            f'{name}: has no {{"cameras": {{camera: [{{"image": [x, y], "floor": [x, y]}}, …]}}}}'
+        )
+    return content
+
+
+def _unit(content: dict[str, Any], name: str) -> str | None:
+    unit = content.get("unit")
+    if unit is not None and not (isinstance(unit, str) and unit.isprintable() and len(unit) <= _SHOWN):
+        raise UserError(f'{name}: unit: is a word, such as "m"')
+    return unit
+
+
+def _from_json(content: dict[str, Any], name: str) -> Iterator[_Pair]:
+    for camera, pairs in content["cameras"].items():
+        check_camera_name(camera, name)
+        if not isinstance(pairs, list):
+            raise UserError(f"{name}: camera {camera}: is a list of pairs")
+        for number, pair in enumerate(pairs, start=1):
+            where = f"{name}: camera {camera}: pair {number}"
+            try:
+                (x, y), (right, far) = pair["image"], pair["floor"]
+            except (KeyError, TypeError, ValueError):
+                raise UserError(f'{where}: is not {{"image": [x, y], "floor": [x, y]}}') from None
+            yield _Pair(camera, _four([x, y, right, far], where))
+
+
+def _four(values: Sequence[Any], where: str) -> tuple[float, float, float, float]:
+    try:
+        x, y, right, far = (float(value) for value in values)
+    except (TypeError, ValueError, OverflowError):
+        raise UserError(f"{where}: {_shown(values)}: are not four numbers") from None
+    if max(map(abs, (x, y, right, far))) > _FARTHEST or not all(map(math.isfinite, (x, y, right, far))):
+        raise UserError(f"{where}: {_shown(values)}: are not four finite numbers, none beyond {_FARTHEST:g}")
+    return x, y, right, far
+
+
+def _shown(values: Sequence[Any]) -> str:
+    return ", ".join(" ".join(str(value).split())[:_SHOWN] for value in values)

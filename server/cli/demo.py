@@ -1,0 +1,89 @@
+"""``myview demo``: everything on the embedded synthetic scene."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import tempfile
+import webbrowser
+from pathlib import Path
+
+import aiohttp
+import typer
+
+from server.cli.generated_config import demo_config, free_port
+from server.supervisor.startup_checks import check_port_free
+from server.supervisor.supervisor import Supervisor
+from server.system.processors import processors
+
+log = logging.getLogger(__name__)
+
+_PORT = 8080
+_RATES = {4: 25.0, 2: 12.5, 0: 6.25}
+"""Frames a second, by how many processors there are at least: drawing people, finding them, and a browser
+that decodes and paints without a graphics card take more than two at 25."""
+_POLL_S = 0.2
+_FIRST_BYTES = 4096
+"""More than the head of a stream: with so many bytes the first picture has come."""
+
+
+def rate_for(there: float) -> float:
+    """Give the frames a second that so many processors can do."""
+    return next(rate for least, rate in _RATES.items() if there >= least)
+
+
+async def run_demo(
+    port: int | None, seconds: float | None, *, open_browser: bool, fps: float | None = None
+) -> None:
+    """Run the demo until it is told to end, or for so many seconds; ``fps``: not what the machine can do.
+
+    Raises:
+        UserError: the port was asked for and is taken.
+    """
+    if port is not None:
+        check_port_free("127.0.0.1", port, "--port")
+    chosen = port or free_port(_PORT if port is None else 0)
+    there = processors()
+    with tempfile.TemporaryDirectory(prefix="myview-demo-") as folder:
+        path, config = demo_config(Path(folder), chosen, fps or rate_for(there))
+        typer.echo(_rate_line(config.site.fps, there))
+        supervisor = asyncio.create_task(Supervisor(path, config, {}, None).run())
+        invite = asyncio.create_task(_invite(f"http://127.0.0.1:{chosen}/", open_browser=open_browser))
+        try:
+            await asyncio.wait({supervisor}, timeout=seconds)
+            if supervisor.done():
+                await supervisor
+        finally:
+            for task in (invite, supervisor):
+                task.cancel()
+            await asyncio.gather(invite, supervisor, return_exceptions=True)
+
+
+def _rate_line(fps: float, there: float) -> str:
+    line = f"Three cameras at {fps:g} frames a second"
+    if fps != rate_for(there):
+        return line
+    have = f"{there:.3g} processor{'s' if there > 1 else ''}"
+    return f"{line}, which {have} can do (MYVIEW_SITE__FPS takes another rate)"
+
+
+async def _invite(url: str, *, open_browser: bool) -> None:
+    """Say where to look as soon as there is something to see."""
+    async with aiohttp.ClientSession() as session:
+        while not await _first_picture(session, url):  # noqa: ASYNC110 — another process: there is no event
+            await asyncio.sleep(_POLL_S)
+    typer.echo(f"MyView is ready: {url}   (Ctrl-C ends it)")
+    if open_browser:
+        await asyncio.to_thread(webbrowser.open, url)
+
+
+async def _first_picture(session: aiohttp.ClientSession, url: str) -> bool:
+    with contextlib.suppress(aiohttp.ClientError, TimeoutError, EOFError):
+        async with session.get(f"{url}api/objects") as answer:
+            objects = (await answer.json())["objects"]
+        if objects:
+            number = objects[0]["object"]
+            async with session.get(f"{url}objects/{number}/best.mp4") as stream:
+                return bool(await stream.content.readexactly(_FIRST_BYTES))
+    return False

@@ -1,0 +1,1 @@
+"""``myview doctor``: checks of a configuration against the machine and the cameras."""

@@ -1,0 +1,95 @@
+"""One camera, tried out: its source is opened, and some frames go the way that they go when the site runs."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, replace
+
+from server.camera.pipeline import CameraPipeline
+from server.camera.sources import SourceEnded
+from server.cli.doctor.stream_probe import Sent, fps_of, watch
+from server.config.camera_password import with_password
+from server.config.site_config import Config
+from server.config.source_address import SourceKind, kind_of
+from server.system.errors import UserError
+
+_FRAMES_S = 3.0
+"""Seconds of frames that are tried at most."""
+
+
+@dataclass(frozen=True, slots=True)
+class Probe:
+    """What became of it.
+
+    Attributes:
+        problem: why the camera cannot run; empty: it can.
+        sent: what a network camera sends; None: it is none.
+        size: width and height of its own pictures.
+        recorded_fps: pictures a second of a video file, as it says; None: it is none.
+        passes: its own H.264 passes through.
+        why_encoded: why it does not, where it could have.
+        frames: how many frames were tried.
+        kbps: what they take as the site streams them.
+        cores: processor cores that this camera takes at the site's rate.
+    """
+
+    problem: str = ""
+    sent: Sent | None = None
+    size: tuple[int, int] | None = None
+    recorded_fps: float | None = None
+    passes: bool = False
+    why_encoded: str = ""
+    frames: int = 0
+    kbps: float = 0.0
+    cores: float = 0.0
+
+
+def probe(config: Config, camera_id: str, seconds: float) -> Probe:
+    """Try a camera for so many seconds, after it has answered."""
+    sent = None
+    try:
+        config = with_password(config, camera_id)
+        camera = config.camera(camera_id)
+        kind = kind_of(camera.source)
+        if kind is SourceKind.STREAM:
+            sent = watch(camera.source, camera.options, seconds / 2, seconds)
+        pipeline = CameraPipeline(config, camera_id)
+    except UserError as error:
+        return Probe(str(error).removeprefix(f"camera {camera_id}: "), sent)
+    try:
+        tried = _tried(config, pipeline, sent, time.monotonic() + seconds / 2)
+        return replace(tried, recorded_fps=fps_of(camera.source) if kind is SourceKind.FILE else None)
+    finally:
+        pipeline.close()
+
+
+def _tried(config: Config, pipeline: CameraPipeline, sent: Sent | None, until: float) -> Probe:
+    fps, size = config.site.fps, pipeline.source.size
+    live = not pipeline.source.recorded
+    frames = units = 0
+    began = time.thread_time()
+    for pulse in range(pipeline.begins, pipeline.begins + max(1, round(_FRAMES_S * fps))):
+        try:
+            image = pipeline.take(pulse)
+        except SourceEnded:
+            break
+        if image is not None:
+            frames, units = frames + 1, units + len(pipeline.encode(pulse, image).data)
+            pipeline.track(pulse, image)
+        if time.monotonic() >= until:
+            break
+        if live:
+            time.sleep(1 / fps)
+    spent = time.thread_time() - began
+    decoding = sent.cpu_s if sent is not None else 0.0
+    each = 1 / max(1, frames)
+    return Probe(
+        problem="" if frames else "no picture came in the time that it was given",
+        sent=sent,
+        size=size,
+        passes=pipeline.passes,
+        why_encoded=pipeline.why_encoded,
+        frames=frames,
+        kbps=8 * units * each * fps / 1000,
+        cores=(spent * each + decoding) * fps,
+    )

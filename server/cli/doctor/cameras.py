@@ -1,0 +1,158 @@
+"""All cameras tried at once, each for so long; and what to say of each."""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from collections.abc import Mapping
+
+from server.camera.audio import open_sound
+from server.cli.doctor.camera_probe import Probe, probe
+from server.cli.doctor.findings import Finding, bad, mistake, ok, reason_of, warning
+from server.config.site_config import Config
+from server.config.source_address import SourceKind, is_device, kind_of
+from server.system.address_redaction import shown
+from server.system.errors import UserError
+
+_GRACE_S = 3.0
+"""What a busy machine takes longer than a camera was given."""
+_SAME_SPEED = 0.01
+"""Part by which a recording's rate may be off the site's without a word: 29.97 for 30."""
+_SAME_RATE = 0.1
+"""Part by which a camera's rate may be off the site's without a word."""
+
+
+def probe_all(config: Config, seconds: float) -> dict[str, Probe]:
+    """Try all cameras in parallel; one that has not answered in time says so."""
+    found: dict[str, Probe] = {}
+
+    def run(camera: str) -> None:
+        try:
+            found[camera] = probe(config, camera, seconds)
+        except OSError as error:
+            found[camera] = Probe(reason_of(error))
+        except Exception as error:  # noqa: BLE001 — of one camera; the others are still to be told of
+            found[camera] = Probe(mistake(error))
+
+    # Daemons: what hangs in a driver must not keep the doctor from ending.
+    threads = [threading.Thread(target=run, args=(it,), daemon=True) for it in config.camera_ids]
+    for thread in threads:
+        thread.start()
+    until = time.monotonic() + 2 * seconds + _GRACE_S
+    for thread in threads:
+        thread.join(max(0.0, until - time.monotonic()))
+    late = Probe(f"no answer within {2 * seconds + _GRACE_S:.0f} s{_while_busy()}")
+    return {camera: found.get(camera, late) for camera in config.camera_ids}
+
+
+def _while_busy() -> str:
+    """Say that the machine has more to do than it can, if so: then that may be why."""
+    load, cores = os.getloadavg()[0], os.cpu_count() or 1
+    return f", while the machine is busy with other things (load {load:.0f})" if load > 2 * cores else ""
+
+
+def sound_findings(config: Config) -> list[Finding]:
+    """Say whether the site's sound can be opened, where it has one."""
+    if config.sounding is None:
+        return []
+    try:
+        open_sound(config, config.sounding)
+    except UserError as error:
+        return [bad("sound", str(error).removeprefix("sound: "), "another file, or a camera that has sound")]
+    return [
+        ok("sound", f"{shown(str(config.sound.source))}: {config.sound.codec}, {config.sound.kbps} kbit/s")
+    ]
+
+
+def camera_findings(config: Config, probes: Mapping[str, Probe], *, runs: bool) -> list[Finding]:
+    """Say of each camera how it is; ``runs``: the site runs, and may hold a device that only one can have."""
+    found = [it for camera, probed in probes.items() for it in _of(config, camera, probed, runs=runs)]
+    return found + _shared(config)
+
+
+def _shared(config: Config) -> list[Finding]:
+    """Tell of devices that two cameras are to have."""
+    found, whose = [], dict[str, str]()
+    for it in config.cameras:
+        if is_device(it.source):
+            first = whose.setdefault(os.path.realpath(it.source), it.id)  # it has other names in /dev/v4l
+            if first != it.id:
+                text = f"{it.source} is camera {first}'s, too, and only one can have it"
+                found.append(bad(f"camera {it.id}", text, "a device of its own, or one camera less"))
+    return found
+
+
+def _of(config: Config, camera: str, found: Probe, *, runs: bool) -> list[Finding]:
+    check = f"camera {camera}"
+    if found.problem or found.size is None:
+        if runs:
+            do = "the site runs, and may have it to itself: see /api/cameras"
+            return [warning(check, found.problem, do)]
+        return [bad(check, found.problem, _remedy(config.camera(camera).source))]
+    parts = [f"{_size(found.size)} pixels"]
+    rate = found.recorded_fps if found.sent is None else found.sent.fps
+    if rate is not None:
+        parts.append(f"{rate:.1f} pictures a second")
+    how = "its own H.264 passes" if found.passes else f"{found.kbps:.0f} kbit/s"
+    parts += [how, f"{found.cores:.2f} of a core"]
+    return [ok(check, ", ".join(parts)), *_doubts(config, check, found)]
+
+
+def _remedy(source: str) -> str:
+    if is_device(source):
+        return "plug it in, let this user have it (group video), and end what else has it"
+    if kind_of(source) is SourceKind.STREAM:
+        return "try its source in ffplay; address, password, cable"
+    return "mend what the configuration says of it, or the file, which this user has to be able to read"
+
+
+def _doubts(config: Config, check: str, found: Probe) -> list[Finding]:
+    site, doubts = config.site, []
+    wide, high = found.size or (site.width, site.height)
+    if wide < site.width and high < site.height:
+        doubts.append(
+            warning(
+                check,
+                f"its pictures ({_size((wide, high))}) are smaller than the site's "
+                f"({_size((site.width, site.height))}), and are enlarged",
+                "lower site.width and site.height, or set the camera to a larger size",
+            )
+        )
+    rate = found.sent.fps if found.sent is not None else None
+    if rate is not None and rate < (1 - _SAME_RATE) * site.fps:
+        doubts.append(
+            warning(
+                check,
+                f"it sends {rate:.1f} pictures a second, the site takes {site.fps:g}: some are shown twice",
+                "set the camera to that rate, or lower site.fps",
+            )
+        )
+    recorded = found.recorded_fps
+    if recorded is not None and abs(recorded / site.fps - 1) > _SAME_SPEED:
+        some = "left out" if recorded > site.fps else "shown twice"
+        doubts.append(
+            warning(
+                check,
+                f"was recorded at {recorded:g} pictures a second, the site takes {site.fps:g}: "
+                f"some are {some}",
+                "set site.fps to that of most of the recordings",
+            )
+        )
+    if found.sent is not None and found.sent.damaged:
+        doubts.append(
+            warning(
+                check,
+                f"{found.sent.damaged} packets could not be decoded, {found.sent.pictures} pictures could",
+                "options: {rtsp_transport: tcp}, or a better network",
+            )
+        )
+    if found.why_encoded:
+        doubts.append(
+            warning(check, f"is encoded anew: {found.why_encoded}", "set the camera so, or h264: encode")
+        )
+    return doubts
+
+
+def _size(size: tuple[int, int]) -> str:
+    return "x".join(map(str, size))

@@ -1,0 +1,93 @@
+"""For how long a certificate is good, and for whom, as TLS itself sees it: by a handshake in this process."""
+
+from __future__ import annotations
+
+import ssl
+import time
+from pathlib import Path
+from typing import Any
+
+from server.cli.doctor.findings import Finding, bad, ok, warning
+
+_SOON_DAYS = 14
+_DAY_S = 86_400
+_NEW_ONE = "have a new one made; the running site takes it without a restart"
+_READABLE = "name another, or let this user read it"
+
+
+def certificate_finding(check: str, certificate: Path, key: Path) -> Finding:
+    """Say whether a certificate goes with its key, how long it is good, and for which hosts."""
+    for path in (certificate, key):
+        if unreadable := _unreadable(path):
+            return bad(check, f"{path}: cannot be read: {unreadable}", _READABLE)
+    try:
+        seen = handshake(certificate, key, certificate)
+    except ssl.SSLCertVerificationError as error:
+        return bad(check, f"{certificate}: {error.verify_message}", _NEW_ONE)
+    except (ssl.SSLError, OSError, ValueError) as error:
+        reason = getattr(error, "reason", None) or str(error)
+        return bad(check, f"{certificate} and {key} are no certificate and its key: {reason}", "both as PEM")
+    days = (ssl.cert_time_to_seconds(str(seen.get("notAfter"))) - time.time()) / _DAY_S
+    names = ", ".join(name for _, name in seen.get("subjectAltName", ()))
+    text = f"{certificate} is good for {days:.0f} days, for {names or 'no host: it has no subjectAltName'}"
+    return ok(check, text) if days >= _SOON_DAYS and names else warning(check, text, _NEW_ONE)
+
+
+def router_finding(check: str, certificate: Path, key: Path, authority: Path, host: str) -> Finding | None:
+    """Say why whoever connects to a host would not take its certificate; None: they would."""
+    try:
+        handshake(certificate, key, authority, host)
+    except ssl.SSLCertVerificationError as error:
+        text = f"{certificate}: who connects to {host} by {authority} refuses it: {error.verify_message}"
+        return bad(check, text, "one that this authority has signed for this host: docs/how-to/secure.md")
+    except (ssl.SSLError, OSError, ValueError):
+        pass  # which is said of the files
+    return None
+
+
+def authority_finding(check: str, authority: Path) -> Finding:
+    """Say whether the certificate by which others are known can be used."""
+    if unreadable := _unreadable(authority):
+        return bad(check, f"{authority}: cannot be read: {unreadable}", _READABLE)
+    try:
+        ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT).load_verify_locations(authority)
+    except (ssl.SSLError, OSError) as error:
+        reason = getattr(error, "reason", None) or error
+        return bad(check, f"{authority}: is no certificate: {reason}", "as PEM")
+    return ok(check, f"{authority} can be read")
+
+
+def handshake(certificate: Path, key: Path, trusted: Path, host: str | None = None) -> dict[str, Any]:
+    """Give what a client that trusts somebody, and looks for a host (None: whoever), learns of a server.
+
+    Raises:
+        ssl.SSLCertVerificationError: it does not go on.
+        ssl.SSLError, OSError, ValueError: the files are no certificate and its key.
+    """
+    server = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH)
+    server.load_cert_chain(certificate, key, password=_no_password)
+    trusting = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    trusting.check_hostname = host is not None
+    trusting.load_verify_locations(trusted)
+    trusting.verify_flags |= ssl.VERIFY_X509_PARTIAL_CHAIN
+    there, back = ssl.MemoryBIO(), ssl.MemoryBIO()
+    one = trusting.wrap_bio(back, there, server_side=False, server_hostname=host)
+    other = server.wrap_bio(there, back, server_side=True)
+    for side in (one, other, one, other):
+        try:
+            side.do_handshake()
+        except ssl.SSLWantReadError:
+            continue
+    return dict(one.getpeercert() or {})
+
+
+def _unreadable(path: Path) -> str:
+    try:
+        with path.open("rb"):
+            return ""
+    except OSError as error:
+        return error.strerror or str(error)
+
+
+def _no_password() -> str:
+    raise ValueError("the key has a password; write it without one")

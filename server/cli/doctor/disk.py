@@ -1,0 +1,129 @@
+"""Whether the disk takes what is to be recorded."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
+
+from server.cli.doctor.camera_probe import Probe
+from server.cli.doctor.findings import Finding, bad, ok, warning
+from server.config.site_config import Config
+from server.system.private_files import rights_of_others
+
+_INDEX_BYTES = 100
+"""A frame of a camera, beside its picture: docs/how-to/record.md."""
+_TRY_AGAIN = "try again when it answers; where encode.max_kbps is set, that is taken for its rate"
+
+
+def disk_findings(config: Config, probes: Mapping[str, Probe]) -> list[Finding]:
+    """Compare what `record` will take with what is free."""
+    folder = config.record.folder
+    if folder is None:
+        return [ok("record", "nothing is recorded")]
+    try:
+        there = _nearest(folder)
+        with tempfile.TemporaryFile(dir=there):
+            pass  # it has no name, so that nothing is left whatever happens
+    except OSError as error:
+        text = f"{_place(folder, error)}: cannot write there: {error.strerror}"
+        return [bad("record.folder", text, "another folder, or let this user write there")]
+    found = [_writable(folder)]
+    return found + _sizes(config, probes, shutil.disk_usage(there).free / 1e6, _held_bytes(folder) / 1e6)
+
+
+def _writable(folder: Path) -> Finding:
+    """Say that a folder can be written, and whether others may look into it: what is made in it is closed."""
+    text = f"{folder} can be written"
+    with suppress(OSError):  # it is not there yet, and is made for one user alone
+        if mode := rights_of_others(folder):
+            text += f", but has mode {mode}: others on this machine may see when it was recorded, not what"
+            return warning("record.folder", text, f"chmod 700 {folder}")
+    return ok("record.folder", text)
+
+
+def _sizes(config: Config, probes: Mapping[str, Probe], free: float, held: float) -> list[Finding]:
+    record, found = config.record, []
+    unknown = [camera for camera, it in probes.items() if _kbps(config, camera, it) is None]
+    guessed = [camera for camera, it in probes.items() if it.problem and camera not in unknown]
+    wanted = needed_mb(config, probes)
+    hours = _hours(record.keep_s)
+    kept = f"{hours} of these cameras take about {wanted:.0f} MB"
+    if unknown:
+        who = ", ".join(unknown)
+        kept = f"without {who}, whose rate is not known, {hours} of the cameras take about {wanted:.0f} MB"
+        if len(unknown) == len(probes):
+            kept = f"what {hours} of {who} take is not known"
+    if guessed:
+        kept += f", with {', '.join(guessed)} as encode.max_kbps allows"
+    if wanted > record.most_mb:
+        fits = f"{'at most' if unknown else 'about'} {_hours(record.keep_s * record.most_mb / wanted)}"
+        text = f"{kept}, but record.most_mb is {record.most_mb:.0f}: {fits} are kept"
+        found.append(warning("record.most_mb", text, "raise it, or lower record.keep_s"))
+    text = f"{kept}; {free:.0f} MB are free, and {held:.0f} MB are recorded already"
+    if min(wanted, record.most_mb) > free + held:
+        do = "lower record.keep_s or record.most_mb, or take a larger disk"
+        found.append(bad("disk", text, do))
+    else:
+        found.append(warning("disk", text, _TRY_AGAIN) if unknown else ok("disk", text))
+    return found
+
+
+def needed_mb(config: Config, probes: Mapping[str, Probe]) -> float:
+    """Give the megabytes that `record.keep_s` of the sound and of all cameras take whose rate is known."""
+    known = [it for camera, probe in probes.items() if (it := _kbps(config, camera, probe)) is not None]
+    kbps = sum(known) + (config.sound.kbps if config.sound.source is not None else 0)
+    index = 8 * _INDEX_BYTES * config.site.fps * len(known) / 1000
+    return (kbps + index) * config.record.keep_s / 8000
+
+
+def _kbps(config: Config, camera: str, probe: Probe) -> float | None:
+    """Give what a camera takes: at most `encode.max_kbps`, or else as much as when it was tried.
+
+    None: it was not, and its rate may be its own.
+    """
+    cap = config.encode.max_kbps
+    if probe.problem:
+        return cap if config.camera(camera).h264 == "encode" else None
+    return probe.kbps if cap is None or probe.passes else cap
+
+
+def _hours(seconds: float) -> str:
+    return f"{seconds / 3600:.1f} hours" if seconds >= 3600 else f"{seconds / 60:.0f} minutes"  # noqa: PLR2004
+
+
+def _nearest(folder: Path) -> Path:
+    """Give a folder, or where it will be made: the first above it that is there.
+
+    Raises:
+        OSError: nobody can tell.
+    """
+    for it in (folder.absolute(), *folder.absolute().parents):
+        with suppress(FileNotFoundError, NotADirectoryError):
+            it.lstat()  # `exists()` ends with an error, too, where one on the way cannot be entered
+            return it
+    return Path(folder.absolute().anchor)
+
+
+def _place(folder: Path, error: OSError) -> Path:
+    """Give where writing fails: the first on the way that is closed, or else the folder that was tried."""
+    if isinstance(error, PermissionError):
+        for it in reversed(folder.absolute().parents):
+            if not os.access(it, os.X_OK):
+                return it
+    with suppress(OSError):
+        return _nearest(folder)
+    return folder
+
+
+def _held_bytes(folder: Path) -> int:
+    """Add up all files in a folder, but those that a running site removes meanwhile."""
+    held = 0
+    for inside, _, names in os.walk(folder):
+        for name in names:
+            with suppress(OSError):
+                held += Path(inside, name).stat().st_size
+    return held

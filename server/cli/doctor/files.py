@@ -1,0 +1,131 @@
+"""The files that a configuration names: who may come, by which certificates, and where cameras stand."""
+
+from __future__ import annotations
+
+import stat
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from pathlib import Path
+
+from server.cli.doctor.certificates import authority_finding, certificate_finding, router_finding
+from server.cli.doctor.findings import Finding, bad, kept_apart, ok, warning
+from server.cli.doctor.reachability import place_of
+from server.config.password_file import read_users
+from server.config.pulse_passwords import SETTING, SHORTEST, pulse_clients
+from server.config.site_config import Config
+from server.config.tokens_file import read_tokens
+from server.supervisor.exposure_checks import check_bus, check_pulses, check_viewers
+from server.system.errors import UserError
+
+_LINES = "name:password, one a line, in a file that this user can read: docs/how-to/secure.md"
+
+
+def file_findings(config: Config) -> list[Finding]:
+    """Say of each file whether it can be used, and who else may read or write it."""
+    found: list[Finding] = []
+    for check, find in _checks(config):
+        with kept_apart(check, found):
+            found += find()
+    return found
+
+
+def _checks(config: Config) -> Iterator[tuple[str, Callable[[], list[Finding]]]]:
+    yield "access", lambda: _exposed(config)
+    yield "access.tokens", lambda: _tokens(config)
+    yield "ground", lambda: [_ground(config)]
+    yield "http.tls", lambda: _pair("http.tls", config.http.tls.certificate, config.http.tls.key)
+    yield "zenoh.tls", lambda: _bus(config)
+    if config.sync.users is not None:
+        yield SETTING, partial(_users, SETTING, config.sync.users, pulse_clients(config))
+    if config.zenoh.users is not None:
+        yield "zenoh.users", partial(_users, "zenoh.users", config.zenoh.users, config.camera_ids)
+    for camera in config.cameras:
+        if camera.password is not None:
+            yield f"camera {camera.id}", partial(_private, f"camera {camera.id}", camera.password)
+
+
+def _pair(check: str, certificate: Path | None, key: Path | None) -> list[Finding]:
+    if certificate is None or key is None:
+        return []
+    return [certificate_finding(check, certificate, key), *_private(f"{check}.key", key)]
+
+
+def _bus(config: Config) -> list[Finding]:
+    tls, there = config.zenoh.tls, place_of(config.zenoh.connect)
+    found = _pair("zenoh.tls", tls.certificate, tls.key)
+    if tls.authority is None:
+        return found
+    found.append(authority_finding("zenoh.tls", tls.authority))
+    if tls.certificate is not None and tls.key is not None and there is not None:
+        refused = router_finding("zenoh.tls", tls.certificate, tls.key, tls.authority, there[0])
+        found += [] if refused is None else [refused]
+    return found
+
+
+def _exposed(config: Config) -> list[Finding]:
+    found: list[Finding] = []
+    checks = [check_pulses, check_bus]
+    if config.access.tokens is None:  # else it is a matter of their file, of which its own line tells
+        checks.insert(0, check_viewers)
+    for check in checks:
+        try:
+            check(config)
+        except UserError as error:
+            found.append(bad("access", str(error)))
+    return found or [ok("access", "nobody is let in by accident")]
+
+
+def _tokens(config: Config) -> list[Finding]:
+    path = config.access.tokens
+    if path is None:
+        return []
+    try:
+        tokens = read_tokens(path)
+    except UserError as error:
+        return [bad("access.tokens", str(error), "`myview token NAME` prints a line for it")]
+    operators = sum(it.role == "operate" for it in tokens)
+    found = [ok("access.tokens", f"{path}: {len(tokens)} tokens, {operators} of them operate")]
+    if not tokens:
+        found = [warning("access.tokens", f"{path} lets nobody in", "`myview token NAME` makes one")]
+    if path.stat().st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+        found.append(
+            warning("access.tokens", f"others may write {path}: let themselves in", f"chmod 644 {path}")
+        )
+    return found
+
+
+def _users(check: str, path: Path, names: Sequence[str]) -> list[Finding]:
+    try:
+        users = read_users(path, check)
+    except UserError as error:
+        return [bad(check, str(error).removeprefix(f"{check}: "), _LINES)]
+    missing = [it for it in names if it not in users]
+    short = [name for name, password in users.items() if len(password) < SHORTEST]
+    found = [ok(check, f"{path}: {len(users)} users")]
+    if missing:
+        do = "a line for each, where the server runs; a camera's machine needs its own alone"
+        found = [warning(check, f"{path} has no line for {', '.join(missing)}", do)]
+    if short and check == SETTING:
+        text = f"{path}: less than {SHORTEST} characters are the passwords of {', '.join(short)}"
+        found = [bad(check, text, "`openssl rand -hex 32` makes one")]
+    return found + _private(check, path)
+
+
+def _private(check: str, path: Path) -> list[Finding]:
+    try:
+        open_to_others = path.stat().st_mode & (stat.S_IRWXG | stat.S_IRWXO)
+    except OSError:
+        return []  # that it cannot be read is said already
+    if not open_to_others:
+        return []
+    return [warning(check, f"others may read {path}, which is secret", f"chmod 600 {path}")]
+
+
+def _ground(config: Config) -> Finding:
+    without = [it.id for it in config.cameras if it.ground is None]
+    if not without:
+        return ok("ground", "all cameras know where they stand")
+    if len(without) == len(config.cameras):
+        return ok("ground", "no camera knows where it stands: people are told apart by looks alone")
+    do = "`myview calibrate`, or the operator's page"
+    return warning("ground", f"{', '.join(without)}: not in the file: known by looks alone", do)

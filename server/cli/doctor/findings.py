@@ -1,0 +1,103 @@
+"""What the doctor finds: one line for each check, how bad it is, and what to do."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from enum import Enum
+
+import msgspec
+from rich.console import Console
+from rich.markup import escape
+
+from server.system.address_redaction import shown, without_addresses
+from server.system.errors import UserError
+from server.system.printable import printable
+
+
+class Level(Enum):
+    """How bad it is."""
+
+    OK = "ok"
+    WARNING = "warning"
+    """The site runs, but not as it should."""
+    BAD = "bad"
+    """The site does not start, or a part of it is missing."""
+
+
+class Finding(msgspec.Struct, frozen=True):
+    """What one check found."""
+
+    check: str
+    level: Level
+    text: str
+    do: str = ""
+    """What to do about it; empty where nothing is to be done."""
+
+
+class Findings(msgspec.Struct, frozen=True):
+    """All of it: what ``--json`` prints."""
+
+    well: bool
+    """Nothing is bad."""
+    findings: list[Finding]
+
+
+def ok(check: str, text: str) -> Finding:
+    """Say that something is as it should be."""
+    return Finding(check, Level.OK, text)
+
+
+def warning(check: str, text: str, do: str) -> Finding:
+    """Say that something should be looked at."""
+    return Finding(check, Level.WARNING, text, do)
+
+
+def bad(check: str, text: str, do: str = "") -> Finding:
+    """Say that something does not work."""
+    return Finding(check, Level.BAD, text, do)
+
+
+def all_of(findings: Sequence[Finding]) -> Findings:
+    """Put findings together."""
+    return Findings(all(it.level is not Level.BAD for it in findings), list(findings))
+
+
+@contextmanager
+def kept_apart(check: str, found: list[Finding]) -> Iterator[None]:
+    """Let it be a finding, too, that a check fails itself: those of the others are still told."""
+    try:
+        yield
+    except (OSError, UserError) as error:
+        found.append(bad(check, reason_of(error), "mend that, and try again"))
+    except Exception as error:  # noqa: BLE001 — a mistake in one check is no reason to say nothing of the others
+        found.append(bad(check, mistake(error), "tell of it"))
+
+
+def reason_of(error: Exception) -> str:
+    """Give an error as a part of a line."""
+    if isinstance(error, OSError) and error.strerror:
+        return f"{shown(str(error.filename))}: {error.strerror}" if error.filename else error.strerror
+    return str(error)
+
+
+def mistake(error: Exception) -> str:
+    """Say that something failed that should not have; an address in what it says is left out."""
+    return f"a mistake in MyView: {type(error).__name__}: {without_addresses(str(error))}"
+
+
+_COLOURS = {Level.OK: "green", Level.WARNING: "yellow", Level.BAD: "red"}
+
+
+def show(it: Finding, width: int, console: Console) -> None:
+    """Print a line for a finding, with what to do behind an arrow; ``width`` is that of all checks' names."""
+    colour = _COLOURS[it.level]
+    do = f" → {it.do}" if it.do else ""
+    head = f"[{colour}]{it.level.value:7}[/{colour}] {escape(f'{it.check:{width}}')}"
+    console.print(f"{head}  {escape(printable(f'{it.text}{do}'))}", soft_wrap=True, highlight=False)
+
+
+def show_counts(findings: Findings, console: Console) -> None:
+    """Print how many there are of each level."""
+    counts = {level: sum(it.level is level for it in findings.findings) for level in Level}
+    console.print(", ".join(f"{count} {level.value}" for level, count in counts.items()), highlight=False)

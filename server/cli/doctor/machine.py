@@ -1,0 +1,122 @@
+"""Whether the clock is right, and whether the machine is large enough."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Mapping
+from pathlib import Path
+
+from camsync.messages import Challenge, Greeting
+from camsync.protocol import ProtocolError, parse_server_line
+from server.cli.doctor.camera_probe import Probe
+from server.cli.doctor.findings import Finding, ok, warning
+from server.config.site_config import Config
+from server.system.clock_sync import clock_is_kept
+from server.system.descriptors import places
+from server.system.processors import processors
+
+_FAR_S = 1.0
+_ANSWER_S = 2.0
+_SERVICE_CORES = 0.3
+"""The best view with a few cameras and viewers, and the pulse server; see docs/how-to/scale.md."""
+_FULL = 0.8
+"""Share of the cores above which a machine has nothing left for a busy scene."""
+_PROCESS_MB = 250
+"""A process without its pictures: its libraries, and what a tracker holds."""
+
+
+async def clock_findings(config: Config) -> list[Finding]:
+    """Say whether somebody keeps this machine's clock, and how far it is from the pulse server's."""
+    found = [_kept(config)]
+    offset = await _offset(config.sync.host, config.sync.port)
+    if offset is None:
+        found.append(ok("pulse server", "is not running: its clock cannot be compared"))
+    elif abs(offset) > _FAR_S:
+        text = f"its clock is {offset:+.1f} s off this machine's"
+        found.append(
+            warning("pulse server", text, "frames do not mind; logs and times of the past do: use NTP")
+        )
+    else:
+        found.append(ok("pulse server", f"its clock is {1000 * offset:+.0f} ms off this machine's"))
+    return found
+
+
+def machine_findings(config: Config, probes: Mapping[str, Probe]) -> list[Finding]:
+    """Compare what these cameras take with what this machine has, as if all of them ran here."""
+    cores = processors()
+    untried = [camera for camera, it in probes.items() if it.problem]
+    takes = sum(it.cores for it in probes.values()) + _SERVICE_CORES
+    who = "all cameras" if not untried else f"without {', '.join(untried)}, the cameras"
+    text = f"{who} and the best view take about {takes:.1f} of {cores:.3g} cores"
+    found = [
+        ok("processor", text)
+        if takes <= _FULL * cores
+        else warning(
+            "processor", text, "lower site.fps or detect.work_width, or put cameras on other machines"
+        )
+    ]
+    free = available_mb()
+    if free is not None:
+        site = config.site
+        pictures = 3 * site.width * site.height * config.track.backlog_s * site.fps / 1e6
+        needs = len(config.cameras) * (_PROCESS_MB + pictures) + 2 * _PROCESS_MB
+        text = f"takes up to {needs:.0f} MB while it is busy; {free:.0f} MB are free"
+        found.append(
+            ok("memory", text)
+            if needs <= free
+            else warning("memory", text, "a lower track.backlog_s, fewer cameras, or more memory")
+        )
+    return found
+
+
+def descriptor_findings(config: Config, descriptors: int) -> list[Finding]:
+    """Say how many connections and viewers the files let that a process may have open."""
+    wanted, most = config.http.connections, places(config, descriptors)
+    viewers = min(config.http.viewers_max, most)
+    has = f"{descriptors} may be open in a process that is started from here: {most} connections"
+    if viewers < config.http.viewers_max:
+        text = f"{has}, and so {viewers} viewers; http.viewers_max says {config.http.viewers_max}"
+    elif most < wanted:
+        text = f"{has}, {viewers} viewers among them; http.connections_max says {wanted}"
+    else:
+        return [ok("open files", f"{has} and {viewers} viewers fit")]
+    do = "a higher hard limit: ulimit -Hn, LimitNOFILE= of systemd, ulimits of compose; or lower settings"
+    return [warning("open files", text, do)]
+
+
+def available_mb() -> float | None:
+    """Give the memory that programs may still have, in megabytes; None where the system does not say."""
+    try:
+        lines = Path("/proc/meminfo").read_text(encoding="ascii").splitlines()
+    except OSError:
+        return None
+    kilobytes = next((it.split()[1] for it in lines if it.startswith("MemAvailable:")), None)
+    return None if kilobytes is None else int(kilobytes) * 1024 / 1e6
+
+
+def _kept(config: Config) -> Finding:
+    kept = clock_is_kept()
+    if kept is None:
+        return ok("clock", "the system does not say whether it is kept by NTP")
+    if kept:
+        return ok("clock", "is kept right (NTP)")
+    text, do = "nobody keeps it right (NTP)", "timedatectl set-ntp true, or chrony; frames do not mind"
+    if config.record.folder is not None and not config.record.trust_clock:
+        text += ": what is recorded does not get older while this machine is off"
+        do += ". Where the clock goes on by itself: record.trust_clock: true"
+    return warning("clock", text, do)
+
+
+async def _offset(host: str, port: int) -> float | None:
+    """Give the pulse server's clock minus ours by its greeting; None: it does not greet."""
+    try:
+        async with asyncio.timeout(_ANSWER_S):
+            asked = time.time()
+            reader, writer = await asyncio.open_connection(host, port)
+            line = await reader.readline()
+            writer.close()
+            said = parse_server_line(line.rstrip(b"\r\n"))
+    except (OSError, TimeoutError, ProtocolError, ValueError):
+        return None
+    return said.now - (asked + time.time()) / 2 if isinstance(said, Greeting | Challenge) else None

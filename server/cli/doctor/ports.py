@@ -1,0 +1,112 @@
+"""Whether the site's ports are free, or who has them."""
+
+from __future__ import annotations
+
+import errno
+import os
+
+import client
+from camsync import Login, SyncError, clients_of
+from server.cli.doctor.findings import Finding, bad, kept_apart, ok
+from server.config.pulse_passwords import pulse_clients, pulse_login
+from server.config.site_config import Config
+from server.supervisor.startup_checks import check_port_free
+from server.system.errors import UserError
+
+_END_IT = "end it, or take another port; if it is this site, set MYVIEW_TOKEN to a token of it"
+
+
+_ALL = frozenset({"0.0.0.0", "::"})  # noqa: S104 — it is not listened on
+
+
+async def port_findings(config: Config) -> tuple[list[Finding], bool]:
+    """Say of each port whether it is free; and whether this very site runs already."""
+    http, sync, zenoh = config.http, config.sync, config.zenoh
+    protocol, _, address = zenoh.listen.partition("/")
+    bus, _, bus_port = address.rpartition(":")
+    runs = False
+    found: list[Finding] = []
+    places: dict[str, tuple[str, int]] = {}
+    for check, host, port in (
+        ("http.port", http.host, http.port),
+        ("sync.port", sync.bind, sync.port),
+        ("zenoh.listen", bus.strip("[]"), int(bus_port) if bus_port.isdecimal() else 0),
+    ):
+        where = f"{host}:{port}"
+        if check == "zenoh.listen" and protocol not in {"tcp", "tls"}:
+            found.append(ok(check, f"{zenoh.listen} is tried when the site starts"))
+            continue
+        twice = [it for it, place in places.items() if _overlap(place, (host, port))]
+        places[check] = (host, port)
+        if twice:
+            found.append(bad(check, f"{where} is what {twice[0]} says, too", "a port for each"))
+            continue
+        with kept_apart(check, found):
+            taken = _taken(host, port, check)
+            if taken is None:
+                found.append(ok(check, f"{where} is free"))
+            elif isinstance(taken, str):
+                do = "an address of this machine, and a port that this user may have"
+                found.append(bad(check, taken, do))
+            else:
+                whose = runs if check == "zenoh.listen" else await _is_ours(config, check)
+                runs = runs or whose
+                here = f"{where} is taken"
+                found.append(
+                    ok(check, f"{here} by this very site, which runs")
+                    if whose
+                    else bad(check, f"{here} by something else", _END_IT)
+                )
+    return found, runs
+
+
+def _overlap(one: tuple[str, int], other: tuple[str, int]) -> bool:
+    """Tell whether two cannot be listened on by two processes of one machine."""
+    return one[1] == other[1] and (one[0] == other[0] or not _ALL.isdisjoint({one[0], other[0]}))
+
+
+def _taken(host: str, port: int, check: str) -> bool | str | None:
+    """Give None where a port is free, True where somebody has it, and else why it cannot be had."""
+    try:
+        check_port_free(host, port, check)
+    except UserError as error:
+        cause = error.__cause__
+        in_use = isinstance(cause, OSError) and cause.errno == errno.EADDRINUSE
+        return in_use or str(error).removeprefix(f"{check}: ")
+    return None
+
+
+async def _is_ours(config: Config, check: str) -> bool:
+    """Ask whoever has a port whether it is this site."""
+    if check == "sync.port":
+        host, login = _reached(config.sync.bind), _login(config)
+        try:
+            clients = {it.name for it in await clients_of(host, config.sync.port, login=login)}
+        except SyncError:
+            return False
+        return not clients.isdisjoint(pulse_clients(config))
+    scheme = "http" if config.http.tls.key is None else "https"
+    host = _reached(config.http.host)
+    url = f"{scheme}://[{host}]" if ":" in host else f"{scheme}://{host}"
+    token = os.environ.get("MYVIEW_TOKEN") or None
+    patience = client.HttpSettings(connect_timeout=2.0, read_timeout=3.0, retries=0, token=token)
+    try:
+        site = await client.site(f"{url}:{config.http.port}", patience)
+    except (client.ClientError, ValueError):
+        return False
+    return site.name == config.site.name and set(site.cameras) == set(config.camera_ids)
+
+
+def _login(config: Config) -> Login | None:
+    """Give what the pulse server knows somebody of this site by: on a camera's machine, that camera."""
+    for name in reversed(pulse_clients(config)):
+        try:
+            return pulse_login(config, name)
+        except UserError:
+            continue
+    return None
+
+
+def _reached(host: str) -> str:
+    """Give where somebody who listens on all addresses is reached from here."""
+    return {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)  # noqa: S104 — it is not listened on

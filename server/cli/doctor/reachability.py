@@ -1,0 +1,95 @@
+"""Whether cameras find the pulse server and the bus where the configuration sends them."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import socket
+
+from server.cli.doctor.findings import Finding, bad, kept_apart, ok, warning
+from server.config.site_config import Config
+
+_ANSWER_S = 3.0
+_ANYWHERE = frozenset({"0.0.0.0", "::"})  # noqa: S104 — it is compared, not listened on
+
+Place = tuple[str, int]
+"""Host and port."""
+
+
+async def way_findings(config: Config) -> list[Finding]:
+    """Say of each way whether it leads to who listens here, or to another machine that answers."""
+    sync, found = config.sync, list[Finding]()
+    ways = [("sync.host", (sync.host, sync.port), "sync.bind", (sync.bind, sync.port))]
+    connect, listen = place_of(config.zenoh.connect), place_of(config.zenoh.listen)
+    if connect is not None and listen is not None:
+        ways.append(("zenoh.connect", connect, "zenoh.listen", listen))
+    for check, there, setting, listens in ways:
+        with kept_apart(check, found):
+            found.append(await _way(check, there, setting, listens))
+    return found
+
+
+def place_of(endpoint: str) -> Place | None:
+    """Give host and port of a zenoh endpoint; None: it is of another kind."""
+    protocol, _, address = endpoint.partition("/")
+    host, _, port = address.rpartition(":")
+    return (host.strip("[]"), int(port)) if protocol in {"tcp", "tls"} and port.isdecimal() else None
+
+
+async def _way(check: str, there: Place, setting: str, listens: Place) -> Finding:
+    where = f"{there[0]}:{there[1]}"
+    try:
+        addresses = await _addresses(there[0])
+    except (socket.gaierror, TimeoutError, UnicodeError) as error:
+        reason = getattr(error, "strerror", None) or "no answer of who knows names"
+        return bad(
+            check, f"{where} cannot be found: {reason}", "the server's name or address, as seen from here"
+        )
+    here = any(map(_is_of_this_machine, addresses))
+    if here and there[1] == listens[1] and await _covers(listens[0], addresses):
+        return ok(check, f"{where} leads to {setting}")
+    away = await _refusal(there)
+    if not away:
+        return ok(check, f"{where} answers")
+    if here:
+        text = f"nobody is at {where}, where cameras look, and {setting} is {listens[0]}:{listens[1]}"
+        return bad(check, text, f"let it lead to {setting}, or {setting} be reached by it")
+    return warning(
+        check, f"{where} does not answer: {away}", "start the site there; or a firewall is between"
+    )
+
+
+async def _addresses(host: str) -> set[str]:
+    async with asyncio.timeout(_ANSWER_S):
+        found = await asyncio.get_running_loop().getaddrinfo(host, None, type=socket.SOCK_STREAM)
+    return {str(it[4][0]) for it in found}
+
+
+def _is_of_this_machine(address: str) -> bool:
+    with socket.socket(socket.AF_INET6 if ":" in address else socket.AF_INET) as probe:
+        try:
+            probe.bind((address, 0))
+        except OSError:
+            return False
+    return True
+
+
+async def _covers(host: str, addresses: set[str]) -> bool:
+    """Tell whether who listens at a host is reached by one of the addresses."""
+    try:
+        return host in _ANYWHERE or not addresses.isdisjoint(await _addresses(host))
+    except (socket.gaierror, TimeoutError, UnicodeError):
+        return False  # which is said of the port
+
+
+async def _refusal(there: Place) -> str:
+    """Say why nobody can be reached; empty: somebody is."""
+    try:
+        async with asyncio.timeout(_ANSWER_S):
+            _, writer = await asyncio.open_connection(*there)
+    except TimeoutError:
+        return f"nothing came within {_ANSWER_S:.0f} s"
+    except OSError as error:
+        return os.strerror(error.errno) if error.errno else str(error)
+    writer.close()
+    return ""

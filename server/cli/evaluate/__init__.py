@@ -1,0 +1,1 @@
+"""``myview evaluate``: tracks and view choices against ground truth."""

@@ -1,0 +1,128 @@
+"""The frames around each cut of somebody's best view, as the paper's Figs. 23 to 25 show them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from bestview import cuts_of
+from server.camera.sources import open_source
+from server.cli.evaluate.ground_truth import Truth
+from server.cli.evaluate.view_scores import Judged
+from server.cli.render.plots import new_figure, save_figure
+from server.cli.render.site_file import SiteFacts
+from server.cli.track.command import pictures
+from server.config.sections import Camera, Site
+
+MOST_CUTS = 12
+"""Cuts shown of one person: the first."""
+_AROUND_S = (-1.0, -0.5, 0.0, 0.5, 1.0)
+"""Seconds from the cut; the frame just before it is shown as well."""
+_WIDTH = 240
+"""Pixels across a picture in the strip."""
+_GREEN = (0, 200, 0)
+
+Image = NDArray[np.uint8]
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class _Shown:
+    """A frame of the best view: what a camera showed."""
+
+    camera: int
+    frame: int
+    """From 0."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Strip:
+    """The frames around one cut."""
+
+    cut: int
+    frames: tuple[_Shown, ...]
+
+
+def plot_strips(
+    folder: Path, truth: Truth, judged: Judged, facts: SiteFacts, videos: Mapping[str, Path]
+) -> None:
+    """Write `person-K.png` for everybody whose best view is cut; boxes are the ground truth's.
+
+    Raises:
+        UserError: a video cannot be read.
+    """
+    strips = {row: _strips(views, facts.fps) for row, views in enumerate(judged.views)}
+    wanted = {shown for found in strips.values() for strip in found for shown in strip.frames}
+    images: dict[_Shown, Image] = {}
+    for index, camera in enumerate(truth.cameras):
+        numbers = sorted(shown.frame for shown in wanted if shown.camera == index)
+        read = _read(videos[camera], facts, camera, numbers)
+        images |= {_Shown(index, number): image for number, image in read.items()}
+    for row, found in strips.items():
+        if found:
+            _plot(folder, row, found, truth, judged, images)
+
+
+def _strips(views: NDArray[np.int64], fps: float) -> list[_Strip]:
+    """Give the strips of (N,) views."""
+    strips = []
+    for cut in cuts_of(views)[:MOST_CUTS].tolist():
+        around = {cut - 1, *(cut + round(seconds * fps) for seconds in _AROUND_S)}
+        inside = [frame for frame in sorted(around) if 0 <= frame < len(views) and views[frame] >= 0]
+        strips.append(_Strip(cut, tuple(_Shown(int(views[frame]), frame) for frame in inside)))
+    return strips
+
+
+def _read(video: Path, facts: SiteFacts, camera: str, numbers: Sequence[int]) -> dict[int, Image]:
+    """Give frames of a camera's recording by number, in its own size."""
+    found: dict[int, Image] = {}
+    if not numbers:
+        return found
+    source = open_source(Camera(id=camera, source=str(video.absolute())), Site(fps=facts.fps))
+    wanted = set(numbers)
+    for number, image in pictures(source):
+        if number in wanted and image is not None:
+            found[number] = np.asarray(cv2.resize(image, facts.sizes[camera]), dtype=np.uint8)
+        if number >= numbers[-1]:
+            break
+    source.close()
+    return found
+
+
+def _plot(
+    folder: Path,
+    row: int,
+    strips: Sequence[_Strip],
+    truth: Truth,
+    judged: Judged,
+    images: Mapping[_Shown, Image],
+) -> None:
+    columns = max(len(strip.frames) for strip in strips)
+    figure = new_figure((2.2 * columns, 0.6 + 1.9 * len(strips)))
+    axes = figure.subplots(len(strips), columns, squeeze=False)
+    for axis in axes.ravel():
+        axis.set_axis_off()
+    for line, strip in zip(axes, strips, strict=True):
+        for axis, shown in zip(line, strip.frames, strict=False):
+            image = images.get(shown)
+            if image is not None:
+                axis.imshow(_with_box(image, truth.boxes[row, shown.frame, shown.camera]))
+            mark = ", cut" if shown.frame == strip.cut else ""
+            axis.set_title(f"{truth.cameras[shown.camera]}, frame {shown.frame + 1}{mark}", fontsize="small")
+    person = truth.people[row]
+    figure.suptitle(f"Person {person}, object {judged.objects.get(person, '-')}: frames around each cut")
+    save_figure(figure, folder / f"person-{person}.png")
+
+
+def _with_box(image: Image, box: NDArray[np.float64]) -> Image:
+    """Give a small picture, red green blue, with the (4,) box, which is NaN where there is none."""
+    scale = _WIDTH / image.shape[1]
+    small = cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+    if not np.isnan(box).any():
+        left, top, right, bottom = (round(float(side) * scale) for side in box)
+        cv2.rectangle(small, (left, top), (right, bottom), _GREEN, 2)
+    return np.asarray(cv2.cvtColor(small, cv2.COLOR_BGR2RGB), dtype=np.uint8)

@@ -1,0 +1,91 @@
+"""Who is where in truth, by all cameras together, and which objects are which people."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bestview import NOBODY, ViewTruth, stands_for, true_views
+from server.cli.render.video_info import Size
+from server.system.errors import UserError
+from tracking.evaluation import Recording
+from tracking.evaluation.frames import line_up
+from tracking.motchallenge import MotRow
+
+LEAST_SHOWN = 0.25
+"""The share of a person that has to show for a view to show them."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Truth:
+    """Everybody in every camera.
+
+    Attributes:
+        people: their K numbers in the ground truth, in order.
+        cameras: the names of C cameras.
+        boxes: (K, N, C, 4) left, top, right, bottom in pixels; NaN where somebody is not in the picture. Row
+            n is frame n + 1 of the files.
+        views: what each camera shows of whom, (K, N, C).
+    """
+
+    people: tuple[int, ...]
+    cameras: tuple[str, ...]
+    boxes: NDArray[np.float64]
+    views: ViewTruth
+
+
+def truth_of(
+    rows: Mapping[str, Sequence[MotRow]], sizes: Mapping[str, Size], least_shown: float = LEAST_SHOWN
+) -> Truth:
+    """Lay out the ground truth of several cameras that share their people's numbers.
+
+    Rows of confidence 0 do not count, as in `tracking.evaluation`.
+
+    Raises:
+        UserError: somebody is twice in one frame of a camera.
+    """
+    counted = {camera: [row for row in found if row.confidence != 0.0] for camera, found in rows.items()}
+    people = sorted({row.id for found in counted.values() for row in found})
+    last = max((row.frame for found in counted.values() for row in found), default=0)
+    place = {number: index for index, number in enumerate(people)}
+    boxes = np.full((len(people), last, len(counted), 4), np.nan)
+    shown = np.full(boxes.shape[:3], -1.0)
+    for camera, (name, found) in enumerate(counted.items()):
+        for row in found:
+            if not np.isnan(boxes[place[row.id], row.frame - 1, camera, 0]):
+                raise UserError(f"--gt: camera {name}: person {row.id} is twice in frame {row.frame}")
+            boxes[place[row.id], row.frame - 1, camera] = row.box
+            shown[place[row.id], row.frame - 1, camera] = row.visible
+    pictures = np.array([sizes[camera] for camera in counted], dtype=np.float64).reshape(-1, 2)
+    views = true_views(boxes, shown, pictures, least_shown)
+    return Truth(tuple(people), tuple(counted), boxes, views)
+
+
+def people_of_objects(
+    people: Sequence[int], recordings: Mapping[str, Recording], least_iou: float
+) -> dict[int, int]:
+    """Give the person that each object stands for, for objects that stand for somebody.
+
+    Raises:
+        ValueError: an id is twice in one frame of a camera, which the message names.
+    """
+    objects = sorted({row.id for it in recordings.values() for row in it.tracks})
+    person_at = {number: index for index, number in enumerate(people)}
+    object_at = {number: index for index, number in enumerate(objects)}
+    matches = np.zeros((len(people), len(objects)), dtype=np.int64)
+    for camera, it in recordings.items():
+        try:
+            frames = line_up(it.truth, it.tracks, least_iou)
+        except ValueError as error:
+            raise ValueError(f"{camera}: {error}") from None
+        for frame in frames:
+            for row, column in zip(*np.nonzero(frame.similarity >= least_iou), strict=True):
+                person, thing = int(frame.truth[row]), int(frame.tracks[column])
+                matches[person_at[person], object_at[thing]] += 1
+    standing = stands_for(matches).tolist()
+    return {
+        number: people[person] for number, person in zip(objects, standing, strict=True) if person != NOBODY
+    }

@@ -1,0 +1,70 @@
+"""Plots of judged choices: the camera over time beside the optimum's (the paper's Fig. 26)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from numpy.typing import NDArray
+
+from server.cli.evaluate.cut_strips import plot_strips
+from server.cli.evaluate.ground_truth import Truth
+from server.cli.evaluate.view_scores import Judged
+from server.cli.render.plots import new_figure, save_figure
+from server.cli.render.site_file import SiteFacts
+
+_ROW_INCHES, _WIDTH_INCHES = 1.1, 11.0
+_SEEN, _BEST, _CHOSEN = "#d9d9d9", "#d9822b", "#2a7f3f"
+_ABOVE = 0.16
+"""How far the choice lies above its camera's line and the optimum below."""
+
+
+def plot_views(
+    folder: Path, truth: Truth, judged: Judged, facts: SiteFacts, videos: Mapping[str, Path]
+) -> None:
+    """Write `choices.png`, and with videos `person-K.png` with the frames around each cut.
+
+    Raises:
+        UserError: a video cannot be read.
+    """
+    rows = [row for row, person in enumerate(truth.people) if person in judged.people]
+    figure = new_figure((_WIDTH_INCHES, 1.2 + _ROW_INCHES * len(rows)))
+    axes = figure.subplots(len(rows), 1, sharex=True, squeeze=False)[:, 0]
+    for axis, row in zip(axes, rows, strict=True):
+        person = truth.people[row]
+        _plot_person(axis, truth.views.visible[row], judged.views[row], judged.best[row], facts.fps)
+        axis.set_yticks(range(len(truth.cameras)), truth.cameras)
+        axis.set_ylim(-0.5, len(truth.cameras) - 0.5)
+        axis.set_ylabel(f"person {person}\nobject {judged.objects.get(person, '-')}")
+    axes[-1].set_xlabel("seconds")
+    axes[-1].set_xlim(0.0, judged.views.shape[1] / facts.fps)
+    lines = [Line2D([], [], color=colour, linewidth=4) for colour in (_CHOSEN, _BEST, _SEEN)]
+    figure.legend(lines, ["chosen", "optimum", "visible"], loc="upper right", ncols=3)
+    figure.suptitle("Camera chosen for each person", x=0.3)
+    save_figure(figure, folder / "choices.png")
+    if videos:
+        plot_strips(folder, truth, judged, facts, videos)
+
+
+def _plot_person(
+    axis: Axes,
+    visible: NDArray[np.bool_],
+    views: NDArray[np.int64],
+    best: NDArray[np.int64],
+    fps: float,
+) -> None:
+    """Draw where (N, C) cameras see somebody, and the (N,) cameras chosen and best."""
+    for camera in range(visible.shape[1]):
+        _bars(axis, visible[:, camera], camera - 0.35, 0.7, _SEEN, fps)
+        _bars(axis, best == camera, camera - _ABOVE - 0.1, 0.2, _BEST, fps)
+        _bars(axis, views == camera, camera + _ABOVE - 0.1, 0.2, _CHOSEN, fps)
+
+
+def _bars(axis: Axes, on: NDArray[np.bool_], bottom: float, height: float, colour: str, fps: float) -> None:
+    """Draw a bar over each run of frames that are on."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], on, [False]]).astype(np.int8)))
+    spans = [(float(begin) / fps, float(end - begin) / fps) for begin, end in edges.reshape(-1, 2)]
+    axis.broken_barh(spans, (bottom, height), color=colour, linewidth=0)

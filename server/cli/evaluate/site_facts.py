@@ -1,0 +1,74 @@
+"""What has to be known of a site to judge its choices: from the options, the videos or the rendering."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from server.cli.generated_config import camera_name
+from server.cli.render.site_file import SITE_FILE, SiteFacts, read_site
+from server.cli.render.video_info import Size, look_at, parse_size
+from server.config.sections import View
+from server.system.errors import UserError
+
+
+@dataclass(frozen=True, slots=True)
+class SiteOptions:
+    """What the command line says of the site; None where it says nothing."""
+
+    size: str | None = None
+    """WIDTHxHEIGHT of every camera's picture."""
+    fps: float | None = None
+    switch_cost_s: float | None = None
+
+
+def videos_by_camera(videos: Sequence[Path], cameras: Sequence[str]) -> dict[str, Path]:
+    """Give each camera's video: by name where the names are the cameras', else in their order.
+
+    Raises:
+        UserError: a camera has none.
+    """
+    named = {camera_name(path): path for path in videos}
+    if all(camera in named for camera in cameras):
+        return {camera: named[camera] for camera in cameras}
+    if len(videos) != len(cameras) or set(named) & set(cameras):
+        raise UserError(
+            f"--videos: give one for each of the cameras {', '.join(cameras)}, named like them or in "
+            "this order"
+        )
+    return dict(zip(cameras, videos, strict=True))
+
+
+def site_facts(
+    choices: Path, cameras: Sequence[str], videos: Mapping[str, Path], options: SiteOptions
+) -> SiteFacts:
+    """Give the facts; options go before videos, and these before the file that a rendering has of itself.
+
+    The rate is the rendering's before it is the videos': that is what its frames are counted by.
+
+    Raises:
+        UserError: the rate or a size is not known, or makes no sense.
+    """
+    beside = choices.with_name(SITE_FILE)
+    told = read_site(beside) if beside.exists() else None
+    sizes: dict[str, Size] = dict(told.sizes) if told else {}
+    fps = told.fps if told else None
+    for camera, path in videos.items():
+        seen = look_at(path)
+        sizes[camera], fps = seen.size, fps or seen.fps
+    if options.size is not None:
+        sizes = dict.fromkeys(cameras, parse_size(options.size))
+    fps = options.fps or fps
+    without = [camera for camera in cameras if camera not in sizes]
+    if without or fps is None:
+        what = f"the size of camera {without[0]}'s picture" if without else "the number of frames a second"
+        raise UserError(
+            f"--views: {what} is not known (there is no {SITE_FILE} of a rendering beside {choices}, or it "
+            "lacks it): give --size WIDTHxHEIGHT and --fps, or --videos"
+        )
+    if options.switch_cost_s is not None:
+        switch_cost_s = options.switch_cost_s
+    else:
+        switch_cost_s = told.switch_cost_s if told else View().switch_cost_s
+    return SiteFacts(fps, switch_cost_s, {camera: sizes[camera] for camera in cameras})

@@ -1,0 +1,99 @@
+"""``myview evaluate``: tracks against ground truth, each camera for itself and all as one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from server.cli.evaluate.file_pairing import pair_up
+from server.system.errors import UserError
+from tracking.motchallenge import MotRow, read_rows
+
+try:
+    from tracking.evaluation import HEADINGS, CameraScores, Recording, cells, evaluate_cameras
+except ModuleNotFoundError as missing:
+    if missing.name != "motrics":
+        raise
+    raise UserError("evaluate: needs a library for the scores: pip install 'myview[evaluate]'") from missing
+
+
+def read_recordings(tracks: Sequence[Path], truth: Sequence[Path]) -> dict[str, Recording]:
+    """Read files, or those of folders, in the pairs that :func:`pair_up` makes of them; by camera.
+
+    Raises:
+        UserError: there is nothing to compare, or a file is missing or malformed.
+    """
+    recordings = {}
+    for pair in pair_up(tracks, truth):
+        recording = Recording(truth=rows_of(pair.truth), tracks=rows_of(pair.tracks))
+        _check(recording, pair.tracks, pair.truth)
+        recordings[pair.camera] = recording
+    return recordings
+
+
+def evaluate_recordings(recordings: Mapping[str, Recording], least_iou: float) -> CameraScores:
+    """Score them.
+
+    Raises:
+        UserError: an id is twice in one frame of a camera.
+    """
+    try:
+        return evaluate_cameras(recordings, least_iou)
+    except ValueError as error:
+        raise UserError(str(error)) from error
+
+
+def print_table(scores: CameraScores) -> None:
+    """Print a row for each camera and, where there are several, one for their mean and one for all as one."""
+    # Without frame and colour, so that eighty columns are enough and a script can split it.
+    table = Table("camera", box=None, padding=(0, 1, 0, 0))
+    for heading in HEADINGS.values():
+        table.add_column(heading, justify="right", no_wrap=True)
+    for camera, found in scores.cameras.items():
+        table.add_row(camera, *cells(found, HEADINGS))
+    if len(scores.cameras) > 1:
+        table.add_row("mean, total", *cells(scores.mean, HEADINGS))
+        table.add_row("joint", *cells(scores.joint, HEADINGS))
+    console = Console(highlight=False)
+    console.print(table, width=max(console.width, console.measure(table).maximum))
+
+
+def content_of(scores: CameraScores) -> dict[str, Any]:
+    """Give all scores for a file; shares are in [0, 1]."""
+    return {
+        "cameras": {camera: asdict(found) for camera, found in scores.cameras.items()},
+        "mean": asdict(scores.mean),
+        "joint": asdict(scores.joint),
+    }
+
+
+def rows_of(path: Path) -> list[MotRow]:
+    """Read a MOTChallenge file.
+
+    Raises:
+        UserError: it cannot be read, or is malformed.
+    """
+    try:
+        return read_rows(path)
+    except OSError as error:
+        raise UserError(f"{path}: cannot be read: {error.strerror}") from error
+    except ValueError as error:
+        raise UserError(str(error)) from error
+
+
+def _check(recording: Recording, tracks: Path, truth: Path) -> None:
+    """Refuse truth that says nothing, and files of different frames."""
+    there = {row.frame for row in recording.truth if row.confidence != 0.0}
+    found = {row.frame for row in recording.tracks}
+    if not there:
+        raise UserError(f"{truth}: nobody is in it who counts (confidence, the seventh field, not 0)")
+    if found and not there & found:
+        raise UserError(
+            f"{tracks}: has no frame in common with {truth}: frames {min(found)} to {max(found)} here, "
+            f"{min(there)} to {max(there)} there (both count from 1)"
+        )

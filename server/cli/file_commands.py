@@ -1,0 +1,182 @@
+"""The commands that turn files into files.
+
+Each imports what it runs only when it runs, so that a process loads no more than it needs.
+"""
+
+from __future__ import annotations
+
+import logging
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from server.system.atomic_write import whole_folder
+from server.system.errors import UserError
+
+SEVERAL = {"render": ("--det",), "evaluate": ("--gt", "--tracks", "--videos")}
+"""Options by command that take several values after one flag (`server/cli/repeated_options.py`)."""
+
+OutFolder = Annotated[Path, typer.Option("--out", help="A new folder to write into.")]
+
+
+def render(
+    videos: Annotated[list[Path], typer.Argument(metavar="VIDEO…", help="One recorded view each.")],
+    out: OutFolder,
+    config: Annotated[Path | None, typer.Option("--config", help="Settings, and cameras by name.")] = None,
+    det: Annotated[
+        list[Path] | None,
+        typer.Option("--det", metavar="FILE…", help="Detections (MOTChallenge) instead, one file per view."),
+    ] = None,
+    ground: Annotated[Path | None, typer.Option("--ground", help="Homographies (JSON) per view.")] = None,
+) -> None:
+    """Render the best view of everybody in recorded views: videos, tracks, choices and plots."""
+    from server.cli.generated_config import config_for_videos
+    from server.cli.progress import bar, total_frames
+    from server.cli.render.renderer import render as render_views
+    from server.config.loader import read_content
+
+    logging.basicConfig(format="%(message)s", level=logging.WARNING)
+    base = read_content(config) if config else {}
+    loaded = config_for_videos(
+        videos,
+        base=base,
+        where=str(config or "myview render"),
+        folder=config.parent if config else Path(),
+        ground=ground,
+        detections=det or [],
+    )
+    with whole_folder(out) as folder, bar("frames") as progress:
+        task = progress.add_task("rendering", total=total_frames(videos, loaded.site.fps))
+        numbers = render_views(loaded, folder, lambda done: progress.update(task, completed=done))
+    who = ", ".join(map(str, numbers)) if numbers else "nobody"
+    typer.echo(f"{out}: best views of {len(numbers)} people ({who}), tracks, choices.csv and plots")
+
+
+def track(
+    out: Annotated[Path, typer.Option("--out", help="The file to write: MOTChallenge text.")],
+    video: Annotated[Path | None, typer.Argument(metavar="[VIDEO]", help="Not needed with --det.")] = None,
+    det: Annotated[Path | None, typer.Option("--det", help="Detections, MOTChallenge text.")] = None,
+    tracker: Annotated[
+        str | None, typer.Option(help="Which tracker; lp is MyView's, the network program.")
+    ] = None,
+    solver: Annotated[str | None, typer.Option(help="Which solver of the network program.")] = None,
+    config: Annotated[Path | None, typer.Option("--config", help="Settings of detector and tracker.")] = None,
+    template: Annotated[
+        list[str] | None,
+        typer.Option(metavar="LEFT,TOP,WIDTH,HEIGHT", help="A box in the first picture: follow that."),
+    ] = None,
+) -> None:
+    """Track everybody in one video, or in its detections alone, or what is shown with --template."""
+    if template:
+        if tracker is not None:
+            raise UserError("--template: has a tracker of its own; leave --tracker out")
+        _track_templates(out, video, det, solver, config, template)
+        return
+    from server.cli.progress import bar, total_frames
+    from server.cli.track.command import track_one
+
+    with bar("frames") as progress:
+        task = progress.add_task("tracking", total=total_frames([video]) if video else None)
+        count = track_one(
+            video,
+            det,
+            out,
+            config,
+            solver,
+            lambda done: progress.update(task, completed=done),
+            tracker,
+        )
+    typer.echo(f"{out}: {count} people")
+
+
+def _track_templates(
+    out: Path, video: Path | None, det: Path | None, solver: str | None, config: Path | None, boxes: list[str]
+) -> None:
+    from server.cli.progress import bar, total_frames
+    from server.cli.track.templates import boxes_from, track_templates
+
+    if video is None or det is not None:
+        raise UserError("--template: needs a video, and no --det")
+    found = boxes_from(boxes)
+    with bar("frames") as progress:
+        task = progress.add_task("tracking", total=total_frames([video]))
+        count = track_templates(
+            video, found, out, config, solver, lambda done: progress.update(task, completed=done)
+        )
+    typer.echo(f"{out}: {count} objects")
+
+
+def evaluate(
+    truth: Annotated[
+        list[Path],
+        typer.Option("--gt", metavar="FILE…", help="Ground truth: files, or a folder of one per camera."),
+    ],
+    tracks: Annotated[
+        list[Path] | None,
+        typer.Option("--tracks", metavar="FILE…", help="Tracks: as many files, or such a folder."),
+    ] = None,
+    views: Annotated[Path | None, typer.Option("--views", help="Choices of views: choices.csv.")] = None,
+    videos: Annotated[
+        list[Path] | None, typer.Option("--videos", metavar="FILE…", help="The views, for --plots.")
+    ] = None,
+    size: Annotated[str | None, typer.Option(help="WIDTHxHEIGHT of the cameras' pictures.")] = None,
+    fps: Annotated[float | None, typer.Option(min=0.01, max=1000.0, help="Frames per second.")] = None,
+    switch_cost: Annotated[
+        float | None,
+        typer.Option(min=0.0, max=3600.0, help="Seconds of not seeing somebody that a cut must save."),
+    ] = None,
+    visible: Annotated[
+        float, typer.Option(min=0.0, max=1.0, help="Share of somebody that shows where they are visible.")
+    ] = 0.25,
+    iou: Annotated[
+        float, typer.Option(min=0.01, max=1.0, help="Overlap from which a box is at a person.")
+    ] = 0.5,
+    json_file: Annotated[Path | None, typer.Option("--json", help="A file for the numbers, too.")] = None,
+    plots: Annotated[
+        Path | None, typer.Option("--plots", help="A new folder for plots of the choices.")
+    ] = None,
+) -> None:
+    """Score tracks (HOTA, MOTA, IDF1, identity switches) and choices of views against ground truth."""
+    from server.cli.evaluate.command import Asked
+    from server.cli.evaluate.command import evaluate as score
+    from server.cli.evaluate.site_facts import SiteOptions
+
+    site = SiteOptions(size, fps, switch_cost)
+    score(Asked(truth, tracks or [], views, videos or [], site, iou, visible, json_file, plots))
+
+
+def scene(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="room, gallery, overhead, court or fish.")],
+    out: OutFolder,
+    cameras: Annotated[
+        int | None, typer.Option(min=1, show_default="as many as suit the scene", help="How many look.")
+    ] = None,
+    objects: Annotated[
+        int | None, typer.Option(min=1, show_default="as many as suit the scene", help="People, or fish.")
+    ] = None,
+    seconds: Annotated[float, typer.Option(min=0.04, max=86400.0)] = 20.0,
+    seed: Annotated[int, typer.Option(min=0)] = 1,
+    size: Annotated[str, typer.Option(help="WIDTHxHEIGHT in pixels.")] = "640x360",
+    fps: Annotated[float, typer.Option(min=1.0, max=240.0)] = 25.0,
+) -> None:
+    """Write a synthetic multi-view recording with ground truth.
+
+    room: people come and go. gallery: cameras without a floor in common. overhead: people meet and part, seen
+    from straight above. court: two teams play. fish: nine that look the same, in a murky tank.
+    """
+    from server.cli.progress import bar
+    from server.cli.render.video_info import parse_size
+    from synthetic import Scene, has_ground, write_recording
+
+    try:
+        drawn = Scene(name, cameras, objects, seed, *parse_size(size), fps)
+        with bar("frames") as progress:
+            task = progress.add_task("drawing", total=None)
+            write_recording(
+                drawn, out, seconds, lambda done, total: progress.update(task, completed=done, total=total)
+            )
+    except (ValueError, OSError) as error:
+        raise UserError(str(error)) from error
+    views = "1 view" if drawn.cameras == 1 else f"{drawn.cameras} views"
+    typer.echo(f"{out}: {views}, gt/{' and ground.json' if has_ground(drawn) else ''}")

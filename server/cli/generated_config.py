@@ -1,0 +1,127 @@
+"""Configurations that are not in a file: for recordings named on the command line, and for the demo."""
+
+from __future__ import annotations
+
+import re
+import socket
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from server.cli.render.video_info import look_at
+from server.config.loader import build_config
+from server.config.site_config import Config
+from server.config.source_address import SourceKind, kind_of
+from server.system.address_redaction import shown
+from server.system.errors import UserError
+
+_NAME_CHARACTERS = 32
+
+DEMO: dict[str, Any] = {
+    "site": {"name": "demo", "fps": 25, "width": 640, "height": 360},
+    "cameras": [
+        {"id": f"c{number}", "source": f"scene:room?camera={number}&cameras=3&objects=4&seed=1"}
+        for number in range(3)
+    ],
+}
+"""The embedded synthetic scene; `configs/demo.yaml` says the same with every setting explained."""
+
+
+def config_for_videos(
+    videos: Sequence[Path],
+    *,
+    base: Mapping[str, Any] | None = None,
+    where: str = "myview render",
+    folder: Path = Path(),
+    ground: Path | None = None,
+    detections: Sequence[Path] = (),
+) -> Config:
+    """Give a configuration for recorded views, named after their files; each is played once.
+
+    ``base`` is the content of a configuration file (in ``folder``): its settings hold, and those of its
+    cameras with the same names. Without a site in it, the size is the first view's, and the rate that of the
+    first that has one: a folder of images has none.
+
+    Raises:
+        UserError: a view cannot be opened or never ends, two have one name, or something in the configuration
+            is wrong.
+    """
+    if detections and len(detections) != len(videos):
+        raise UserError(
+            f"--det: {len(detections)} detection files for {len(videos)} views; give one for each, in order"
+        )
+    content = dict(base or {})
+    known = {str(camera.get("id")): camera for camera in _cameras_of(content, where)}
+    for video in videos:
+        _check_recorded(video)
+    if "site" not in content:
+        content["site"] = _site_like(videos)
+    cameras = []
+    for number, video in enumerate(videos):
+        name = camera_name(video)
+        source = str(video.absolute())
+        camera = {**known.get(name, {}), "id": name, "source": source, "at_end": "stop"}
+        if detections:
+            camera["detections"] = str(detections[number].absolute())
+        cameras.append(camera)
+    content["cameras"] = cameras
+    if ground is not None:
+        content["ground"] = str(ground.absolute())
+    return build_config(content, where=where, folder=folder)
+
+
+def camera_name(video: Path) -> str:
+    """Give the name of a view: its file's, with a dash for whatever a camera's name cannot have."""
+    return re.sub(r"[^A-Za-z0-9_-]+", "-", video.stem).lstrip("-_")[:_NAME_CHARACTERS] or "view"
+
+
+def _check_recorded(video: Path) -> None:
+    if kind_of(str(video)) not in {SourceKind.FILE, SourceKind.FOLDER}:
+        raise UserError(f"{shown(str(video))}: is not a recorded video or a folder of images")
+    if not video.exists():
+        raise UserError(f"{shown(str(video))}: no such file or folder")
+
+
+def _cameras_of(content: Mapping[str, Any], where: str) -> list[dict[str, Any]]:
+    cameras = content.get("cameras") or []
+    if not isinstance(cameras, list) or not all(isinstance(camera, dict) for camera in cameras):
+        raise UserError(f"{where}: cameras: is a list of cameras, each with id and source")
+    return cameras
+
+
+def _site_like(videos: Sequence[Path]) -> dict[str, Any]:
+    """Take rate and size from views; a size that H.264 cannot store is rounded down by a pixel."""
+    first = look_at(videos[0])
+    width, height = first.size
+    rates = (first.fps, *(look_at(it).fps for it in videos[1:])) if first.fps is None else (first.fps,)
+    rate = next((fps for fps in rates if fps is not None), None)
+    said = {} if rate is None else {"fps": rate}
+    return {**said, "width": width - width % 2, "height": height - height % 2}
+
+
+def demo_config(folder: Path, port: int, fps: float) -> tuple[Path, Config]:
+    """Write the demo's configuration into a folder, on free ports; the environment goes before it."""
+    sync, bus = free_port(), free_port()
+    content = {
+        **DEMO,
+        "site": {**DEMO["site"], "fps": fps},
+        "sync": {"port": sync},
+        "zenoh": {"connect": f"tcp/127.0.0.1:{bus}", "listen": f"tcp/127.0.0.1:{bus}"},
+        "http": {"port": port},
+    }
+    path = folder / "demo.yaml"
+    path.write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
+    return path, build_config(content, where="demo", folder=folder)
+
+
+def free_port(preferred: int = 0) -> int:
+    """Give the preferred port if it is free, else any that is."""
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind(("127.0.0.1", preferred))
+        except OSError:
+            probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])

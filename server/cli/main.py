@@ -1,0 +1,128 @@
+"""The command line: one entry point, exit code 0, or one line that says what is wrong and another code."""
+
+from __future__ import annotations
+
+import atexit
+import errno
+import gc
+import os
+import signal
+import sys
+from importlib.metadata import version as version_of
+from typing import Annotated
+
+import typer
+
+from server.cli import file_commands, operation_commands, site_commands, token_commands, viewer_commands
+from server.cli.calibrate.command import calibrate
+from server.cli.repeated_options import one_value_per_flag
+from server.supervisor.shutdown import SUPERVISED, end_with_parent
+from server.system.address_redaction import shown
+from server.system.descriptors import raise_limit
+from server.system.errors import UserError
+from server.system.log_setup import say_failure
+
+app = typer.Typer(
+    help="MyView: pick a person; see them, live, from whichever camera sees them best.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+
+
+def _say_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"myview {version_of('myview')}")
+        raise typer.Exit
+
+
+@app.callback()
+def _myview(
+    version: Annotated[
+        bool,
+        typer.Option("--version", help="Say which version this is.", callback=_say_version, is_eager=True),
+    ] = False,
+) -> None:
+    """Take what is said before a command."""
+
+
+for run in (
+    site_commands.demo,
+    site_commands.up,
+    site_commands.sync,
+    site_commands.camera,
+    site_commands.bestview,
+    file_commands.render,
+    file_commands.track,
+    file_commands.evaluate,
+    file_commands.scene,
+    calibrate,
+    viewer_commands.watch,
+    operation_commands.doctor,
+    operation_commands.status,
+    token_commands.token,
+):
+    app.command()(run)
+
+_BAD_INPUT = UserError.code
+_INTERRUPTED = 130
+_NO_WAY = {errno.EACCES, errno.EPERM, errno.ENAMETOOLONG, errno.ELOOP}
+_TERMINATED = 143
+_told: list[int] = []
+"""SIGTERM, once it has come."""
+
+
+def _end(number: int, _: object) -> None:
+    _told.append(number)
+    sys.exit(_TERMINATED)
+
+
+def _was_cut_short(error: BaseException | None) -> bool:
+    """Tell whether an error comes of a call that a signal has cut short: it is no other than that signal."""
+    while error is not None:
+        if isinstance(error, OSError) and error.errno == errno.EINTR:
+            return True
+        error = error.__cause__ or error.__context__
+    return False
+
+
+def main() -> None:
+    """Run the command line; no traceback for bad input."""
+    # All memory goes with the process: to look for cycles in a thousand modules first takes half a second.
+    atexit.register(gc.freeze)
+    raise_limit()
+    if os.environ.get(SUPERVISED):
+        end_with_parent()
+    # So that what is half-written is tidied away; what runs until it is told to end writes nothing before it
+    # has its own handler, and until then ends at once.
+    if signal.getsignal(signal.SIGINT) == signal.SIG_DFL:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+    if signal.getsignal(signal.SIGTERM) == signal.SIG_DFL:
+        signal.signal(signal.SIGTERM, _end)
+    try:
+        app(args=one_value_per_flag(sys.argv[1:], file_commands.SEVERAL))
+    except KeyboardInterrupt:
+        sys.exit(_INTERRUPTED)
+    except Exception as error:  # noqa: BLE001 — said, or raised again
+        if _was_cut_short(error):
+            sys.exit(_TERMINATED if _told else _INTERRUPTED)
+        _fail(error)
+
+
+def _fail(error: Exception) -> None:
+    """Say in one line what is wrong, and end; what is a mistake here is raised again."""
+    if isinstance(error, UserError):
+        say_failure(str(error))
+        sys.exit(error.code)
+    if isinstance(error, BrokenPipeError):  # whoever read our output has gone, as by `… | head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(0)
+    if isinstance(error, OSError) and error.filename is not None and error.errno in _NO_WAY:
+        # Of a path that leads nowhere, wherever it is first looked into.
+        say_failure(f"{shown(str(error.filename))}: {error.strerror}")
+        sys.exit(_BAD_INPUT)
+    raise error
+
+
+if __name__ == "__main__":
+    main()

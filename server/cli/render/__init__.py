@@ -1,0 +1,1 @@
+"""``myview render``: recorded views processed offline, to files."""

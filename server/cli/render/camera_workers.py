@@ -1,0 +1,195 @@
+"""The offline way: the same classes as live, with a clock that waits for everybody."""
+
+from __future__ import annotations
+
+import logging
+import multiprocessing
+import queue
+import signal
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from multiprocessing.process import BaseProcess
+from multiprocessing.queues import Queue
+from typing import TypeAlias
+
+from server.camera.encoding.encoder import AccessUnit
+from server.camera.peers.cross_view_scorer import Heard
+from server.camera.pipeline import CameraPipeline, Searched
+from server.camera.sources import SourceEnded
+from server.cli.render.peer_pipes import Others, Pipes, Piping
+from server.config.site_config import Config
+from server.messaging.messages import CameraTracks, Found
+from server.supervisor.shutdown import end_at_once_again, end_with_parent, ending_later
+from server.system.errors import UserError
+
+log = logging.getLogger(__name__)
+
+_AHEAD = 8
+"""Batches a camera may be ahead of the others: bounds memory however long the recording is."""
+_POLL_S = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Batch:
+    """What one camera did up to the end of one epoch."""
+
+    camera: str
+    units: list[AccessUnit]
+    tracks: CameraTracks | None
+    ended: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Failure:
+    """Why a camera's worker ended before its recording."""
+
+    text: str
+    bad_input: bool
+
+
+Outbox: TypeAlias = "Queue[Batch | Failure]"
+
+
+class CameraWorkers:
+    """One process per camera; gives their batches in turn, so that all are at the same pulse.
+
+    Raises:
+        UserError: while iterating, when a camera's recording cannot be read.
+    """
+
+    def __init__(self, config: Config) -> None:
+        self._config = config
+        self._outboxes: dict[str, Outbox] = {}
+        self._processes: dict[str, BaseProcess] = {}
+
+    def start(self) -> None:
+        """Start all workers; a signal waits until each is known, so that :meth:`close` ends every one."""
+        context = multiprocessing.get_context("spawn")
+        piping = Piping({camera: self._config.witnesses(camera) for camera in self._config.camera_ids})
+        with ending_later():
+            for camera in self._config.camera_ids:
+                outbox: Outbox = context.Queue(_AHEAD)
+                with piping.of(camera) as pipes:
+                    process = context.Process(
+                        target=_work, args=(self._config, camera, outbox, pipes), name=camera, daemon=True
+                    )
+                    process.start()
+                self._outboxes[camera], self._processes[camera] = outbox, process
+
+    def __iter__(self) -> Iterator[Batch]:
+        running = dict(self._outboxes)
+        while running:
+            for camera in list(running):
+                batch = self._next(camera)
+                yield batch
+                if batch.ended:
+                    del running[camera]
+
+    def close(self) -> None:
+        """End all workers."""
+        for process in self._processes.values():
+            process.terminate()
+            process.join()
+
+    def _next(self, camera: str) -> Batch:
+        while True:
+            alive = self._processes[
+                camera
+            ].is_alive()  # before looking: its last word may still be on the way
+            try:
+                item = self._outboxes[camera].get(timeout=_POLL_S)
+            except queue.Empty:
+                if alive:
+                    continue
+                raise UserError(f"camera {camera}: its worker died") from None
+            if isinstance(item, Failure):
+                if item.bad_input:
+                    raise UserError(item.text)
+                raise RuntimeError(item.text)  # noqa: TRY004 — what failed was not an argument
+            return item
+
+
+def _work(config: Config, camera: str, outbox: Outbox, others: Pipes) -> None:
+    end_with_parent()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent, which ends its workers
+    end_at_once_again()
+    try:
+        pipeline = CameraPipeline(config, camera)
+        if pipeline.why_encoded:
+            log.warning("camera %s is encoded: its own H.264: %s", camera, pipeline.why_encoded)
+        for batch in run_camera(pipeline, camera, others):
+            outbox.put(batch)
+    except UserError as error:
+        outbox.put(Failure(str(error), bad_input=True))
+    except Exception as error:  # noqa: BLE001 — goes to the parent, which raises it
+        outbox.put(Failure(f"camera {camera}: {type(error).__name__}: {error}", bad_input=False))
+
+
+def run_camera(pipeline: CameraPipeline, camera: str, others: Others | None = None) -> Iterator[Batch]:
+    """Run a recording through a camera's pipeline, epoch by epoch, in step with the others."""
+    run = CameraRun(pipeline, camera)
+    while not run.ended:
+        word = run.search()
+        batch = run.follow(others.exchange(word) if others is not None and word is not None else ())
+        if batch is not None:
+            yield batch
+
+
+def run_cameras(pipelines: Mapping[str, CameraPipeline]) -> Iterator[Batch]:
+    """Run all cameras' recordings in this process, in step."""
+    runs = {camera: CameraRun(pipeline, camera) for camera, pipeline in pipelines.items()}
+    while runs:
+        words = {camera: run.search() for camera, run in runs.items()}
+        for camera, run in list(runs.items()):
+            said = [word for other, word in words.items() if other != camera and word is not None]
+            batch = run.follow(said)
+            if batch is not None:
+                yield batch
+            if run.ended:
+                del runs[camera]
+
+
+class CameraRun:
+    """One camera's recording, frame by frame: it is searched, and then everybody is followed."""
+
+    def __init__(self, pipeline: CameraPipeline, camera: str) -> None:
+        self._pipeline, self._camera = pipeline, camera
+        self._units: list[AccessUnit] = []
+        self._pulse = 0
+        self._searched: Searched | None = None
+        self.ended = False
+
+    def search(self) -> Found | None:
+        """Take, encode and search the next frame; give what the other cameras are told, if they are."""
+        try:
+            image = self._pipeline.take(self._pulse)
+        except SourceEnded:
+            self._searched = None
+            return self._pipeline.last_word(self._pulse)
+        if image is not None:
+            self._units.append(self._pipeline.encode(self._pulse, image))
+        self._searched = self._pipeline.search(self._pulse, image)
+        return self._searched.word
+
+    def follow(self, words: Sequence[Found]) -> Batch | None:
+        """Follow everybody into it, by what the others found, too; give what an epoch's end brings.
+
+        Raises:
+            UserError: the recording is over, and there was not one picture in it.
+        """
+        if self._searched is None:
+            return self._finish()
+        tracks = self._pipeline.follow(self._searched, Heard(tuple(words)))
+        self._pulse += 1
+        if tracks is None:
+            return None
+        units, self._units = self._units, []
+        return Batch(self._camera, units, tracks, ended=False)
+
+    def _finish(self) -> Batch:
+        self.ended = True
+        tracks = self._pipeline.finish(self._pulse)
+        self._pipeline.close()
+        if self._pulse <= max(0, self._pipeline.begins):
+            raise UserError(f"camera {self._camera}: there is not one picture in its recording")
+        return Batch(self._camera, self._units, tracks, ended=True)

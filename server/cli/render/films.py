@@ -1,0 +1,104 @@
+"""A file per person: the best view, spliced, from the first sighting to the last."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO
+
+from server.config.sections import Site
+from server.media.audio.audio_chunk import Heard
+from server.media.containers.mp4_audio import sound_fragment
+from server.media.stream_format import Agreement
+from server.service.streaming.audio_buffer import SoundShelf
+from server.service.streaming.frame_buffer import Shelf
+from server.service.streaming.media_chunk import Footage
+from server.service.streaming.streams import Gop, Showing
+from server.service.streaming.timeline import Timeline
+from server.service.view_selection.decider import GopDecision
+
+
+@dataclass(slots=True)
+class _Film:
+    file: BinaryIO
+    showing: Showing
+    origin: int
+    """The pulse that is at time 0."""
+    wanted: int
+    """Bytes up to the end of the last GOP in which the person was about."""
+    until: int
+    """The pulse after it."""
+
+
+class Films:
+    """Writes ``object-1.mp4`` (or ``.webm``) and so on; the fragments of the streams, begun at time 0.
+
+    ``sound`` is None where there is none.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        shelves: Mapping[str, Shelf],
+        agreement: Agreement,
+        site: Site,
+        sound: SoundShelf | None = None,
+    ) -> None:
+        folder.mkdir()
+        self._folder, self._shelves, self._agreement, self._site = folder, shelves, agreement, site
+        self._sound = sound
+        self._films: dict[int, _Film] = {}
+
+    @property
+    def numbers(self) -> list[int]:
+        """Everybody who has a film."""
+        return sorted(self._films)
+
+    def write(self, decision: GopDecision) -> None:
+        """Append one GOP to everybody's film."""
+        gop = Gop(self._shelves, decision.first, decision.frames, self._site.fps, 0, self._sound)
+        for choice in decision.choices:
+            film = self._films.get(choice.number)
+            if film is None and choice.camera is None:
+                continue
+            if film is None:
+                film = self._films[choice.number] = self._begin(choice.number, decision)
+            for footage in film.showing.show(choice.camera, gop):
+                self._write(film, footage)
+            if not choice.away:
+                film.wanted, film.until = film.file.tell(), decision.first + decision.frames
+
+    def close(self) -> None:
+        """Cut off what was shown after a person had left for good, and close the files."""
+        for film in self._films.values():
+            if not film.file.closed:
+                film.file.truncate(film.wanted)
+                film.file.seek(0)
+                film.file.write(self._head(film.until - film.origin))
+                film.file.close()
+
+    def _begin(self, number: int, decision: GopDecision) -> _Film:
+        file = (self._folder / f"object-{number}.{self._agreement.container}").open("wb")
+        file.write(self._head(0))
+        showing = Showing(Timeline(self._agreement, self._site.fps, decision.frames))
+        return _Film(file, showing, decision.first, file.tell(), decision.first)
+
+    def _write(self, film: _Film, footage: Footage) -> None:
+        if footage.heard is not None:
+            film.file.write(_begun_at(film.origin, footage.heard, self._site.fps))
+        for picture in footage.pictures:
+            film.file.write(self._agreement.begun_at(film.origin, picture.fragment, self._site.fps))
+
+    def _head(self, pulses: int) -> bytes:
+        sound = None if self._sound is None else self._sound.format
+        return self._agreement.head(self._site, sound, pulses=pulses) or b""
+
+
+def _begun_at(origin: int, heard: Heard, fps: float) -> bytes:
+    """Give sound as it is in a film that has this pulse at time 0; a frame that begins before is left out."""
+    form = heard.format
+    sample = round(origin * form.rate / fps)
+    early = max(0, -((heard.first * form.samples - sample) // form.samples))
+    first, frames = heard.first + early, heard.frames[early:]
+    return sound_fragment(form, frames, first, sample) if frames else b""

@@ -1,0 +1,86 @@
+"""What cameras tell each other offline: a pipe from each to each, and everybody waits for everybody."""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from multiprocessing.connection import Connection
+from typing import Protocol
+
+import msgspec
+
+from server.messaging.messages import Found
+
+_DECODER = msgspec.json.Decoder(Found)
+
+
+class Others(Protocol):
+    """The other cameras of one, as it is in step with them."""
+
+    def exchange(self, word: Found) -> Sequence[Found]:
+        """Tell them what was found in a frame; give what they found in it."""
+        ...
+
+
+@dataclass(slots=True)
+class Pipes:
+    """One camera's ends of the pipes, in the order of the configuration.
+
+    Nobody gets ahead of another by more than one frame, and two words fit into a pipe: telling never
+    waits for somebody who tells, too.
+    """
+
+    tell: dict[str, Connection] = field(default_factory=dict)
+    hear: dict[str, Connection] = field(default_factory=dict)
+
+    def exchange(self, word: Found) -> Sequence[Found]:
+        """Tell the others what was found in a frame; give what those who have not ended found in it."""
+        data = msgspec.json.encode(word)
+        for camera, connection in list(self.tell.items()):
+            try:
+                connection.send_bytes(data)
+            except OSError:  # it has ended, and closed its pipes
+                del self.tell[camera]
+        if word.ended:
+            return ()
+        return [said for camera in list(self.hear) if (said := self._hear(camera)) is not None]
+
+    def _hear(self, camera: str) -> Found | None:
+        try:
+            word = _DECODER.decode(self.hear[camera].recv_bytes())
+        except EOFError:  # it failed: whoever started it will say so
+            word = None
+        if word is None or word.ended:
+            del self.hear[camera]
+            return None
+        return word
+
+
+class Piping:
+    """Lays the pipes between cameras that are started one after the other.
+
+    Open are only those that somebody still has to be given: of very many cameras all would be too many.
+    """
+
+    def __init__(self, others: Mapping[str, Sequence[str]]) -> None:
+        self._others = others
+        self._laid: dict[str, Pipes] = {camera: Pipes() for camera in others}
+        self._given: set[str] = set()
+
+    @contextmanager
+    def of(self, camera: str) -> Iterator[Pipes]:
+        """Give the ends of a camera's pipes, while its process starts; they are its own from then on."""
+        own = self._laid[camera]
+        for other in self._others[camera]:
+            if other not in self._given:
+                theirs = self._laid[other]
+                own.hear[other], theirs.tell[camera] = multiprocessing.Pipe(duplex=False)
+                theirs.hear[camera], own.tell[other] = multiprocessing.Pipe(duplex=False)
+        try:
+            yield own
+        finally:
+            self._given.add(camera)
+            for connection in (*own.tell.values(), *own.hear.values()):
+                connection.close()

@@ -1,0 +1,113 @@
+"""``myview render``: the best view of everybody in recorded views, as files."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from pathlib import Path
+
+from server.cli.render.camera_workers import Batch, CameraWorkers
+from server.cli.render.films import Films
+from server.cli.render.plots import plot_choices, plot_tracks
+from server.cli.render.site_file import write_site
+from server.cli.render.soundtrack import Soundtrack
+from server.cli.render.video_info import Size
+from server.config.site_config import Config
+from server.media.codec import agreement_for
+from server.service.decision_files.recorder import Recorder
+from server.service.ingest.epoch_aligner import Aligner
+from server.service.streaming.frame_buffer import Shelf
+from server.service.view_selection.decider import Decider, GopDecision, homographies
+
+log = logging.getLogger(__name__)
+
+_BOOT = 0
+
+
+class Renderer:
+    """Runs recordings through the classes of the live system and writes what they decide."""
+
+    def __init__(self, config: Config, folder: Path) -> None:
+        cameras = config.camera_ids
+        self._config, self._folder = config, folder
+        # What is to be decided, and what the camera that was run first has done since.
+        frames = 4 * (config.view.lookahead + config.encode.gop + config.track.window.stride)
+        agreement = agreement_for(config)
+        self._shelves = {camera: Shelf(config.site.fps, frames, agreement) for camera in cameras}
+        self._aligner = Aligner(cameras, config.track.window.stride, grace=0)
+        for camera in cameras:
+            self._aligner.come(camera)
+        self._decider = Decider(
+            config, homographies(config), lambda camera, pulse: self._shelves[camera].has(pulse)
+        )
+        self._recorder = Recorder(folder, cameras, self._decider.people.fits)
+        self._soundtrack = Soundtrack(config)
+        shelf = self._soundtrack.shelf
+        self._films = Films(folder / "best", self._shelves, agreement, config.site, shelf)
+        self._sizes: dict[str, Size] = {}
+        self.ended: dict[str, int] = {}
+        """The last pulse of each camera whose recording is over."""
+        self.frames = 0
+
+    def take(self, batch: Batch) -> None:
+        """Take in what a camera did, and decide what can be decided."""
+        for unit in batch.units:
+            self._shelves[batch.camera].put(unit.pulse, _BOOT, unit.data, key=unit.key)
+            self._aligner.frame(batch.camera, _BOOT, unit.pulse)
+            self.frames += 1
+        if batch.tracks is not None:
+            self._aligner.tracks(batch.tracks)
+            self._sizes[batch.camera] = batch.tracks.size
+            if batch.ended:
+                self.ended[batch.camera] = batch.tracks.last
+        for epoch in self._aligner.ready(now=-1):
+            for decision in self._decider.step(epoch):
+                self._write(decision)
+
+    def finish(self) -> list[int]:
+        """Decide and write the rest; give everybody's number."""
+        for decision in self._decider.finish(max(self.ended.values())):
+            self._write(decision)
+        self.close()
+        write_site(self._folder, self._config, self._sizes)
+        plot_choices(self._folder / "choices.csv", self._config.camera_ids, self._folder / "choices.png")
+        for camera in self._config.camera_ids:
+            plot_tracks(self._folder / "tracks" / f"{camera}.txt", self._folder / "tracks" / f"{camera}.png")
+        return self._films.numbers
+
+    def close(self) -> None:
+        """Close all files; done by :meth:`finish`, too."""
+        self._recorder.close()
+        self._films.close()
+
+    def _write(self, decision: GopDecision) -> None:
+        self._recorder.write(decision)
+        self._soundtrack.read(decision.first, decision.first + decision.frames)
+        self._films.write(decision)
+
+
+def render(config: Config, folder: Path, progress: Callable[[int], None]) -> list[int]:
+    """Render into an existing folder; ``progress`` is told the frames done, all cameras together.
+
+    Raises:
+        UserError: a recording cannot be read.
+    """
+    renderer = Renderer(config, folder)
+    workers = CameraWorkers(config)
+    try:
+        workers.start()
+        for batch in workers:
+            renderer.take(batch)
+            progress(renderer.frames)
+        _say_if_unequal({camera: renderer.ended[camera] for camera in config.camera_ids})
+        return renderer.finish()
+    finally:
+        workers.close()
+        renderer.close()
+
+
+def _say_if_unequal(ended: dict[str, int]) -> None:
+    """Say once that views are of different length."""
+    if len(set(ended.values())) > 1:
+        lengths = ", ".join(f"{camera} with frame {last + 1}" for camera, last in ended.items())
+        log.warning("the views are of different length: %s; the shorter ones end first", lengths)

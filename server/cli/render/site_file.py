@@ -1,0 +1,68 @@
+"""`site.json`, beside `choices.csv`: what a rendering was made with, as far as judging it takes it."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from server.cli.render.video_info import Size
+from server.config.duplicate_keys import parse_json
+from server.config.site_config import Config
+from server.system.errors import UserError
+
+SITE_FILE = "site.json"
+
+
+@dataclass(frozen=True, slots=True)
+class SiteFacts:
+    """What has to be known of a site to judge its choices.
+
+    Attributes:
+        fps: frames per second.
+        switch_cost_s: lambda, in seconds of not seeing the person.
+        sizes: each camera's own picture.
+    """
+
+    fps: float
+    switch_cost_s: float
+    sizes: Mapping[str, Size]
+
+    @property
+    def switch_cost(self) -> float:
+        """Lambda in frames of not seeing the person."""
+        return self.switch_cost_s * self.fps
+
+
+def write_site(folder: Path, config: Config, sizes: Mapping[str, Size]) -> None:
+    """Write it."""
+    content = {
+        "fps": config.site.fps,
+        "gop": config.encode.gop,
+        "lookahead": config.view.lookahead,
+        "switch_cost_s": config.view.switch_cost_s,
+        "sizes": {camera: list(sizes[camera]) for camera in config.camera_ids},
+    }
+    (folder / SITE_FILE).write_text(json.dumps(content, indent=1) + "\n", encoding="ascii")
+
+
+def read_site(path: Path) -> SiteFacts:
+    """Read it.
+
+    Raises:
+        UserError: it cannot be read, or is none.
+    """
+    try:
+        content = parse_json(path.read_text(encoding="ascii"))
+        sizes = {str(name): (int(width), int(height)) for name, (width, height) in content["sizes"].items()}
+        facts = SiteFacts(float(content["fps"]), float(content["switch_cost_s"]), sizes)
+    except OSError as error:
+        raise UserError(f"{path}: cannot be read: {error.strerror}") from error
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
+        raise UserError(f"{path}: is not what `myview render` writes: {error}") from error
+    sensible = 0 < facts.fps < math.inf and 0 <= facts.switch_cost_s < math.inf
+    if not sensible or any(side <= 0 for size in sizes.values() for side in size):
+        raise UserError(f"{path}: a rate, a size or a cost in it makes no sense")
+    return facts

@@ -1,0 +1,41 @@
+"""The site's sound for films: of a recording, read as far as films are written."""
+
+from __future__ import annotations
+
+from server.camera.audio import RecordedSound, open_sound, runs
+from server.config.site_config import Config
+from server.messaging.messages import SoundHead
+from server.service.streaming.audio_buffer import SoundShelf
+
+_KEPT_S = 20.0
+_AHEAD_S = 1.0
+"""What an encoder, which gives whole frames, may hold back is less."""
+
+
+class Soundtrack:
+    """Fills a shelf. ``shelf`` is None where there is no sound, or none that is recorded.
+
+    Raises:
+        UserError: it cannot be opened.
+    """
+
+    def __init__(self, config: Config) -> None:
+        camera, form = config.sounding, config.sound.format
+        opened = None if camera is None else open_sound(config, camera)
+        self._sound = opened if isinstance(opened, RecordedSound) else None
+        self._fps = config.site.fps
+        self._begun = False
+        self.shelf = None
+        if form is not None and self._sound is not None:
+            self.shelf = SoundShelf(form, self._fps, _KEPT_S)
+
+    def read(self, first: int, until: int) -> None:
+        """Put what sounds at the pulses ``first … until - 1`` on the shelf; pulses must grow."""
+        if self._sound is None or self.shelf is None:
+            return
+        frames = [] if self._begun else self._sound.until(first)
+        self._begun = True
+        frames += self._sound.until(until + round(_AHEAD_S * self._fps))
+        for run in runs(frames):
+            head = SoundHead(first=run[0].number, sizes=[len(frame.data) for frame in run])
+            self.shelf.put(head, b"".join(frame.data for frame in run))

@@ -1,0 +1,50 @@
+"""What a recorded view says of its pictures: their size and rate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from server.camera.sources import Folder, Recording
+from server.system.errors import UserError
+
+Size = tuple[int, int]
+"""Width and height of a picture, pixels."""
+
+
+@dataclass(frozen=True, slots=True)
+class Recorded:
+    """A recorded view's pictures.
+
+    Attributes:
+        size: of each as it is shown: upright, with square pixels.
+        fps: frames a second; None of a folder of images, which does not say.
+    """
+
+    size: Size
+    fps: float | None
+
+
+def look_at(view: Path) -> Recorded:
+    """Look at a video or a folder of images.
+
+    Raises:
+        UserError: it cannot be opened, or there is not one picture in it.
+    """
+    if view.is_dir():
+        return Recorded(Folder(str(view), 0, "stop").size, None)
+    recording = Recording(str(view), quiet=True)
+    recording.close()
+    return Recorded(recording.size, recording.fps)
+
+
+def parse_size(text: str) -> Size:
+    """Read `WIDTHxHEIGHT`.
+
+    Raises:
+        UserError: it is not that.
+    """
+    width, _, height = text.partition("x")
+    if not (width.isdecimal() and height.isdecimal() and int(width) and int(height)):
+        raise UserError(f"--size: {text!r} is not WIDTHxHEIGHT, such as 640x360")
+    return int(width), int(height)

@@ -1,0 +1,119 @@
+"""The commands that run a site or a part of it.
+
+Each imports what it runs only when it runs, so that a process loads no more than it needs.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Coroutine
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from server.supervisor.shutdown import run_process
+from server.system.atomic_write import check_new_folder
+from server.system.errors import UserError
+from server.system.log_setup import log_to_stderr
+
+if TYPE_CHECKING:
+    from server.config.running_config import Running
+
+ConfigPath = Annotated[Path, typer.Argument(metavar="CONFIG", help="The site's configuration, a YAML file.")]
+_UP_LETS_GO_S = 1.9
+"""Those that it has started end before."""
+LogFolder = Annotated[
+    Path | None, typer.Option("--out", help="Write tracks and camera choices into this new folder.")
+]
+
+
+def _read(config: Path) -> Running:
+    """Read the configuration that a process runs by, which may be asked for again from then on.
+
+    Raises:
+        UserError: it cannot be read, or something in it is wrong.
+    """
+    from server.config.running_config import Running
+    from server.supervisor.sighup import mind_hang_ups
+
+    mind_hang_ups()
+    return Running(config)
+
+
+def sync(config: ConfigPath) -> None:
+    """Send frame pulses over TCP: one process of a site."""
+    from server.supervisor.sync_process import sync_process
+
+    log_to_stderr("sync")
+    running = _read(config)
+    run_process(lambda: sync_process(running))
+
+
+def camera(
+    config: ConfigPath, camera_id: Annotated[str, typer.Argument(metavar="ID", help="Which camera.")]
+) -> None:
+    """Run one camera: take, encode, track, publish: one process of a site."""
+    from server.supervisor.camera_process import camera_process
+    from server.system.niceness import be_nicer
+
+    log_to_stderr(camera_id)
+    running = _read(config)
+    if camera_id not in running.now.camera_ids:
+        raise UserError(
+            f"{config}: there is no camera {camera_id!r}; there are {', '.join(running.now.camera_ids)}"
+        )
+
+    def run() -> Coroutine[Any, Any, None]:
+        be_nicer(running.now.site.niceness)  # a supervisor has seen to that before
+        return camera_process(running, camera_id)
+
+    run_process(run)
+
+
+def bestview(config: ConfigPath, out: LogFolder = None) -> None:
+    """Choose, splice and serve: the page, the streams and the API of a site."""
+    from server.supervisor.bestview_process import bestview_process
+
+    log_to_stderr("bestview")
+    running = _read(config)
+    if out is not None:
+        check_new_folder(out)
+    run_process(lambda: bestview_process(running, out))
+
+
+def up(
+    config: ConfigPath,
+    port: Annotated[
+        int | None, typer.Option(min=0, max=65535, help="HTTP port, instead of the configuration's.")
+    ] = None,
+    out: LogFolder = None,
+) -> None:
+    """Run a whole site on this machine: every process, watched and restarted."""
+    from server.supervisor.site import check_exposed, run_up
+    from server.supervisor.startup_checks import check_ports, check_recordings
+
+    log_to_stderr("up")
+    environment = {} if port is None else {"MYVIEW_HTTP__PORT": str(port)}
+    os.environ.update(environment)
+    running = _read(config)
+    if out is not None:
+        check_new_folder(out)
+    check_exposed(running.now)
+    check_ports(running.now)
+    check_recordings(running.now)
+    run_process(lambda: run_up(running, environment, out), let_go_s=_UP_LETS_GO_S)
+
+
+def demo(
+    port: Annotated[int | None, typer.Option(min=0, max=65535, help="HTTP port; 8080 if it is free.")] = None,
+    seconds: Annotated[float | None, typer.Option(min=0, help="End by itself after this long.")] = None,
+    no_browser: Annotated[bool, typer.Option("--no-browser", help="Do not open a browser.")] = False,
+) -> None:
+    """Show the system at work on an embedded synthetic scene."""
+    from server.cli.demo import run_demo
+
+    log_to_stderr("demo")
+    run_process(
+        lambda: run_demo(port, seconds, open_browser=not no_browser), let_go_s=_UP_LETS_GO_S, hang_up=True
+    )

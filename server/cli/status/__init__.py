@@ -1,0 +1,1 @@
+"""``myview status``: the status of a running site in the terminal."""

@@ -1,0 +1,116 @@
+"""A site's status as a picture for the terminal."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import UTC, datetime
+
+from rich.console import Group, RenderableType
+from rich.markup import escape
+from rich.table import Table
+from rich.text import Text
+
+from client import CameraNow, PersonNow, ServiceNow, SiteNow
+from server.system.printable import printable
+
+_STATES = {"live": "green", "ended": "cyan", "starting": "yellow"}
+_MEGA = 1e6
+
+
+@dataclass(frozen=True, slots=True)
+class Rates:
+    """What two snapshots say together: None where there is only one, or another run between them."""
+
+    cores: float | None = None
+    bytes_s: float | None = None
+
+    @classmethod
+    def between(cls, before: SiteNow | None, after: SiteNow) -> Rates:
+        """Compare two snapshots by the server's clock."""
+        if before is None or before.service is None or after.service is None:
+            return cls()
+        seconds = after.now - before.now
+        if seconds <= 0 or before.service.began != after.service.began:
+            return cls()
+        one, other = before.service, after.service
+        return cls((other.cpu_s - one.cpu_s) / seconds, (other.sent_bytes - one.sent_bytes) / seconds)
+
+
+def picture(now: SiteNow, rates: Rates, notice: str = "") -> RenderableType:
+    """Show a site: a head, its cameras, its people; ``notice`` says what has happened to the connection."""
+    parts: list[RenderableType] = [_head(now)]
+    if now.service is not None:
+        parts.append(_service(now.service, rates))
+    if notice:
+        parts.append(Text(printable(notice), style="yellow"))
+    parts += [Text(), _cameras(now.cameras), Text(), _people(now.people)]
+    return Group(*parts)
+
+
+def _head(now: SiteNow) -> Text:
+    at = datetime.fromtimestamp(now.now, UTC).strftime("%H:%M:%S UTC")
+    pulse = "no pulse" if now.pulse is None else f"pulse {now.pulse}"
+    ready = (f"ready: {printable(now.why)}", "green")
+    if not now.ready:
+        ready = (f"not ready: {printable(now.why)}", "red")
+    return Text.assemble((printable(now.name), "bold"), f"  {at}  {pulse}  ", ready)
+
+
+def _service(service: ServiceNow, rates: Rates) -> Text:
+    kinds = ", ".join(f"{count} {kind}" for kind, count in service.viewers.items() if count)
+    waiting = ", ".join(f"{count} {queue}" for queue, count in service.waiting.items() if count)
+    parts = [
+        f"viewers: {kinds or 'none'}",
+        f"recording: {service.recorded_bytes / _MEGA:.0f} MB" if service.recording else "not recording",
+        f"{_ms(service.delay_s)} from pulse to viewer",
+        f"loop {_ms(service.lag_s)} late",
+        f"{service.memory_bytes / _MEGA:.0f} MB",
+    ]
+    if rates.cores is not None and rates.bytes_s is not None:
+        parts.append(f"{rates.cores:.2f} cores, {rates.bytes_s / _MEGA:.2f} MB/s out")
+    if waiting:
+        parts.append(f"waiting: {waiting}")
+    return Text(printable("; ".join(parts)))
+
+
+def _cameras(cameras: tuple[CameraNow, ...]) -> RenderableType:
+    heads = ("camera", "state", "fps", "pulse", "tracks", "missed", "shed", "late", "waiting", "certified")
+    table = Table(*heads, box=None, header_style="dim", pad_edge=False)
+    for column in table.columns:
+        column.no_wrap = True
+    words = []
+    for it in cameras:
+        table.add_row(
+            escape(printable(it.camera)),
+            Text(printable(it.state), style=_STATES.get(it.state, "red")),
+            f"{it.fps:.1f}",
+            _ms(it.sync_error_s),
+            _ms(it.tracking_delay_s),
+            str(it.missed),
+            str(it.shed),
+            str(it.late),
+            "-" if it.waiting is None else str(it.waiting),
+            "-" if it.certified is None else f"{100 * it.certified:.0f} %",
+        )
+        step = "" if it.in_step or it.state != "live" else "counts by itself"
+        words += [
+            Text(printable(f"{it.camera}: {said}"), style="yellow") for said in (it.message, step) if said
+        ]
+    return Group(table, *words)
+
+
+def _people(people: tuple[PersonNow, ...]) -> RenderableType:
+    if not people:
+        return Text("nobody is known", style="dim")
+    table = Table("person", "shown by", "for", "seen by", box=None, header_style="dim", pad_edge=False)
+    for person in people:
+        who = f"{person.object} {person.name}" if person.name else str(person.object)
+        since = "-" if person.since_s is None else f"{person.since_s:.0f} s"
+        seen = " ".join(person.cameras) or "nobody"
+        shown = [escape(printable(it)) for it in (who, person.camera or "-", since, seen)]
+        table.add_row(*shown, style="" if person.visible else "dim")
+    return table
+
+
+def _ms(seconds: float | None) -> str:
+    return "-" if seconds is None else f"{1000 * seconds:.0f} ms"

@@ -1,0 +1,47 @@
+"""The command that lets somebody in."""
+
+from __future__ import annotations
+
+import secrets
+from datetime import UTC, datetime
+from typing import Annotated
+
+import typer
+
+from server.system.errors import UserError
+
+_BYTES = 32
+
+
+def token(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="Whose it is: for people, and not secret.")],
+    operate: Annotated[
+        bool, typer.Option("--operate", help="They may operate, too, not only watch.")
+    ] = False,
+    number: Annotated[int | None, typer.Option("--object", min=1, help="They see this person alone.")] = None,
+    camera: Annotated[str | None, typer.Option("--camera", help="They see this camera alone.")] = None,
+) -> None:
+    """Print a new token, once, and the line that lets it in."""
+    import yaml
+    from pydantic import ValidationError
+
+    from server.config.tokens_file import Token, digest_of
+
+    given = secrets.token_urlsafe(_BYTES)
+    line = {"name": name, "sha256": digest_of(given), "role": "operate" if operate else "watch"}
+    limits = {"object": number, "camera": camera}
+    made = datetime.now(UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
+    content = {**line, **{key: it for key, it in limits.items() if it is not None}, "made": made}
+    try:
+        Token.model_validate(content)
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(map(str, first["loc"]))
+        said = first["msg"].removeprefix("Value error, ")
+        raise UserError(f"token: {f'{place}: ' if place else ''}{said}") from error
+    written = yaml.safe_dump(
+        content, default_flow_style=True, sort_keys=False, width=1000, allow_unicode=True
+    )
+    typer.echo(f"the token, which is not kept anywhere:\n  {given}\n")
+    typer.echo("the line that lets it in, for the file that access.tokens names, below 'tokens:'")
+    typer.echo(f"  - {written.strip()}")

@@ -1,0 +1,1 @@
+"""``myview track``: one video, or its detections, to MOTChallenge text."""

@@ -1,0 +1,158 @@
+"""``myview track``: one video, or just its detections, to MOTChallenge text."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from dataclasses import dataclass, replace
+from itertools import count
+from pathlib import Path
+
+import numpy as np
+
+from server.camera.background_warmup import ready_detector
+from server.camera.sources import Image, Source, SourceEnded, open_source
+from server.camera.tracker_setup import ready_tracker
+from server.cli.generated_config import config_for_videos
+from server.config.loader import build_config, read_content
+from server.config.site_config import Config
+from server.media.letterbox import Fit
+from server.system.atomic_write import whole_file
+from server.system.errors import UserError
+from tracking import Detections, Solver, WindowResult, create_solver, solver_names
+from tracking.baselines import Tracker, needs_pictures, tracker_names
+from tracking.detectors import MotFileDetector
+from tracking.motchallenge import MotRow, write_rows
+
+_NO_PICTURE = np.empty((0, 0, 3), dtype=np.uint8)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Frame:
+    """A frame of a recording, counted from 0; there is no picture where only detections are known."""
+
+    number: int
+    detections: Detections
+    image: Image | None
+
+
+def track_one(
+    video: Path | None,
+    det: Path | None,
+    out: Path,
+    config: Path | None,
+    solver: str | None,
+    progress: Callable[[int], None],
+    tracker: str | None = None,
+) -> int:
+    """Track and write; give the number of people.
+
+    Raises:
+        UserError: there is nothing to track in, something cannot be read or written, or no solver or
+            tracker has that name.
+    """
+    if video is None and det is None:
+        raise UserError("track: name a video, or its detections with --det, or both")
+    loaded = loaded_for(video, det, config)
+    frames = _from_detections(det) if video is None and det is not None else searched(loaded)
+    follower = _follower(loaded, _tracker_for(loaded, tracker, video), lambda: solver_for(loaded, solver))
+    rows: list[MotRow] = []
+    with whole_file(out, video, det) as draft:
+        for frame in frames:
+            rows += final_rows(follower.push(frame.number, frame.detections, frame.image))
+            progress(frame.number + 1)
+        rows += final_rows(follower.flush())
+        write_rows(draft, rows)
+    return len({row.id for row in rows})
+
+
+def _tracker_for(config: Config, name: str | None, video: Path | None) -> str:
+    """Give the tracker of that name, or the configuration's.
+
+    Raises:
+        UserError: there is none, or it looks at pictures and there are none.
+    """
+    if name is not None and name not in tracker_names():
+        raise UserError(f"--tracker: no tracker is called {name!r}; there are {', '.join(tracker_names())}")
+    chosen = name or config.track.tracker
+    if video is None and needs_pictures(chosen):
+        raise UserError(f"--tracker: {chosen} follows what pictures show: name a video, too")
+    return chosen
+
+
+def _follower(config: Config, name: str, solver: Callable[[], Solver]) -> Tracker:
+    """Give the tracker, which has looked ahead where it goes by pictures."""
+    camera = config.cameras[0]
+    if not needs_pictures(name):
+        return ready_tracker(config, name, camera, None, solver)
+    with closing(open_source(camera, config.site)) as source:
+        return ready_tracker(config, name, camera, source, solver)
+
+
+def solver_for(config: Config, name: str | None) -> Solver:
+    """Give the solver of that name, or the configuration's.
+
+    Raises:
+        UserError: there is none.
+    """
+    if name is not None and name not in solver_names():
+        raise UserError(f"--solver: no solver is called {name!r}; there are {', '.join(solver_names())}")
+    return create_solver(name or config.track.solver)
+
+
+def loaded_for(video: Path | None, det: Path | None, config: Path | None) -> Config:
+    """Give the configuration, with the video as its only camera."""
+    base = read_content(config) if config else {}
+    base.pop("ground", None)  # one camera needs no floor; the file may be what `myview calibrate` is to make
+    where, folder = str(config or "myview track"), config.parent if config else Path()
+    if video is not None:
+        return config_for_videos(
+            [video], base=base, where=where, folder=folder, detections=[] if det is None else [det]
+        )
+    nothing = {"id": "detections", "source": "scene:none"}  # a configuration has a camera; nobody opens it
+    return build_config({**base, "cameras": [nothing]}, where=where, folder=folder)
+
+
+def searched(config: Config) -> Iterator[Frame]:
+    """Give every frame of the video, and what is found in it, in its own pixels."""
+    camera = config.cameras[0]
+    source = open_source(camera, config.site)
+    fit = Fit(source.size, (config.site.width, config.site.height))
+    detector = ready_detector(config, camera, source, fit)
+    for number, image in pictures(source):
+        if image is not None:
+            found = detector.detect(fit.image(image), number)
+            yield Frame(number, replace(found, boxes=fit.boxes_to_own(found.boxes)), image)
+    source.close()
+
+
+def pictures(source: Source, first: int = 0) -> Iterator[tuple[int, Image | None]]:
+    """Give the frames of a recording from `first` to its end; `None` where one has no picture."""
+    for number in count(first):
+        try:
+            image = source.take(number)
+        except SourceEnded:
+            return
+        yield number, image
+
+
+def _from_detections(path: Path) -> Iterator[Frame]:
+    try:
+        detector = MotFileDetector(path)
+    except OSError as error:
+        raise UserError(f"--det: {path}: {error.strerror}") from error
+    except ValueError as error:
+        raise UserError(f"--det: {error}") from error
+    for number in range(detector.last + 1):
+        yield Frame(number, detector.detect(_NO_PICTURE, number), None)
+
+
+def final_rows(result: WindowResult | None) -> Iterator[MotRow]:
+    """Give the rows of the frames that are final now, moments in hiding included."""
+    if result is None:
+        return
+    for track in result.tracks:
+        for number in range(result.first, result.final_to + 1):
+            left, top, right, bottom = (float(side) for side in track.interpolated[number - result.first])
+            if not np.isnan(left):
+                yield MotRow(number + 1, track.id, left, top, right - left, bottom - top)

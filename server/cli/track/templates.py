@@ -1,0 +1,90 @@
+"""``myview track --template``: objects that are known by a picture of each, to MOTChallenge text."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from server.camera.sources import SourceEnded, open_source
+from server.cli.track.command import final_rows, loaded_for, pictures, solver_for
+from server.system.atomic_write import whole_file
+from server.system.errors import UserError
+from tracking import TemplateTracker
+from tracking.detectors import TemplateSettings
+from tracking.motchallenge import MotRow, write_rows
+
+_NUMBERS = 4
+
+
+def boxes_from(texts: Sequence[str]) -> NDArray[np.float64]:
+    """Read boxes given as ``LEFT,TOP,WIDTH,HEIGHT`` in pixels; give left, top, right, bottom, ``(n, 4)``.
+
+    Raises:
+        UserError: one of them is none.
+    """
+    boxes = []
+    for text in texts:
+        try:
+            numbers = [int(part) for part in text.split(",")]
+        except ValueError:
+            numbers = []
+        if len(numbers) != _NUMBERS or min(numbers[:2]) < 0 or min(numbers[2:]) < 1:
+            raise UserError(f"--template: {text!r} is not LEFT,TOP,WIDTH,HEIGHT in pixels")
+        left, top, width, height = numbers
+        boxes.append((left, top, left + width, top + height))
+    return np.array(boxes, dtype=np.float64).reshape(-1, _NUMBERS)
+
+
+def track_templates(
+    video: Path,
+    boxes: NDArray[np.float64],
+    out: Path,
+    config: Path | None,
+    solver: str | None,
+    progress: Callable[[int], None],
+) -> int:
+    """Follow what is in the boxes of the first picture and write; give the number of objects.
+
+    Raises:
+        UserError: a box is not in the picture, or something cannot be read or written.
+    """
+    loaded = loaded_for(video, None, config)
+    settings = loaded.track
+    source = open_source(loaded.cameras[0], loaded.site)
+    try:
+        image = source.take(0)
+        if image is None:
+            raise UserError(f"{video}: has no picture")
+        _check_inside(boxes, source.size)
+        tracker = TemplateTracker(
+            image, boxes, TemplateSettings(), settings.window, settings.costs, solver_for(loaded, solver)
+        )
+        rows = [
+            MotRow(1, number, left, top, right - left, bottom - top)
+            for number, (left, top, right, bottom) in enumerate(boxes.tolist(), 1)
+        ]
+        with whole_file(out, video) as draft:
+            for number, picture in pictures(source, 1):
+                if picture is not None:
+                    rows += final_rows(tracker.push(picture))
+                progress(number + 1)
+            rows += final_rows(tracker.flush())
+            write_rows(draft, rows)
+    except (SourceEnded, ValueError) as error:
+        raise UserError(f"{video}: {error}") from error
+    finally:
+        source.close()
+    return len(boxes)
+
+
+def _check_inside(boxes: NDArray[np.float64], size: tuple[int, int]) -> None:
+    width, height = size
+    for left, top, right, bottom in boxes.tolist():
+        if right > width or bottom > height:
+            raise UserError(
+                f"--template: {left:g},{top:g},{right - left:g},{bottom - top:g} is not inside the "
+                f"{width}x{height} picture"
+            )

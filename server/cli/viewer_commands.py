@@ -1,0 +1,41 @@
+"""The commands that watch somebody else's site.
+
+Each imports what it runs only when it runs, so that a process loads no more than it needs.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from server.supervisor.shutdown import run_until_told
+
+
+def watch(
+    url: Annotated[str, typer.Argument(metavar="URL", help="The server, e.g. http://localhost:8080")],
+    number: Annotated[
+        int | None, typer.Option("--object", help="Whom to watch; else all are listed.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option("--out", help="The file to record into.")] = None,
+    seconds: Annotated[float | None, typer.Option(min=0, help="Stop recording after this long.")] = None,
+    start: Annotated[
+        str | None,
+        typer.Option(
+            "--from", help="From when on: -60 (seconds back), p1250 (a pulse) or a time (ISO 8601)."
+        ),
+    ] = None,
+    end: Annotated[str | None, typer.Option("--to", help="Until when, likewise.")] = None,
+    token: Annotated[
+        str | None,
+        typer.Option(
+            envvar="MYVIEW_TOKEN", show_envvar=True, help="What lets in, if the server asks for it."
+        ),
+    ] = None,
+) -> None:
+    """List who is there, or watch or record somebody's best view."""
+    from server.cli.watch import run_watch
+
+    asyncio.run(run_until_told(lambda: run_watch(url, number, out, seconds, start, end, token)))

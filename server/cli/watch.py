@@ -1,0 +1,86 @@
+"""``myview watch``: who is there, or somebody's best view, shown as it comes or recorded."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from client import AwayError as ServerAway
+from client import ClientError, HttpSettings, Progress, objects, watch
+from server.system.atomic_write import check_new_file
+from server.system.errors import AwayError, UserError
+
+_TELL_EVERY_S = 1.0
+
+
+async def run_watch(
+    url: str,
+    number: int | None,
+    out: Path | None,
+    seconds: float | None,
+    start: str | None = None,
+    end: str | None = None,
+    token: str | None = None,
+) -> None:
+    """List who is there, or follow somebody.
+
+    Raises:
+        AwayError: the server cannot be reached.
+        UserError: it does not know them, or the file cannot be written.
+    """
+    if number is None and (out or seconds is not None or start or end):
+        raise UserError("watch: --out, --seconds, --from and --to are about somebody: say whom by --object")
+    if out is not None:
+        check_new_file(out)
+    settings, before = HttpSettings(token=token), _file_at(out)
+    try:
+        if number is None:
+            await _list(url, settings)
+            return
+        watched = await watch(url, number, out, seconds, _Teller(), start=start, end=end, settings=settings)
+    except ServerAway as error:
+        raise AwayError(f"watch: {error}") from error
+    except (ClientError, ValueError) as error:
+        raise UserError(f"watch: {error}") from error
+    except OSError as error:
+        kept = "; what was recorded before that is kept" if _file_at(out) != before else ""
+        raise UserError(f"{out}: cannot write there: {error.strerror}{kept}") from error
+    where = f" in {out}" if out else ""
+    typer.echo(f"object {number}: {watched.seconds:.1f} s, {watched.cuts} cuts{where}")
+    if not watched.complete:
+        raise AwayError("watch: the server went away before the end")
+
+
+def _file_at(out: Path | None) -> int | None:
+    """Return what the disk knows a file by; None where there is none."""
+    return out.stat().st_ino if out is not None and out.exists() else None
+
+
+async def _list(url: str, settings: HttpSettings) -> None:
+    table = Table("object", "visible", "shown by", "seen by", box=None)
+    for it in await objects(url, settings):
+        who = escape(f"{it.object} {it.name}") if it.name else str(it.object)
+        table.add_row(who, "yes" if it.visible else "no", it.camera or "-", " ".join(it.cameras))
+    Console().print(table)
+
+
+class _Teller:
+    """Says once a second how far it is, on standard error."""
+
+    def __init__(self) -> None:
+        self._told = 0.0
+
+    def __call__(self, progress: Progress) -> None:
+        now = time.monotonic()
+        if now - self._told >= _TELL_EVERY_S:
+            self._told = now
+            typer.echo(
+                f"{progress.seconds:6.1f} s  {progress.bytes / 1e6:6.2f} MB  "
+                f"camera {progress.camera or '-'}  {progress.cuts} cuts",
+                err=True,
+            )

@@ -1,0 +1,41 @@
+"""A camera's password from a file of its own: it then stands in no configuration that others read."""
+
+from __future__ import annotations
+
+from urllib.parse import quote
+
+from server.config.sections import Camera
+from server.config.site_config import Config
+from server.system.errors import UserError
+
+PLACE = "{password}"
+"""Where the password goes in an address."""
+
+
+def with_password(config: Config, camera_id: str) -> Config:
+    """Fill in one camera's password; only that camera's process needs the file.
+
+    Raises:
+        UserError: the file cannot be read, or is no line of text.
+    """
+    camera = config.camera(camera_id)
+    if camera.password is None:
+        return config
+    filled = camera.model_copy(update={"source": camera.source.replace(PLACE, _quoted(camera))})
+    cameras = [filled if it.id == camera_id else it for it in config.cameras]
+    return config.model_copy(update={"cameras": cameras})
+
+
+def _quoted(camera: Camera) -> str:
+    """Read the password, written as it may stand in an address."""
+    assert camera.password is not None  # noqa: S101 — it was asked for
+    where = f"cameras.{camera.id}.password: the file"  # not by its name: some write the password there
+    try:
+        text = camera.password.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "it is no text"
+        raise UserError(f"{where} that it names cannot be read: {reason}") from None
+    password = text.removesuffix("\n").removesuffix("\r")
+    if not password or not password.isprintable():
+        raise UserError(f"{where} that it names has to be one line, the password")
+    return quote(password, safe="")

@@ -1,0 +1,91 @@
+"""Keys that a mapping has twice: readers keep the last one, and drop the first without a word.
+
+Two sections ``access:``, pasted from two documents, would so lose the tokens, and let everybody in.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Hashable
+from typing import Any
+
+import yaml
+
+from server.config.values import shortened
+from server.system.address_redaction import shown
+
+_NO_VALUES = frozenset({"tag:yaml.org,2002:merge", "tag:yaml.org,2002:value"})
+"""Keys ``<<`` and ``=``, which stand for nothing but themselves."""
+_JSON_TOKEN = re.compile(r'("(?:[^"\\]|\\.)*")(\s*:)?|[{}]', re.DOTALL)
+"""In valid JSON quotes are of strings alone: each string is found as a whole. Group 2: it is a key."""
+
+
+class DuplicateKeyError(ValueError):
+    """A mapping has a key twice; the text says which, and in which lines."""
+
+    def __init__(self, key: str, first: int, second: int) -> None:
+        lines = f"lines {first} and {second}" if first != second else f"line {first}"
+        super().__init__(
+            f"{shortened(shown(key))!a} is there twice, in {lines}, and only the last would count: keep one, "
+            "with all that belongs to it"
+        )
+
+
+def check_yaml_keys(root: yaml.Node, value_of: Callable[[yaml.Node], Any]) -> None:
+    """Look that no mapping has a key twice; what merges (``<<``) bring may be said anew.
+
+    Keys are the same if they are written the same, or stand for the same: ``1``, ``"1"`` and ``0x1``.
+    ``value_of`` gives what a scalar stands for.
+
+    Raises:
+        DuplicateKeyError: one has.
+    """
+    left, seen = [root], set[int]()
+    while left:
+        node = left.pop()
+        if id(node) in seen:  # an alias
+            continue
+        seen.add(id(node))
+        if isinstance(node, yaml.SequenceNode):
+            left += reversed(node.value)
+        elif isinstance(node, yaml.MappingNode):
+            _check_yaml_mapping(node, value_of)
+            left += [it for pair in reversed(node.value) for it in reversed(pair)]
+
+
+def _check_yaml_mapping(node: yaml.MappingNode, value_of: Callable[[yaml.Node], Any]) -> None:
+    lines: dict[Hashable, int] = {}
+    for key, _ in node.value:
+        if not isinstance(key, yaml.ScalarNode):
+            continue  # who reads it refuses such a key
+        value = key.value if key.tag in _NO_VALUES else value_of(key)
+        line = key.start_mark.line + 1
+        forms: set[Hashable] = {key.value, str(value), value}
+        for form in forms & lines.keys():
+            raise DuplicateKeyError(key.value, lines[form], line)
+        lines |= dict.fromkeys(forms, line)
+
+
+def parse_json(text: str) -> Any:
+    """Parse JSON in which no object has a key twice.
+
+    Raises:
+        DuplicateKeyError: one has.
+        ValueError, RecursionError: it is no JSON that can be read, as :func:`json.loads` says it.
+    """
+    content = json.loads(text)
+    open_objects: list[dict[str, int]] = []
+    line, end = 1, 0
+    for token in _JSON_TOKEN.finditer(text):
+        line, end = line + text.count("\n", end, token.start()), token.start()
+        if token[0] == "{":
+            open_objects.append({})
+        elif token[0] == "}":
+            open_objects.pop()
+        elif token[2] is not None:
+            key, lines = json.loads(token[1]), open_objects[-1]
+            if key in lines:
+                raise DuplicateKeyError(key, lines[key], line)
+            lines[key] = line
+    return content

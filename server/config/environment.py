@@ -1,0 +1,80 @@
+"""What the environment says of the configuration, looked at before pydantic-settings reads it.
+
+It takes names in capitals and in small letters alike, keeps one of two, and drops what it does not know.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from typing import Any
+
+from server.config.duplicate_keys import DuplicateKeyError, parse_json
+from server.config.site_config import PREFIX, Config
+from server.system.errors import UserError
+
+_DELIMITER = "__"
+
+
+def check_environment(where: str) -> None:
+    """Look that the environment's words on settings are understood, and no two of them are on one setting.
+
+    Raises:
+        UserError: they are not, as in ``MYVIEW_HTP__PORT``, or two are; the text begins with ``where``.
+    """
+    variables: dict[tuple[str, ...], str] = {}
+    for name in sorted(os.environ):
+        place = _place(name)
+        if place is None:
+            continue
+        if place[0] not in Config.model_fields or (place[0] == "ground" and len(place) > 1):
+            raise UserError(f"{where}: environment: {name}: there is no section {place[0]!r}")
+        if place in variables:
+            raise UserError(f"{where}: environment: {_both(variables[place], name, place)}")
+        variables[place] = name
+    for place, name in variables.items():
+        try:
+            _parsed(os.environ[name])
+        except DuplicateKeyError as error:
+            raise UserError(f"{where}: environment: {name}: {error}") from error
+        for length in range(1, len(place)):
+            outer = variables.get(place[:length])
+            if outer is not None and _says(_parsed(os.environ[outer]), place[length:]):
+                raise UserError(f"{where}: environment: {_both(outer, name, place)}")
+
+
+def _place(name: str) -> tuple[str, ...] | None:
+    """Give the way to the setting that a variable is for; None: it is for none, as MYVIEW_LOG."""
+    if not name.upper().startswith(PREFIX):
+        return None
+    place = tuple(name[len(PREFIX) :].lower().split(_DELIMITER))
+    return place if len(place) > 1 or place[0] in Config.model_fields else None
+
+
+def _both(one: str, other: str, place: Sequence[str]) -> str:
+    return f"{one} and {other} both say {'.'.join(place)}: leave one out"
+
+
+def _parsed(text: str) -> Any:
+    """Parse a variable's value where it is JSON; else give it as it is.
+
+    Raises:
+        DuplicateKeyError: an object in it has a key twice.
+    """
+    try:
+        return parse_json(text)
+    except DuplicateKeyError:
+        raise
+    except (ValueError, RecursionError):
+        return text
+
+
+def _says(content: Any, place: Sequence[str]) -> bool:
+    """Tell whether a section's content has something at a place, or has no places at all."""
+    for key in place:
+        if not isinstance(content, dict):
+            return True
+        if key not in content:
+            return False
+        content = content[key]
+    return True

@@ -1,0 +1,229 @@
+"""From a YAML file to a :class:`Config`, or to one line that says what is wrong with it."""
+
+from __future__ import annotations
+
+import difflib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+from pydantic_settings import SettingsError
+
+from bestview import checked_homography, turns
+from server.config.duplicate_keys import DuplicateKeyError, parse_json
+from server.config.environment import check_environment
+from server.config.ground_unit import checked_unit
+from server.config.sections import Camera, View, Zenoh, ZenohTls
+from server.config.site_config import Config
+from server.config.source_address import resolved
+from server.config.values import check_camera_name, check_numbers, check_values, shortened
+from server.config.yaml_file import read_yaml
+from server.system.errors import UserError
+
+
+def load_config(path: Path) -> Config:
+    """Read a site's configuration; paths in it are relative to the file.
+
+    Raises:
+        UserError: the file cannot be read, or something in it is wrong.
+    """
+    return build_config(read_content(path), where=str(path), folder=path.parent)
+
+
+def read_content(path: Path) -> dict[str, Any]:
+    """Read a configuration file's sections, unchecked.
+
+    Raises:
+        UserError: it cannot be read, or is no mapping of sections.
+    """
+    content = read_yaml(path, "the configuration")
+    if not isinstance(content, dict) or not all(isinstance(section, str) for section in content):
+        raise UserError(f"{path}: a configuration is a mapping of sections, such as 'cameras:'")
+    return content
+
+
+def build_config(content: Mapping[str, Any], *, where: str, folder: Path) -> Config:
+    """Check a configuration's content, the environment's words on it, and what it refers to.
+
+    Raises:
+        UserError: something is wrong; the text begins with ``where``.
+    """
+    check_environment(where)
+    check_values(content, where)
+    try:
+        config = Config(**content)
+    except ValidationError as error:
+        raise UserError(_one_line(where, error)) from None  # its own words repeat keys as they are
+    except SettingsError as error:
+        raise UserError(f"{where}: environment: {error}; a list, or a whole section, must be JSON") from error
+    check_numbers(config.model_dump(), where)
+    return with_files(config, where=where, folder=folder)
+
+
+def with_files(config: Config, *, where: str, folder: Path) -> Config:
+    """Read the ground that a configuration names, and resolve all its paths.
+
+    Raises:
+        UserError: the ground cannot be read, or is wrong; the text begins with ``where``.
+    """
+    homographies, unit = _homographies(folder / config.ground, where) if config.ground else ({}, None)
+    try:
+        cameras = [_resolved(camera, homographies, unit, folder) for camera in config.cameras]
+        _one_side(cameras)
+    except ValueError as error:
+        raise UserError(f"{where}: {error}") from error
+    onnx = replace(config.detect.onnx, model=config.detect.model_in(folder))
+    detect = replace(config.detect, onnx=onnx)
+    sound = config.sound
+    if sound.source is not None and sound.source not in config.camera_ids:
+        sound = sound.model_copy(update={"source": resolved(sound.source, folder)})
+    record = config.record
+    if record.folder is not None:
+        record = record.model_copy(update={"folder": folder / record.folder})
+    update = {"cameras": cameras, "detect": detect, "sound": sound, "record": record}
+    return config.model_copy(update={**update, **_who_may(config, folder)})
+
+
+def _who_may(config: Config, folder: Path) -> dict[str, Any]:
+    """Resolve the paths of the files of tokens, passwords and certificates."""
+    access, tls = config.access, config.http.tls
+    if access.tokens is not None:
+        access = access.model_copy(update={"tokens": folder / access.tokens})
+    if tls.certificate is not None and tls.key is not None:
+        files = {"certificate": folder / tls.certificate, "key": folder / tls.key}
+        tls = tls.model_copy(update=files)
+    return {
+        "access": access,
+        "http": config.http.model_copy(update={"tls": tls}),
+        "sync": config.sync.model_copy(update={"users": _users(config.sync.users, folder)}),
+        "zenoh": _bus_files(config.zenoh, folder),
+    }
+
+
+def _bus_files(zenoh: Zenoh, folder: Path) -> Zenoh:
+    named = {name: getattr(zenoh.tls, name) for name in ZenohTls.model_fields}
+    tls = ZenohTls(**{name: None if it is None else (folder / it).absolute() for name, it in named.items()})
+    return zenoh.model_copy(update={"tls": tls, "users": _users(zenoh.users, folder)})
+
+
+def _users(path: Path | None, folder: Path) -> Path | None:
+    return None if path is None else (folder / path).absolute()
+
+
+def changed_view(view: View, changes: Mapping[str, Any], where: str) -> View:
+    """Give the settings of the choice with some of them changed, checked as those of a file are.
+
+    Raises:
+        UserError: something is wrong; the text begins with ``where``.
+    """
+    check_values(changes, where)
+    try:
+        return View.model_validate(_merged(view.model_dump(), changes))
+    except ValidationError as error:
+        raise UserError(_one_line(where, error, ("view",))) from None
+
+
+def _merged(content: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Give the content with changes to it, section by section."""
+    merged = dict(content)
+    for key, value in changes.items():
+        inner = merged.get(key)
+        merged[key] = _merged(inner, value) if isinstance(inner, dict) and isinstance(value, dict) else value
+    return merged
+
+
+def _resolved(camera: Camera, homographies: Mapping[str, Any], unit: str | None, folder: Path) -> Camera:
+    """Make paths absolute and fill in the ground homography from the file for all cameras, and its unit."""
+    ground, ground_unit = camera.ground, camera.ground_unit
+    if ground is None:
+        ground, ground_unit = homographies.get(camera.id), ground_unit or unit
+    detections = folder / camera.detections if camera.detections else None
+    update = {
+        "ground": ground,
+        "ground_unit": ground_unit,
+        "source": resolved(camera.source, folder),
+        "password": folder / camera.password if camera.password else None,
+        "detections": detections,
+    }
+    return camera.model_copy(update=update)
+
+
+def _one_side(cameras: Sequence[Camera]) -> None:
+    """Refuse homographies of which one sees the floor as from above and another as from below.
+
+    Raises:
+        ValueError: there are such.
+    """
+    sides = {it.id: turns(np.array(it.ground, dtype=np.float64)) for it in cameras if it.ground is not None}
+    ways = [[camera for camera, side in sides.items() if side == way] for way in (1, -1)]
+    fewer, others = sorted(ways, key=len)
+    if fewer:
+        raise ValueError(
+            f"ground: camera {fewer[0]} has the floor mirrored against camera {others[0]}: one of them has "
+            "its horizon below the floor, as if tilted past straight down, or its axes exchanged"
+        )
+
+
+def _homographies(path: Path, where: str) -> tuple[dict[str, list[list[float]]], str | None]:
+    """Read ``{"unit": "m", "homography": {"c0": [[…], […], […]]}}``; the unit may be left out.
+
+    Raises:
+        UserError: it cannot be read, a matrix in it is not an invertible 3x3, or the unit is not understood.
+    """
+    try:
+        content = parse_json(path.read_text(encoding="utf-8"))
+        matrices = dict(content["homography"].items())
+    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+        raise UserError(f"{where}: ground: cannot read {path}: {_reason(error)}") from error
+    except DuplicateKeyError as error:
+        raise UserError(f"{where}: ground: {path}: {error}") from error
+    except (KeyError, TypeError, AttributeError, ValueError, RecursionError) as error:
+        raise UserError(f'{where}: ground: {path} has no {{"homography": {{camera: 3x3}}}}') from error
+    for camera_id, matrix in matrices.items():
+        check_camera_name(camera_id, f"{where}: ground: {path}")
+        try:
+            checked_homography(matrix, f"camera {camera_id}")
+        except ValueError as error:
+            raise UserError(f"{where}: ground: {path}: {error}") from error
+    try:
+        return matrices, None if content.get("unit") is None else checked_unit(content["unit"])
+    except ValueError as error:
+        raise UserError(f"{where}: ground: {path}: unit: {error}") from error
+
+
+def _reason(error: Exception) -> str:
+    if isinstance(error, OSError) and error.strerror:
+        return error.strerror
+    return " ".join(str(error).split())
+
+
+def _one_line(where: str, error: ValidationError, within: tuple[str, ...] = ()) -> str:
+    errors = error.errors()
+    more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
+    return " ".join(f"{where}: {_plain(errors[0], within)}{more}".split())
+
+
+def _plain(detail: ErrorDetails, within: tuple[str, ...]) -> str:
+    loc = (*within, *detail["loc"])
+    place = ".".join(shortened(str(part)) for part in loc)
+    message = detail["msg"].removeprefix("Value error, ")
+    if detail["type"] == "extra_forbidden":
+        close = difflib.get_close_matches(str(loc[-1]), _known_keys(loc[:-1]), n=1)
+        message = "unknown key" + (f"; did you mean {close[0]!r}?" if close else "")
+    return f"{place}: {message}" if place else message
+
+
+def _known_keys(section: tuple[int | str, ...]) -> list[str]:
+    """List the keys of a section, given the way to it."""
+    model: Any = Config
+    for part in section:
+        if isinstance(part, int):
+            model = Camera
+        elif isinstance(model, type) and issubclass(model, BaseModel) and part in model.model_fields:
+            model = model.model_fields[part].annotation
+    return list(model.model_fields) if isinstance(model, type) and issubclass(model, BaseModel) else []

@@ -1,0 +1,44 @@
+"""Files of ``name:password``, one a line: who may come to the bus, and to the pulses."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from server.system.errors import UserError
+
+
+def read_users(path: Path, setting: str) -> dict[str, str]:
+    """Read the users' passwords by name; ``setting`` is what names the file.
+
+    Raises:
+        UserError: it cannot be read, or a line is no name and password.
+    """
+    try:
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "it is no text"
+        raise UserError(f"{setting}: cannot read {path}: {reason}") from error
+    users: dict[str, str] = {}
+    numbers: dict[str, int] = {}
+    for number, line in enumerate(lines, start=1):
+        name, colon, password = line.partition(":")
+        if not (name and colon and password) or line != line.strip():
+            raise UserError(f"{setting}: {path}: line {number} is no name:password")
+        if name in users:
+            raise UserError(
+                f"{setting}: {path}: lines {numbers[name]} and {number} are for the same name: keep one"
+            )
+        users[name], numbers[name] = password, number
+    return users
+
+
+def password_of(path: Path, name: str, setting: str) -> str:
+    """Give a user's password.
+
+    Raises:
+        UserError: it cannot be read, or there is none.
+    """
+    password = read_users(path, setting).get(name)
+    if password is None:
+        raise UserError(f"{setting}: {path} has no line for {name!r}, as which this process comes")
+    return password

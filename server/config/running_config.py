@@ -1,0 +1,99 @@
+"""The configuration that a process runs by, and its file, which may say something else by now."""
+
+from __future__ import annotations
+
+import os
+import stat
+from dataclasses import dataclass
+from pathlib import Path
+
+import yaml
+
+from server.config.config_diff import differing
+from server.config.loader import build_config, load_config, read_content
+from server.config.site_config import Config
+from server.system.errors import UserError
+from server.system.file_state import State, state_of
+
+IN_FORCE = "MYVIEW_IN_FORCE"
+"""In the environment of what `myview up` starts: where it keeps the configuration that the site runs by.
+
+A process that has to be started again must not go by a file that nobody has said is to be in force.
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class OnDisk:
+    """How the file on the disk is different from what runs."""
+
+    error: str
+    """Why it cannot be in force; empty: it can."""
+    waiting: tuple[str, ...]
+    """The settings in which it differs."""
+
+    @property
+    def differs(self) -> bool:
+        """Whether the file is not what runs."""
+        return bool(self.error or self.waiting)
+
+
+class Running:
+    """What a process runs by. ``now`` is set anew when something else has come into force.
+
+    Raises:
+        UserError: the file cannot be read, or something in it is wrong.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.now = self.wanted()
+        self._seen: tuple[State | None, ...] = ()
+        self._file: Config | UserError = self.now
+
+    def wanted(self) -> Config:
+        """Read what is to be in force: what a supervisor says is, or the file.
+
+        Raises:
+            UserError: it cannot be read, or something in it is wrong.
+        """
+        kept = os.environ.get(IN_FORCE)
+        if kept is None or not is_ours(Path(kept)):
+            return load_config(self.path)
+        return build_config(read_content(Path(kept)), where=str(self.path), folder=self.path.parent)
+
+    def on_disk(self) -> OnDisk:
+        """Say how the file is different from what runs; it is read when it has changed.
+
+        One that is wrong is read each time: what it refers to, and may be wrong itself, is not known.
+        """
+        folder = self.path.parent
+        ground = self._file.ground if isinstance(self._file, Config) else None
+        seen = (state_of(self.path), None if ground is None else state_of(folder / ground))
+        if seen != self._seen or isinstance(self._file, UserError):
+            self._seen = seen
+            try:
+                self._file = load_config(self.path)
+            except UserError as error:
+                self._file = error
+        if isinstance(self._file, UserError):
+            return OnDisk(str(self._file), ())
+        return OnDisk("", differing(self.now, self._file))
+
+
+def is_ours(path: Path) -> bool:
+    """Tell whether a file or folder is there and belongs to this process's user: no other says what runs."""
+    try:
+        found = path.lstat()
+    except OSError:
+        return False
+    return found.st_uid == os.geteuid() and not stat.S_ISLNK(found.st_mode)
+
+
+def written(config: Config, folder: Path) -> str:
+    """Write a configuration as a file that says the same from anywhere: all paths in it are absolute.
+
+    ``folder`` is where its own file lies.
+    """
+    content = config.model_dump(mode="json", exclude={"ground"})  # each camera has its own
+    absolute = build_config(content, where="the configuration in force", folder=folder.absolute())
+    return yaml.safe_dump(absolute.model_dump(mode="json", exclude={"ground"}), sort_keys=False)

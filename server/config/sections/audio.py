@@ -1,0 +1,40 @@
+"""The site's sound."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from server.config.sections.base import Section
+from server.media.audio.audio_format import OPUS_RATE, Coding, SoundFormat
+
+
+class Sound(Section):
+    """One sound for the whole site, under every picture."""
+
+    source: str | None = None
+    """A camera's id: that camera's sound. Or a file; None: the site has no sound."""
+    offset: int = 0
+    """A file's sound at pulse n is that of its moment (n - offset) / fps; a camera has its own offset."""
+    at_end: Literal["stop", "loop"] = "stop"
+    """What a file does after its end; a camera has its own."""
+    codec: Coding = "aac"
+    """What all streams have, but transport streams no Opus. A source that is that already, of this rate and
+    so many channels, is passed on as it is; anything else is encoded."""
+    rate: Literal[48_000, 44_100, 32_000, 24_000] = 48_000
+    """Samples a second."""
+    channels: Literal[1, 2] = 2
+    kbps: Annotated[int, Field(ge=16, le=320)] = 96
+    """Of what has to be encoded."""
+
+    @model_validator(mode="after")
+    def _opus_has_its_rate(self) -> Self:
+        if self.codec == "opus" and self.rate != OPUS_RATE:
+            raise ValueError(f"codec: opus has {OPUS_RATE} samples a second; rate says {self.rate}")
+        return self
+
+    @property
+    def format(self) -> SoundFormat | None:
+        """What all streams of the site sound like; None: they have no sound."""
+        return None if self.source is None else SoundFormat(self.rate, self.channels, self.codec)

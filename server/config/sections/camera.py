@@ -1,0 +1,100 @@
+"""One camera, and what is done with its pictures and its people."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, NonNegativeFloat, PositiveFloat, ValidationInfo, field_validator
+
+from bestview import WitnessSettings, checked_homography
+from server.config.dataclass_section import validated
+from server.config.ground_unit import checked_unit
+from server.config.sections.base import Name, Polygon, Section
+from tracking import DEFAULT_SOLVER, CostSettings, WindowSettings, create_solver
+from tracking.baselines import DEFAULT_TRACKER, TEMPORAL, tracker_names
+from tracking.baselines.temporal_consistency import TemporalSettings
+from tracking.interactive import AssistSettings
+
+
+class Camera(Section):
+    """One camera."""
+
+    id: Name
+    source: str
+    """A file, a folder of images, a URL that FFmpeg opens, /dev/video0, or scene:NAME?camera=0&…"""
+    password: Path | None = None
+    """A file whose one line, the camera's password, goes where `source` says `{password}`."""
+    kind: Literal["upright", "overhead"] = "upright"
+    """People stand upright in its picture, or it looks straight down on them."""
+    offset: int = 0
+    """A recording shows at pulse n its moment (n - offset) / fps."""
+    at_end: Literal["stop", "loop"] = "stop"
+    """What a recording does after its last frame."""
+    h264: Literal["encode", "auto", "pass"] = "encode"
+    """The source's own: its pictures are encoded anew; it passes where it fits; it passes or is refused."""
+    options: dict[str, str] = {}
+    """Options for FFmpeg's opener, e.g. rtsp_transport: tcp."""
+    ignore: list[Polygon] = []
+    """Parts of the picture where nobody is looked for, in pixels of the camera's own picture."""
+    ground: list[list[float]] | None = None
+    """3x3 homography from the camera's own picture (pixels) to the ground plane."""
+    ground_unit: Annotated[str, AfterValidator(checked_unit)] | None = None
+    """The ground plane's unit: by m, cm or mm it is known how tall people are in the picture."""
+    detections: Path | None = None
+    """A MOTChallenge detection file to use instead of looking for people in the picture."""
+
+    @field_validator("password")
+    @classmethod
+    def _password_has_its_place(cls, password: Path | None, info: ValidationInfo) -> Path | None:
+        if password is not None and "{password}" not in info.data.get("source", ""):
+            raise ValueError("names a file, but source does not say where it goes: rtsp://name:{password}@…")
+        return password
+
+    @field_validator("ground")
+    @classmethod
+    def _ground_is_invertible(
+        cls, ground: list[list[float]] | None, info: ValidationInfo
+    ) -> list[list[float]] | None:
+        if ground is not None:
+            checked_homography(ground, f"camera {info.data.get('id', '?')}")
+        return ground
+
+
+class Track(Section):
+    """Following people in one camera: the network LP over a moving window (paper, II)."""
+
+    tracker: str = DEFAULT_TRACKER
+    """MyView's own, or one of those that it is measured beside."""
+    solver: str = DEFAULT_SOLVER
+    backlog_s: PositiveFloat = 2.0
+    """Seconds of frames that may wait on a busy machine; a camera's older ones are left out, and said so."""
+    shed_load: bool = True
+    """On a machine with too much to do search every 2nd frame, every 3rd and so on, before much is late."""
+    window: Annotated[WindowSettings, validated(WindowSettings)] = WindowSettings()
+    costs: Annotated[CostSettings, validated(CostSettings)] = CostSettings()
+    temporal: Annotated[TemporalSettings, validated(TemporalSettings)] = TemporalSettings()
+    """The tracker of that name: person-to-blob matching over some seconds."""
+    assist: Annotated[AssistSettings, validated(AssistSettings)] = AssistSettings()
+    """What is foreseen for an operator to look at, and what their pointing weighs."""
+    witness: Annotated[WitnessSettings, validated(WitnessSettings)] = WitnessSettings()
+    """How a camera goes by what others find that look at the same ground."""
+    witness_wait_s: NonNegativeFloat = 0.3
+    """Seconds after a frame was taken until which it waits for what the others found in it."""
+
+    def lag(self, fps: float) -> int:
+        """Give the frames that follow a final frame at most when a window ends."""
+        return self.temporal.lag(fps) if self.tracker == TEMPORAL else self.window.lag
+
+    @field_validator("tracker")
+    @classmethod
+    def _tracker_is_known(cls, tracker: str) -> str:
+        if tracker not in tracker_names():
+            raise ValueError(f"no tracker is called {tracker!r}; there are {', '.join(tracker_names())}")
+        return tracker
+
+    @field_validator("solver")
+    @classmethod
+    def _solver_is_known(cls, solver: str) -> str:
+        create_solver(solver)
+        return solver

@@ -1,0 +1,35 @@
+"""How pictures are encoded."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, PositiveInt, model_validator
+
+from server.config.sections.base import Section
+
+
+class Encode(Section):
+    """Identical in all cameras that encode: that is what makes cutting without re-encoding possible."""
+
+    codec: Literal["h264", "vp8"] = "h264"
+    """H.264 by x264 in MP4, or VP8 by libvpx in WebM: free of patents' and of the GPL's terms."""
+    gop: PositiveInt = 10
+    """Frames in a closed group of pictures; views can change only where one begins."""
+    crf: Annotated[int, Field(ge=0, le=51)] = 23
+    """x264's constant quality: smaller is better and larger; 18 to 28 is sensible."""
+    preset: Literal["ultrafast", "superfast", "veryfast", "faster", "fast", "medium"] = "ultrafast"
+    max_kbps: Annotated[int, Field(ge=16)] | None = None
+    """Kilobits that a camera's pictures take in any second at most; None: as many as the quality wants."""
+    parameters: Literal["equal", "own"] = "equal"
+    """Those of H.264 (SPS, PPS): the same in all cameras; or cameras that pass theirs on have their own."""
+    quantizer: Annotated[int, Field(ge=0, le=63)] = 16
+    """VP8's constant quality, instead of crf: smaller is better and larger; 8 to 32 is sensible."""
+    speed: Annotated[int, Field(ge=1, le=16)] = 10
+    """VP8's, instead of preset: higher is quicker, and a little larger."""
+
+    @model_validator(mode="after")
+    def _can_be_capped(self) -> Self:
+        if self.codec == "vp8" and self.max_kbps is not None:
+            raise ValueError("max_kbps: VP8's encoder keeps no cap in every second; take codec: h264")
+        return self

@@ -1,0 +1,66 @@
+"""What all processes of a site share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import Field, NonNegativeFloat, PositiveFloat
+
+from server.config.sections.base import Endpoint, Name, Port, Section, Side
+
+
+class Site(Section):
+    """What all cameras share. Every camera's picture is scaled to one size, so that any can follow any."""
+
+    name: Name = "site"
+    fps: Annotated[float, Field(ge=0.001, le=1000, allow_inf_nan=False)] = 25.0
+    width: Side = 640
+    height: Side = 360
+    niceness: Annotated[int, Field(ge=0, le=19)] = 10
+    """How much nicer a camera's process is than who starts it, as in nice(1): a busy machine serves first."""
+
+
+class Sync(Section):
+    """The pulse server."""
+
+    host: str = "127.0.0.1"
+    """Where cameras find the server."""
+    bind: str = "127.0.0.1"
+    """The address the server listens on."""
+    port: Port = 7400
+    users: Path | None = None
+    """A file of `name:password`, one a line; none: whoever reaches the server is believed.
+
+    A camera comes as its id, services as bestview, bestview-1, … The server needs all lines, others theirs.
+    """
+    start_timeout_s: NonNegativeFloat = 20.0
+    """How long pulse 0 waits for all cameras to be there, so that recordings start at their first frame."""
+
+
+class ZenohTls(Section):
+    """Encryption of the bus, where its addresses begin with tls/."""
+
+    authority: Path | None = None
+    """PEM: the authority that has signed the router's certificate; whoever connects goes by it."""
+    certificate: Path | None = None
+    """PEM: the router's certificate; it names the host of `zenoh.connect`."""
+    key: Path | None = None
+    """PEM: its private key."""
+
+
+class Zenoh(Section):
+    """The message bus. The best-view service is its router: no separate daemon is needed."""
+
+    connect: Endpoint = "tcp/127.0.0.1:7447"
+    """Where cameras find the router."""
+    listen: Endpoint = "tcp/127.0.0.1:7447"
+    """Where the best-view service's router listens."""
+    lease_s: PositiveFloat = 1.0
+    """A process that is silent this long counts as gone."""
+    users: Path | None = None
+    """A file of `name:password`, one a line; none: whoever reaches the router is believed.
+
+    A camera comes as its id, and sends under its own key alone. The router needs all lines, others their own.
+    """
+    tls: ZenohTls = ZenohTls()

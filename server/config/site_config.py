@@ -1,0 +1,161 @@
+"""The configuration of one site: one YAML file that every process reads.
+
+A key can be overridden from the environment: ``MYVIEW_SECTION__KEY=value`` (``MYVIEW_HTTP__PORT=8081``).
+Every default is documented in ``configs/demo.yaml``.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Self
+
+from pydantic import Field, model_validator
+from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, SettingsConfigDict
+
+from server.config.dataclass_section import validated
+from server.config.sections import Access, Camera, Encode, Http, Record, Site, Sound, Sync, Track, View, Zenoh
+from server.config.sections.detect import DetectSettings
+from tracking.baselines import TEMPORAL
+
+PREFIX = "MYVIEW_"
+_SERVICE = re.compile(r"bestview(-\d+)?")
+"""What best-view services are called beside the cameras, where pulses and passwords are given out."""
+
+
+class Config(BaseSettings):
+    """A whole site."""
+
+    model_config = SettingsConfigDict(
+        extra="forbid",
+        frozen=True,
+        hide_input_in_errors=True,
+        env_prefix=PREFIX,
+        env_nested_delimiter="__",
+    )
+
+    site: Site = Site()
+    sync: Sync = Sync()
+    zenoh: Zenoh = Zenoh()
+    encode: Encode = Encode()
+    cameras: Annotated[list[Camera], Field(min_length=1)]
+    ground: Path | None = None
+    """A JSON file with one homography per camera; a camera's own `ground` goes before it."""
+    sound: Sound = Sound()
+    detect: Annotated[DetectSettings, validated(DetectSettings)] = DetectSettings()
+    """Finding people in a picture; by default by background subtraction and box filters (paper, IV.A.2)."""
+    track: Track = Track()
+    view: View = View()
+    http: Http = Http()
+    access: Access = Access()
+    record: Record = Record()
+
+    @classmethod
+    def settings_customise_sources(
+        cls,
+        settings_cls: type[BaseSettings],
+        init_settings: PydanticBaseSettingsSource,
+        env_settings: PydanticBaseSettingsSource,
+        dotenv_settings: PydanticBaseSettingsSource,
+        file_secret_settings: PydanticBaseSettingsSource,
+    ) -> tuple[PydanticBaseSettingsSource, ...]:
+        """Let the environment go before the file; where it has nothing to say, it is not asked at length."""
+        del settings_cls, dotenv_settings, file_secret_settings
+        told = any(name.upper().startswith(PREFIX) for name in os.environ)
+        return (env_settings, init_settings) if told else (init_settings,)
+
+    @model_validator(mode="after")
+    def _cameras_have_different_names(self) -> Self:
+        ids = [camera.id for camera in self.cameras]
+        for camera_id in ids:
+            if _SERVICE.fullmatch(camera_id):
+                raise ValueError(
+                    f"cameras: {camera_id!r} is what a best-view service is called; take another id"
+                )
+            if ids.count(camera_id) > 1:
+                raise ValueError(f"cameras: two cameras are called {camera_id!r}; every id must be its own")
+        return self
+
+    @model_validator(mode="after")
+    def _lookahead_covers_the_tracker(self) -> Self:
+        self.check_lookahead(self.view)
+        return self
+
+    @property
+    def least_lookahead(self) -> int:
+        """The frames that a view must be looked ahead for at least: its tracks no longer change then."""
+        return self.encode.gop + self.track.lag(self.site.fps)
+
+    def check_lookahead(self, view: View) -> None:
+        """Check that these settings look far enough ahead.
+
+        Raises:
+            ValueError: they do not.
+        """
+        if view.lookahead < self.least_lookahead:
+            lag = "track.window.window - track.window.stride"
+            if self.track.tracker == TEMPORAL:
+                lag = "the frames of all stages of track.temporal, less one"
+            raise ValueError(
+                f"view.lookahead: is {view.lookahead} frames but must be at least {self.least_lookahead} "
+                f"(encode.gop + {lag}), "
+                "so that a view is chosen on tracks that no longer change"
+            )
+
+    @model_validator(mode="after")
+    def _nobody_is_settled_untold(self) -> Self:
+        identity = self.view.identity
+        least = identity.told_after + 2 * identity.regroup
+        if identity.settled_after < least:
+            raise ValueError(
+                f"view.identity.settled_after: is {identity.settled_after} frames but must be "
+                f"at least {least} (told_after + 2 * regroup), "
+                "so that whoever is settled has been told to be somebody"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _streams_can_be_of_this_codec(self) -> Self:
+        for place, wanted in (("record.folder", self.record.folder), ("sound.source", self.sound.source)):
+            if self.encode.codec == "vp8" and wanted is not None:
+                raise ValueError(f"{place}: a site whose encode.codec is vp8 has none; take h264 for it")
+        for camera in self.cameras:
+            if self.encode.codec == "vp8" and camera.h264 != "encode":
+                raise ValueError(f"cameras: {camera.id}: h264: {camera.h264}: encode.codec is vp8")
+        return self
+
+    @property
+    def sounding(self) -> str | None:
+        """The camera whose process sends the sound: the one whose sound it is, or the first; None: nobody."""
+        source = self.sound.source
+        return source if source is None or source in self.camera_ids else self.camera_ids[0]
+
+    def witnesses(self, camera_id: str) -> Sequence[str]:
+        """Give the cameras that may look at the same ground as this one, if it goes by what others find."""
+        looks = {it.id for it in self.cameras if it.ground is not None} - self.overhead
+        if not self.track.witness.use or camera_id not in looks:
+            return ()
+        return tuple(it for it in self.camera_ids if it in looks and it != camera_id)
+
+    @property
+    def overhead(self) -> frozenset[str]:
+        """The cameras that look straight down."""
+        return frozenset(it.id for it in self.cameras if it.kind == "overhead")
+
+    def camera(self, camera_id: str) -> Camera:
+        """Give one camera.
+
+        Raises:
+            KeyError: there is none of this id.
+        """
+        for camera in self.cameras:
+            if camera.id == camera_id:
+                return camera
+        raise KeyError(f"no camera {camera_id!r}; there are {', '.join(self.camera_ids)}")
+
+    @property
+    def camera_ids(self) -> Sequence[str]:
+        """The cameras' names in the order of the configuration: the order of every camera axis."""
+        return tuple(camera.id for camera in self.cameras)

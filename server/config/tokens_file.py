@@ -1,0 +1,89 @@
+"""The file of tokens: who may watch what, and who may operate.
+
+It knows a token by its SHA-256. A token is 256 random bits: there is nothing to guess, and no need for a slow
+hash. Every request is checked, and by a slow one strangers could keep the server busy.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections import Counter
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import AwareDatetime, Field, ValidationError, model_validator
+
+from server.config.sections.base import Name, Section
+from server.config.values import check_values, shortened
+from server.config.yaml_file import read_yaml
+from server.system.errors import UserError
+
+Role = Literal["watch", "operate"]
+
+
+class Token(Section):
+    """One token: somebody who may come, and what they may."""
+
+    name: Annotated[str, Field(min_length=1, max_length=64, pattern=r"^[^\x00-\x1f\x7f]*$")]
+    """Whose it is, for people: it is not secret."""
+    sha256: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
+    role: Role
+    object: Annotated[int, Field(ge=1, le=999_999_999)] | None = None
+    """Nobody but this person's views."""
+    camera: Name | None = None
+    """Nothing but this camera."""
+    made: AwareDatetime | None = None
+    """When it was made. Where people have been numbered anew since, its object is void."""
+
+    @model_validator(mode="after")
+    def _makes_sense(self) -> Self:
+        if self.object is not None and self.camera is not None:
+            raise ValueError("object, camera: a token is for one of them; make two")
+        if self.role == "operate" and (self.object is not None or self.camera is not None):
+            raise ValueError("role: who operates sees everything: leave object and camera out, or say watch")
+        if self.object is not None and self.made is None:
+            raise ValueError(
+                "made: is missing, and a number is somebody's for one run of the service alone; "
+                "`myview token` writes it"
+            )
+        return self
+
+
+def digest_of(token: str) -> str:
+    """Give what the file knows of a token: its SHA-256, in hex."""
+    return hashlib.sha256(token.encode(errors="surrogatepass")).hexdigest()  # heads may hold any bytes
+
+
+def read_tokens(path: Path) -> tuple[Token, ...]:
+    """Read the file of tokens.
+
+    Raises:
+        UserError: it cannot be read, or something in it is wrong.
+    """
+    content = read_yaml(path, "the tokens")
+    check_values(content, str(path))
+    listed = content.get("tokens") if isinstance(content, dict) and len(content) == 1 else None
+    if not isinstance(listed, list):
+        raise UserError(
+            f"{path}: is no list of tokens: it begins with 'tokens:', and each has a line of its own"
+        )
+    tokens = tuple(_token(path, number, one) for number, one in enumerate(listed))
+    for what in ("name", "sha256"):
+        given = Counter(getattr(it, what) for it in tokens)
+        twice = next((it for it, count in given.items() if count > 1), None)
+        if twice is not None:
+            numbers = [number for number, it in enumerate(tokens) if getattr(it, what) == twice]
+            places = " and ".join(f"tokens.{number}" for number in numbers[:2])
+            raise UserError(f"{path}: {places}: have the same {what}, {twice}; each has its own")
+    return tokens
+
+
+def _token(path: Path, number: int, content: Any) -> Token:
+    try:
+        return Token.model_validate(content)
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(["tokens", str(number), *(shortened(str(it)) for it in first["loc"])])
+        said = "unknown key" if first["type"] == "extra_forbidden" else first["msg"]
+        line = f"{path}: {place}: {said.removeprefix('Value error, ')}"
+        raise UserError(" ".join(line.split())) from None

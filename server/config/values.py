@@ -1,0 +1,92 @@
+"""Values as YAML and JSON have them, before and after somebody has looked at what they mean."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from server.system.address_redaction import shown
+from server.system.errors import UserError
+
+_DEEPEST = 32
+_MOST = 1_000_000
+"""Values; an alias that YAML refers to again counts again, as it does for whoever reads it."""
+_LARGEST = 1e15
+_SHOWN = 40
+_LONGEST_NAME = 64
+
+_HOLDING = (dict, list, tuple, set)
+
+
+def shortened(key: str) -> str:
+    """Give a key as a line can name it: it may be as long as its file, or an address by mistake."""
+    key = shown(key)
+    return key if len(key) <= _SHOWN else f"{key[:_SHOWN]}…"
+
+
+def check_camera_name(name: str, where: str) -> None:
+    """Look that a file's name for a camera can be written into a line; it need not be one of the site's.
+
+    Raises:
+        UserError: it cannot; the text begins with ``where``.
+    """
+    if not name or len(name) > _LONGEST_NAME or not name.isprintable():
+        raise UserError(f"{where}: camera {name[:_SHOWN]!a}: no name that can be read")
+
+
+def check_values(content: Any, where: str) -> None:
+    """Look that values end somewhere, and that their texts are texts of one line, as what names them is.
+
+    Raises:
+        UserError: they do not, or are not; the text begins with ``where``.
+    """
+    for place, value in _inside(content, where):
+        if isinstance(value, str):
+            try:
+                value.encode()
+            except UnicodeEncodeError:
+                raise UserError(f"{where}: {_named(place)}has characters that are none") from None
+            if value and value.splitlines() != [value]:
+                raise UserError(f"{where}: {_named(place)}is more than a line")
+
+
+def check_numbers(content: Any, where: str) -> None:
+    """Look that sums and products of numbers are still numbers.
+
+    Raises:
+        UserError: one is too large for that; the text begins with ``where`` and names it.
+    """
+    for place, value in _inside(content, where):
+        if isinstance(value, int | float) and not abs(value) <= _LARGEST:
+            # Python writes no number of thousands of digits, but in hexadecimal it does.
+            written = str(value) if isinstance(value, float) else hex(value)
+            raise UserError(f"{where}: {_named(place)}{written[:_SHOWN]} is a number beyond all measure")
+
+
+def _named(place: tuple[Any, ...]) -> str:
+    """Give the way to a value as a line begins with it, in a line whatever the keys are."""
+    words = (shortened(" ".join(it.split())) if isinstance(it, str) else _short(it) for it in place)
+    return f"{'.'.join(words)}: " if place else ""
+
+
+def _short(key: Any) -> str:
+    """Give a key that is no text; Python writes no number of thousands of digits."""
+    return "…" if isinstance(key, int) and abs(key) > _LARGEST else shortened(str(key))
+
+
+def _inside(content: Any, where: str) -> Iterator[tuple[tuple[Any, ...], Any]]:
+    """Give all values, keys too, and by what keys they are reached."""
+    left: list[tuple[tuple[Any, ...], Any]] = [((), content)] if isinstance(content, _HOLDING) else []
+    seen = 0
+    while left:
+        place, value = left.pop()
+        seen += len(value)
+        if len(place) > _DEEPEST or seen > _MOST:
+            raise UserError(f"{where}: is nested without end, or larger than any configuration")
+        if isinstance(value, dict):
+            yield from ((place, key) for key in value)
+        for key, it in value.items() if isinstance(value, dict) else enumerate(value):
+            if isinstance(it, _HOLDING):
+                left.append(((*place, key), it))
+            else:
+                yield (*place, key), it

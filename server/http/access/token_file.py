@@ -1,0 +1,56 @@
+"""The file of tokens, read again when it has changed."""
+
+from __future__ import annotations
+
+import hmac
+import logging
+from pathlib import Path
+
+from server.config.tokens_file import Token, read_tokens
+from server.system.errors import UserError
+from server.system.file_state import state_of
+
+log = logging.getLogger(__name__)
+
+
+class TokenFile:
+    """The tokens in force. A file that cannot be read, or makes no sense, leaves them as they are."""
+
+    def __init__(self, path: Path) -> None:
+        """Read the file.
+
+        Raises:
+            UserError: it cannot be read, or something in it is wrong.
+        """
+        self._path = path
+        self._read = self._seen = state_of(path)
+        self._tokens = _by_digest(path)
+
+    def look(self) -> None:
+        """Read the file again if it has changed, once it is still: it may be half-written."""
+        before, self._seen = self._seen, state_of(self._path)
+        if self._seen == self._read or self._seen != before:
+            return
+        self._read = self._seen
+        try:
+            self._tokens = _by_digest(self._path)
+        except UserError as error:
+            log.warning("%s; the %d tokens as they were stay in force", error, len(self._tokens))
+        else:
+            log.info("%s: %d tokens are in force", self._path, len(self._tokens))
+
+    def find(self, digest: str) -> Token | None:
+        """Give the token of a SHA-256; all are compared, each in the same time: that tells nothing."""
+        found = None
+        for token in self._tokens.values():
+            if hmac.compare_digest(token.sha256, digest):
+                found = token
+        return found
+
+    def still(self, digest: str) -> Token | None:
+        """Give the token of a SHA-256 that was found before, if it is in force now."""
+        return self._tokens.get(digest)
+
+
+def _by_digest(path: Path) -> dict[str, Token]:
+    return {it.sha256: it for it in read_tokens(path)}

@@ -1,0 +1,1 @@
+"""The JSON API: handlers, responses, schemas, events."""

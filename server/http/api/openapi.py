@@ -1,0 +1,197 @@
+"""The API's own description: OpenAPI 3.1 made from the routes and the schemas, and a page to read it."""
+
+from __future__ import annotations
+
+import html
+import inspect
+import re
+from functools import cached_property
+from importlib.metadata import version
+from typing import Any
+
+import msgspec
+from aiohttp import web
+
+from server.http.access.grants import Need, need_of
+from server.http.api.query_validation import HELD, OVERLAY, PAST
+from server.http.api.schema import Cameras, Choice, FlagList, Objects, Past, Problem, SessionInfo, SiteInfo
+from server.http.operator.schema import OPERATOR, OPERATOR_FILES, OPERATOR_RESULTS
+
+routes = web.RouteTableDef()
+
+_JSON: dict[str, type[msgspec.Struct]] = {
+    "/api/site": SiteInfo,
+    "/api/session": SessionInfo,
+    "/api/objects": Objects,
+    "/api/cameras": Cameras,
+    "/api/flags": FlagList,
+    "/api/objects/{object}/choice": Choice,
+    "/api/objects/{object}/past": Past,
+    "/api/cameras/{camera}/past": Past,
+    **OPERATOR,
+}
+_OTHER = {
+    "/objects/{object}/best.mp4": "video/mp4",
+    "/cameras/{camera}/live.mp4": "video/mp4",
+    "/objects/{object}/best.webm": "video/webm",
+    "/cameras/{camera}/live.webm": "video/webm",
+    "/objects/{object}/best.ts": "video/mp2t",
+    "/cameras/{camera}/live.ts": "video/mp2t",
+    "/objects/{object}/hls/index.m3u8": "application/vnd.apple.mpegurl",
+    "/objects/{object}/hls/init.mp4": "video/mp4",
+    "/objects/{object}/hls/{segment}.m4s": "video/mp4",
+    "/objects/{object}/hls/{segment}.{part}.m4s": "video/mp4",
+    "/cameras/{camera}/hls/index.m3u8": "application/vnd.apple.mpegurl",
+    "/cameras/{camera}/hls/init.mp4": "video/mp4",
+    "/cameras/{camera}/hls/{segment}.m4s": "video/mp4",
+    "/cameras/{camera}/hls/{segment}.{part}.m4s": "video/mp4",
+    "/objects/{object}/best.mjpeg": "multipart/x-mixed-replace",
+    "/cameras/{camera}/live.mjpeg": "multipart/x-mixed-replace",
+    "/objects/{object}/best.jpg": "image/jpeg",
+    "/cameras/{camera}/live.jpg": "image/jpeg",
+    "/objects/{object}/thumb.jpg": "image/jpeg",
+    "/api/events": "text/event-stream",
+    "/api/past": "application/x-ndjson",
+    "/healthz": "text/plain",
+    "/readyz": "text/plain",
+    "/metrics": "text/plain",
+    **OPERATOR_FILES,
+    **OPERATOR_RESULTS,
+}
+_UNAVAILABLE = {
+    "/objects/{object}/best.mp4",
+    "/cameras/{camera}/live.mp4",
+    "/readyz",
+    "/api/events",
+    "/api/past",
+} | {path for path in _OTHER if path.endswith((".webm", ".ts", ".m3u8", ".mjpeg", "best.jpg", "live.jpg"))}
+_OF_PEOPLE = {"/api/operator/people", "/api/operator/pointing"}
+_FROM_IS_NEEDED = {"/api/past", *OPERATOR_FILES}
+_SPANS = {"/api/objects/{object}/past", "/api/cameras/{camera}/past"}
+_MOMENT = {"type": "string", "examples": ["-60", "p1250", "2026-11-21T16:13:36Z"]}
+_SCHEMAS: dict[str, Any] = {
+    "object": {"type": "integer", "minimum": 0},
+    "camera": {"type": "string"},
+    "segment": {"type": "integer", "minimum": 0},
+    "part": {"type": "integer", "minimum": 0},
+    "_HLS_msn": {"type": "integer", "minimum": 0, "description": "Waits until this segment is there."},
+    "_HLS_part": {"type": "integer", "minimum": 0, "description": "Waits until this part of it is there."},
+    "overlay": {"enum": [0, 1], "default": 0, "description": "1: boxes are burnt in."},
+    "from": {**_MOMENT, "description": "Begins there: seconds back, a pulse, or a time."},
+    "to": {**_MOMENT, "description": "Ends there, likewise; HLS also live: it goes on."},
+    "at": {**_MOMENT, "description": "Of the last minute; what was before the first question is not kept."},
+    "held": {"type": "string", "description": "Shows this camera, not the best: held by hand."},
+    "prefer": {"type": "string", "description": "Shows this camera while it sees the person, else the best."},
+    "fps": {"type": "number", "exclusiveMinimum": 0, "description": "Pictures a second; the site's at most."},
+}
+
+
+class Described:
+    """What an application tells of itself, made when it is first asked for: anybody may ask, and often."""
+
+    def __init__(self, app: web.Application) -> None:
+        self._app = app
+
+    @cached_property
+    def document(self) -> dict[str, Any]:
+        """The OpenAPI document."""
+        return describe(self._app)
+
+    @cached_property
+    def encoded(self) -> bytes:
+        """The same as JSON."""
+        return msgspec.json.encode(self.document)
+
+
+DESCRIBED = web.AppKey("described", Described)
+
+
+def describe(app: web.Application) -> dict[str, Any]:
+    """Give the OpenAPI document of an application's routes."""
+    _, components = msgspec.json.schema_components(
+        [*_JSON.values(), Problem], ref_template="#/components/schemas/{name}"
+    )
+    paths: dict[str, dict[str, Any]] = {}
+    for route in app.router.routes():
+        if route.method == "HEAD" or route.resource is None:
+            continue
+        path = route.resource.canonical
+        if path in _JSON or path in _OTHER:
+            operation = _operation(path, inspect.getdoc(route.handler) or "")
+            paths.setdefault(path, {})[route.method.lower()] = operation
+    return {
+        "openapi": "3.1.0",
+        "info": {"title": "MyView", "version": version("myview")},
+        "paths": dict(sorted(paths.items())),
+        "components": {"schemas": components},
+    }
+
+
+def _operation(path: str, summary: str) -> dict[str, Any]:
+    if path in _JSON:
+        content = {"application/json": {"schema": {"$ref": f"#/components/schemas/{_JSON[path].__name__}"}}}
+    else:
+        content = {_OTHER[path]: {}}
+    error = {"application/json": {"schema": {"$ref": "#/components/schemas/Problem"}}}
+    responses: dict[str, Any] = {"200": {"description": "OK", "content": content}}
+    names = re.findall(r"\{(\w+)\}", path)
+    if names or path in OPERATOR_RESULTS:
+        responses["404"] = {"description": "There is none of this name.", "content": error}
+    if path in OVERLAY | PAST | HELD | _SPANS or path.endswith("/choice"):
+        responses["400"] = {"description": "The query asks for what there is not.", "content": error}
+    if path in OPERATOR.keys() | OPERATOR_FILES.keys() | OPERATOR_RESULTS.keys():
+        responses["400"] = {"description": "It asks for what there is not.", "content": error}
+    if need_of("GET", path) is not Need.NOTHING:
+        responses["401"] = {
+            "description": "Where there are tokens: none was given, or a wrong one.",
+            "content": error,
+        }
+        responses["403"] = {"description": "The token is not for this.", "content": error}
+        responses["429"] = {"description": "Too many wrong tokens; try again later.", "content": error}
+    if path in PAST | OPERATOR_FILES.keys():
+        responses["416"] = {"description": "Nothing is kept of that time.", "content": error}
+    if path in _UNAVAILABLE | _OF_PEOPLE | _SPANS or "object" in names:
+        responses["503"] = {"description": "Not now; try again later."}
+    parameters = [{"name": name, "in": "path", "required": True, "schema": _SCHEMAS[name]} for name in names]
+    queries = ["prefer"] * (path in HELD)
+    queries += ["overlay"] * (path in OVERLAY) + ["fps"] * path.endswith(".mjpeg")
+    queries += ["from", "to"] * (path in PAST | _SPANS | OPERATOR_FILES.keys())
+    queries += ["at"] * path.endswith("/choice")
+    queries += ["_HLS_msn", "_HLS_part"] * path.endswith(".m3u8")
+    if path in HELD:
+        parameters.append({"name": "camera", "in": "query", "required": False, "schema": _SCHEMAS["held"]})
+    parameters += [
+        {
+            "name": it,
+            "in": "query",
+            "required": path in _FROM_IS_NEEDED and it == "from",
+            "schema": _SCHEMAS[it],
+        }
+        for it in queries
+    ]
+    return {"summary": summary.splitlines()[0], "parameters": parameters, "responses": responses}
+
+
+@routes.get("/api/openapi.json")
+async def get_openapi(request: web.Request) -> web.Response:
+    """Describe the API to programs."""
+    return web.Response(body=request.app[DESCRIBED].encoded, content_type="application/json")
+
+
+@routes.get("/api")
+async def get_readable(request: web.Request) -> web.Response:
+    """Describe the API to people."""
+    rows = "".join(
+        f"<tr><td><code>GET {html.escape(path)}</code></td>"
+        f"<td>{html.escape(item['get']['summary'])}</td></tr>"
+        for path, item in request.app[DESCRIBED].document["paths"].items()
+    )
+    page = (
+        "<!doctype html><html lang=en><meta charset=utf-8><title>MyView: the API</title>"
+        "<meta name=viewport content='width=device-width'>"
+        "<style>body{font:16px/1.5 system-ui;background:#15171a;color:#dde;margin:2rem auto;max-width:60rem;"
+        "padding:0 1rem}td{padding:.3rem 1rem .3rem 0;vertical-align:top}a{color:#6c6}</style>"
+        f"<h1>MyView: the API</h1><table>{rows}</table>"
+        "<p>Schemas: <a href='/api/openapi.json'>openapi.json</a></p></html>"
+    )
+    return web.Response(text=page, content_type="text/html")

@@ -1,0 +1,111 @@
+"""``/metrics`` of the cameras' stages: how long each takes, how well it is solved, what is lost where."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+
+from prometheus_client import Metric
+from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, HistogramMetricFamily
+from prometheus_client.registry import Collector
+
+from server.messaging.messages import CameraStatus
+from server.service.ingest.ingest import CameraState
+from server.service.metrics.camera_metrics import Spread
+from server.service.service import BestViewService
+
+Value = Callable[[str, CameraState], float | None]
+"""A camera's number by its id and state; None: it is not known."""
+
+
+class CameraStages(Collector):
+    """Gives what the cameras' messages say of their stages."""
+
+    def __init__(self, service: BestViewService) -> None:
+        self._service = service
+
+    def collect(self) -> Iterable[Metric]:
+        """Give all metrics as they are now."""
+        yield self._stages()
+        yield self._gauge("fps", "Frames taken a second.", _of_status(lambda it: it.fps))
+        yield self._gauge(
+            "in_step",
+            "Pulses come from the server: the camera does not count by itself.",
+            _of_status(lambda it: float(it.in_step)),
+        )
+        yield self._gauge(
+            "waiting_frames", "Frames that wait to be searched.", _of_status(lambda it: it.waiting)
+        )
+        yield self._gauge(
+            "load_level",
+            "How much is left out because the machine has too much to do; 0: nothing.",
+            _of_status(lambda it: it.load_level),
+        )
+        for what, words, spread in _SPREADS:
+            yield self._spread(what, words, spread)
+        late, lost = self._service.aligner.late_messages, self._service.lacking.lost_pictures
+        yield self._counter("late_windows", "Windows that came too late to count.", lambda it, _: late[it])
+        yield self._counter(
+            "lost_pictures", "Pictures not there when their GOP was decided.", lambda it, _: lost[it]
+        )
+        yield self._counter("windows", "Windows solved.", lambda _, it: it.gauge.totals.windows)
+        yield self._counter(
+            "certified_windows",
+            "Windows whose answer is proven to be the best there is.",
+            lambda _, it: it.gauge.totals.certified,
+        )
+        yield self._counter(
+            "pointings",
+            "Places that an operator pointed at and the tracker was given, since its start.",
+            _of_status(lambda it: it.pointed),
+        )
+        yield self._counter(
+            "mended_windows",
+            "Windows that have changed what was final, by where an operator pointed.",
+            lambda _, it: it.gauge.totals.mended,
+        )
+        yield self._counter("gap", "Sum of the gaps of all other windows.", lambda _, it: it.gauge.totals.gap)
+
+    def _stages(self) -> Metric:
+        family = HistogramMetricFamily(
+            "myview_stage_seconds", "How long a camera's stage took.", labels=["camera", "stage"]
+        )
+        for camera, state in self._service.intake.states.items():
+            for stage, took in state.gauge.totals.stages.items():
+                family.add_metric([camera, stage], took.buckets, took.sum)
+        return family
+
+    def _spread(self, what: str, words: str, of: Callable[[CameraState], Spread | None]) -> Metric:
+        family = GaugeMetricFamily(f"myview_camera_{what}_seconds", words, labels=["camera", "lately"])
+        for camera, state in self._service.intake.states.items():
+            spread = of(state)
+            if spread is not None:
+                family.add_metric([camera, "median"], spread.median)
+                family.add_metric([camera, "worst"], spread.worst)
+        return family
+
+    def _gauge(self, what: str, words: str, value: Value) -> Metric:
+        return self._filled(GaugeMetricFamily(f"myview_camera_{what}", words, labels=["camera"]), value)
+
+    def _counter(self, what: str, words: str, value: Value) -> Metric:
+        return self._filled(CounterMetricFamily(f"myview_camera_{what}", words, labels=["camera"]), value)
+
+    def _filled(self, family: GaugeMetricFamily | CounterMetricFamily, value: Value) -> Metric:
+        for camera, state in self._service.intake.states.items():
+            number = value(camera, state)
+            if number is not None:
+                family.add_metric([camera], number)
+        return family
+
+
+def _of_status(value: Callable[[CameraStatus], float]) -> Value:
+    return lambda _, state: None if state.status is None else value(state.status)
+
+
+_SPREADS: tuple[tuple[str, str, Callable[[CameraState], Spread | None]], ...] = (
+    ("sync_error", "How long after its pulse a frame was taken.", lambda it: it.gauge.sync_error),
+    (
+        "tracking_delay",
+        "How long after the pulse of a window's last frame it was solved.",
+        lambda it: it.gauge.tracking_delay,
+    ),
+)

@@ -1,0 +1,151 @@
+"""The configuration in force, and what of the choice can be changed to try it out."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from aiohttp import web
+from pydantic import BaseModel
+from pydantic_core import PydanticUndefined
+
+from server.config.loader import changed_view
+from server.config.sections import TUNED, View
+from server.config.site_config import Config
+from server.config.yaml_file import as_lines, one_line
+from server.http.access.grants import OPERATING
+from server.http.api.handlers import answer, asked_for, problem
+from server.http.app_keys import ON_DISK, SERVICE
+from server.http.operator.schema import Choosing, Setting, Settings
+from server.service.service import BestViewService
+from server.system.address_redaction import HIDDEN, shown, shown_endpoint
+from server.system.errors import UserError
+
+routes = web.RouteTableDef()
+
+_ENDPOINTS = frozenset({"zenoh.connect", "zenoh.listen"})
+_PASSWORD = re.compile(r"cameras[.][^.]+[.]password")
+"""The name of a file; but who misunderstands that writes the password itself there."""
+
+
+@routes.get(f"{OPERATING}/config")
+async def get_config(request: web.Request) -> web.Response:
+    """Give the configuration in force, with what differs from the defaults; passwords are not shown."""
+    found = request.app[ON_DISK]()
+    settings = list(settings_of(request.app[SERVICE].config))
+    return answer(Settings(settings, found.error, list(found.waiting)))
+
+
+@routes.get(f"{OPERATING}/choosing")
+async def get_choosing(request: web.Request) -> web.Response:
+    """Say what views are chosen by now, and what the configuration says."""
+    return answer(_choosing(request.app[SERVICE]))
+
+
+@routes.put(f"{OPERATING}/choosing")
+async def put_choosing(request: web.Request) -> web.Response:
+    """Choose views by other settings, to try them out: until they are changed again or the service ends."""
+    service = request.app[SERVICE]
+    asked = await asked_for(request, dict[str, float | bool])
+    known = _flat(service.decider.view)
+    for key in asked:
+        if key not in known:
+            return problem(400, f"view.{key}: cannot be changed here; what can is {', '.join(known)}")
+    try:
+        service.choose_by(changed_view(service.decider.view, _nested(asked), "to try out"))
+    except UserError as error:
+        return problem(400, str(error))
+    return answer(_choosing(service))
+
+
+@routes.delete(f"{OPERATING}/choosing")
+async def delete_choosing(request: web.Request) -> web.Response:
+    """Choose views by what the configuration says again."""
+    service = request.app[SERVICE]
+    service.choose_by(service.config.view)
+    return answer(_choosing(service))
+
+
+def settings_of(config: Config) -> Iterator[Setting]:
+    """Give every setting in force, in the order of the reference."""
+    for name, field in Config.model_fields.items():
+        if name == "cameras":
+            for camera in config.cameras:
+                yield from _settings(f"cameras.{camera.id}", camera, type(camera))
+        else:
+            yield from _setting(name, getattr(config, name), field.get_default(call_default_factory=True))
+
+
+def _settings(place: str, section: Any, default: Any) -> Iterator[Setting]:
+    """Give the settings of a section; ``default`` is one at its defaults, or the class."""
+    for name in _names(section):
+        if isinstance(default, type) and issubclass(default, BaseModel):
+            usual = default.model_fields[name].get_default(call_default_factory=True)
+        else:
+            usual = getattr(default, name)
+        yield from _setting(f"{place}.{name}", getattr(section, name), usual)
+
+
+def _setting(key: str, value: Any, usual: Any) -> Iterator[Setting]:
+    if isinstance(value, BaseModel) or dataclasses.is_dataclass(value):
+        yield from _settings(key, value, usual)
+    else:
+        default = None if usual is PydanticUndefined else _written(key, usual)
+        yield Setting(key, _written(key, value), default, usual is not PydanticUndefined and value != usual)
+
+
+def _names(section: Any) -> list[str]:
+    if isinstance(section, BaseModel):
+        return list(type(section).model_fields)
+    return [field.name for field in dataclasses.fields(section)]
+
+
+def _written(key: str, value: Any) -> str:
+    """Write a value as a configuration does, without what may be secret."""
+    if key in _ENDPOINTS:
+        return one_line(shown_endpoint(value))
+    if value is not None and _PASSWORD.fullmatch(key):
+        return one_line(HIDDEN)
+    return one_line(_shown(value))
+
+
+def _shown(value: Any) -> Any:
+    """Give a value as YAML has it: of addresses their hosts, and of options for FFmpeg their names alone."""
+    match value:
+        case Mapping():
+            return {shown(it): HIDDEN for it in value}
+        case list() | tuple():
+            return [_shown(it) for it in value]
+        case bool() | int() | float() | None:
+            return value
+        case _:
+            return shown(str(value))
+
+
+def _choosing(service: BestViewService) -> Choosing:
+    now, file, usual = _flat(service.decider.view), _flat(service.config.view), _flat(View())
+    lines = {key: value for key, value in now.items() if value != usual[key] or value != file[key]}
+    written = "" if not lines else as_lines({"view": _nested(lines)})
+    least, most = service.config.least_lookahead, service.most_lookahead
+    return Choosing(values=now, file=file, lines=written, least_lookahead=least, most_lookahead=most)
+
+
+def _flat(view: View) -> dict[str, float | bool]:
+    flat: dict[str, float | bool] = {}
+    for name in TUNED:
+        value = getattr(view, name)
+        if dataclasses.is_dataclass(value):
+            flat |= {f"{name}.{it.name}": getattr(value, it.name) for it in dataclasses.fields(value)}
+        else:
+            flat[name] = value
+    return flat
+
+
+def _nested(flat: Mapping[str, float | bool]) -> dict[str, Any]:
+    nested: dict[str, Any] = {}
+    for key, value in flat.items():
+        section, _, name = key.rpartition(".")
+        (nested.setdefault(section, {}) if section else nested)[name] = value
+    return nested

@@ -1,0 +1,1 @@
+"""Video and JPEG streams over HTTP."""

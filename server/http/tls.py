@@ -1,0 +1,95 @@
+"""HTTPS from certificate files, which are read again when they change."""
+
+from __future__ import annotations
+
+import logging
+import ssl
+from pathlib import Path
+
+from server.config.sections import Tls
+from server.http.periodic import again_and_again
+from server.system.errors import UserError
+from server.system.file_state import State, state_of
+
+log = logging.getLogger(__name__)
+
+_LOOK_EVERY_S = 5.0
+
+
+class Certificate:
+    """What the server proves itself by. New connections get the newest that could be read."""
+
+    def __init__(self, certificate: Path, key: Path) -> None:
+        """Read both files.
+
+        Raises:
+            UserError: they cannot be read, or do not belong together.
+        """
+        self._certificate, self._key = certificate, key
+        self._seen = self._state()
+        """As it is in force."""
+        self._trouble = ""
+        """Why what is there now is not."""
+        self._newest = self._load()
+        self.context = self._newest
+        # A context keeps what it has loaded beside a later key of another kind: each pair has its own.
+        self.context.sni_callback = self._hand_over
+
+    @classmethod
+    def of(cls, settings: Tls) -> Certificate | None:
+        """Read what a configuration names; None: it names nothing.
+
+        Raises:
+            UserError: it cannot be read.
+        """
+        if settings.certificate is None or settings.key is None:
+            return None
+        return cls(settings.certificate, settings.key)
+
+    def look(self) -> None:
+        """Read the files again if they have changed; what cannot be read leaves the old one in force."""
+        now = self._state()
+        if now == self._seen:
+            return
+        try:
+            self._newest = self._load()
+        except UserError as error:  # read again at the next look: it may be half of a renewal
+            if str(error) != self._trouble:
+                log.warning("%s; the certificate as it was stays in force", error)
+            self._trouble = str(error)
+        else:
+            self._seen, self._trouble = now, ""
+            log.info("%s: is in force for new connections", self._certificate)
+
+    async def run(self) -> None:
+        """Look again and again."""
+        await again_and_again(_LOOK_EVERY_S, self._look, "looking at the certificate")
+
+    async def _look(self) -> None:
+        self.look()
+
+    def _hand_over(self, connection: ssl.SSLObject, _: str | None, __: ssl.SSLContext) -> None:
+        connection.context = self._newest
+
+    def _load(self) -> ssl.SSLContext:
+        context = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH)
+        for what, path in (("certificate", self._certificate), ("key", self._key)):
+            try:
+                path.read_bytes()
+            except OSError as error:
+                raise UserError(f"http.tls.{what}: cannot read {path}: {error.strerror}") from error
+        try:
+            context.load_cert_chain(self._certificate, self._key, password=_no_password)
+        except (OSError, ValueError) as error:  # of ssl, or one of them has gone this very moment
+            reason = getattr(error, "reason", None) or getattr(error, "strerror", None) or str(error)
+            raise UserError(
+                f"http.tls: {self._certificate} and {self._key} are no certificate and its key: {reason}"
+            ) from error
+        return context
+
+    def _state(self) -> tuple[State | None, ...]:
+        return tuple(state_of(it) for it in (self._certificate, self._key))
+
+
+def _no_password() -> str:
+    raise ValueError("the key has a password; write it without one")

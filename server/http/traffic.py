@@ -1,0 +1,49 @@
+"""How much is sent, and how far behind those are whom it is sent to."""
+
+from __future__ import annotations
+
+from aiohttp import web
+
+from server.service.streaming.broadcaster import Viewer
+
+
+class Sent:
+    """Counts bytes of streams and of other answers, and what viewers lose.
+
+    Attributes:
+        streams: bytes of endless answers.
+        answers: bytes of all others.
+    """
+
+    def __init__(self) -> None:
+        self.streams = self.answers = 0
+        self._viewers: set[Viewer] = set()
+        self._lost = 0
+        """GOPs of viewers who have gone."""
+
+    def join(self, viewer: Viewer) -> None:
+        """Look at a viewer from now on; call :meth:`leave` in the end."""
+        self._viewers.add(viewer)
+
+    def leave(self, viewer: Viewer) -> None:
+        """Keep what a viewer has lost."""
+        self._viewers.discard(viewer)
+        self._lost += viewer.lost
+
+    @property
+    def lost(self) -> int:
+        """How many GOPs viewers have lost because they fell behind."""
+        return self._lost + sum(viewer.lost for viewer in self._viewers)
+
+    @property
+    def longest(self) -> int:
+        """How many pieces wait for the viewer who is furthest behind."""
+        return max((viewer.waiting for viewer in self._viewers), default=0)
+
+    async def count(self, request: web.Request, response: web.StreamResponse) -> None:
+        """Count an answer that has a body of its own; streams count themselves."""
+        if isinstance(response, web.Response) and request.method != "HEAD":
+            self.answers += response.content_length or 0
+
+
+SENT = web.AppKey("sent", Sent)

@@ -1,0 +1,1 @@
+"""Media formats: H.264, VP8, audio, containers."""

@@ -1,0 +1,1 @@
+"""Audio formats: AAC and Opus."""

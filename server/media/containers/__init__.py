@@ -1,0 +1,1 @@
+"""Containers: fragmented MP4, MPEG-TS, WebM."""

@@ -1,0 +1,117 @@
+"""Fragmented MP4 by hand (ISO/IEC 14496-12 and -15): the header, and pictures in fragments that stand alone.
+
+A library's muxer keeps a fragment back until it knows the next packet, and builds every stream anew. Here a
+fragment is made once per camera and frame, and every stream is a list of references to such fragments.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import accumulate
+
+from server.media.audio.audio_format import SoundFormat
+from server.media.containers.mp4_audio import SOUND_TRACK, sound_track
+from server.media.containers.mp4_boxes import box, full, moof_mdat, movie_head, track, track_defaults
+from server.media.h264.annexb import ParameterSets
+from server.media.rendering_messages import TIMESCALE
+
+_TRACK = 1
+_SYNC_SAMPLE = 0x02000000
+"""sample_depends_on = 2: an I picture (8.8.3.1)."""
+_OTHER_SAMPLE = 0x01010000
+"""sample_depends_on = 1, sample_is_non_sync_sample."""
+_TFDT_AT = 8 + 16 + 8 + 16 + 12
+"""Where a fragment's decode time stands: behind the heads of moof, mfhd, traf, tfhd and tfdt."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """One frame ready for a fragment."""
+
+    data: bytes
+    """NAL units behind their lengths."""
+    key: bool
+    lasts: int = 1
+    """Pulses that it is shown for."""
+
+
+def ticks(pulse: int, fps: float) -> int:
+    """Give the presentation time of a pulse: the media time of a frame is exactly pulse / fps."""
+    return round(pulse * TIMESCALE / fps)
+
+
+def init_segment(
+    parameters: ParameterSets, width: int, height: int, sound: SoundFormat | None = None
+) -> bytes:
+    """Give ``ftyp`` and ``moov``: what a player needs before the first fragment, the same for all streams."""
+    last = _TRACK if sound is None else SOUND_TRACK
+    return box("ftyp", b"iso5" + struct.pack(">I", 512) + b"iso5iso6avc1mp41") + box(
+        "moov",
+        movie_head(last),
+        track(
+            _TRACK,
+            TIMESCALE,
+            b"vide",
+            full("vmhd", 0, 1, bytes(8)),
+            _entry(parameters, width, height),
+            size=(width, height),
+        ),
+        b"" if sound is None else sound_track(sound),
+        box("mvex", *(track_defaults(number + 1) for number in range(last))),
+    )
+
+
+def fragment(samples: Sequence[Sample], first: int, fps: float) -> bytes:
+    """Give ``moof`` and ``mdat`` of consecutive frames, the first of them shown at pulse ``first``."""
+    pulses = accumulate((sample.lasts for sample in samples), initial=first)
+    return _fragment(samples, first, [ticks(pulse, fps) for pulse in pulses])
+
+
+def still(samples: Sequence[Sample], first: int, until: int, fps: float) -> bytes:
+    """Give a fragment that shows the last of some frames: those before it pass in a tick each."""
+    begin = ticks(first, fps)
+    return _fragment(samples, first, [*(begin + place for place in range(len(samples))), ticks(until, fps)])
+
+
+def _fragment(samples: Sequence[Sample], first: int, edges: Sequence[int]) -> bytes:
+    """Give the fragment of samples, each shown from its edge to the next, in ticks."""
+    entries = b"".join(
+        struct.pack(
+            ">3I",
+            edges[number + 1] - edges[number],
+            len(sample.data),
+            _SYNC_SAMPLE if sample.key else _OTHER_SAMPLE,
+        )
+        for number, sample in enumerate(samples)
+    )
+    track_head = full("tfhd", 0, 0x020000, struct.pack(">I", _TRACK))
+    return moof_mdat(first, track_head, edges[0], 0x000701, entries, [it.data for it in samples])
+
+
+def _entry(parameters: ParameterSets, width: int, height: int) -> bytes:
+    sps, pps = parameters.sps, parameters.pps
+    configuration = (
+        b"\x01" + sps[1:4] + b"\xff\xe1" + struct.pack(">H", len(sps)) + sps
+        + b"\x01" + struct.pack(">H", len(pps)) + pps
+    )  # fmt: skip
+    return box(
+        parameters.entry,
+        bytes(6) + struct.pack(">H", 1) + bytes(16) + struct.pack(">2H", width, height)
+        + struct.pack(">2I", 0x480000, 0x480000) + bytes(4) + struct.pack(">H", 1) + bytes(32)
+        + struct.pack(">Hh", 24, -1),
+        box("avcC", configuration),
+    )  # fmt: skip
+
+
+def rebased(frame: bytes, by: int) -> bytes:
+    """Move a fragment of :func:`fragment` in time by ``by`` ticks."""
+    (time,) = struct.unpack_from(">Q", frame, _TFDT_AT)
+    return frame[:_TFDT_AT] + struct.pack(">Q", time + by) + frame[_TFDT_AT + 8 :]
+
+
+def sample_of(frame: bytes) -> bytes:
+    """Give the sample of a fragment of :func:`fragment` that has one."""
+    (moof_bytes,) = struct.unpack_from(">I", frame)
+    return frame[moof_bytes + 8 :]

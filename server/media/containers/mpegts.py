@@ -1,0 +1,199 @@
+"""MPEG transport stream by hand (ISO/IEC 13818-1): one program, a video, perhaps a sound, on one clock.
+
+Each packet counts on from the one before of its stream (continuity_counter, modulo 16). So that a GOP is
+packed once however many watch, and any GOP can follow any other, each GOP is stretched by stuffing to a
+multiple of 16 packets: then all begin at 0. That is 7.5 packets a GOP on average, and no stream has bytes of
+its own.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from server.media.audio.audio_chunk import Heard
+from server.media.containers.fmp4 import ticks
+from server.media.h264.annexb import units_of
+from server.media.picture import Picture
+from server.media.rendering_messages import TIMESCALE
+
+PACKET_BYTES = 188
+COUNTERS = 16
+"""Packets after which the continuity counter begins anew."""
+
+_PAT_PID, _PMT_PID, _VIDEO_PID, _SOUND_PID = 0x0000, 0x1000, 0x0100, 0x0101
+_H264, _AAC = 0x1B, 0x0F
+"""stream_type."""
+_CLOCK = 1 << 33
+"""Time stamps are modulo this (2.4.3.7)."""
+_DELAY = TIMESCALE // 5
+"""How long before it is shown a picture is on its way: the time reference is as far behind."""
+_PCR_EVERY = TIMESCALE // 10
+"""The time reference comes at least that often (2.7.2)."""
+_PAYLOAD = PACKET_BYTES - 4
+_PCR_FIELD = 8
+"""Bytes of an adaptation field with a time reference."""
+_AUD = b"\x00\x00\x00\x01\x09\xf0"
+"""Access unit delimiter: begins every picture in a transport stream (2.14.1)."""
+_START_CODE = b"\x00\x00\x00\x01"
+_PES_HEAD = 14
+_FRAMES_AT_ONCE = 6
+"""Frames of sound in a PES packet, which has to say how long it is: in 16 bits."""
+
+
+@dataclass(frozen=True, slots=True)
+class Counters:
+    """Where a piece of a stream stands: what has been sent of each PID before it, modulo 16."""
+
+    tables: int = 0
+    video: int = 0
+    sound: int = 0
+    whole: bool = True
+    """Stretch it to a multiple of 16 packets, so that any other can follow."""
+
+
+def packets(picture: Picture) -> int:
+    """Give how many packets with content a picture becomes; packing it is not needed for that."""
+    return _packets(_PES_HEAD + len(_AUD) + len(picture.sample))
+
+
+def sound_packets(heard: Heard) -> int:
+    """Give how many packets with content some sound becomes; there is none of Opus here."""
+    return sum(_plain_packets(len(content)) for content in _sound_pes(heard))
+
+
+def pack(pictures: Sequence[Picture], fps: float, counters: Counters, heard: Heard | None = None) -> bytes:
+    """Give consecutive pictures as packets, behind what is to be heard with them, if that is AAC.
+
+    The tables come before each whole GOP and each key picture.
+    """
+    out: list[bytes] = []
+    heard = heard if heard is not None and heard.format.coding == "aac" else None
+    if counters.whole or pictures[0].key:
+        out += [
+            _table(_PAT_PID, _PAT, counters.tables),
+            _table(_PMT_PID, _PMT if heard is None else _PMT_WITH_SOUND, counters.tables),
+        ]
+    if heard is not None:
+        out += _pack_sound(heard, counters)
+    counter = counters.video
+    for place, picture in enumerate(pictures):
+        content = _pes(picture, fps)
+        count = _packets(len(content))
+        if counters.whole and place == len(pictures) - 1:
+            count += -(counter + count) % COUNTERS
+        time = ticks(picture.pulse, fps)
+        out += _split(_VIDEO_PID, content, count, counter, _reference(time, key=picture.key))
+        counter = (counter + count) % COUNTERS
+        for later in range(time + _PCR_EVERY, ticks(picture.until, fps), _PCR_EVERY):
+            out.append(_packet(_VIDEO_PID, counter - 1, b"", _reference(later)))
+    return b"".join(out)
+
+
+def _pack_sound(heard: Heard, counters: Counters) -> Iterator[bytes]:
+    counter, contents = counters.sound, _sound_pes(heard)
+    for place, content in enumerate(contents):
+        count = _plain_packets(len(content))
+        if counters.whole and place == len(contents) - 1:
+            count += -(counter + count) % COUNTERS
+        yield from _split(_SOUND_PID, content, count, counter, b"")
+        counter = (counter + count) % COUNTERS
+
+
+def _sound_pes(heard: Heard) -> list[bytes]:
+    """Give sound as PES packets, each frame behind its ADTS head."""
+    form, made = heard.format, list[bytes]()
+    for place in range(0, len(heard.frames) if form.coding == "aac" else 0, _FRAMES_AT_ONCE):
+        stamp = _stamp(round((heard.first + place) * form.samples * TIMESCALE / form.rate) % _CLOCK)
+        frames = heard.frames[place : place + _FRAMES_AT_ONCE]
+        content = b"".join(form.adts(len(frame)) + frame for frame in frames)
+        made.append(
+            struct.pack(">IHBBB", 0x1C0, 3 + len(stamp) + len(content), 0x84, 0x80, 5) + stamp + content
+        )
+    return made
+
+
+def _plain_packets(content: int) -> int:
+    return -(-content // _PAYLOAD)
+
+
+def _packets(content: int) -> int:
+    return 1 + max(0, -(-(content - _PAYLOAD + _PCR_FIELD) // _PAYLOAD))
+
+
+def _pes(picture: Picture, fps: float) -> bytes:
+    """Give a picture as a PES packet (2.4.3.6): it carries its time, and says its length where that fits."""
+    time = ticks(picture.pulse, fps) % _CLOCK
+    stamp = _stamp(time)
+    content = _AUD + b"".join(_annex_b(picture.sample))
+    length = 3 + len(stamp) + len(content)
+    # 0x84: the access unit begins right here; 0x80: it is decoded when it is shown.
+    head = struct.pack(">IHBBB", 0x1E0, length if length < 1 << 16 else 0, 0x84, 0x80, len(stamp))
+    return head + stamp + content
+
+
+def _stamp(time: int) -> bytes:
+    return struct.pack(">BHH", 0x21 | time >> 29 & 0x0E, time >> 14 & 0xFFFE | 1, time << 1 & 0xFFFE | 1)
+
+
+def _annex_b(sample: bytes) -> Iterator[bytes]:
+    for unit in units_of(sample):
+        yield _START_CODE
+        yield unit
+
+
+def _reference(time: int, *, key: bool = False) -> bytes:
+    """Give an adaptation field's flags and time reference (2.4.3.4)."""
+    base = (time - _DELAY) % _CLOCK
+    return struct.pack(">BIH", 0x10 | 0x40 * key, base >> 1, (base & 1) << 15 | 0x7E00)
+
+
+def _split(pid: int, content: bytes, count: int, counter: int, reference: bytes) -> Iterator[bytes]:
+    """Spread the content over so many packets: full ones first, and at least a byte in each."""
+    at = 0
+    for place in range(count):
+        field = reference if place == 0 else b""
+        room = _PAYLOAD - (1 + len(field) if field else 0)
+        size = min(room, len(content) - at - (count - 1 - place))
+        yield _packet(pid, counter + place, content[at : at + size], field, begins=place == 0)
+        at += size
+
+
+def _packet(pid: int, counter: int, payload: bytes, field: bytes = b"", *, begins: bool = False) -> bytes:
+    """Give a packet; ``field`` is an adaptation field without its length, stuffed as far as there is room."""
+    room = _PAYLOAD - len(payload)
+    control = 0x10 * bool(payload)
+    if room:
+        control |= 0x20
+        stuffed = (field or b"\x00") if room > 1 else b""
+        field = bytes([room - 1]) + stuffed.ljust(room - 1, b"\xff")
+    return struct.pack(">BHB", 0x47, begins << 14 | pid, control | counter % COUNTERS) + field + payload
+
+
+def _table(pid: int, section: bytes, counter: int) -> bytes:
+    payload = (b"\x00" + section).ljust(_PAYLOAD, b"\xff")
+    return _packet(pid, counter, payload, begins=True)
+
+
+def _section(table: int, number: int, body: bytes) -> bytes:
+    """Give a section of one part (2.4.4.3, 2.4.4.8), version 0, in force."""
+    content = struct.pack(">HBBB", number, 0xC1, 0, 0) + body
+    head = struct.pack(">BH", table, 0xB000 | len(content) + 4) + content
+    return head + struct.pack(">I", _crc(head))
+
+
+def _crc(data: bytes) -> int:
+    """Give CRC_32 of annex A."""
+    crc = 0xFFFFFFFF
+    for byte in data:
+        crc ^= byte << 24
+        for _ in range(8):
+            crc = (crc << 1 ^ (0x04C11DB7 if crc & 1 << 31 else 0)) & 0xFFFFFFFF
+    return crc
+
+
+_PAT = _section(0, 1, struct.pack(">HH", 1, 0xE000 | _PMT_PID))
+_STREAMS = struct.pack(">HHBHH", 0xE000 | _VIDEO_PID, 0xF000, _H264, 0xE000 | _VIDEO_PID, 0xF000)
+_PMT = _section(2, 1, _STREAMS)
+_PMT_WITH_SOUND = _section(2, 1, _STREAMS + struct.pack(">BHH", _AAC, 0xE000 | _SOUND_PID, 0xF000))

@@ -1,0 +1,1 @@
+"""H.264 parsing and writing (ITU-T H.264)."""

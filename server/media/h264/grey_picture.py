@@ -1,0 +1,57 @@
+"""A mid-grey key picture of H.264, written by hand: for who may not see what the cameras show.
+
+Every macroblock is predicted by the mean of its neighbours and has no residue (ITU-T H.264, 8.3.3.3): grey in
+all formats alike. The picture carries the parameter sets of the stream that it stands in, so that a decoder
+takes it for a camera's key picture. It is written once for each of them: a byte a macroblock, or less.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+from server.media.h264 import cabac
+from server.media.h264.annexb import NAL_IDR, ParameterSets, sample
+from server.media.h264.bitstream import BitWriter, unit_of
+from server.media.h264.repeat_picture import slice_heads
+
+_SLICE_I = 7
+"""slice_type of a picture all of whose slices are I."""
+_IDR = 0x60 | NAL_IDR
+"""NAL head with nal_ref_idc 3."""
+_GREY_MACROBLOCK = "00100111"
+"""mb_type I_16x16_2_0_0, intra_chroma_pred_mode DC, mb_qp_delta 0, and no coefficients (7.3.5)."""
+
+
+@lru_cache(maxsize=16)
+def grey_picture(parameters: ParameterSets, idr_pic_id: int) -> bytes:
+    """Return the sample of a grey key picture: length-prefixed NAL units, parameter sets first.
+
+    ``idr_pic_id`` differs between two key pictures in a row (7.4.3).
+
+    Raises:
+        UnfitError: the parameter sets are damaged, or use what hardly any camera does.
+    """
+    head = slice_heads(parameters)
+    bits = BitWriter()
+    for value in (0, _SLICE_I, head.pps_id):
+        bits.ue(value)
+    bits.u(head.frame_num_bits, 0)
+    bits.ue(idr_pic_id)
+    if head.order_bits:
+        bits.u(head.order_bits, 0)
+        if head.order_of_fields:
+            bits.se(0)
+    if head.redundant:
+        bits.ue(0)
+    bits.u(2, 0)  # what was before may still be shown, and this is no long-term reference
+    bits.se(cabac.SLICE_QP - head.init_qp)
+    if head.deblocking_control:
+        bits.ue(1)
+    if head.cabac:
+        bits.align(1)
+        bits.copy(cabac.grey_slice(head.width, head.height))
+    else:
+        bits.copy(_GREY_MACROBLOCK * head.macroblocks)
+        bits.u(1, 1)
+    bits.align(0)
+    return sample([parameters.sps, parameters.pps, unit_of(_IDR, bits.done())])

@@ -1,0 +1,211 @@
+"""A picture that repeats the one before it, written by hand: for where no camera can be shown.
+
+It is a P picture in which every macroblock is skipped (ITU-T H.264, 7.3.4): some ten bytes, pixel for pixel
+the picture before. The parameter sets say how it must be written.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+from server.media.h264 import cabac
+from server.media.h264.annexb import NAL_IDR, NAL_SLICE, ParameterSets, nal_type
+from server.media.h264.bitstream import BitReader, BitWriter, payload_of, unit_of
+
+_HIGH_PROFILES = frozenset({44, 83, 86, 100, 110, 118, 122, 128, 134, 135, 138, 139, 244})
+"""Those whose sequence parameter set says more of colours (7.3.2.1.1)."""
+_LENGTH_BYTES = 4
+_SLICE_P = 5
+"""slice_type of a picture all of whose slices are P."""
+_REFERENCE = 0x40 | NAL_SLICE
+"""NAL head with nal_ref_idc 2."""
+_ORDER_BY_NUMBERS, _ORDER_BY_DECODING = 0, 2
+"""pic_order_cnt_type: each picture says its place, or, of an encoder without B pictures, need not."""
+_MOST_MACROBLOCKS = 139_264
+"""Of a picture at the highest level there is (table A-1); writing a picture takes time for each."""
+_MOST_FRAME_NUM_BITS = 16
+"""Also of pic_order_cnt_lsb."""
+
+
+class UnfitError(Exception):
+    """Streams of these parameter sets cannot be continued: they use what a site's cameras never do."""
+
+
+@dataclass(frozen=True, slots=True)
+class Continuing:
+    """What the parameter sets say about the head of a slice.
+
+    Attributes:
+        width, height: of a picture, in macroblocks.
+        order_bits: of pic_order_cnt_lsb; 0: pictures are shown in the order in which they are decoded.
+        order_of_fields: the second field's place is said as well.
+    """
+
+    pps_id: int
+    frame_num_bits: int
+    width: int
+    height: int
+    order_bits: int
+    order_of_fields: bool
+    cabac: bool
+    weighted: bool
+    init_qp: int
+    deblocking_control: bool
+    redundant: bool
+
+    @property
+    def macroblocks(self) -> int:
+        """How many macroblocks a picture has."""
+        return self.width * self.height
+
+    def frame_num(self, sample: bytes) -> int:
+        """Give frame_num of a picture, length-prefixed NAL units.
+
+        Raises:
+            ValueError: there is no picture in it.
+        """
+        at = 0
+        while at + _LENGTH_BYTES < len(sample):
+            length = int.from_bytes(sample[at : at + _LENGTH_BYTES], "big")
+            at += _LENGTH_BYTES
+            if nal_type(sample[at : at + 1]) in (NAL_SLICE, NAL_IDR):
+                head = BitReader(payload_of(sample[at : at + min(length, 32)]))
+                head.ue(), head.ue(), head.ue()
+                return head.u(self.frame_num_bits)
+            at += length
+        raise ValueError("a sample without a picture")
+
+    def next_num(self, frame_num: int) -> int:
+        """Give the frame_num that follows."""
+        return (frame_num + 1) % (1 << self.frame_num_bits)
+
+    def repeat(self, frame_num: int, *, reference: bool) -> bytes:
+        """Give a sample that shows the picture before again; it is number ``frame_num``.
+
+        One that is no ``reference`` leaves the number to the next picture as well: it can be slipped in
+        between two pictures of a camera, but not two of them in a row (8.2.1.3).
+        """
+        bits = BitWriter()
+        for value in (0, _SLICE_P, self.pps_id):
+            bits.ue(value)
+        bits.u(self.frame_num_bits, frame_num)
+        if self.redundant:
+            bits.ue(0)
+        bits.u(1, 1)  # num_ref_idx_active_override_flag: there is one reference, the newest picture
+        bits.ue(0)
+        bits.u(1, 0)
+        if self.weighted:
+            for value in (0, 0):
+                bits.ue(value)
+            bits.u(2, 0)  # as if there were no weights
+        if reference:
+            bits.u(1, 0)
+        if self.cabac:
+            bits.ue(0)
+        bits.se(cabac.SLICE_QP - self.init_qp)
+        if self.deblocking_control:
+            bits.ue(1)
+        if self.cabac:
+            bits.align(1)
+            bits.copy(cabac.skipped_slice(self.macroblocks))
+        else:
+            bits.ue(self.macroblocks)  # mb_skip_run
+            bits.u(1, 1)
+        bits.align(0)
+        unit = unit_of(_REFERENCE if reference else NAL_SLICE, bits.done())
+        return len(unit).to_bytes(_LENGTH_BYTES, "big") + unit
+
+
+def continuing(parameters: ParameterSets) -> Continuing:
+    """Read the parameter sets of streams whose last picture can be repeated.
+
+    Raises:
+        UnfitError: they are damaged, or use what x264 without B pictures does not.
+    """
+    found = slice_heads(parameters)
+    if found.order_bits:
+        raise UnfitError("pictures may be shown in another order than they are decoded in")
+    return found
+
+
+@lru_cache(maxsize=8)
+def slice_heads(parameters: ParameterSets) -> Continuing:
+    """Read the parameter sets.
+
+    Raises:
+        UnfitError: they are damaged, or use what hardly any camera does.
+    """
+    try:
+        sps = _read_sps(BitReader(payload_of(parameters.sps)))
+        return _read_pps(BitReader(payload_of(parameters.pps)), sps)
+    except ValueError as error:
+        raise UnfitError(str(error)) from error
+
+
+@dataclass(frozen=True, slots=True)
+class _Sequence:
+    """What the sequence parameter set says; as in :class:`Continuing`."""
+
+    frame_num_bits: int
+    width: int
+    height: int
+    order_bits: int
+
+
+def _read_sps(bits: BitReader) -> _Sequence:
+    profile = bits.u(8)
+    bits.u(16)
+    bits.ue()
+    if profile in _HIGH_PROFILES:
+        colour, depth, chroma_depth = bits.ue(), bits.ue(), bits.ue()
+        if (colour, depth, chroma_depth) != (1, 0, 0):
+            raise ValueError("not 8 bit 4:2:0")
+        bits.u(1)
+        if bits.u(1):
+            raise ValueError("with scaling lists")
+    frame_num_bits = bits.ue() + 4
+    order = bits.ue()
+    if order not in (_ORDER_BY_NUMBERS, _ORDER_BY_DECODING):
+        raise ValueError("pictures are put in order by a rule")
+    order_bits = bits.ue() + 4 if order == _ORDER_BY_NUMBERS else 0
+    bits.ue()
+    bits.u(1)
+    width, height = bits.ue() + 1, bits.ue() + 1
+    if not bits.u(1):
+        raise ValueError("interlaced")
+    if width * height > _MOST_MACROBLOCKS or max(frame_num_bits, order_bits) > _MOST_FRAME_NUM_BITS:
+        raise ValueError("beyond every level")
+    return _Sequence(frame_num_bits, width, height, order_bits)
+
+
+def _read_pps(bits: BitReader, sps: _Sequence) -> Continuing:
+    pps_id = bits.ue()
+    bits.ue()
+    arithmetic = bool(bits.u(1))
+    order_of_fields = bool(bits.u(1))
+    if bits.ue():
+        raise ValueError("with slice groups")
+    bits.ue()
+    bits.ue()
+    weighted = bool(bits.u(1))
+    bits.u(2)
+    init_qp = 26 + bits.se()
+    bits.se()
+    bits.se()
+    deblocking_control = bool(bits.u(1))
+    bits.u(1)
+    redundant = bool(bits.u(1))
+    return Continuing(
+        pps_id=pps_id,
+        frame_num_bits=sps.frame_num_bits,
+        width=sps.width,
+        height=sps.height,
+        order_bits=sps.order_bits,
+        order_of_fields=order_of_fields,
+        cabac=arithmetic,
+        weighted=weighted,
+        init_qp=init_qp,
+        deblocking_control=deblocking_control,
+        redundant=redundant,
+    )

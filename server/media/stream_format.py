@@ -1,0 +1,163 @@
+"""What all streams of a site are made of, which its cameras must share."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Literal
+
+from server.config.sections import Site
+from server.media.audio.audio_format import SoundFormat
+from server.media.containers.fmp4 import Sample, fragment, init_segment, rebased, sample_of, ticks
+from server.media.gap_filler import NO_CAMERAS, Bridge, H264Bridge
+from server.media.h264.annexb import ParameterSets, nal_units, parameter_sets, sample, units_of
+from server.media.h264.grey_picture import grey_picture
+from server.media.h264.repeat_picture import UnfitError, continuing
+from server.media.picture import Picture
+
+Container = Literal["mp4", "webm"]
+
+
+class ParameterMismatchError(Exception):
+    """The camera's parameters are not the site's: its frames would decode into wrong pixels."""
+
+
+class Agreement:
+    """H.264 in MP4: the first key frame of a site fixes the parameter sets.
+
+    Whoever has others cannot be spliced in.
+    """
+
+    container: Container = "mp4"
+
+    def __init__(self) -> None:
+        self.parameters: ParameterSets | None = None
+
+    @property
+    def codec(self) -> str | None:
+        """The codec string of RFC 6381; None before the first key frame."""
+        return None if self.parameters is None else self.parameters.codec
+
+    def check(self, found: ParameterSets | None) -> None:
+        """Compare the parameter sets of a key frame, None where it has none.
+
+        Raises:
+            ParameterMismatchError: they are missing, or not the site's.
+        """
+        if found is None:
+            raise ParameterMismatchError("a key frame without parameter sets")
+        if self.parameters is None:
+            self.parameters = found
+        elif found != self.parameters:
+            raise ParameterMismatchError("its H.264 parameter sets differ from the other cameras'")
+
+    def accept(self, key: bytes) -> ParameterSets | None:
+        """Look at a camera's key frame; give the parameter sets up to the next, where they are its own.
+
+        Raises:
+            ParameterMismatchError: it is not of the site, and the camera must be refused.
+        """
+        self.check(parameter_sets(nal_units(key)))
+        return None
+
+    def pack(self, access_unit: bytes, pulse: int, fps: float, *, key: bool) -> bytes:
+        """Give a frame as a fragment, which fits into any stream of the site."""
+        return fragment([Sample(sample(nal_units(access_unit)), key)], pulse, fps)
+
+    def head(
+        self, site: Site, sound: SoundFormat | None = None, *, pulses: int | None = None
+    ) -> bytes | None:
+        """Give what a player needs before the first fragment; None before the first key frame.
+
+        ``pulses``: how many there are in a file. Its size does not depend on the number.
+        """
+        del pulses  # players add up the fragments
+        if self.parameters is None:
+            return None
+        return init_segment(self.parameters, site.width, site.height, sound)
+
+    def begun_at(self, origin: int, fragment: bytes, fps: float) -> bytes:
+        """Give a fragment as it is in a stream that has this pulse at time 0."""
+        return rebased(fragment, -ticks(origin, fps))
+
+    def told_by(self, key: bytes) -> ParameterSets | None:
+        """Give the parameter sets of the pictures from a key fragment on, where they may be its own."""
+        del key
+        return None
+
+    def bridge(self, newest: Picture, fps: float) -> Bridge | None:
+        """Give what bridges holes after a picture; None where it is not known how."""
+        del newest
+        return None if self.parameters is None else bridge_by(self.parameters, fps)
+
+    def blank(self, newest: Picture | None, first: int, frames: int, fps: float) -> list[Picture]:
+        """Return a GOP of grey pictures that fits after a picture; nothing where it is not known how.
+
+        Where its last picture cannot be repeated, the grey one lasts for all of it.
+        """
+        del newest
+        return self._blank(self.parameters, None, first, frames, fps)
+
+    def _blank(
+        self,
+        written_by: ParameterSets | None,
+        decoded_by: ParameterSets | None,
+        first: int,
+        frames: int,
+        fps: float,
+    ) -> list[Picture]:
+        """Return that GOP by some parameter sets; ``decoded_by`` is what its pictures say of themselves."""
+        if written_by is None:
+            return []
+        try:
+            grey = grey_picture(written_by, first // frames % 2)
+        except UnfitError:
+            return []
+        bridge = bridge_by(written_by, fps)
+        lasts = frames if bridge is None else 1
+        made = fragment([Sample(grey, key=True, lasts=lasts)], first, fps)
+        key = Picture(first, key=True, fragment=made, boot=NO_CAMERAS, lasts=lasts, parameters=decoded_by)
+        if bridge is None:
+            return [key]
+        bridge = replace(bridge, parameters=decoded_by)
+        return [key, *bridge.after(key, [(pulse, 1) for pulse in range(first + 1, first + frames)])]
+
+
+class OwnParameters(Agreement):
+    """The same, but cameras may have parameter sets of their own, which their key frames carry."""
+
+    def accept(self, key: bytes) -> ParameterSets:
+        """Take a camera's parameter sets for its own.
+
+        Raises:
+            ParameterMismatchError: it has none.
+        """
+        found = parameter_sets(nal_units(key))
+        if found is None:
+            raise ParameterMismatchError("a key frame without parameter sets")
+        if self.parameters is None:
+            self.parameters = replace(found, may_change=True)
+        return found
+
+    def told_by(self, key: bytes) -> ParameterSets | None:
+        """Find them in the picture, where they always are."""
+        return parameter_sets(units_of(sample_of(key)))
+
+    def bridge(self, newest: Picture, fps: float) -> Bridge | None:
+        """Give what bridges holes after a picture, by that picture's own parameter sets."""
+        if newest.parameters is None:
+            return None
+        bridge = bridge_by(newest.parameters, fps)
+        return None if bridge is None else replace(bridge, parameters=newest.parameters)
+
+    def blank(self, newest: Picture | None, first: int, frames: int, fps: float) -> list[Picture]:
+        """Return a GOP of grey pictures by the parameter sets of a picture; they are in it, as at any cut."""
+        known = self.parameters if newest is None or newest.parameters is None else newest.parameters
+        return self._blank(known, known, first, frames, fps)
+
+
+def bridge_by(parameters: ParameterSets, fps: float) -> H264Bridge | None:
+    """Give what bridges holes in a stream of these parameter sets; None where it is not known how."""
+    try:
+        return H264Bridge(continuing(parameters), fps)
+    except UnfitError:
+        return None

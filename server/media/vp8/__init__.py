@@ -1,0 +1,1 @@
+"""VP8 parsing and writing (RFC 6386)."""

@@ -1,0 +1,1 @@
+"""Messages between the processes, and the zenoh bus that carries them."""

@@ -1,0 +1,218 @@
+"""zenoh for asyncio: publish, subscribe and liveliness, bounded everywhere."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from typing import Any, Self
+
+import zenoh
+
+from server.config.password_file import password_of
+from server.config.sections import Zenoh
+from server.messaging.bus_access import SETTING
+from server.messaging.inbox import Inbox, Message
+from server.messaging.messages import camera_of
+from server.system.address_redaction import shown_endpoint
+from server.system.errors import UserError
+
+_DROP_AFTER_US = 20_000
+"""zenoh drops a message after 1 ms in a full queue by default: too soon for an I picture's burst."""
+
+_OPEN_WITHIN_MS = 5_000
+_MESSAGE_MAX = 1 << 25
+"""Bytes of one message; a picture of 4K that is decoded by no other has some millions."""
+_PUBLISHERS = 64
+"""Keys for which something is prepared: of more, those not sent to for longest are prepared anew."""
+
+
+class Bus:
+    """One zenoh session. Close it, or the process never ends: zenoh's threads are not daemons."""
+
+    def __init__(self, session: zenoh.Session) -> None:
+        self._session = session
+        self._publishers: dict[str, zenoh.Publisher] = {}
+        """Whoever was sent to last is the last."""
+        self._undeclare: list[Callable[[], None]] = []
+
+    @classmethod
+    def router(cls, settings: Zenoh, access: Mapping[str, Any] | None = None) -> Self:
+        """Open the session that all others connect to (the best-view service's).
+
+        ``access`` is zenoh's access control: what each user of ``settings.users`` may.
+
+        Raises:
+            UserError: the address cannot be listened on.
+        """
+        config = _config(settings, "router", None)
+        if settings.users is not None:
+            config.insert_json5("transport/auth/usrpwd/dictionary_file", json.dumps(str(settings.users)))
+        for key, file in (("certificate", settings.tls.certificate), ("private_key", settings.tls.key)):
+            if file is not None:
+                config.insert_json5(f"transport/link/tls/listen_{key}", json.dumps(str(file)))
+        if access is not None:
+            config.insert_json5("access_control", json.dumps(access))
+        try:
+            config.insert_json5("listen/endpoints", json.dumps([settings.listen]))
+            return cls(zenoh.open(config))
+        except zenoh.ZError as error:
+            raise UserError(
+                f"zenoh.listen: cannot listen on {shown_endpoint(settings.listen)}; is the port in use?"
+                + (" Are zenoh.tls.certificate and key a pair?" if settings.tls.key is not None else "")
+            ) from error
+
+    @classmethod
+    def client(cls, settings: Zenoh, user: str | None = None) -> Self:
+        """Open a session of the site's router; it need not be there yet, and may go and come back.
+
+        It hears the router's process, which is the best-view service, and is heard by it; not other clients.
+        ``user`` is who it comes as, where the router asks.
+
+        Raises:
+            UserError: the address is not one that zenoh understands, or there is no such user.
+        """
+        # A peer, not a client: a client's session cannot be opened while the router is away.
+        return cls._connected(settings, "peer", user)
+
+    @classmethod
+    def second(cls, settings: Zenoh, user: str | None = None) -> Self:
+        """Open the like for a further best-view service, which hears all of the router's clients.
+
+        Raises:
+            UserError: the address is not one that zenoh understands.
+        """
+        # A router tells routers what it hears from peers, but no peer what it hears from another.
+        return cls._connected(settings, "router", user)
+
+    @classmethod
+    def hearing(cls, settings: Zenoh, user: str | None = None) -> Self:
+        """Open a session that hears the router's other clients, too.
+
+        The router must be there; later it may go and come back. Blocks for some seconds at most.
+
+        Raises:
+            UserError: the router is not there.
+        """
+        config = _config(settings, "client", user)
+        try:
+            config.insert_json5("connect/timeout_ms", str(_OPEN_WITHIN_MS))
+            config.insert_json5("connect/endpoints", json.dumps([settings.connect]))
+            return cls(zenoh.open(config))
+        except zenoh.ZError as error:
+            refused = "" if settings.users is None else ", or who is there refuses this user"
+            raise UserError(
+                f"zenoh.connect: nobody is at {shown_endpoint(settings.connect)}{refused}"
+            ) from error
+
+    @classmethod
+    def _connected(cls, settings: Zenoh, mode: str, user: str | None) -> Self:
+        config = _config(settings, mode, user)
+        config.insert_json5("connect/timeout_ms", "-1")  # keep trying in the background
+        config.insert_json5("connect/exit_on_failure", "false")
+        config.insert_json5("listen/endpoints", "[]")
+        config.insert_json5(
+            "connect/retry", '{"period_init_ms": 100, "period_max_ms": 1000, "period_increase_factor": 2}'
+        )
+        try:
+            config.insert_json5("connect/endpoints", json.dumps([settings.connect]))
+            return cls(zenoh.open(config))
+        except zenoh.ZError:
+            raise UserError(
+                f"zenoh.connect: cannot use {shown_endpoint(settings.connect)}: has zenoh this protocol, "
+                "and is all right that stands behind the port?"
+            ) from None
+
+    def publish(self, key: str, payload: bytes, attachment: bytes | None = None) -> None:
+        """Send a message; it is dropped where a receiver is too slow or nobody is there."""
+        publisher = self._publishers.pop(key, None)
+        if publisher is None:
+            if len(self._publishers) >= _PUBLISHERS:
+                self._publishers.pop(next(iter(self._publishers))).undeclare()  # type: ignore[no-untyped-call]
+            publisher = self._session.declare_publisher(
+                key,
+                congestion_control=zenoh.CongestionControl.DROP,
+                priority=zenoh.Priority.DATA,  # one priority for all: a camera's messages stay in order
+            )
+        self._publishers[key] = publisher
+        publisher.put(payload, attachment=attachment)
+
+    def subscribe(self, key: str, handler: Callable[[Message], None]) -> Inbox[Message]:
+        """Call ``handler`` on the event loop for every message under ``key`` (a key expression)."""
+        inbox = Inbox(handler, whose=_sender, size=_size)
+
+        def receive(sample: zenoh.Sample) -> None:
+            attachment = sample.attachment.to_bytes() if sample.attachment is not None else b""
+            inbox.put(Message(str(sample.key_expr), sample.payload.to_bytes(), attachment))
+
+        self._undeclare.append(self._session.declare_subscriber(key, receive).undeclare)
+        return inbox
+
+    def listen(self, key: str, handler: Callable[[Message], None]) -> Callable[[], None]:
+        """Subscribe until what is returned is called."""
+        self.subscribe(key, handler)
+        undeclare = self._undeclare[-1]
+
+        def end() -> None:
+            if undeclare in self._undeclare:
+                self._undeclare.remove(undeclare)
+                undeclare()
+
+        return end
+
+    def declare_alive(self, key: str) -> None:
+        """Say that this process is there, until it closes its session or is gone."""
+        self._undeclare.append(self._session.liveliness().declare_token(key).undeclare)
+
+    def watch_alive(self, key: str, handler: Callable[[str, bool], None]) -> None:
+        """Call ``handler(key, is_there)`` on the event loop for all that are there now, come and go."""
+
+        def unpack(message: Message) -> None:
+            handler(message.key, message.payload == b"1")
+
+        inbox = Inbox(unpack, whose=_sender, size=_size)
+
+        def receive(sample: zenoh.Sample) -> None:
+            there = sample.kind == zenoh.SampleKind.PUT
+            inbox.put(Message(str(sample.key_expr), b"1" if there else b"0", b""))
+
+        subscriber = self._session.liveliness().declare_subscriber(key, receive, history=True)
+        self._undeclare.append(subscriber.undeclare)
+
+    def close(self) -> None:
+        """Undeclare everything and close the session."""
+        for undeclare in reversed(self._undeclare):
+            undeclare()
+        self._undeclare.clear()
+        self._publishers.clear()
+        self._session.close()  # type: ignore[no-untyped-call]
+
+
+def _sender(message: Message) -> str:
+    """Return whose a message is: one camera's are no other's."""
+    return camera_of(message.key)
+
+
+def _size(message: Message) -> int:
+    return len(message.payload) + len(message.attachment)
+
+
+def _config(settings: Zenoh, mode: str, user: str | None) -> zenoh.Config:
+    config = zenoh.Config()
+    for key, value in {
+        "mode": mode,
+        "scouting/multicast/enabled": False,  # a site is what its configuration says, not who is nearby
+        "scouting/gossip/enabled": False,  # all traffic goes by the router: cameras need not reach each other
+        "transport/link/tx/lease": int(settings.lease_s * 1000),
+        "transport/link/tx/queue/congestion_control/drop/wait_before_drop": _DROP_AFTER_US,
+        "transport/link/tx/queue/size/data": 16,
+        "transport/link/rx/max_message_size": _MESSAGE_MAX,
+        "transport/shared_memory/enabled": False,
+    }.items():
+        config.insert_json5(key, json.dumps(value))
+    if settings.users is not None and user is not None:
+        password = password_of(settings.users, user, SETTING)
+        config.insert_json5("transport/auth/usrpwd/user", json.dumps(user))
+        config.insert_json5("transport/auth/usrpwd/password", json.dumps(password))
+    if settings.tls.authority is not None:
+        config.insert_json5("transport/link/tls/root_ca_certificate", json.dumps(str(settings.tls.authority)))
+    return config

@@ -1,0 +1,289 @@
+"""The messages on the bus, and the keys they travel under.
+
+Everything but pictures is JSON, so that any zenoh subscriber can read it; video travels as plain Annex B
+H.264 (or frames of VP8) with a small JSON head in zenoh's attachment. Numbers survive the way exactly: JSON
+floats are written with as many digits as they need.
+
+========================================  =======================================  =====================
+key                                       payload                                  attachment
+========================================  =======================================  =====================
+``myview/SITE/camera/ID/video``           one access unit, Annex B H.264 or VP8    :class:`FrameHead`
+``myview/SITE/camera/ID/tracks``          :class:`CameraTracks`
+``myview/SITE/camera/ID/status``          :class:`CameraStatus`
+``myview/SITE/camera/ID/thumbs/LOCAL``    JPEG of one person                       :class:`ThumbHead`
+``myview/SITE/camera/ID/found``           :class:`Found`
+``myview/SITE/camera/ID/pointing``        :class:`server.messaging.operator_messages.Pointings`
+``myview/SITE/camera/ID/remember``        :class:`server.messaging.retained_state.Remembered`
+``myview/SITE/camera/ID/remembered``      the same, to a service that has come; empty: nothing
+``myview/SITE/camera/ID/hears``           liveliness token: it hears what the other cameras find
+``myview/SITE/camera/ID/alive``           liveliness token
+``myview/SITE/sound``                     frames of sound, one after the other     :class:`SoundHead`
+``myview/SITE/bestview/choices``          :class:`GopChoices`
+``myview/SITE/bestview/INDEX/choices``    of a further service that shares the site
+``myview/SITE/bestview/alive``            liveliness token
+``myview/SITE/bestview/INDEX/alive``      of a further service
+========================================  =======================================  =====================
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+import msgspec
+
+from server.messaging.number_types import LAST_PULSE, Coordinate, Cost, Duration, Number, Pixels, Pulse, Time
+from server.messaging.operator_messages import TROUBLES_MOST, Trouble
+
+UNREADABLE = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
+"""What a decoder raises: it is no JSON or other JSON, it is no text, it is nested without end."""
+
+Box = tuple[Coordinate, Coordinate, Coordinate, Coordinate]
+"""Left, top, right, bottom in pixels of the site's picture."""
+
+NumberedBox = tuple[int, float, float, float, float]
+"""A person's number, and their box: left, top, right, bottom in pixels of the site's picture."""
+
+
+class FrameHead(msgspec.Struct, frozen=True, kw_only=True):
+    """What one access unit is. Times are unix seconds by the camera's clock."""
+
+    pulse: Pulse
+    key: bool
+    """It begins a GOP: SPS, PPS and an IDR picture are inside."""
+    boot: Number
+    """Which run of the camera process: a restarted camera has another one."""
+    after: Pulse | None = None
+    """The pulse of the access unit before it, which it is decoded by; null where it is not known."""
+    due: Time
+    """When the pulse was due."""
+    taken: Time
+    """When the picture was there."""
+    encoded: Time
+
+
+BINS_MOST = 1024
+"""Bins of a histogram; more would tell nobody apart better."""
+
+
+class Glimpse(msgspec.Struct, frozen=True, kw_only=True):
+    """How a person looks in consecutive frames in which nobody else is in the box."""
+
+    first: Pulse
+    last: Pulse
+    histogram: Annotated[list[Annotated[float, msgspec.Meta(le=1e6)]], msgspec.Meta(max_length=BINS_MOST)]
+    """The mean of these frames' histograms."""
+
+
+SOUND_MOST = 16_384
+"""Frames of sound in one message at most: those of some minutes, whatever a frame lasts."""
+
+
+class SoundHead(msgspec.Struct, frozen=True, kw_only=True):
+    """Which frames of the site's sound these are (:mod:`server.media.audio.audio_format`)."""
+
+    first: Number
+    """The number of the first: a frame has 1024 samples of AAC, 960 of Opus, counted from pulse 0."""
+    sizes: Annotated[list[Annotated[int, msgspec.Meta(ge=1, le=8184)]], msgspec.Meta(max_length=SOUND_MOST)]
+    """Bytes of each; a transport stream can say no more than 8191 with its head."""
+
+
+class Track(msgspec.Struct, frozen=True, kw_only=True):
+    """One person in one camera over a window."""
+
+    id: Number
+    """The tracker's own number: one per person, camera and boot."""
+    boxes: list[Box | None]
+    """One per frame of the window; null where the person is hidden."""
+    confidence: Cost
+    looks: list[Glimpse] = []
+    """Where nobody else was in the boxes, in the frames up to ``final_to``; in their order."""
+    sharpness: Annotated[float, msgspec.Meta(ge=0, le=1)] | None = None
+    """How sharp the picture of the person is; null where nobody has measured it."""
+
+
+class Solve(msgspec.Struct, frozen=True, kw_only=True):
+    """How well the window's program was solved."""
+
+    objective: Cost
+    bound: Cost
+    gap: Cost
+    integral: bool
+    rounds: Number
+
+
+TRACKS_MOST = 1000
+"""People that a camera follows in one window at most: more than any picture has room for."""
+
+
+class CameraTracks(msgspec.Struct, frozen=True, kw_only=True):
+    """What a camera knows after solving one window."""
+
+    camera: str
+    boot: Number
+    size: tuple[Pixels, Pixels]
+    """Width and height of the camera's own picture; boxes are in the site's, which it was scaled into."""
+    epoch: Pulse
+    """Which of the site's windows: it ends with pulse (epoch + 1) · stride - 1, or with the recording."""
+    first: Pulse
+    """First frame (pulse number) of the window."""
+    last: Annotated[int, msgspec.Meta(ge=-1, le=LAST_PULSE)]
+    """Last frame; -1 or before ``first`` where there was none."""
+    final_to: Annotated[int, msgspec.Meta(ge=-LAST_PULSE, le=LAST_PULSE)]
+    """Every frame up to this one never changes again."""
+    ended: bool
+    """The recording is over: nothing follows."""
+    shed: list[Pulse]
+    """Frames of this epoch that were missed or not searched for people because the machine was too busy."""
+    unsearched: list[Pulse] = []
+    """Frames of this epoch in which nobody could have been found: those that are shed, and those before the
+    recording begins or while the detector does not know its background yet."""
+    alone: list[Pulse] = []
+    """Frames in which people were followed without what some other camera found: its word was not there."""
+    tracks: Annotated[list[Track], msgspec.Meta(max_length=TRACKS_MOST)]
+    solve: Solve | None
+    solved_at: Time = 0.0
+    """When the window was solved, unix seconds by the camera's clock; 0 offline."""
+    search_s: Duration | None = None
+    """Seconds that it took to look for people in a frame, the mean of this epoch's; null offline."""
+    solve_s: Duration | None = None
+    """Seconds that it took to follow everybody to the end of the window; null offline."""
+    troubles: Annotated[list[Trouble], msgspec.Meta(max_length=TROUBLES_MOST)] = []
+    """What the tracker foresees, where it is set to."""
+    mended_from: Pulse | None = None
+    """The first frame, final before, that somebody's pointing has changed; null: none has."""
+
+
+ScoredBox = tuple[Coordinate, Coordinate, Coordinate, Coordinate, Annotated[float, msgspec.Meta(ge=0, le=1)]]
+"""Left, top, right, bottom in pixels of the camera's own picture, and how sure the detector is."""
+
+FOUND_MOST = 100
+"""Boxes that a camera tells the others of one frame at most; those that it is surest of."""
+
+
+class Found(msgspec.Struct, frozen=True, kw_only=True):
+    """What a camera found in one frame, before it follows anybody: for the other cameras."""
+
+    camera: str
+    boot: Number
+    size: tuple[Pixels, Pixels]
+    """Width and height of the camera's own picture."""
+    pulse: Pulse
+    boxes: Annotated[list[ScoredBox], msgspec.Meta(max_length=FOUND_MOST)] | None
+    """Null: nobody was looked for, so that it says nothing."""
+    ended: bool = False
+    """The recording has no frame for this pulse: nothing follows."""
+
+
+CameraWord = Literal["starting", "live", "away", "ended"]
+"""How a camera is; away: its source gives no pictures now."""
+
+
+class CameraStatus(msgspec.Struct, frozen=True, kw_only=True):
+    """How a camera is, once a second."""
+
+    camera: str
+    boot: Number
+    state: CameraWord
+    pulse: Annotated[int, msgspec.Meta(ge=-1, le=LAST_PULSE)]
+    fps: Duration
+    """Frames taken in the last second or so."""
+    missed: Number
+    """Pulses without a frame since the start."""
+    shed: Number
+    """Frames not searched for people since the start."""
+    waiting: Number = 0
+    """Frames that wait to be searched."""
+    load_level: Annotated[int, msgspec.Meta(ge=0, le=100)] = 0
+    """How much is left out because the machine has too much to do; 0: nothing."""
+    load: Annotated[str, msgspec.Meta(max_length=200, pattern=r"^[ -~]*\Z")] = ""
+    """What is left out, for people: printable, since it stands on pages and in terminals."""
+    pointed: Number = 0
+    """Places that an operator pointed at and the tracker was given, since the start."""
+    bad_messages: Number = 0
+    """Messages to the camera that it could not understand, since the start."""
+    in_step: bool
+    """Pulses come from the server; otherwise the camera goes on at its own rate."""
+    clock_offset: Time
+    """Server's clock minus the camera's, seconds."""
+    round_trip: Time
+
+
+class ThumbHead(msgspec.Struct, frozen=True, kw_only=True):
+    """Which person a thumbnail shows."""
+
+    track: Number
+    boot: Number
+    pulse: Pulse
+
+
+class Cut(msgspec.Struct, frozen=True, kw_only=True):
+    """A change of view."""
+
+    object: int
+    pulse: int
+    from_camera: str = msgspec.field(name="from")
+    to_camera: str = msgspec.field(name="to")
+
+
+class Merged(msgspec.Struct, frozen=True, kw_only=True):
+    """Two numbers turned out to be one person: ``lost`` is never used again."""
+
+    kept: int
+    lost: int
+
+
+class Parted(msgspec.Struct, frozen=True, kw_only=True):
+    """Whom a camera showed as ``kept`` turned out to be ``parted``, somebody else."""
+
+    kept: int
+    parted: int
+    camera: str
+
+
+class GopChoices(msgspec.Struct, frozen=True, kw_only=True):
+    """The chosen camera of every object for one GOP, and the final boxes of its frames."""
+
+    first: int
+    frames: int
+    choices: dict[int, str]
+    boxes: dict[str, list[list[NumberedBox]]]
+    """Per camera and frame: object, left, top, right, bottom."""
+    cuts: list[Cut]
+    merged: list[Merged] = []
+    """What has turned out since the GOP before, as ``split``."""
+    split: list[Parted] = []
+
+
+_CAMERA_PART = 3
+
+
+def pulse_client(index: int) -> str:
+    """Name a best-view service at the pulse server, which waits for it before pulse 0."""
+    return "bestview" if index == 0 else f"bestview-{index}"
+
+
+@dataclass(frozen=True, slots=True)
+class Keys:
+    """The zenoh key expressions of a site."""
+
+    site: str
+
+    def camera(self, camera_id: str, what: str) -> str:
+        """Name a camera's key; ``*`` as the id stands for all cameras."""
+        return f"myview/{self.site}/camera/{camera_id}/{what}"
+
+    @property
+    def sound(self) -> str:
+        """Name the key of the site's sound."""
+        return f"myview/{self.site}/sound"
+
+    def bestview(self, what: str, index: int = 0) -> str:
+        """Name a key of the best-view service, of several the one with this index."""
+        return f"myview/{self.site}/bestview/{f'{index}/' if index else ''}{what}"
+
+
+def camera_of(key: str) -> str:
+    """Give the camera id inside a camera's key; empty where there is none."""
+    parts = key.split("/")
+    return parts[_CAMERA_PART] if len(parts) > _CAMERA_PART else ""

@@ -1,0 +1,58 @@
+"""What goes between a camera and the operator who helps its tracker: troubles one way, places the other."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import msgspec
+
+from server.messaging.number_types import Coordinate, Cost, Number, Pulse
+
+TROUBLES_MOST = 32
+"""Troubles that a camera tells of one window at most; the riskiest ones."""
+
+TroubleReason = Literal["alike", "fading", "gap", "exchange"]
+"""Two who look alike are about to cross; somebody fades into the background; the window is not proven; two
+solutions in which two people are exchanged cost nearly the same."""
+
+
+class Trouble(msgspec.Struct, frozen=True, kw_only=True):
+    """Where a camera's tracker may soon take people for each other, or lose somebody."""
+
+    reason: TroubleReason
+    tracks: Annotated[list[Number], msgspec.Meta(max_length=2)]
+    """Whom it is about, first whom to point at; none: the window."""
+    pulse: Pulse
+    """When that is expected."""
+    margin: Cost
+    """By how much the solution that is taken costs less than the other one: the smaller the less sure."""
+    risk: Annotated[float, msgspec.Meta(ge=0, le=1)]
+    """How likely it is to go wrong unless somebody helps."""
+
+
+POINTS_MOST = 256
+"""Places that are pointed at in one message at most: ten seconds at 25 frames a second."""
+
+
+REACH_LEAST = 1.0
+"""Pixels by which any pointing may be off: nobody points better."""
+
+
+class Pointed(msgspec.Struct, frozen=True, kw_only=True):
+    """Whom a track follows is at this place, says somebody who sees it."""
+
+    pulse: Pulse
+    track: Number
+    x: Coordinate
+    """Pixels of the site's picture, as ``y`` and ``reach``."""
+    y: Coordinate
+    reach: Annotated[float, msgspec.Meta(ge=REACH_LEAST, le=1e4)]
+    """How far off the pointing may be."""
+
+
+class Pointings(msgspec.Struct, frozen=True, kw_only=True):
+    """What an operator points at in one camera's picture."""
+
+    boot: Number
+    """The run of the camera whose tracks are named."""
+    points: Annotated[list[Pointed], msgspec.Meta(max_length=POINTS_MOST)]

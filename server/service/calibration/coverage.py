@@ -1,0 +1,76 @@
+"""What a walk has covered so far, as far as it can be told before it is calibrated from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from server.service.calibration.walk_samples import Samples, Trail
+
+_FEW = 10
+"""Feet below which nothing is said of shares."""
+
+
+@dataclass(frozen=True, slots=True)
+class CameraCovered:
+    """What one camera has seen of it.
+
+    Attributes:
+        camera: its name.
+        feet: feet seen while another camera saw somebody, too, at the moments that are compared.
+        thirds: what shares of them were in the left, middle and right third of the picture; 0 of none.
+        deep: how many times as tall the nearest of them appear as the farthest; None: too few were seen.
+    """
+
+    camera: str
+    feet: int
+    thirds: tuple[float, float, float]
+    deep: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class PairCovered:
+    """For how many seconds two cameras saw somebody at once."""
+
+    one: str
+    other: str
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class Covered:
+    """What all of them have seen of it."""
+
+    cameras: tuple[CameraCovered, ...] = ()
+    pairs: tuple[PairCovered, ...] = ()
+
+
+def covered(trails: Sequence[Trail], seconds: float) -> Covered:
+    """Say what was covered; the moments that are compared are so many seconds apart."""
+    samples = [it.samples for it in trails]
+    moments = 1 + max((int(it.moment.max()) for it in samples if it.moment.size), default=-1)
+    there = np.zeros((len(samples), moments), dtype=np.bool_)
+    for row, it in zip(there, samples, strict=True):
+        row[it.moment] = True
+    count = there.sum(axis=0)
+    cameras = [_camera(trail.camera, it, count) for trail, it in zip(trails, samples, strict=True)]
+    both = there.astype(np.int64) @ there.T.astype(np.int64)
+    pairs = [
+        PairCovered(trails[one].camera, trails[other].camera, seconds * int(both[one, other]))
+        for one, other in combinations(range(len(trails)), 2)
+    ]
+    return Covered(tuple(cameras), tuple(pairs))
+
+
+def _camera(name: str, samples: Samples, count: NDArray[np.int64]) -> CameraCovered:
+    """Say what one camera has seen; ``count`` is how many cameras saw anybody at each moment, (M,)."""
+    shared = count[samples.moment] > 1
+    third, tall = samples.third[shared], samples.tall[shared]
+    left, middle, right = (float(it) for it in np.bincount(third, minlength=3) / max(1, len(third)))
+    small, large = np.quantile(tall, (0.05, 0.95)) if len(tall) >= _FEW else (0.0, 0.0)
+    deep = float(large / small) if small > 0 else None
+    return CameraCovered(name, len(third), (left, middle, right), deep)

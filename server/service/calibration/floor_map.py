@@ -1,0 +1,69 @@
+"""The floor as a map: what each camera covers of it, and how its pictures' places lead there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from server.media.letterbox import Fit
+
+Floats = NDArray[np.float64]
+
+FARTHEST = 3.0
+"""A camera covers the floor up to so many times the distance of the nearest place that it shows of it."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Covered:
+    """One camera's part of the floor.
+
+    Attributes:
+        homography: (3, 3) from pixels of the site's picture to the ground; its third coordinate is above 0
+            for places on the floor, and not for what is above the horizon.
+        outline: (V, 2) corners of what the camera covers, in ground units; V is 0 where it sees no floor.
+    """
+
+    homography: Floats
+    outline: Floats
+
+
+def covered(own: Floats, size: tuple[int, int], site: tuple[int, int]) -> Covered:
+    """Give what a camera covers of the floor.
+
+    Args:
+        own: (3, 3) homography from the camera's own picture, pixels -> ground.
+        size: width and height of that picture.
+        site: width and height of the site's.
+    """
+    fit = Fit(size, site)
+    left, top = fit.to_site(np.zeros(2)).tolist()
+    to_own = np.array([[1.0, 0.0, -left], [0.0, 1.0, -top], [0.0, 0.0, fit.scale]]) / fit.scale
+    width, height = (float(side) for side in size)
+    # The floor lies below the horizon: where there is one, lower in the picture is nearer.
+    corners = np.array([[0.0, height], [width, height], [width, 0.0], [0.0, 0.0]])
+    down = own[2, 1] if own[2, 1] != 0 else own[2, 2]
+    matrix = own * np.sign(down)
+    near = float((matrix[2, :2] * corners).sum(axis=1).max() + matrix[2, 2])
+    outline = np.empty((0, 2)) if near <= 0 else _mapped(matrix, _cut(corners, matrix[2], near / FARTHEST))
+    return Covered(np.asarray(matrix @ to_own), outline)
+
+
+def _cut(corners: Floats, row: Floats, least: float) -> Floats:
+    """Cut away the part of a polygon where the third coordinate is below `least` (Sutherland, Hodgman)."""
+    depth = corners @ row[:2] + row[2] - least
+    kept: list[Floats] = []
+    for at, corner in enumerate(corners):
+        before = at - 1
+        if (depth[before] < 0) != (depth[at] < 0):
+            share = depth[before] / (depth[before] - depth[at])
+            kept.append(corners[before] + share * (corner - corners[before]))
+        if depth[at] >= 0:
+            kept.append(corner)
+    return np.array(kept).reshape(-1, 2)
+
+
+def _mapped(matrix: Floats, points: Floats) -> Floats:
+    places = points @ matrix[:, :2].T + matrix[:, 2]
+    return np.asarray(places[:, :2] / places[:, 2:])

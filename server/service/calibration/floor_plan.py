@@ -1,0 +1,87 @@
+"""The floor plan: what each camera sees of the floor, the foot points, and how far they are off."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO
+
+import cv2
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import LineCollection
+from matplotlib.colors import to_rgba
+from matplotlib.figure import Figure
+
+from bestview import to_ground
+from bestview.calibration import Floats, WalkCalibration
+
+_COLOURS = ("#1b7f5c", "#c8501e", "#4a5fc1", "#a8327d", "#8a7a10", "#2b8fb3", "#7b4a2b", "#555555")
+_INCHES = 9.0
+_MARGIN = 0.08
+_MOST_POINTS = 4000
+
+
+@dataclass(frozen=True, slots=True)
+class PlanView:
+    """One camera on the plan.
+
+    Attributes:
+        camera: its name.
+        homography: its pixels to the floor, (3, 3).
+        image: the points in its picture, (N, 2) pixels.
+        place: where these are said to be, (N, 2) on the floor: marked, or agreed on by the cameras.
+        floor: cameras of one number share a floor; each floor has a plan of its own.
+    """
+
+    camera: str
+    homography: Floats
+    image: Floats
+    place: Floats
+    floor: int = 0
+
+
+def plan_of(found: WalkCalibration) -> list[PlanView]:
+    """Give what there is to draw of a calibration from walks."""
+    return [PlanView(it.camera, it.homography, it.image, it.place, it.floor) for it in found.cameras]
+
+
+def plot_plan(views: Sequence[PlanView], unit: str, out: Path | BinaryIO) -> None:
+    """Draw the plan, as PNG: an area and points for each camera, a line from each point to its place."""
+    floors = sorted({view.floor for view in views})
+    figure = Figure(figsize=(_INCHES, _INCHES * len(floors)), layout="tight")
+    FigureCanvasAgg(figure)
+    for axis, floor in zip(figure.subplots(len(floors), 1, squeeze=False)[:, 0], floors, strict=True):
+        for number, view in enumerate(views):
+            if view.floor == floor:
+                _draw(axis, view, _COLOURS[number % len(_COLOURS)])
+        axis.set_aspect("equal")
+        axis.margins(_MARGIN)
+        axis.autoscale_view()
+        axis.set_xlabel(_plain(unit))
+        axis.set_ylabel(_plain(unit))
+        axis.legend(title="camera", markerscale=3)
+    figure.suptitle("Floor plan: what was covered, foot points, and how far they are off", fontsize="medium")
+    figure.savefig(out, dpi=100, format="png", bbox_inches="tight", metadata={"Software": None})
+
+
+def _draw(axis: Axes, view: PlanView, colour: str) -> None:
+    step = -(-len(view.image) // _MOST_POINTS)
+    seen = to_ground(view.homography, view.image[::step])
+    axis.fill(*_area(view).T, facecolor=to_rgba(colour, 0.12), edgecolor=colour, linewidth=1)
+    lines = np.stack([seen, view.place[::step]], axis=1)
+    axis.add_collection(LineCollection(list(lines), colors=colour, linewidths=0.6, alpha=0.6))
+    axis.plot(*seen.T, ".", markersize=3, color=colour, label=_plain(view.camera))
+
+
+def _plain(text: str) -> str:
+    """Give a text as it is to be read: between dollars Matplotlib reads formulas, and may fail to."""
+    return text.replace("$", r"\$")
+
+
+def _area(view: PlanView) -> Floats:
+    """Give the outline of the points, (K, 2): convex in the picture, and so on the floor."""
+    outline = cv2.convexHull(view.image.astype(np.float32)).reshape(-1, 2)
+    return to_ground(view.homography, outline.astype(np.float64))

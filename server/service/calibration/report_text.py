@@ -1,0 +1,141 @@
+"""What a walk has shown, in plain words, and the same in numbers for the file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from bestview.calibration import Spread, WalkCalibration, WalkedCamera, WalkSettings
+from server.service.calibration.walk_comparison import Walked
+
+_THIRDS = ("left", "middle", "right")
+_LITTLE = 0.03
+"""Share of a walk below which it has not covered a third of the picture."""
+_SURE = 2.0
+"""Standard errors that an offset must be away from 0, or else it is none."""
+_SHORT_S = 0.15
+"""Seconds in which people walk by a tenth of their height, which is how exactly feet are found."""
+_SHALLOW = 1.25
+"""How many times as tall the nearest must appear as the farthest."""
+
+
+@dataclass(frozen=True, slots=True)
+class Missed:
+    """Something that the walk did not cover; serious, where a calibration would be a guess."""
+
+    words: str
+    serious: bool
+
+
+def missed(camera: str, thirds: Sequence[float], deep: float) -> Iterator[Missed]:
+    """Say where somebody should walk, too; `thirds` and `deep` are as of a `WalkedCamera`."""
+    bare = [name for name, share in zip(_THIRDS, thirds, strict=True) if share < _LITTLE]
+    if bare:
+        where = " and the ".join(bare)
+        yield Missed(
+            f"walk also through the {where} third of camera {camera}, if there is floor and another "
+            "camera sees it",
+            serious=len(bare) > 1,
+        )
+    if deep < _SHALLOW:
+        yield Missed(f"walk also nearer to camera {camera}, and farther from it", serious=True)
+
+
+def in_words(walked: Walked, found: WalkCalibration, settings: WalkSettings) -> list[str]:
+    """Give the lines about errors, coverage and offsets."""
+    on_floor, in_pictures = _heights(found.heights), _shares(found.picture)
+    lines = [f"feet that two cameras see are {on_floor} apart, in the pictures {in_pictures} of the diagonal"]
+    for it in found.cameras:
+        left, middle, right = (f"{100 * share:.0f}" for share in it.thirds)
+        lines.append(
+            f"{it.camera}: {_heights(it.heights)}, {_shares(it.picture)}; of the walk {left} % in the left, "
+            f"{middle} % in the middle and {right} % in the right third, the nearest {it.deep:.1f} times as "
+            "tall as the farthest"
+        )
+    lines += [f"{it.camera}: left out: {it.why}" for it in found.left_out]
+    lines += _floors(found)
+    if walked.guessed:
+        sizes = ", ".join(f"{it.camera} {it.size[0]}x{it.size[1]}" for it in walked.walks)
+        lines.append(f"the pictures' size is guessed from the boxes ({sizes}); --size says it better")
+    if walked.rate_guessed:
+        lines.append(f"{walked.fps:g} frames a second are taken for granted; --fps says it better")
+    if settings.shift:
+        lines += _offsets(walked, found)
+    return lines
+
+
+def details(walked: Walked, found: WalkCalibration, person: float) -> dict[str, Any]:
+    """Give what the file says beside the homographies."""
+    return {
+        "person": person,
+        "offset": {it.camera: _offset(walked, it) for it in found.cameras},
+        "floor": {it.camera: it.floor for it in found.cameras},
+        "residuals": {
+            it.camera: {"heights": _numbers(it.heights), "picture": _numbers(it.picture)}
+            for it in found.cameras
+        },
+        "left_out": {it.camera: it.why for it in found.left_out},
+    }
+
+
+def _floors(found: WalkCalibration) -> list[str]:
+    floors = sorted({it.floor for it in found.cameras})
+    if len(floors) == 1:
+        return []
+    groups = (", ".join(it.camera for it in found.cameras if it.floor == floor) for floor in floors)
+    said = f"there are {len(floors)} floors: {'; '.join(groups)}; no camera sees two of them"
+    return [f"{said}; they lie far apart in the file, and offsets hold within each"]
+
+
+def _offsets(walked: Walked, found: WalkCalibration) -> list[str]:
+    """Give the offsets as words."""
+    first, fps = found.cameras[0].camera, walked.fps
+    lines = []
+    for it in found.cameras:
+        if it.offset or it.offset_error:
+            how = "out of step" if _moved(it) else "in step, as far as can be told"
+            if _moved(it) and abs(it.offset) / fps < _SHORT_S:
+                how = "perhaps out of step; feet that are found late look so, too: compare two frames first"
+            if _moved(it) and it.camera in walked.live:
+                how += "; its pictures come when they come: nothing can be set for that"
+            frames = f"{it.offset:+.1f} frames ({it.offset / fps:+.2f} s)"
+            unsure = f"give or take {_SURE * it.offset_error:.1f}"
+            lines.append(f"{it.camera}: {frames} later than {first}, {unsure}: {how}")
+    return lines
+
+
+def offset_lines(walked: Walked, found: WalkCalibration) -> str:
+    """Give the lines of a configuration that bring the cameras into step; empty: they are."""
+    moved = [it for it in found.cameras if _moved(it) and it.camera not in walked.live]
+    lines = [f"  - id: {it.camera}\n    offset: {_use(walked, it)}\n" for it in moved]
+    return "".join(["cameras:\n", *lines]) if lines else ""
+
+
+def _offset(walked: Walked, camera: WalkedCamera) -> dict[str, float]:
+    return {
+        "frames": round(camera.offset, 2),
+        "error": round(camera.offset_error, 2),
+        "use": _use(walked, camera),
+    }
+
+
+def _use(walked: Walked, camera: WalkedCamera) -> int:
+    """Give the offset to write: what was found comes on top of what the frames have in them already."""
+    return walked.offsets.get(camera.camera, 0) + (round(camera.offset) if _moved(camera) else 0)
+
+
+def _moved(camera: WalkedCamera) -> bool:
+    return abs(camera.offset) > _SURE * camera.offset_error and round(camera.offset) != 0
+
+
+def _heights(spread: Spread) -> str:
+    return f"{spread.median:.2f} person heights (median; 90 % below {spread.most:.2f})"
+
+
+def _shares(spread: Spread) -> str:
+    return f"{100 * spread.median:.1f} % (90 % below {100 * spread.most:.1f} %)"
+
+
+def _numbers(spread: Spread) -> dict[str, float]:
+    return {"median": round(spread.median, 4), "p90": round(spread.most, 4)}

@@ -1,0 +1,1 @@
+"""Decided tracks and view choices, written to files."""

@@ -1,0 +1,89 @@
+"""What a running site decides, as files: where they cannot be written the site goes on without them."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from server.media.letterbox import Fit
+from server.service.decision_files.recorder import Recorder
+from server.service.view_selection.decider import GopDecision
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class _Late:
+    """A frame that did not count as it should have; what is said of it."""
+
+    pulse: int
+    camera: str
+    what: str
+
+    @property
+    def row(self) -> str:
+        return f"{self.pulse + 1},{self.camera},{self.what}\n"
+
+
+class LiveRecorder:
+    """Writes what :class:`~server.service.decision_files.recorder.Recorder` writes, and what came too late.
+
+    A disk may be full for an hour. Nobody's stream ends for that: decisions are left out as wholes, and once
+    there is room again ``late.csv`` says of which frames.
+    """
+
+    def __init__(self, folder: Path, cameras: Sequence[str], fits: Mapping[str, Fit]) -> None:
+        """Begin new files, for this user alone, in a folder, which may exist.
+
+        Raises:
+            OSError: one cannot be written.
+        """
+        self._folder = folder
+        self._recorder = Recorder(folder, cameras, fits, private=True)
+        self._late: list[_Late] = []
+        self._missing = range(0)
+        """Pulses of which nothing could be written, and ``late.csv`` does not say so yet."""
+
+    def late(self, camera: str, pulses: Sequence[int], what: str) -> None:
+        """Note frames that came too late to count; they are written with the next decision."""
+        self._late += (_Late(it, camera, what) for it in pulses)
+
+    def write(self, decision: GopDecision) -> None:
+        """Write a decision, or leave it out."""
+        try:
+            self._recorder.write(decision, self._rows())
+        except OSError as error:
+            self._leave_out(decision, error)
+            return
+        if self._missing:
+            log.info("%s: written again; %d frames are missing", self._folder, len(self._missing))
+        self._missing = range(0)
+        self._late.clear()
+
+    def close(self) -> None:
+        """Write what is known of late frames, and close the files."""
+        try:
+            self._recorder.write_late(self._rows())
+        except OSError as error:
+            log.warning("%s: the end of late.csv could not be written: %s", self._folder, error.strerror)
+        self._late.clear()
+        self._recorder.close()
+
+    def _leave_out(self, decision: GopDecision, error: OSError) -> None:
+        if not self._missing:
+            log.error(
+                "%s: cannot write: %s; decisions are left out until there is room again; the streams go on",
+                self._folder,
+                error.strerror or error,
+            )
+        last = decision.first + decision.frames
+        self._missing = range(self._missing.start if self._missing else decision.first, last)
+        self._late = [it for it in self._late if it.pulse not in self._missing]
+
+    def _rows(self) -> list[str]:
+        rows = [it.row for it in self._late]
+        if self._missing:
+            rows.append(f"{self._missing.start + 1},,not written up to {self._missing.stop}\n")
+        return rows

@@ -1,0 +1,97 @@
+"""What was decided, as files: tracks per camera, the camera choices, and what came too late."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from bestview import Merge, Split
+from server.media.letterbox import Fit
+from server.messaging.messages import NumberedBox
+from server.service.decision_files.row_files import WholeFiles
+from server.service.view_selection.decider import GopDecision
+from server.system.private_files import make_private_folder
+from tracking.motchallenge import MotRow, format_row
+
+CHOICES_HEAD = "frame,object,camera\n"
+CORRECTIONS_HEAD = "frame,what,object,other,camera\n"
+LATE_HEAD = "frame,camera,what\n"
+
+
+class Recorder:
+    """Writes decisions: ``tracks/<camera>.txt``, ``choices.csv``, ``corrections.csv``, ``late.csv``.
+
+    ``fits`` may grow: a camera is in it from its first word on. A choice is a line also while nobody sees
+    the person: it says what their stream shows.
+
+    Frames count from 1 in all of them, as in MOTChallenge files: frame 1 is pulse 0. Boxes are in pixels of
+    the camera's own picture. An empty ``late.csv`` says that the files are exactly what `myview render`
+    writes for the same recordings.
+    """
+
+    def __init__(
+        self, folder: Path, cameras: Sequence[str], fits: Mapping[str, Fit], *, private: bool = False
+    ) -> None:
+        """Begin new files in a folder, which may exist; ``private``: for this user alone.
+
+        Raises:
+            OSError: one cannot be written.
+        """
+        self._fits = fits
+        if private:
+            make_private_folder(folder / "tracks")
+        else:
+            (folder / "tracks").mkdir(parents=True, exist_ok=True)
+        self._tracks = {camera: folder / "tracks" / f"{camera}.txt" for camera in cameras}
+        self._choices = folder / "choices.csv"
+        self._corrections = folder / "corrections.csv"
+        self._late = folder / "late.csv"
+        heads = {self._choices: CHOICES_HEAD, self._corrections: CORRECTIONS_HEAD, self._late: LATE_HEAD}
+        self._files = WholeFiles(dict.fromkeys(self._tracks.values(), "") | heads, private=private)
+
+    def write(self, decision: GopDecision, late: Sequence[str] = ()) -> None:
+        """Write a decision, and rows of ``late.csv``.
+
+        Raises:
+            OSError: that cannot be written; the files are as they were.
+        """
+        texts: dict[Path, list[str]] = defaultdict(list)
+        for camera, frames in decision.boxes.items():
+            for place, boxes in enumerate(frames):
+                if boxes:
+                    texts[self._tracks[camera]] += self._rows(camera, decision.first + place + 1, boxes)
+        for place in range(decision.frames):
+            texts[self._choices] += (
+                f"{decision.first + place + 1},{choice.number},{choice.camera}\n"
+                for choice in decision.choices
+                if choice.camera is not None
+            )
+        texts[self._corrections] += (f"{decision.first + 1},{_line(it)}\n" for it in decision.corrections)
+        texts[self._late] += late
+        self._files.append({path: "".join(rows) for path, rows in texts.items() if rows})
+
+    def write_late(self, rows: Sequence[str]) -> None:
+        """Write rows of ``late.csv`` alone.
+
+        Raises:
+            OSError: as :meth:`write`.
+        """
+        self._files.append({self._late: "".join(rows)})
+
+    def close(self) -> None:
+        """Close the files."""
+        self._files.close()
+
+    def _rows(self, camera: str, frame: int, boxes: Sequence[NumberedBox]) -> Iterator[str]:
+        own = self._fits[camera].boxes_to_own(np.array([box for _, *box in boxes], dtype=np.float64))
+        for (number, *_), (left, top, right, bottom) in zip(boxes, own.tolist(), strict=True):
+            yield format_row(MotRow(frame, number, left, top, right - left, bottom - top)) + "\n"
+
+
+def _line(correction: Merge | Split) -> str:
+    if isinstance(correction, Merge):
+        return f"merged,{correction.kept},{correction.lost},"
+    return f"split,{correction.kept},{correction.parted},{correction.camera}"

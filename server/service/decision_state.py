@@ -1,0 +1,117 @@
+"""What is known now, for the API and the page: who is there, which camera shows whom, and why."""
+
+from __future__ import annotations
+
+from bestview import Merge, Split
+from server.messaging.messages import Cut, GopChoices, Merged, Parted
+from server.service.view_selection.decider import GopDecision, ObjectChoice
+from server.service.view_selection.explanation import Explanation
+from server.service.view_selection.recent_reasons import Reason, Reasons, Standing
+
+
+class Board:
+    """Remembers every object's newest decision, and the reasons of the last minute."""
+
+    def __init__(self, fps: float) -> None:
+        self.standings: dict[int, Standing] = {}
+        self.merged: dict[int, int] = {}
+        self.cuts = 0
+        self.end = 0
+        """The first pulse that nothing is decided about."""
+        self._reasons = Reasons(fps)
+
+    def put(self, decision: GopDecision) -> GopChoices:
+        """Take a decision over; give it as the message that is published and sent to the page."""
+        cuts = []
+        seen_by: dict[int, list[str]] = {}
+        for camera, frames in decision.boxes.items():
+            for number, *_ in frames[-1] if frames else ():
+                seen_by.setdefault(number, []).append(camera)
+        for choice in decision.choices:
+            cut = _cut(choice, decision.first)
+            if cut is not None:
+                cuts.append(cut)
+            self._stand(decision, choice, tuple(seen_by.get(choice.number, ())))
+        numbers = {choice.number for choice in decision.choices}
+        self.standings = {number: it for number, it in self.standings.items() if number in numbers}
+        self.merged = decision.merged
+        self._reasons.put(self.standings, decision.first, decision.why)
+        self.cuts += len(cuts)
+        self.end = decision.first + decision.frames
+        return GopChoices(
+            first=decision.first,
+            frames=decision.frames,
+            choices={choice.number: choice.camera for choice in decision.choices if choice.camera},
+            boxes=decision.boxes,
+            cuts=cuts,
+            merged=[
+                Merged(kept=it.kept, lost=it.lost) for it in decision.corrections if isinstance(it, Merge)
+            ],
+            split=[
+                Parted(kept=it.kept, parted=it.parted, camera=it.camera)
+                for it in decision.corrections
+                if isinstance(it, Split)
+            ],
+        )
+
+    def resolve(self, number: int) -> int:
+        """Give the number that a merged one goes by now."""
+        return self.merged.get(number, number)
+
+    def explain(self, number: int, pulse: int | None = None) -> Reason | None:
+        """Explain an object's newest view, or that at a pulse of the last minute.
+
+        What was before the first question about an object is not kept.
+
+        Returns:
+            None: there is no such object, or nothing is kept of that time.
+        """
+        standing = self.standings.get(self.resolve(number))
+        if standing is None:
+            return None
+        newest = self._reasons.newest(standing)
+        return newest if pulse is None else self._reasons.at(standing.choice.number, pulse)
+
+    def _stand(self, decision: GopDecision, choice: ObjectChoice, cameras: tuple[str, ...]) -> None:
+        known = self.standings.get(choice.number)
+        stays = known is not None and known.choice.camera == choice.camera
+        self.standings[choice.number] = Standing(
+            choice=choice,
+            first=decision.first,
+            frames=decision.frames,
+            since=known.since if known is not None and stays else decision.first,
+            cameras=cameras,
+        )
+
+
+def _cut(choice: ObjectChoice, pulse: int) -> Cut | None:
+    if choice.camera is None or choice.before is None or choice.camera == choice.before:
+        return None
+    return Cut(object=choice.number, pulse=pulse, from_camera=choice.before, to_camera=choice.camera)
+
+
+def reason(choice: ObjectChoice, why: Explanation) -> str:
+    """Say in one plain sentence why this view was chosen."""
+    camera = choice.camera
+    if camera is None:
+        return "No camera's picture can be shown at the moment."
+    if choice.away or not any(view.seen or view.unfound for view in why.views.values()):
+        return f"Nobody sees this person at the moment; {camera} saw them last."
+    return _compared(camera, why)
+
+
+def _compared(camera: str, why: Explanation) -> str:
+    """Say why this camera, of those that see the person or should."""
+    shown = why.views.get(camera)
+    if shown is not None and not shown.seen and shown.unfound:
+        return f"{camera} does not find this person, but others know that they stand before it."
+    possible = {name: view.cost for name, view in why.views.items() if view.cost is not None}
+    if camera not in possible:  # it has a hole ahead
+        return f"{camera} is shown for as long as it can be: some of its next frames are missing."
+    if len(possible) == 1:
+        return f"{camera} is the only camera whose picture can be shown."
+    if possible[camera] <= min(possible.values()):
+        return f"{camera} sees this person best over the next frames."
+    if why.stay is not None and why.cut is not None and why.stay > why.cut:
+        return f"Another camera will see this person better than {camera}: it is too soon to cut."
+    return f"Another camera sees this person a little better than {camera}, but not enough to be worth a cut."

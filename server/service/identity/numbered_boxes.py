@@ -1,0 +1,45 @@
+"""Everybody's boxes in a camera's frames, by the people's numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bestview import TrackKey
+from server.messaging.messages import NumberedBox
+from server.service.identity.camera_window import CameraWindow
+from server.service.ingest.window_history import Stretch
+
+Numbers = Callable[[Sequence[TrackKey], int, int], NDArray[np.int64]]
+"""The people's numbers behind T tracks in some frames: tracks, first frame, frames -> (T, frames)."""
+
+
+def numbered_boxes(
+    stretches: Sequence[Stretch[CameraWindow]], numbers: Numbers, first: int, frames: int
+) -> list[list[NumberedBox]]:
+    """Give the boxes of each of the frames from `first` on, by rising number.
+
+    Of two tracks of one person in one frame the first counts. Negative numbers are nobody's.
+    """
+    told: list[list[NumberedBox]] = [[] for _ in range(frames)]
+    for stretch in stretches:
+        window, count = stretch.window, stretch.last - stretch.first + 1
+        place = stretch.first - window.first
+        boxes = window.boxes[:, place : place + count]
+        whose = numbers(window.keys, stretch.first, count)
+        # Frame by frame, and in a frame in the tracks' order.
+        frame, track = np.nonzero((~np.isnan(boxes[..., 0]) & (whose >= 0)).T)
+        number = whose[track, frame]
+        order = np.lexsort((number, frame))
+        frame, track, number = frame[order], track[order], number[order]
+        new = np.ones(len(order), dtype=np.bool_)
+        new[1:] = (frame[1:] != frame[:-1]) | (number[1:] != number[:-1])
+        frame, track, number = frame[new], track[new], number[new]
+        rows = list(zip(number.tolist(), *boxes[track, frame].T.tolist(), strict=True))
+        ends = np.searchsorted(frame, np.arange(count + 1)).tolist()
+        for at, (begin, end) in enumerate(pairwise(ends), start=stretch.first - first):
+            told[at] = rows[begin:end]
+    return told

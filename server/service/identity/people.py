@@ -1,0 +1,270 @@
+"""Who is who: from every camera's own track numbers to one number per person."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from itertools import chain
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bestview import IdentityRegistry, IdentitySettings, Merge, Split, TrackKey
+from server.config.sections import Share
+from server.media.letterbox import Fit
+from server.messaging.messages import NumberedBox
+from server.service.identity.camera_window import CameraWindow, Reader
+from server.service.identity.id_switch_repair import Mending
+from server.service.identity.local_numbers import Followed
+from server.service.identity.manual_overrides import ByHand
+from server.service.identity.numbered_boxes import numbered_boxes
+from server.service.identity.person_registry import Roll
+from server.service.identity.published_tracks import ToldTracks
+from server.service.identity.sharding import served
+from server.service.identity.track_parts import (
+    NOBODY_YET,
+    UNKNOWN,
+    Part,
+    numbers_over,
+    parts_of,
+    with_settled,
+)
+from server.service.identity.undetected_frames import Unsearched
+from server.service.ingest.epoch_aligner import Epoch
+from server.service.ingest.window_history import History
+
+ALL = Share()
+"""One service for everybody."""
+_LATELY = 100
+"""Frames that tell whether a camera looks; at least those of an epoch."""
+
+
+class People:
+    """Joins the cameras' tracks epoch by epoch, and remembers who was where.
+
+    ``homographies`` map each camera's own picture to the ground; None where there is none. ``share`` says
+    whom this service decides for; who is who is worked out for everybody, the same in every service. ``lag``
+    frames before an epoch's end tracks are final: who is who is worked out up to there. ``overhead`` are the
+    cameras that look straight down; ``fps`` are the site's frames a second.
+    """
+
+    def __init__(
+        self,
+        settings: IdentitySettings,
+        cameras: Sequence[str],
+        homographies: Mapping[str, NDArray[np.float64] | None],
+        site_size: tuple[int, int],
+        lag: int,
+        share: Share = ALL,
+        overhead: Collection[str] = (),
+        fps: float = 25.0,
+    ) -> None:
+        self._registry = IdentityRegistry(settings, homographies, overhead, fps)
+        self._remembered = settings.forget_after
+        self.roll = Roll(settings.remember)
+        """Everybody, also those whom another service decides for."""
+        self._share = share
+        self._histories = {camera: History[CameraWindow]() for camera in cameras}
+        self._reader = Reader(site_size)
+        self._lag = lag
+        self._mending = Mending(self._registry, self._reader)
+        self.unsearched = Unsearched()
+        """Frames in which cameras could not have found anybody."""
+        self.told = ToldTracks()
+        """By which tracks people were shown in GOPs that are told."""
+        self._parts: dict[TrackKey, Sequence[Part]] = {}
+        self._heard: dict[TrackKey, int] = {}
+        self._asked_from = 0
+        """Nobody asks for frames before this one any more."""
+        self._corrections: list[Merge | Split] = []
+        self._by_hand = ByHand()
+        self._expected: dict[Followed, tuple[int, int]] = {}
+        """Tracks that are not heard of yet: whose they were in an earlier run, and when that ended."""
+        self._now = -1
+        """The last frame that was spoken of."""
+
+    def update(self, epoch: Epoch) -> Sequence[CameraWindow]:
+        """Take over what all cameras said about an epoch; give it as it was read."""
+        late = [self._taken(window) for window in self._reader.read_late(epoch)]
+        windows = [self._taken(window) for window in self._reader.read(epoch)]
+        self._recall(windows)
+        tracks = [track for window in windows for track in window.local_tracks()]
+        since = max(self._now + 1, epoch.last + 1 - _LATELY)  # there may be a long time in between
+        pictures = self._pictures(windows, since - self._lag, epoch.last - self._lag)
+        self._now = epoch.last
+        update = self._by_hand.read(self._registry.update(tracks, epoch.last - self._lag, pictures))
+        for key, parts in parts_of(update.numbers).items():
+            self._parts[key] = with_settled(self._parts.get(key, ()), parts, self._asked_from)
+        self._mending.overlay(self._parts)
+        keys = chain.from_iterable(window.keys for window in windows)
+        seen = chain.from_iterable(window.seen() for window in windows)
+        for key, (first, last) in zip(keys, seen, strict=True):
+            self._heard[key] = epoch.last
+            self.roll.note(self._parts.get(key, ()), first, last)
+        self.roll.left(update.gone, update.returned)
+        for merge in update.merged:
+            self._merge(merge.kept, merge.lost)
+        self._corrections += [*update.merged, *update.split]
+        self._forget(epoch.last)
+        return [*late, *windows]
+
+    @property
+    def fits(self) -> Mapping[str, Fit]:
+        """How each camera's own picture lies in the site's; known from its first word on."""
+        return self._reader.fits
+
+    @property
+    def known(self) -> list[int]:
+        """Everybody's number whom this service decides for, in order; those who are away too."""
+        return served(self.roll.everybody, self.roll.merged, self._share)
+
+    @property
+    def elsewhere(self) -> list[int]:
+        """The other people's numbers, in order: another service decides for them."""
+        mine = set(self.known)
+        return [number for number in self.roll.everybody if number not in mine]
+
+    @property
+    def next_number(self) -> int:
+        """The first number that nobody was given yet."""
+        return self._registry.next_number
+
+    def begin_at(self, number: int) -> None:
+        """Give no number below this one any more: an earlier run has given them."""
+        self._registry.begin_at(number)
+
+    def expect(self, tracks: Mapping[Followed, int], pulse: int) -> None:
+        """Take over whose tracks are that are not heard of yet, from a run that ended with a pulse."""
+        self._expected |= {
+            track: (number, pulse) for track, number in tracks.items() if not self.heard_of(track)
+        }
+
+    def expect_no_more(self, tracks: Iterable[Followed]) -> None:
+        """Take these tracks, should they be heard of, for somebody's of whom nothing is known."""
+        for track in tracks:
+            self._expected.pop(track, None)
+
+    @property
+    def merged_by_hand(self) -> dict[int, int]:
+        """Give by number that was said to be another's whose it is."""
+        return self._by_hand.said
+
+    def merge(self, kept: int, lost: int) -> None:
+        """Take somebody's word that two numbers are one person's, whatever the evidence says from now on."""
+        here = not {kept, lost} <= self.roll.away
+        self._by_hand.merge(kept, lost, self.roll.away)
+        self._merge(kept, lost)
+        if here:
+            self.roll.away.discard(kept)
+        self._corrections.append(Merge(kept, lost))
+
+    def part(self, number: int, cameras: Collection[str]) -> int | None:
+        """Take somebody's word that whom these cameras show as this person now is somebody new.
+
+        Returns:
+            Their number; None: none of the cameras shows the person now.
+        """
+        tracks = [
+            key
+            for key, parts in self._parts.items()
+            if key.camera in cameras and parts[-1].number == number and self._heard.get(key) == self._now
+        ]
+        new = self._registry.part(tracks, self._by_hand.worked_out(number))
+        if new is None:
+            return None
+        for key in tracks:  # those that the registry has settled it does not speak of again
+            since = max(self._asked_from, self._parts[key][-1].first)
+            self._parts[key] = [*self._parts[key], Part(since, new)]
+            self.roll.note([Part(since, new)], since, max(since, self._now))
+        self._corrections += [Split(number, new, camera) for camera in sorted({it.camera for it in tracks})]
+        return new
+
+    def number(self, camera: str, local: int, pulse: int) -> int | None:
+        """Give the person's number behind a camera's local one in a frame; None while it is not confirmed."""
+        number = int(self.numbers([TrackKey(camera, local)], pulse, 1)[0, 0])
+        return None if number == NOBODY_YET else number
+
+    def boxes(self, camera: str, first: int, frames: int) -> list[list[NumberedBox]]:
+        """Give everybody's box in each of a camera's frames from `first` on, in the numbers' order."""
+        told = self._histories[camera].over(first, first + frames - 1)
+        return numbered_boxes(told, self.numbers, first, frames)
+
+    def whose(self, camera: str, boot: int, track: int, pulse: int) -> int | None:
+        """Give the person's number behind a tracker's number in a frame."""
+        key = self._reader.locals.known(camera, boot, track)
+        return None if key is None else self.number(key.camera, key.local, pulse)
+
+    def heard_of(self, track: Followed) -> bool:
+        """Tell whether a camera has spoken of this track, lately."""
+        return self._reader.locals.known(track.camera, track.boot, track.track) is not None
+
+    def followed(self, numbers: Collection[int], since: int) -> dict[int, list[Followed]]:
+        """Give the tracks by which these people were followed since a pulse; who was not is left out."""
+        found: dict[int, list[Followed]] = {}
+        wanted = set(numbers)
+        for key, parts in self._parts.items():
+            if parts[-1].number in wanted and self._heard.get(key, -1) >= since:
+                found.setdefault(parts[-1].number, []).append(self._reader.locals.origin(key))
+        return dict(sorted(found.items()))
+
+    def numbers(self, keys: Sequence[TrackKey], first: int, frames: int) -> NDArray[np.int64]:
+        """Give the persons' numbers behind T tracks, frame by frame, (T, frames); -1: nobody yet."""
+        return numbers_over([self._parts.get(key, UNKNOWN) for key in keys], first, frames)
+
+    def take_corrections(self) -> tuple[Merge | Split, ...]:
+        """Give what has turned out about numbers since this was last asked, in order."""
+        taken, self._corrections = tuple(self._corrections), []
+        return taken
+
+    def forget_boxes_before(self, pulse: int) -> None:
+        """Let go of the boxes before a pulse, and of who they were."""
+        if self.told.frames:
+            said = [it for history in self._histories.values() for it in history.over(0, pulse - 1)]
+            for it in sorted(said, key=lambda it: it.last):
+                self.told.note(it, self.numbers(it.window.keys, it.last, 1)[:, 0])
+        self._asked_from = max(self._asked_from, pulse)
+        self.unsearched.forget_before(pulse)
+        self._mending.keep_only(self._parts, self._asked_from)
+        for history in self._histories.values():
+            history.forget_before(pulse)
+
+    def _pictures(self, windows: Sequence[CameraWindow], first: int, last: int) -> dict[str, tuple[int, int]]:
+        """Give the pictures of the cameras that could have seen anybody in the frames that are final now."""
+        return {
+            it.message.camera: it.message.size
+            for it in windows
+            if not self.unsearched.over(it.message.camera, first, last + 1 - first).all()
+        }
+
+    def _taken(self, window: CameraWindow) -> CameraWindow:
+        """Take a window over, by what its tracks are called if its past was mended."""
+        self.unsearched.note(window.message)
+        history = self._histories[window.message.camera]
+        if window.message.mended_from is not None:
+            before = history.over(window.first, window.fresh - 1)
+            window, splits = self._mending.read(window, before, self._parts, self._asked_from)
+            self._corrections += self._by_hand.read_splits(splits)
+        history.put(window, window.first, window.message.last)
+        return window
+
+    def _recall(self, windows: Iterable[CameraWindow]) -> None:
+        """Know the tracks again that an earlier run knew, when they are first heard of."""
+        for key in chain.from_iterable(it.keys for it in windows) if self._expected else ():
+            number, pulse = self._expected.pop(self._reader.locals.origin(key), (0, 0))
+            if number:
+                self._registry.recall(key, self.roll.whose(number), pulse)
+
+    def _merge(self, kept: int, lost: int) -> None:
+        self.roll.merge(kept, lost)
+        self._mending.merge({lost: kept})
+        self._parts = {
+            key: [Part(part.first, kept) if part.number == lost else part for part in parts]
+            for key, parts in self._parts.items()
+        }
+
+    def _forget(self, now: int) -> None:
+        """Let go of tracks and people that were not heard of for as long as the registry remembers."""
+        for key in [key for key, heard in self._heard.items() if heard < now - self._remembered]:
+            del self._heard[key]
+            self._parts.pop(key, None)
+            self._reader.locals.forget(key)
+        self.roll.forget_unseen_since(now - self._remembered)

@@ -1,0 +1,55 @@
+"""By which of its tracks a camera showed somebody in frames that were told: whom somebody points at."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Collection, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from server.service.identity.camera_window import CameraWindow
+from server.service.identity.local_numbers import Followed
+from server.service.ingest.window_history import Stretch
+
+
+class ToldTracks:
+    """Remembers the tracks behind the numbers, for ``frames`` back at least; 0: nothing."""
+
+    def __init__(self) -> None:
+        self.frames = 0
+        self._said: deque[tuple[int, int, Mapping[tuple[str, int], Followed]]] = deque()
+        self._oldest: int | None = None
+
+    def note(self, said: Stretch[CameraWindow], whose: NDArray[np.int64]) -> None:
+        """Take over by which tracks a camera shows people, (T,) their numbers; those below 0 are nobody's.
+
+        Frames come in their order, of one camera as of another.
+        """
+        if self._oldest is None:
+            self._oldest = said.first
+        message = said.window.message
+        tracks = {
+            (message.camera, number): Followed(message.camera, message.boot, track.id)
+            for track, number in zip(message.tracks, whose.tolist(), strict=True)
+            if number >= 0
+        }
+        self._said.append((said.first, said.last, tracks))
+        while self._said[0][1] < said.last - self.frames:
+            self._oldest = self._said.popleft()[1] + 1
+
+    def remembers(self, pulse: int) -> bool:
+        """Say whether a frame is one of those that are remembered."""
+        return self._oldest is not None and self._oldest <= pulse
+
+    def of(self, camera: str, numbers: Collection[int], pulse: int) -> Followed | None:
+        """Give the track that showed somebody in a frame, or else last before it; None: none did.
+
+        ``numbers`` are all that the person has had.
+        """
+        for first, _, tracks in reversed(self._said):
+            if first <= pulse:
+                found = [tracks[camera, it] for it in numbers if (camera, it) in tracks]
+                if found:
+                    return found[0]
+        return None

@@ -1,0 +1,185 @@
+"""Who is who goes on when the service is started anew: tracks that are still followed are whose they were."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass
+from itertools import chain
+from math import inf
+
+from server.messaging.retained_state import ALSO_MOST, NUMBER_MOST, Known, Remembered
+from server.service.identity.local_numbers import Followed
+from server.service.identity.people import People
+
+ALONE_MOST = 1_000_000
+"""The first free number that is believed of one camera alone: larger ones another must say, too."""
+_SLACK = 10_000
+"""Numbers by which the newest word may be ahead of the one before: nobody gives so many in a second."""
+LONGEST_S = 30.0
+"""Seconds that the service may be away: in a longer time a track may have gone over to somebody else."""
+
+
+def remembered_by(
+    people: People, cameras: Iterable[str], pulse: int, lately: int, since: float
+) -> dict[str, Remembered]:
+    """Put down for each camera whom it has followed lately, and since when numbers are not given twice."""
+    followed = people.followed(people.roll.everybody, pulse - lately)
+    boots: dict[str, int] = {}
+    for it in chain.from_iterable(followed.values()):
+        boots[it.camera] = max(it.boot, boots.get(it.camera, 0))
+    also: dict[int, list[int]] = {}
+    for old, number in people.roll.merged.items():
+        if old <= NUMBER_MOST:
+            also.setdefault(number, []).append(old)
+    by_hand = set(people.merged_by_hand.values())
+    known: dict[str, list[Known]] = {camera: [] for camera in cameras}
+    for number, tracks in followed.items():
+        if number > NUMBER_MOST:
+            continue
+        mine: dict[str, list[int]] = {}
+        for it in tracks:
+            if it.boot == boots[it.camera]:  # of a run of the camera that is over nobody remembers anything
+                mine.setdefault(it.camera, []).append(it.track)
+        for camera, theirs in mine.items():
+            known[camera].append(
+                Known(
+                    number=number,
+                    tracks=theirs,
+                    also=also.get(number, [])[-ALSO_MOST:],
+                    name=people.roll.names.get(number, ""),
+                    by_hand=number in by_hand,
+                )
+            )
+    following = min(people.next_number, NUMBER_MOST + 1)
+    return {
+        camera: Remembered(pulse=pulse, boot=boots.get(camera, 0), next=following, since=since, people=them)
+        for camera, them in known.items()
+    }
+
+
+@dataclass(frozen=True, slots=True)
+class _Awaited:
+    """One person, whom tracks of several cameras may follow."""
+
+    number: int
+    tracks: tuple[Followed, ...]
+    also: tuple[int, ...]
+    name: str
+    by_hand: bool
+
+
+class Returning:
+    """Gives people their numbers back, and what was said of them by hand, as they are found again.
+
+    Args:
+        said: what each camera remembers; only what is said of now counts.
+        pulse: where the service begins.
+        longest: frames that it may have been away.
+    """
+
+    def __init__(self, said: dict[str, Remembered], pulse: int, longest: int) -> None:
+        self._until = -1
+        self._over = False
+        self._tracks: dict[Followed, int] = {}
+        self._awaited: list[_Awaited] = []
+        self._found: dict[Followed, int] = {}
+        """The pulse at which each track was first heard of again."""
+        self.next_number = max((first_free(it) for it in said.values()), default=1)
+        """No number below it is given any more, however long ago that was."""
+        lately = {camera: it for camera, it in said.items() if it.pulse < pulse <= it.pulse + longest}
+        # All that were told of lately were told the same: one that says otherwise does not decide.
+        since = sorted(it.since for it in lately.values())
+        self.since = since[len(since) // 2] if since else max((it.since for it in said.values()), default=inf)
+        """When numbers began, unix seconds; infinite: nobody remembers."""
+        if lately:
+            self._until = max(it.pulse for it in lately.values()) + longest
+            self._awaited = _awaited(lately)
+            self._tracks = {track: it.number for it in self._awaited for track in it.tracks}
+
+    @property
+    def over(self) -> bool:
+        """Whether nobody is awaited any more: tracks of those who were found may still come."""
+        return self._over
+
+    @property
+    def numbers(self) -> Collection[int]:
+        """The numbers of those who are awaited, with those that they once had."""
+        return {number for it in self._awaited for number in (it.number, *it.also)}
+
+    def begin(self, people: People, pulse: int) -> None:
+        """Tell whose the tracks will be, before anybody has heard of them."""
+        people.begin_at(self.next_number)
+        people.expect(self._tracks, pulse - 1)
+
+    def look(self, people: People, pulse: int) -> None:
+        """Look for them after an epoch that ends with a pulse was taken in."""
+        if pulse > self._until:
+            self._awaited, self._over = [], True
+            people.expect_no_more(self._tracks)
+        self._awaited = [it for it in self._awaited if not self._give_back(it, people, pulse)]
+
+    def _give_back(self, awaited: _Awaited, people: People, pulse: int) -> bool:
+        """Tell whether somebody is here again, with all that is to be said of them said."""
+        found = [self._number(it, people, pulse) for it in awaited.tracks]
+        numbers = sorted({it for it in found if it is not None})
+        if not numbers:
+            return False
+        kept = awaited.number if awaited.number in numbers else numbers[0]
+        if awaited.name and kept not in people.roll.names:
+            people.roll.call(kept, awaited.name)
+        people.roll.known_as(kept, awaited.also)
+        for other in numbers if awaited.by_hand else ():
+            if other != kept:
+                people.merge(kept, other)
+        return not awaited.by_hand or None not in found
+
+    def _number(self, track: Followed, people: People, pulse: int) -> int | None:
+        """Give whose a track was when it was first heard of again; None: nobody knows."""
+        if people.heard_of(track):
+            self._found.setdefault(track, pulse)
+        first = self._found.get(track)
+        return None if first is None else people.whose(track.camera, track.boot, track.track, first)
+
+
+def first_free(said: Remembered) -> int:
+    """Give the first number that nobody has or had; what a camera says may contradict itself."""
+    return max([said.next, *(number + 1 for it in said.people for number in (it.number, *it.also))])
+
+
+def believed(firsts: Iterable[int]) -> int:
+    """Return up to which first free number cameras are believed: no camera alone moves all to come far ahead.
+
+    >>> believed([7, 5]), believed([900_000_000, 5]), believed([2_000_007, 2_000_005])
+    (1000000, 1000000, 2010005)
+    """
+    _, other, *_ = [*sorted(firsts, reverse=True), 1, 1]
+    return max(other + _SLACK, ALONE_MOST)
+
+
+def _awaited(said: dict[str, Remembered]) -> list[_Awaited]:
+    """Put together what the cameras remember: the newest word on somebody counts."""
+    newest: dict[int, Known] = {}
+    tracks: dict[int, set[Followed]] = {}
+    whose: dict[int, int] = {}
+    """By an old number: who had it."""
+    for camera, it in sorted(said.items(), key=lambda named: (named[1].pulse, named[0])):
+        for known in it.people:
+            newest[known.number] = known
+            whose |= dict.fromkeys(known.also, known.number)
+            theirs = tracks.setdefault(known.number, set())
+            theirs |= {Followed(camera, it.boot, track) for track in known.tracks}
+    for old in sorted(whose.keys() & newest.keys()):  # some camera had not heard yet that two are one
+        kept = whose[old]
+        if kept != old and kept in newest:
+            tracks[kept] |= tracks.pop(old)
+            del newest[old]
+    return [
+        _Awaited(
+            number=number,
+            tracks=tuple(sorted(tracks[number], key=lambda it: (it.camera, it.boot, it.track))),
+            also=tuple(old for old in known.also if whose[old] == number and old not in newest),
+            name=known.name,
+            by_hand=known.by_hand,
+        )
+        for number, known in sorted(newest.items())
+    ]

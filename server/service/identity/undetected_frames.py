@@ -1,0 +1,31 @@
+"""In which frames a camera could not have found anybody: it was not there to see them."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+
+import numpy as np
+from numpy.typing import NDArray
+
+from server.messaging.messages import CameraTracks
+
+
+class Unsearched:
+    """Keeps them as the cameras say them. Who is not found in such a frame may be there all the same."""
+
+    def __init__(self) -> None:
+        self._frames: dict[str, set[int]] = defaultdict(set)
+
+    def note(self, message: CameraTracks) -> None:
+        """Take in what a camera says of an epoch."""
+        self._frames[message.camera].update(message.unsearched)
+
+    def over(self, camera: str, first: int, frames: int) -> NDArray[np.bool_]:
+        """Tell it of each of a camera's frames from `first` on, (frames,)."""
+        known = self._frames.get(camera, set())
+        return np.array([it in known for it in range(first, first + frames)], dtype=np.bool_)
+
+    def forget_before(self, pulse: int) -> None:
+        """Let go of the frames before a pulse."""
+        for camera, frames in self._frames.items():
+            self._frames[camera] = {it for it in frames if it >= pulse}

@@ -1,0 +1,1 @@
+"""What arrives from the cameras: validated, aligned by epoch, losses recorded."""

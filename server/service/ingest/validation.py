@@ -1,0 +1,34 @@
+"""Whether a camera's message, well formed as it is, can be true: what follows relies on it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from server.messaging.epochs import end_of_epoch
+from server.messaging.messages import CameraTracks
+
+_WINDOW_MAX = 100_000
+"""Frames of one message; far more than any window and any gap that a tracker joins."""
+
+
+def makes_sense(message: CameraTracks, stride: int) -> bool:
+    """Tell whether the frames, the tracks and the sizes in a message fit together."""
+    frames, end = message.last - message.first + 1, end_of_epoch(message.epoch, stride)
+    ids = [track.id for track in message.tracks]
+    looks = [look for track in message.tracks for look in track.looks]
+    bins = [len(look.histogram) for look in looks]
+    return (
+        0 <= frames <= _WINDOW_MAX
+        and message.final_to <= message.last <= end
+        and all(_is_short(it, end) for it in (message.shed, message.unsearched, message.alone))
+        and len(ids) == len(dict.fromkeys(ids))
+        and all(count == bins[0] > 0 for count in bins)
+        and all(len(track.boxes) == frames for track in message.tracks)
+        and (message.mended_from is None or message.first <= message.mended_from <= message.final_to)
+        and all(message.first <= look.first <= look.last <= message.final_to for look in looks)
+    )
+
+
+def _is_short(pulses: Sequence[int], end: int) -> bool:
+    """Tell whether these can be frames of an epoch that ends with a pulse; later ones would be kept."""
+    return len(pulses) <= _WINDOW_MAX and max(pulses, default=-1) <= end

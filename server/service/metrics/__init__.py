@@ -1,0 +1,1 @@
+"""Measurements of the cameras and of the service itself."""

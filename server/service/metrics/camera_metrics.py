@@ -1,0 +1,107 @@
+"""What is measured of one camera: how far it is from the pulse, how late its tracks are, what was proven."""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections import OrderedDict, deque
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+
+from server.messaging.messages import CameraTracks, FrameHead
+from server.service.metrics.stage_totals import Totals
+
+_FRAMES = 250
+"""Frames that are measured: ten seconds at 25 a second."""
+_WINDOWS = 120
+_PROVEN = 1e-6
+"""A gap of a program that is taken for none: what is left of rounding."""
+
+
+@dataclass(frozen=True, slots=True)
+class Spread:
+    """Seconds, as they were lately."""
+
+    median: float
+    worst: float
+    """Furthest from 0."""
+
+
+@dataclass(frozen=True, slots=True)
+class Trouble:
+    """What went wrong, and when: unix seconds."""
+
+    text: str
+    at: float
+
+
+class Gauge:
+    """Measures one camera by the heads of its frames and the reports of its windows.
+
+    Frames and windows carry times of the camera's own clock, and are compared with nothing else.
+    """
+
+    def __init__(self, now: Callable[[], float] = time.time) -> None:
+        self._now = now
+        self._errors: deque[float] = deque(maxlen=_FRAMES)
+        self._due: OrderedDict[int, float] = OrderedDict()
+        self._delays: deque[float] = deque(maxlen=_WINDOWS)
+        self._proven: deque[bool] = deque(maxlen=_WINDOWS)
+        self.totals = Totals()
+        """Since the service began: another run of the camera is added."""
+        self.last_trouble: Trouble | None = None
+        """Stays when the camera is well again."""
+        self.size: tuple[int, int] | None = None
+        """Width and height of the camera's own picture; None: it has not said."""
+
+    def begin(self) -> None:
+        """Forget what was measured of another run of the camera."""
+        for measured in (self._errors, self._due, self._delays, self._proven):
+            measured.clear()
+
+    def frame(self, head: FrameHead) -> None:
+        """Take in a frame that came."""
+        self.totals.frame(head)
+        self._errors.append(head.taken - head.due)
+        self._due[head.pulse] = head.due
+        while len(self._due) > _FRAMES:
+            self._due.popitem(last=False)
+
+    def window(self, tracks: CameraTracks) -> None:
+        """Take in a window that was solved."""
+        self.size = tracks.size
+        proven = tracks.solve is not None and tracks.solve.gap <= _PROVEN
+        if tracks.solve is not None:
+            self._proven.append(proven)
+        due = self._due.get(tracks.last)
+        self.totals.window(tracks, due, proven=proven)
+        if due is not None and tracks.solved_at > 0:
+            self._delays.append(tracks.solved_at - due)
+
+    def trouble(self, text: str) -> None:
+        """Note what went wrong."""
+        self.last_trouble = Trouble(" ".join(text.split()), self._now())
+
+    @property
+    def sync_error(self) -> Spread | None:
+        """How long after its pulse a frame was taken; None: no frame came."""
+        return _spread(self._errors)
+
+    @property
+    def tracking_delay(self) -> Spread | None:
+        """How long after the pulse of a window's last frame it was solved; None: none was."""
+        return _spread(self._delays)
+
+    @property
+    def windows(self) -> int:
+        """How many windows `certified` is about."""
+        return len(self._proven)
+
+    @property
+    def certified(self) -> float | None:
+        """Share of the windows whose answer is proven to be the best there is; None: there were none."""
+        return sum(self._proven) / len(self._proven) if self._proven else None
+
+
+def _spread(values: Collection[float]) -> Spread | None:
+    return Spread(statistics.median(values), max(values, key=abs)) if values else None

@@ -1,0 +1,48 @@
+"""Where an operator points at somebody: to the tracker of the camera in whose picture it was."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from server.messaging.operator_messages import Pointed, Pointings
+from server.service.identity.people import People
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A place in a frame, in pixels of the site's picture.
+
+    Attributes:
+        pulse: of the frame.
+        x: from the left.
+        y: from the top.
+        reach: how far off it may be.
+    """
+
+    pulse: int
+    x: float
+    y: float
+    reach: float
+
+
+def pointings(people: People, camera: str, number: int, places: Sequence[Place]) -> Pointings | None:
+    """Say in the camera's own terms where somebody is: by the track that it showed them by.
+
+    Frames that are forgotten are left out, and so are those of an earlier run of the camera.
+
+    Returns:
+        None: nothing is left, or the camera has not shown this person.
+    """
+    told, numbers = people.told, [number, *people.roll.also(number)]
+    known = [it for it in places if told.remembers(it.pulse)]
+    tracks = [(it, told.of(camera, numbers, it.pulse)) for it in known]
+    boots = [track.boot for _, track in tracks if track is not None]
+    if not boots:
+        return None
+    points = [
+        Pointed(pulse=it.pulse, track=track.track, x=it.x, y=it.y, reach=it.reach)
+        for it, track in tracks
+        if track is not None and track.boot == max(boots)
+    ]
+    return Pointings(boot=max(boots), points=points)

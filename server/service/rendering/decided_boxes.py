@@ -1,0 +1,79 @@
+"""The boxes that go with decided frames, for whoever draws."""
+
+from __future__ import annotations
+
+import struct
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from server.media.containers.webm import CLUSTER, pulse_of
+from server.media.rendering_messages import TIMESCALE, Boxes
+from server.messaging.messages import GopChoices
+
+_TFDT = b"tfdt"
+
+
+@dataclass(frozen=True, slots=True)
+class Told:
+    """What is known of the frames of one GOP in one camera."""
+
+    first: int
+    boxes: Boxes
+    chosen: int | None = None
+
+
+NOTHING = Told(0, [])
+
+
+def first_pulse(fragments: bytes, fps: float) -> int:
+    """Give the pulse that fragments, or clusters of WebM, begin with."""
+    if fragments.startswith(CLUSTER):
+        return pulse_of(fragments, fps)
+    at = fragments.index(_TFDT) + len(_TFDT) + 4  # behind version and flags
+    (ticks,) = struct.unpack_from(">Q", fragments, at)
+    return round(int(ticks) * fps / TIMESCALE)
+
+
+class Decided:
+    """Keeps the newest ``gops`` decisions; ``resolve`` gives the number that a merged one goes by now."""
+
+    def __init__(self, resolve: Callable[[int], int], fps: float, gops: int) -> None:
+        self._resolve, self._fps = resolve, fps
+        self._kept: deque[GopChoices] = deque(maxlen=gops)
+
+    def put(self, choices: GopChoices) -> None:
+        """Take a decision in."""
+        self._kept.append(choices)
+
+    @property
+    def newest(self) -> int | None:
+        """The last decided frame; None before the first decision."""
+        return self._kept[-1].first + self._kept[-1].frames - 1 if self._kept else None
+
+    def of_camera(self, camera: str, fragments: bytes) -> Told:
+        """Give everybody's boxes in a camera's GOP."""
+        choices = self._of(fragments)
+        return NOTHING if choices is None else Told(choices.first, choices.boxes.get(camera, []))
+
+    def of_person(self, number: int, fragments: bytes, *, alone: bool = False) -> Told:
+        """Give everybody's boxes in a GOP of a person's stream, and the number that the person has there.
+
+        ``alone``: give no box but theirs, by any of their numbers.
+        """
+        choices = self._of(fragments)
+        if choices is None:
+            return NOTHING
+        there = number if number in choices.choices else self._resolve(number)
+        camera = choices.choices.get(there)
+        if camera is None:
+            return NOTHING
+        boxes = choices.boxes.get(camera, [])
+        if alone:
+            person = self._resolve(number)
+            boxes = [[box for box in frame if self._resolve(box[0]) == person] for frame in boxes]
+        return Told(choices.first, boxes, there)
+
+    def _of(self, fragments: bytes) -> GopChoices | None:
+        pulse = first_pulse(fragments, self._fps)
+        return next((it for it in self._kept if it.first <= pulse < it.first + it.frames), None)

@@ -1,0 +1,93 @@
+"""Series of JPEG: each picture at its moment, to whoever watches at a rate that it belongs to."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+
+from server.media.rendering_messages import Canvas, Drawn, Jpeg, belongs
+from server.service.rendering.multipart_jpeg import part
+from server.service.rendering.pacing import Pace
+from server.service.streaming.broadcaster import Channel, Chunk, Viewer
+
+_NEWEST = 1
+"""A viewer has one picture waiting at the most: the newest."""
+_KEPT_GOPS = 2
+"""So much is kept back at the most, to be shown in pace."""
+
+
+@dataclass(frozen=True, slots=True)
+class Series:
+    """Pictures at one rate."""
+
+    rate: float
+    """A second."""
+    boxed: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Due:
+    """A picture and its moment."""
+
+    at: float
+    picture: Jpeg
+    boxed: bool
+
+
+class AllSeries:
+    """All series of one stream. ``live`` pictures are shown as they come, others in pace."""
+
+    def __init__(self, canvas: Canvas, *, live: bool) -> None:
+        self._fps, self._live = canvas.fps, live
+        self._pace = Pace(canvas.fps, _KEPT_GOPS * canvas.gop / canvas.fps)
+        self._waiting: deque[Due] = deque(maxlen=4 * _KEPT_GOPS * canvas.gop)  # more than the pace keeps
+        self._channels: dict[Series, Channel] = {}
+        self._last = -1
+        self._closed = False
+
+    @property
+    def viewers(self) -> int:
+        """How many are watching."""
+        return sum(channel.viewers for channel in self._channels.values())
+
+    def join(self, series: Series) -> Viewer:
+        """Let a viewer in; call :meth:`leave` in the end."""
+        channel = self._channels.setdefault(series, Channel(queue_starts=_NEWEST))
+        if self._closed:
+            channel.close()
+        return channel.join()
+
+    def leave(self, series: Series, viewer: Viewer) -> None:
+        """Let a viewer go."""
+        self._channels[series].leave(viewer)
+        if not self._channels[series].viewers:
+            del self._channels[series]
+
+    def rates(self, *, boxed: bool) -> list[float]:
+        """Give the rates that are watched."""
+        return sorted({series.rate for series in self._channels if series.boxed is boxed})
+
+    def put(self, drawn: Drawn, now: float) -> None:
+        """Take in what was drawn; ``now`` is in seconds by a clock that never steps."""
+        pictures = [(it, False) for it in drawn.plain] + [(it, True) for it in drawn.boxed]
+        for picture, boxed in sorted(pictures, key=lambda it: it[0].pulse):
+            if picture.pulse > self._last:
+                at = now if self._live else self._pace.due(picture.pulse, now)
+                self._waiting.append(Due(at, picture, boxed))
+        self._last = max(self._last, drawn.newest)
+
+    def show(self, now: float) -> float | None:
+        """Pass on what is due; give the moment of the next picture, None where none waits."""
+        while self._waiting and self._waiting[0].at <= now:
+            due = self._waiting.popleft()
+            chunk = Chunk(part(due.picture), start=True)
+            for series, channel in self._channels.items():
+                if series.boxed is due.boxed and belongs(due.picture.pulse, series.rate, self._fps):
+                    channel.publish(chunk)
+        return self._waiting[0].at if self._waiting else None
+
+    def close(self) -> None:
+        """End all of them for everybody."""
+        self._closed = True
+        for channel in self._channels.values():
+            channel.close()

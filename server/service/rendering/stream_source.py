@@ -1,0 +1,223 @@
+"""One stream that is drawn: a viewer of the spliced stream, whose eyes are a process."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+from collections.abc import Callable
+
+from camsync import Spell
+from server.media.rendering_messages import Canvas, Draw, Jpeg, Still
+from server.service.rendering.decided_boxes import Told
+from server.service.rendering.jpeg_series import AllSeries
+from server.service.rendering.overlay_film import Film
+from server.service.rendering.stills import Stills
+from server.service.rendering.worker_process import DrawProcess, ProcessDiedError
+from server.service.streaming.audio_buffer import SoundShelf
+from server.service.streaming.broadcaster import Channel, Piece, Viewer
+from server.service.streaming.media_chunk import Footage
+
+log = logging.getLogger(__name__)
+
+_RETRY_FIRST_S, _RETRY_MAX_S = 0.1, 5.0
+_PATIENCE_S = 8.0
+"""How long somebody waits for a first picture: a process may have to start, and even to be replaced."""
+
+
+class NoPictureError(Exception):
+    """No picture came in time."""
+
+
+class Source:
+    """Decodes one stream while somebody uses it; what is made of it outlives the process that makes it.
+
+    A slow process is a slow viewer: it loses whole GOPs, and nobody waits for it. ``told`` gives the boxes of
+    fragments. ``live`` pictures are shown as they come, others in pace. ``sound`` goes under the film, with
+    ``silent_holes`` only where there are pictures.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        stream: Channel,
+        told: Callable[[bytes], Told],
+        canvas: Canvas,
+        *,
+        live: bool,
+        queue_gops: int,
+        sound: SoundShelf | None = None,
+        silent_holes: bool = False,
+    ) -> None:
+        self._name, self._stream, self._told, self._canvas = name, stream, told, canvas
+        self._live, self._queue_gops, self._sound = live, queue_gops, sound
+        self._silent_holes = silent_holes
+        self._begin()
+        self._stills = Stills()
+        self._used = asyncio.Event()
+        self._shown = asyncio.Event()
+        self.newest = -1
+        """The last frame that the present process has drawn."""
+        self._answered = False
+        self.users = 0
+        self.restarts = 0
+        self._viewer: Viewer | None = None
+        self._lost = 0
+        self._dies = Spell()
+        self.pid: int | None = None
+        """The process that draws now."""
+
+    @property
+    def viewers(self) -> int:
+        """How many streams of it are being watched."""
+        return self.film.channel.viewers + self.series.viewers
+
+    @property
+    def lost(self) -> int:
+        """How many GOPs the process was too slow for."""
+        return self._lost + (0 if self._viewer is None else self._viewer.lost)
+
+    def use(self) -> None:
+        """Somebody uses it."""
+        self.users += 1
+        self._used.set()
+
+    def release(self) -> None:
+        """Somebody does not use it any more."""
+        self.users -= 1
+        if not self.users:
+            self._used.clear()
+            self._begin()
+
+    async def still(self, kind: Still, pulse: int) -> Jpeg:
+        """Give a picture of this frame or a newer one.
+
+        Raises:
+            NoPictureError: none came in time.
+        """
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(_PATIENCE_S):
+                picture = await self._stills.get(kind, pulse)
+                if picture is not None:
+                    return picture
+        raise NoPictureError
+
+    async def film_head(self) -> bytes:
+        """Give what the film begins with, when its first frames are there.
+
+        Raises:
+            NoPictureError: none came in time.
+        """
+        with contextlib.suppress(TimeoutError):
+            await asyncio.wait_for(self.film.begun.wait(), _PATIENCE_S)
+        if self.film.head is None:
+            raise NoPictureError
+        return self.film.head
+
+    async def run(self) -> None:
+        """Draw until the stream ends; a process that dies is replaced."""
+        try:
+            async with asyncio.TaskGroup() as both:
+                show = both.create_task(self._show(), name=f"show {self._name}")
+                await self._draw_on()
+                show.cancel()
+        finally:
+            self.close()
+
+    async def _draw_on(self) -> None:
+        pause = _RETRY_FIRST_S
+        while True:
+            try:
+                await self._run_process()
+            except ProcessDiedError as error:
+                pause = _RETRY_FIRST_S if self._answered else min(2 * pause, _RETRY_MAX_S)
+                if (more := self._dies.happened(str(error))) is not None:
+                    told = "drawing %s: the process %s%s; starting another"
+                    log.warning(told, self._name, error, more)
+                self.restarts += 1
+                self.film.interrupted()
+                await asyncio.sleep(pause)
+            else:
+                return
+
+    def close(self) -> None:
+        """End what is made of it for everybody."""
+        self.film.close()
+        self.series.close()
+        self._stills.close()
+
+    def _begin(self) -> None:
+        """Begin anew what is made of it: whoever comes must not be shown what others saw before."""
+        self.film = Film(self._canvas, self._queue_gops, self._sound, silent_holes=self._silent_holes)
+        self.series = AllSeries(self._canvas, live=self._live)
+
+    async def _run_process(self) -> None:
+        self.newest, self._answered = -1, False
+        process = await DrawProcess.start(self._canvas)
+        self.pid = process.pid
+        works = (self._feed(process), self._give_stills(process), process.watch())
+        tasks = [asyncio.create_task(work) for work in works]
+        try:
+            finished, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+            for task in finished:
+                task.result()
+        finally:
+            for task in tasks:
+                task.cancel()
+            await process.end()
+            self.pid = None
+            await asyncio.gather(*tasks, return_exceptions=True)
+
+    async def _feed(self, process: DrawProcess) -> None:
+        """Draw what comes, while somebody wants it, until the stream ends."""
+        while True:
+            await self._used.wait()
+            viewer = self._viewer = self._stream.join()
+            try:
+                async for piece in viewer.pieces():
+                    await self._draw(process, piece)
+                    if not self.users:
+                        break
+                else:
+                    return
+            finally:
+                self._stream.leave(viewer)
+                self._lost, self._viewer = self.lost, None
+
+    async def _draw(self, process: DrawProcess, piece: Piece) -> None:
+        fragments = piece.data
+        told = self._told(fragments)
+        drawn = await process.ask(
+            Draw(
+                fragments=fragments,
+                first=told.first,
+                boxes=told.boxes,
+                chosen=told.chosen,
+                film=self.film.wanted > 0,
+                plain=self.series.rates(boxed=False),
+                boxed=self.series.rates(boxed=True),
+            )
+        )
+        self.newest, self._answered = drawn.newest, True
+        self.film.put(drawn.film, silent=isinstance(piece, Footage) and piece.silent)
+        self.series.put(drawn, asyncio.get_running_loop().time())
+        self._shown.set()
+        self._stills.asked.set()
+
+    async def _give_stills(self, process: DrawProcess) -> None:
+        while True:
+            await self._stills.asked.wait()
+            self._stills.asked.clear()
+            for kind in self._stills.possible(self.newest):
+                drawn = await process.ask(Draw(still=kind))
+                self._stills.give(kind, drawn.still)
+
+    async def _show(self) -> None:
+        """Pass pictures on, each at its moment."""
+        loop = asyncio.get_running_loop()
+        while True:
+            self._shown.clear()
+            following = self.series.show(loop.time())
+            timeout = None if following is None else max(0.0, following - loop.time())
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(self._shown.wait(), timeout)

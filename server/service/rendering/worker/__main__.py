@@ -1,0 +1,55 @@
+"""The drawing process: requests on standard input, answers on standard output, until the input ends."""
+
+from __future__ import annotations
+
+import logging
+import os
+import sys
+from typing import BinaryIO
+
+# Before NumPy is imported: there is a process for each stream already.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import cv2
+import msgspec
+
+from server.media.rendering_messages import LENGTH_BYTES, Canvas, Draw, framed
+from server.service.rendering.worker.stream_renderer import Studio
+from server.system.log_format import formatter
+
+
+def serve(requests: BinaryIO, answers: BinaryIO) -> None:
+    """Answer until the service closes the pipe, or is no more."""
+    first = _message(requests)
+    if first is None:
+        return
+    studio = Studio(msgspec.msgpack.decode(first, type=Canvas))
+    decoder = msgspec.msgpack.Decoder(Draw)
+    while (body := _message(requests)) is not None:
+        answers.write(framed(studio.draw(decoder.decode(body))))
+        answers.flush()
+
+
+def _message(requests: BinaryIO) -> bytes | None:
+    head = requests.read(LENGTH_BYTES)
+    if len(head) < LENGTH_BYTES:
+        return None
+    size = int.from_bytes(head, "big")
+    body = requests.read(size)
+    return body if len(body) == size else None
+
+
+def main() -> None:
+    """Serve the process that started this one."""
+    handler = logging.StreamHandler()
+    handler.setFormatter(formatter("draw"))
+    logging.basicConfig(handlers=[handler], level=logging.WARNING)
+    cv2.setNumThreads(1)
+    try:
+        serve(sys.stdin.buffer, sys.stdout.buffer)
+    except BrokenPipeError:  # the service has gone first
+        os._exit(0)  # standard output cannot be flushed any more
+
+
+if __name__ == "__main__":
+    main()

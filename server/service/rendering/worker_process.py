@@ -1,0 +1,88 @@
+"""The service's end of a drawing process: started on demand, asked one thing at a time, ended for sure."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from typing import NoReturn, Self
+
+import msgspec
+
+from server.media.rendering_messages import LENGTH_BYTES, Canvas, Draw, Drawn, framed
+from server.system.child_process import start_child
+
+_ANSWER_S = 5.0
+"""An answer that takes longer does not come: the process hangs."""
+
+
+class ProcessDiedError(Exception):
+    """The drawing process has ended, or hangs and was killed."""
+
+
+class DrawProcess:
+    """A running process. Whoever started it calls :meth:`end`."""
+
+    def __init__(self, process: asyncio.subprocess.Process) -> None:
+        assert process.stdin is not None  # noqa: S101 — tells mypy that there are pipes
+        assert process.stdout is not None  # noqa: S101
+        self._process, self._requests, self._answers = process, process.stdin, process.stdout
+        self._turn = asyncio.Lock()
+        self._decoder = msgspec.msgpack.Decoder(Drawn)
+
+    @classmethod
+    async def start(cls, canvas: Canvas) -> Self:
+        """Start one.
+
+        Raises:
+            ProcessDiedError: the system does not let it start.
+        """
+        try:
+            process = await start_child("server.service.rendering.worker")
+        except OSError as error:
+            raise ProcessDiedError(f"cannot be started: {error.strerror}") from error
+        started = cls(process)
+        started._requests.write(framed(canvas))
+        return started
+
+    @property
+    def pid(self) -> int:
+        """Its number in the system."""
+        return self._process.pid
+
+    async def ask(self, request: Draw) -> Drawn:
+        """Give the answer to a request; nothing else is asked meanwhile.
+
+        Whoever gives up waiting must end the process: the answer would be taken for another's.
+
+        Raises:
+            ProcessDiedError: there is none, and the process is of no use any more.
+        """
+        async with self._turn:
+            try:
+                async with asyncio.timeout(_ANSWER_S):
+                    self._requests.write(framed(request))
+                    await self._requests.drain()
+                    size = int.from_bytes(await self._answers.readexactly(LENGTH_BYTES), "big")
+                    return self._decoder.decode(await self._answers.readexactly(size))
+            except TimeoutError as error:
+                raise ProcessDiedError(f"gave no answer within {_ANSWER_S:g} s") from error
+            except (OSError, asyncio.IncompleteReadError) as error:
+                raise ProcessDiedError("died") from error
+            except msgspec.DecodeError as error:
+                raise ProcessDiedError(f"gave no sense: {error}") from error
+
+    async def watch(self) -> NoReturn:
+        """Wait until it dies by itself, which may be long before it is asked again.
+
+        Raises:
+            ProcessDiedError: it has died.
+        """
+        await self._process.wait()
+        raise ProcessDiedError("died")
+
+    async def end(self) -> None:
+        """End it: it has nothing to save."""
+        with contextlib.suppress(ProcessLookupError):
+            self._process.kill()
+        self._requests.close()
+        await self._process.wait()

@@ -1,0 +1,120 @@
+"""Why each view was chosen, in numbers: worked out when somebody asks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bestview import NO_CAMERA
+from bestview.quality import QualitySettings
+from server.service.view_selection.lookahead_window import Part
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True)
+class ViewReason:
+    """What one camera's view of one person is worth over the look-ahead."""
+
+    cost: float | None
+    """Mean cost of a frame; None: it cannot be shown."""
+    seen: float
+    """Share of the frames in which the camera sees the person."""
+    quality: float | None
+    """Mean over these; None: there are none."""
+    terms: dict[str, float]
+    """What the quality is made of: mean of each term that weighs something; empty where there are none."""
+    unfound: float
+    """Share of the frames in which it does not find the person, who stands before it as others know."""
+    unfound_quality: float | None
+    """What those views are taken to be worth, likewise; None: there are none."""
+
+
+@dataclass(frozen=True, slots=True)
+class Explanation:
+    """Why one person is shown by that camera. Costs are in frames of not seeing the person at all."""
+
+    frames: int
+    """Frames of the look-ahead."""
+    views: dict[str, ViewReason]
+    """By camera."""
+    weights: dict[str, float]
+    """Of the terms: the share of a view's worth that is lost where a term is at its worst."""
+    stay: float | None
+    """What the look-ahead costs with the camera of the GOP before; None: none, or it cannot be shown."""
+    cut: float | None
+    """What it costs with the best other camera, `switch_cost` included; None: there is none."""
+    cut_to: str | None
+    """That camera."""
+    switch_cost: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Why:
+    """What one GOP's choices were made by.
+
+    Attributes:
+        part: the look-ahead.
+        before: (K,) the camera of the GOP before, by index; -1: none.
+        weight: (N,) for how many frames each frame of the look-ahead stands.
+        switch_cost: what a cut costs, in frames of not seeing the person.
+        settings: how the terms weigh.
+    """
+
+    part: Part
+    before: Ints
+    weight: Floats
+    switch_cost: float
+    settings: QualitySettings
+
+    def of(self, number: int) -> Explanation:
+        """Explain one person's view.
+
+        Raises:
+            KeyError: the GOP was not decided for this person.
+        """
+        views, cameras = self.part.views(number), self.part.outlook.cameras
+        columns = self.part.outlook.views.camera[views]
+        unfound = self.part.unfound(number)
+        others = self.part.outlook.unfound.camera[unfound]
+        each = self.part.cost(number)
+        cost, mean = (each * self.weight[:, None]).sum(axis=0), each.mean(axis=0)
+        before = int(self.before[self.part.numbers == number][0])
+        stay = np.inf if before == NO_CAMERA else cost[before]
+        other = np.where(np.arange(len(cost)) == before, np.inf, cost)
+        best = int(np.argmin(other))
+        cut = other[best] + (0.0 if before == NO_CAMERA else self.switch_cost)
+        return Explanation(
+            frames=self.part.frames,
+            views={
+                name: self._view(views[columns == place], unfound[others == place], mean[place])
+                for place, name in enumerate(cameras)
+            },
+            weights={name: self.settings.weights[name] for name in self.settings.terms},
+            stay=_finite(stay),
+            cut=_finite(cut),
+            cut_to=cameras[best] if np.isfinite(cut) else None,
+            switch_cost=self.switch_cost,
+        )
+
+    def _view(self, views: Ints, unfound: Ints, mean: float) -> ViewReason:
+        """Tell what one camera had to say of a person: where it finds them, and where it does not."""
+        outlook = self.part.outlook
+        terms = [outlook.terms(int(view)) for view in views]
+        return ViewReason(
+            cost=_finite(mean),
+            seen=len(views) / self.part.frames,
+            quality=float(np.mean(outlook.quality[views])) if terms else None,
+            terms=dict(zip(self.settings.terms, np.mean(terms, axis=0).tolist(), strict=True))
+            if terms
+            else {},
+            unfound=len(unfound) / self.part.frames,
+            unfound_quality=float(np.mean(outlook.unfound.quality[unfound])) if unfound.size else None,
+        )
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

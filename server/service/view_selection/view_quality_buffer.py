@@ -1,0 +1,138 @@
+"""What the cameras see and how well: every window's view quality, by camera and pulse."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bestview.quality import Looks, Quality, QualitySettings, Seen, view_quality
+from server.config.site_config import Config
+from server.media.letterbox import Fit
+from server.service.identity.camera_window import CameraWindow
+from server.service.ingest.window_history import History, Stretch
+
+Floats = NDArray[np.float64]
+
+_FOR_EVER = 2**62
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SeenWindow:
+    """How well one camera's window of F frames shows whom its T tracks follow.
+
+    Attributes:
+        window: the tracks.
+        quality: (F, T), NaN where hidden.
+        terms: (terms, F, T) what it is made of, NaN where hidden.
+    """
+
+    window: CameraWindow
+    quality: Floats
+    terms: Floats
+
+
+class Sight:
+    """Weighs the views of every window as it comes, and keeps what was last said of each frame.
+
+    A window's quality does not depend on who its tracks are, nor on other cameras: it is worked out once.
+    ``homographies`` lead from each camera's own picture to the ground.
+    """
+
+    def __init__(
+        self, config: Config, homographies: Mapping[str, Floats | None], fits: Mapping[str, Fit]
+    ) -> None:
+        self.settings: QualitySettings = config.view.quality
+        self._size = (float(config.site.width), float(config.site.height))
+        self._fps = config.site.fps
+        self._homographies, self.fits = homographies, fits
+        self._overhead = config.overhead
+        self._histories = {camera: History[SeenWindow]() for camera in config.camera_ids}
+
+    def put(self, windows: Sequence[CameraWindow]) -> None:
+        """Take over what cameras said of an epoch."""
+        for seen in self._seen(windows):
+            first, frames = seen.window.first, len(seen.quality)
+            self._histories[seen.window.message.camera].put(seen, first, first + frames - 1)
+
+    def weigh_anew(self, settings: QualitySettings) -> None:
+        """Go by other settings from now on, also of what was said already."""
+        self.settings = settings
+        for history in self._histories.values():
+            for said in history.over(0, _FOR_EVER):
+                (seen,) = self._seen([said.window.window])
+                history.put(seen, said.first, said.last)
+
+    def over(self, camera: str, first: int, last: int) -> list[Stretch[SeenWindow]]:
+        """Give what was last said of a camera's frames from `first` to `last`."""
+        return self._histories[camera].over(first, last)
+
+    def forget_before(self, pulse: int) -> None:
+        """Let go of the frames before a pulse."""
+        for history in self._histories.values():
+            history.forget_before(pulse)
+
+    def _seen(self, windows: Sequence[CameraWindow]) -> list[SeenWindow]:
+        """Weigh the views of some windows, all at once."""
+        if not windows:
+            return []
+        start = min(window.first for window in windows)
+        weighed = self._weigh(windows, start)
+        quality, terms = weighed.quality.T, weighed.terms.transpose(0, 2, 1)
+        ends = np.cumsum([len(window.keys) for window in windows]).tolist()
+        seen = []
+        for window, end in zip(windows, ends, strict=True):
+            count, frames = window.boxes.shape[:2]
+            rows, tracks = slice(window.first - start, window.first - start + frames), slice(end - count, end)
+            seen.append(SeenWindow(window, quality[rows, tracks], terms[:, rows, tracks]))
+        return seen
+
+    def _weigh(self, windows: Sequence[CameraWindow], start: int) -> Quality:
+        """Weigh the views of all windows at once, track after track; frames that one lacks are hidden."""
+        tracks = [track for window in windows for track in window.message.tracks]
+        return view_quality(
+            Seen(
+                _side_by_side(windows, start),
+                np.repeat(np.arange(len(windows)), [len(window.keys) for window in windows]),
+                np.clip(np.array([it.confidence for it in tracks], dtype=np.float64), 0.0, 1.0),
+                # None becomes NaN: nobody has measured it.
+                np.array([it.sharpness for it in tracks], dtype=np.float64),
+            ),
+            self.looks([window.message.camera for window in windows]),
+            self.settings,
+        )
+
+    def looks(self, cameras: Sequence[str]) -> Looks:
+        """Give what view quality asks of cameras that have spoken."""
+        pictures = np.array([self._picture(camera) for camera in cameras]).reshape(-1, 4)
+        return Looks(self._size, pictures, [self._ground(camera) for camera in cameras], self._fps)
+
+    def _picture(self, camera: str) -> tuple[float, float, float, float]:
+        """Say where a camera's own picture lies in the site's: in its middle."""
+        left, top = (float(side) for side in self.fits[camera].to_site(np.zeros(2)))
+        return left, top, self._size[0] - left, self._size[1] - top
+
+    def _ground(self, camera: str) -> Floats | None:
+        """Give the homography from the site's picture; none of a camera that nobody can walk towards."""
+        own = self._homographies[camera]
+        if own is None or camera in self._overhead:
+            return None
+        (left, top), scale = self.fits[camera].to_site(np.zeros(2)), self.fits[camera].scale
+        to_own = np.array([[1.0, 0.0, -left], [0.0, 1.0, -top], [0.0, 0.0, scale]]) / scale
+        return np.asarray(own @ to_own)
+
+
+def _side_by_side(windows: Sequence[CameraWindow], start: int) -> Floats:
+    """Give the boxes of all tracks over the frames of all windows from `start` on: (T, N, 4)."""
+    frames = max(window.first + window.boxes.shape[1] for window in windows) - start
+    if all(window.boxes.shape[1] == frames for window in windows):
+        return np.concatenate([window.boxes for window in windows])
+    boxes = np.full((sum(len(window.keys) for window in windows), frames, 4), np.nan)
+    end = 0
+    for window in windows:
+        count, own = window.boxes.shape[:2]
+        boxes[end : end + count, window.first - start : window.first - start + own] = window.boxes
+        end += count
+    return boxes

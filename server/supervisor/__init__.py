@@ -1,0 +1,1 @@
+"""Processes of a site: start-up, supervision, reload, shutdown, health checks."""

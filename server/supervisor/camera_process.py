@@ -1,0 +1,109 @@
+"""One camera's process."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+
+from camsync import Spell, SyncError
+from server.camera.process import CameraProcess
+from server.config.camera_password import with_password
+from server.config.running_config import Running
+from server.config.site_config import Config
+from server.config.source_address import SourceKind, kind_of
+from server.supervisor.reload import Reload
+from server.supervisor.sighup import reloads
+from server.supervisor.startup_checks import check_recording
+from server.supervisor.startup_signal import say_started
+from server.system.errors import AwayError, UserError
+
+log = logging.getLogger(__name__)
+
+_RETRY_FIRST_S, _RETRY_MAX_S = 0.5, 10.0
+
+
+async def camera_process(running: Running, camera_id: str) -> None:
+    """Run one camera; when a configuration that is read again changes what it goes by, it begins anew.
+
+    A network camera or device that does not answer yet is waited for.
+
+    Raises:
+        UserError: its source cannot be opened.
+        AwayError: it lost the pulses for good, or cannot begin anew.
+    """
+    if kind_of(running.now.camera(camera_id).source) is SourceKind.STREAM:
+        say_started()  # opening it is mostly waiting for a network or a device, which keeps no processor
+    anew = asyncio.Event()
+    following = asyncio.create_task(_follow(running, camera_id, anew), name="reload")
+    try:
+        camera = await _made(running, camera_id, anew, begun=False)
+        say_started()
+        while not await _run(camera, anew):
+            camera = await _made(running, camera_id, anew, begun=True)
+    except SyncError as error:
+        raise AwayError(f"camera {camera_id}: {error}") from error
+    finally:
+        following.cancel()
+        await asyncio.gather(following, return_exceptions=True)
+
+
+async def _made(running: Running, camera_id: str, anew: asyncio.Event, *, begun: bool) -> CameraProcess:
+    """Make it as soon as its source can be opened, by what is in force then; ``anew`` says that this changed.
+
+    To end instead, and be started again, would load all libraries each time. Once the site has begun, as it
+    does while a camera is waited for, what is wrong with one camera ends that one alone.
+    """
+    away, pause = Spell(calm=0.0), _RETRY_FIRST_S
+    while True:
+        anew.clear()
+        try:
+            camera = await asyncio.to_thread(_opened, running.now, camera_id)
+        except AwayError as error:
+            if (more := away.happened(str(error))) is not None:
+                log.warning("%s%s; it is tried again", error, more)
+            begun = True
+        except UserError as error:
+            if not begun:
+                raise
+            raise AwayError(str(error)) from error  # whoever looks after this process starts it again
+        else:
+            if ended := away.over():
+                log.info("camera %s: it answers, after %.0f s", camera_id, ended.seconds)
+            return camera
+        with contextlib.suppress(TimeoutError):
+            await asyncio.wait_for(anew.wait(), pause)
+        pause = min(2 * pause, _RETRY_MAX_S)
+
+
+def _opened(config: Config, camera_id: str) -> CameraProcess:
+    return CameraProcess(with_password(config, camera_id), camera_id)
+
+
+async def _run(camera: CameraProcess, anew: asyncio.Event) -> bool:
+    """Run until the recording is over, which is said, or until the camera has to begin anew."""
+    run, waiting = asyncio.create_task(camera.run()), asyncio.create_task(anew.wait())
+    try:
+        await asyncio.wait({run, waiting}, return_when=asyncio.FIRST_COMPLETED)
+        if run.done():
+            run.result()
+        return run.done()
+    finally:
+        anew.clear()
+        for task in (run, waiting):
+            task.cancel()
+        await asyncio.gather(run, waiting, return_exceptions=True)
+
+
+async def _follow(running: Running, camera_id: str, anew: asyncio.Event) -> None:
+    def check(_: Config, reload: Reload) -> None:
+        if camera_id in reload.cameras:
+            check_recording(reload.now, camera_id)
+
+    async for reload in reloads(running, check):
+        running.now = reload.now
+        if camera_id in reload.cameras:
+            log.info("the configuration was read again, and changes this camera: it begins anew")
+            anew.set()
+        else:
+            log.info("the configuration was read again: nothing in it changes this camera while it runs")

@@ -1,0 +1,70 @@
+"""A site that other machines can reach is so because the configuration says so, and not by accident."""
+
+from __future__ import annotations
+
+import ipaddress
+import re
+
+from server.config.site_config import Config
+from server.config.tokens_file import read_tokens
+from server.system.address_redaction import shown_endpoint
+from server.system.errors import UserError
+
+_AUTHORITY = re.compile(r"[a-z]+/(?P<host>[^\s?#]+):[0-9]+")
+
+
+def check_viewers(config: Config) -> None:
+    """Refuse to serve other machines without tokens, unless the site is said to be open to all.
+
+    Raises:
+        UserError: `http.host` is not of this machine alone; or the file of tokens cannot be read.
+    """
+    if config.access.tokens is not None:
+        read_tokens(config.access.tokens)
+    elif not (is_loopback(config.http.host) or config.access.open_to_all):
+        raise UserError(
+            f"http.host: {config.http.host} lets other machines watch, and there are no tokens: name a file "
+            "of them in access.tokens (`myview token NAME` makes one), or say access.open_to_all: true"
+        )
+
+
+def check_pulses(config: Config) -> None:
+    """Refuse to send pulses to other machines, unless they have to prove who they are, or are trusted.
+
+    Raises:
+        UserError: `sync.bind` is not of this machine alone.
+    """
+    if config.sync.users is None and not is_loopback(config.sync.bind):
+        what = f"sync.bind: {config.sync.bind} lets other machines listen to the pulses"
+        _check_network(config, what, "name a file of passwords in sync.users")
+
+
+def check_bus(config: Config) -> None:
+    """Refuse to be other machines' router, unless the bus asks who comes, or their network is trusted.
+
+    Raises:
+        UserError: `zenoh.listen` is not of this machine alone.
+    """
+    zenoh = config.zenoh
+    if zenoh.users is not None and zenoh.listen.startswith("tls/"):
+        return
+    found = _AUTHORITY.match(zenoh.listen)
+    if found is None or not is_loopback(found["host"].strip("[]")):
+        what = f"zenoh.listen: {shown_endpoint(zenoh.listen)} lets other machines send frames and tracks"
+        _check_network(config, what, "let it be tls/ and name zenoh.users")
+
+
+def is_loopback(host: str) -> bool:
+    """Tell whether nobody but this machine can reach a host that is listened on."""
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
+
+
+def _check_network(config: Config, what: str, remedy: str) -> None:
+    if not config.access.trusted_network:
+        raise UserError(
+            f"{what}, and whoever does is believed: bind it to 127.0.0.1, {remedy}, or, where nobody else "
+            "reaches it, say access.trusted_network: true"
+        )

@@ -1,0 +1,128 @@
+"""Whether one process of a site in containers is well: its container's health check.
+
+    python -m server.supervisor.healthcheck sync | bestview | camera ID
+
+It ends with 0 if so; else with 1, and one line that the engine keeps. It starts every few seconds beside
+each process, so it loads nothing but what it asks with: no configuration, only the environment that the
+compose files set. ``MYVIEW_HEALTH_URL`` is where the best view answers, ``MYVIEW_HEALTH_CERTIFICATE`` the
+file of the certificate by which it is known, and ``MYVIEW_HEALTH_TOKEN`` (a file) or ``MYVIEW_TOKEN`` what
+lets in.
+"""
+
+from __future__ import annotations
+
+import http.client
+import json
+import os
+import socket
+import ssl
+import sys
+import urllib.request
+from collections.abc import Sequence
+from pathlib import Path
+
+_URL = "http://bestview:8080"
+_SYNC_PORT = "7400"
+_TIMEOUT_S = 5.0
+
+
+class UnwellError(Exception):
+    """What is wrong, in one line."""
+
+
+def check_pulses() -> None:
+    """See whether the pulse server greets.
+
+    Raises:
+        UnwellError: it does not.
+        OSError: nobody is there.
+    """
+    address = "127.0.0.1", int(os.environ.get("MYVIEW_SYNC__PORT", _SYNC_PORT))
+    with socket.create_connection(address, timeout=_TIMEOUT_S) as server:
+        if not server.recv(64).startswith(b"MYVIEW-SYNC"):
+            raise UnwellError("what answers is no pulse server")
+
+
+def check_service() -> None:
+    """See whether the best-view service answers.
+
+    Raises:
+        OSError: it does not.
+    """
+    _asked("/healthz")
+
+
+def check_camera(camera: str) -> None:
+    """See whether the best view gets a camera's frames: all the way from its source to the viewers' side.
+
+    Raises:
+        UnwellError: it does not.
+        OSError: the best view is away.
+    """
+    known = {it["camera"]: it for it in json.loads(_asked("/api/cameras"))["cameras"]}
+    if camera not in known:
+        raise UnwellError(f"the best view knows no camera {camera}, or the token is for another one")
+    if known[camera]["state"] != "live" or not known[camera]["fps"] > 0:
+        raise UnwellError(f"{camera} is {known[camera]['state']}: {known[camera]['message'] or 'no frames'}")
+
+
+def _asked(path: str) -> bytes:
+    url = os.environ.get("MYVIEW_HEALTH_URL") or _URL
+    asked = urllib.request.Request(url.rstrip("/") + path)  # noqa: S310 — the compose files say where
+    token = _token()
+    if token:
+        asked.add_header("Authorization", f"Bearer {token}")
+    # No proxy, though an engine may hand one to all containers: it knows none of a site's own names.
+    opener = urllib.request.build_opener(
+        urllib.request.ProxyHandler({}), urllib.request.HTTPSHandler(context=_trust())
+    )
+    with opener.open(asked, timeout=_TIMEOUT_S) as answer:
+        found: bytes = answer.read()
+    return found
+
+
+def _token() -> str:
+    file = os.environ.get("MYVIEW_HEALTH_TOKEN")
+    return Path(file).read_text(encoding="ascii").strip() if file else os.environ.get("MYVIEW_TOKEN", "")
+
+
+def _trust() -> ssl.SSLContext | None:
+    """Know the service by its very certificate, which is for the name that browsers use, not for ours."""
+    file = os.environ.get("MYVIEW_HEALTH_CERTIFICATE")
+    if not file:
+        return None
+    trust = ssl.create_default_context(cafile=file)
+    trust.check_hostname = False
+    trust.verify_flags |= ssl.VERIFY_X509_PARTIAL_CHAIN
+    return trust
+
+
+def check(words: Sequence[str]) -> None:
+    """Check what is asked for.
+
+    Raises:
+        UnwellError, OSError, ValueError, KeyError, TypeError, HTTPException: it is not well, or nobody knows.
+    """
+    match words:
+        case ["sync"]:
+            check_pulses()
+        case ["bestview"]:
+            check_service()
+        case ["camera", camera]:
+            check_camera(camera)
+        case _:
+            raise UnwellError("what is to be checked is sync, bestview or camera ID")
+
+
+def main(words: Sequence[str]) -> int:
+    """Give the exit code."""
+    try:
+        check(words)
+    except (UnwellError, OSError, ValueError, KeyError, TypeError, http.client.HTTPException) as error:
+        print(f"{' '.join(words)}: {' '.join(str(error).split())}")  # noqa: T201 — the engine keeps it
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,113 @@
+"""What becomes of a site's processes when its configuration is read again."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from server.config.config_diff import differing
+from server.config.sections import TUNED, Camera, Track
+from server.config.site_config import Config
+
+_LIVE = tuple(f"view.{name}" for name in TUNED)
+"""The best view takes these over from one GOP to the next."""
+_OF_A_CAMERA = ("source", "password", "offset", "at_end", "h264", "options", "ignore", "detections")
+"""What nobody but the camera's own process goes by."""
+_TRACK = tuple(name for name in Track.model_fields if name != "backlog_s")
+_OF_CAMERAS = ("detect", *(f"track.{name}" for name in _TRACK))
+"""What all cameras' processes go by, and nobody else."""
+_EPOCHS = ("track.window.window", "track.window.stride")
+"""But the best view lines windows up by these."""
+_BY_LAG = ("tracker", "temporal")
+"""And these may say how late a frame is final, which it goes by as well."""
+_OF_THE_BEST_VIEW = ("view", "http", "access", "record")
+
+
+@dataclass(frozen=True, slots=True)
+class Reload:
+    """What another configuration changes.
+
+    Attributes:
+        now: what to run by from now on: the old one, with what can be changed in a running site.
+        live: settings that the best view takes over without a break.
+        cameras: cameras whose processes have to begin anew.
+        best_view: settings that wait for a restart of the best view, which ends streams.
+        site: settings that wait for a restart of all processes.
+    """
+
+    now: Config
+    live: tuple[str, ...] = ()
+    cameras: tuple[str, ...] = ()
+    best_view: tuple[str, ...] = ()
+    site: tuple[str, ...] = ()
+
+    @property
+    def line(self) -> str:
+        """All of it in one line."""
+        parts = {
+            "in force now": self.live,
+            "these cameras begin anew": self.cameras,
+            "waits for a restart of the best view, which ends streams": self.best_view,
+            "waits for a restart of all processes": self.site,
+        }
+        told = "; ".join(f"{what}: {', '.join(names)}" for what, names in parts.items() if names)
+        return f"the configuration was read again: {told or 'nothing in it has changed'}"
+
+
+def reloaded(running: Config, wanted: Config) -> Reload:
+    """Sort out what another configuration changes in a running site."""
+    keys = differing(running, wanted)
+    view = running.view.model_copy(update={name: getattr(wanted.view, name) for name in TUNED})
+    live = _of(keys, _LIVE)
+    try:
+        running.check_lookahead(view)
+    except ValueError:  # what makes a shorter one possible waits itself
+        view = view.model_copy(update={"lookahead": running.view.lookahead})
+        live = tuple(key for key in live if key != "view.lookahead")
+    kept = _kept(running, wanted, keys)
+    shared = tuple(key for key in _of(keys, _OF_CAMERAS) if not _of((key,), [f"track.{it}" for it in kept]))
+    # Whose H.264 can pass depends on the site's codec: with another one, that waits, too.
+    names_of_own = tuple(it for it in _OF_A_CAMERA if not (it == "h264" and "encode.codec" in keys))
+    own = {it: _of(keys, [f"cameras.{it}.{name}" for name in names_of_own]) for it in running.camera_ids}
+    sharp = (running.view.quality.sharp > 0) != (view.quality.sharp > 0)  # cameras measure it, or do not
+    anew = tuple(camera for camera in running.camera_ids if shared or sharp or own[camera])
+    done = {*live, *shared, *(key for names in own.values() for key in names)}
+    waiting = tuple(key for key in keys if key not in done)
+    best_view = _of(waiting, _OF_THE_BEST_VIEW)
+    now = running.model_copy(
+        update={
+            "view": view,
+            "detect": wanted.detect,
+            "track": _track(running, wanted, kept),
+            "cameras": [_camera(running, wanted, it, names_of_own) for it in running.camera_ids],
+        }
+    )
+    return Reload(now, live, anew, best_view, tuple(key for key in waiting if key not in best_view))
+
+
+def _of(keys: Sequence[str], sections: Sequence[str]) -> tuple[str, ...]:
+    """Give those of the keys that are one of the sections, or in one."""
+    return tuple(key for key in keys if any(f"{key}.".startswith(f"{section}.") for section in sections))
+
+
+def _kept(running: Config, wanted: Config, keys: Sequence[str]) -> tuple[str, ...]:
+    """Name what of `track` has to stay as it is, since it changes when windows end or frames are final."""
+    fps = running.site.fps
+    apart = running.track.model_copy(update={name: getattr(wanted.track, name) for name in _BY_LAG})
+    late = _BY_LAG if apart.lag(fps) != running.track.lag(fps) else ()
+    return (*late, "window") if any(key in _EPOCHS for key in keys) else late
+
+
+def _track(running: Config, wanted: Config, kept: Sequence[str]) -> Track:
+    """Take over how people are followed, but not when windows end and frames are final."""
+    names = [name for name in _TRACK if name not in kept]
+    return running.track.model_copy(update={name: getattr(wanted.track, name) for name in names})
+
+
+def _camera(running: Config, wanted: Config, camera_id: str, names: Sequence[str]) -> Camera:
+    """Take over what only the camera's own process goes by."""
+    before = running.camera(camera_id)
+    if running.camera_ids != wanted.camera_ids:
+        return before
+    after = wanted.camera(camera_id)
+    return before.model_copy(update={name: getattr(after, name) for name in names})

@@ -1,0 +1,24 @@
+"""The synthetic scene knows where its floor is: nobody has to calibrate it."""
+
+from __future__ import annotations
+
+from server.config.sections import Camera, Site
+from server.config.site_config import Config
+from server.config.source_address import SourceKind, kind_of
+
+
+def with_scene_ground(config: Config) -> Config:
+    """Give the configuration with the floor of every camera of a synthetic scene that has none of its own.
+
+    Raises:
+        UserError: there is no such scene.
+    """
+    return config.model_copy(update={"cameras": [_calibrated(it, config.site) for it in config.cameras]})
+
+
+def _calibrated(camera: Camera, site: Site) -> Camera:
+    if camera.ground is not None or kind_of(camera.source) is not SourceKind.SCENE:
+        return camera
+    from server.camera.sources.synthetic import Stage  # noqa: PLC0415 — it draws, and other sites need not load it
+
+    return camera.model_copy(update={"ground": Stage(camera.source, site).ground})

@@ -1,0 +1,115 @@
+"""Ending well: on SIGTERM or SIGINT a process lets go of everything and exits with 0."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import ctypes
+import logging
+import os
+import signal
+import sys
+import threading
+from collections.abc import Callable, Coroutine, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from server.system.accept_errors import AcceptErrors
+
+log = logging.getLogger(__name__)
+
+_PR_SET_PDEATHSIG = 1
+_ENDING = (signal.SIGINT, signal.SIGTERM)
+SUPERVISED = "MYVIEW_SUPERVISED"
+"""Set in the environment of a process that a supervisor looks after."""
+OVER = 4
+"""The code by which such a process says that nothing is left to do; 0 is that of one told to end."""
+_LET_GO_S = 1.2
+"""How long a process has to let go of everything; a camera that is silent is waited for longer."""
+
+
+async def run_until_told(
+    main: Callable[[], Coroutine[Any, Any, None]],
+    told: Callable[[], None] = lambda: None,
+    *,
+    hang_up: bool = True,
+) -> bool:
+    """Run a coroutine until it is over or a signal asks to end, when ``told`` is called first.
+
+    Returns:
+        Whether it was over by itself.
+
+    ``hang_up``: SIGHUP asks for that, too.
+    """
+    task = asyncio.create_task(main())
+    loop = asyncio.get_running_loop()
+    loop.set_exception_handler(AcceptErrors())
+
+    def end() -> None:
+        told()
+        task.cancel()
+
+    for number in (*_ENDING, signal.SIGHUP) if hang_up else _ENDING:
+        loop.add_signal_handler(number, end)
+    try:
+        await task
+    except asyncio.CancelledError:
+        return False
+    return True
+
+
+def end_with_parent() -> None:
+    """Ask the kernel to end this process when its supervisor is gone (Linux; elsewhere nothing)."""
+    with contextlib.suppress(OSError, AttributeError):
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
+
+
+def run_process(
+    main: Callable[[], Coroutine[Any, Any, None]], let_go_s: float = _LET_GO_S, *, hang_up: bool = False
+) -> None:
+    """Run a process's coroutine until it is over, or SIGTERM or SIGINT comes.
+
+    ``hang_up``: SIGHUP ends it, too; else it looks after that itself.
+
+    Who is told to end has so many seconds to let go of everything. Then the process ends all the same: a
+    thread may be held up by a camera that says nothing, and whoever stops a site would wait for that, too.
+    """
+    over = asyncio.run(run_until_told(main, lambda: _end_after(let_go_s), hang_up=hang_up))
+    if over and os.environ.get(SUPERVISED):
+        sys.exit(OVER)
+
+
+def _end_after(seconds: float) -> None:
+    def end() -> None:
+        log.info("told to end: what is held up is left as it is")
+        os._exit(0)
+
+    timer = threading.Timer(seconds, end)
+    timer.daemon = True
+    timer.start()
+
+
+@contextmanager
+def ending_later() -> Iterator[None]:
+    """Put off SIGINT and SIGTERM until the block is over; only in the main thread.
+
+    The mask alone would not do: a library's thread may take the signal, and Python then runs the
+    handler here all the same.  It is set too because children inherit it: one that is told to end while
+    it still starts would say so with a traceback.  They call :func:`end_at_once_again`.
+    """
+    came: list[int] = []
+    before = {number: signal.signal(number, lambda number, _: came.append(number)) for number in _ENDING}
+    signal.pthread_sigmask(signal.SIG_BLOCK, _ENDING)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, _ENDING)
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        if came:
+            signal.raise_signal(came[0])
+
+
+def end_at_once_again() -> None:
+    """In a child that was started within :func:`ending_later`: let SIGINT and SIGTERM through."""
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, _ENDING)

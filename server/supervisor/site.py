@@ -1,0 +1,107 @@
+"""A whole site on one machine, and what its supervisor makes of a configuration that is read again."""
+
+from __future__ import annotations
+
+import asyncio
+import errno
+import logging
+import tempfile
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from camsync import Spell
+from server.config.running_config import IN_FORCE, Running, is_ours, written
+from server.config.site_config import Config
+from server.supervisor.exposure_checks import check_bus, check_pulses, check_viewers
+from server.supervisor.reload import Reload
+from server.supervisor.sighup import reloads
+from server.supervisor.startup_checks import check_recording
+from server.supervisor.supervisor import Supervisor
+from server.system.errors import UserError
+
+log = logging.getLogger(__name__)
+
+_APART_S = 4.0
+"""Between two cameras that begin anew, so that the others show whom the first one showed."""
+
+
+async def run_up(running: Running, environment: Mapping[str, str], out: Path | None) -> None:
+    """Run a site until the best-view service has nothing left to do, or this task is cancelled.
+
+    Raises:
+        UserError: a process refused its input.
+    """
+    with _folder() as folder:
+        kept, failing = Path(folder) / "site.yaml", Spell()
+        # Anew each time: what is old and temporary may be tidied away, and sites run for months.
+        supervisor = Supervisor(
+            running.path,
+            running.now,
+            {**environment, IN_FORCE: str(kept)},
+            out,
+            before_start=lambda: _keep(running, kept, failing),
+        )
+        following = asyncio.create_task(
+            _follow(running, supervisor, lambda: _keep(running, kept, failing)), name="reload"
+        )
+        try:
+            await supervisor.run()
+        finally:
+            following.cancel()
+            await asyncio.gather(following, return_exceptions=True)
+
+
+def check_exposed(config: Config) -> None:
+    """Refuse a site that is open to others by accident.
+
+    Raises:
+        UserError: it is.
+    """
+    for check in (check_viewers, check_pulses, check_bus):
+        check(config)
+
+
+async def _follow(running: Running, supervisor: Supervisor, keep: Callable[[], None]) -> None:
+    """Tell those processes whose settings have changed, whenever the configuration is read again."""
+    async for reload in reloads(running, _check):
+        log.info("%s", reload.line)
+        running.now = reload.now
+        keep()
+        supervisor.hang_up("bestview")
+        for number, camera in enumerate(reload.cameras):
+            if number:
+                await asyncio.sleep(_APART_S)
+            supervisor.hang_up(camera)
+
+
+def _folder() -> tempfile.TemporaryDirectory[str]:
+    """Make a folder that nobody else can look into: cameras have passwords.
+
+    Raises:
+        UserError: it cannot be made.
+    """
+    try:
+        return tempfile.TemporaryDirectory(prefix="myview-up-")
+    except OSError as error:
+        reason = error.strerror or error
+        raise UserError(f"cannot make a temporary folder (TMPDIR names where): {reason}") from error
+
+
+def _check(wanted: Config, reload: Reload) -> None:
+    check_exposed(wanted)
+    for camera in reload.cameras:
+        check_recording(reload.now, camera)
+
+
+def _keep(running: Running, kept: Path, failing: Spell) -> None:
+    """Write down what the site runs by, for processes that begin: all of it or nothing."""
+    new = kept.with_suffix(".new")
+    try:
+        kept.parent.mkdir(mode=0o700, exist_ok=True)
+        if not is_ours(kept.parent):  # it was tidied away, and somebody else took the name
+            raise PermissionError(errno.EACCES, "its folder is somebody else's")
+        new.write_text(written(running.now, running.path.parent), encoding="utf-8")
+        new.replace(kept)
+    except OSError as error:
+        if (more := failing.happened(str(error.strerror))) is not None:
+            log.warning("%s: cannot write what is in force: %s%s", kept, error.strerror, more)

@@ -1,0 +1,181 @@
+"""All processes of a configuration on one machine, watched and restarted."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import os
+import signal
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from camsync import Spell
+from server.config.site_config import Config
+from server.supervisor.shutdown import OVER, SUPERVISED
+from server.supervisor.startup_signal import STARTED, started_pipe
+from server.system.errors import UserError
+from server.system.niceness import make_nicer
+from server.system.processors import processors
+
+log = logging.getLogger(__name__)
+
+_RETRY_FIRST_S, _RETRY_MAX_S = 0.2, 10.0
+_SETTLED_S = 10.0
+"""A process that ran this long has started well: its next restart is quick again."""
+_STARTS_WITHIN_S = 10.0
+"""How long a process that loads keeps others from being started: it may hang, and never say that it has."""
+_END_S = 1.6
+"""How long processes have to end before they are killed; they end by themselves a little sooner."""
+
+
+@dataclass(slots=True)
+class Child:
+    """One process and how it fares."""
+
+    name: str
+    arguments: Sequence[str]
+    awaits: Sequence[Child] = ()
+    """Those that must have started before it is."""
+    nicer: int = 0
+    """By how much it yields to the supervisor, and to those that are started as the supervisor is."""
+    process: asyncio.subprocess.Process | None = None
+    restarts: int = 0
+    dies: Spell = field(default_factory=Spell)
+    started: asyncio.Event = field(default_factory=asyncio.Event)
+    """It has loaded once, or had the time to."""
+    done: asyncio.Event = field(default_factory=asyncio.Event)
+    """It has ended by itself with nothing left to do."""
+
+
+class Supervisor:
+    """Starts one process each for the pulses, every camera and the best view; restarts what dies.
+
+    A camera whose recording is over says so (`OVER`) and stays so; when the best-view service does,
+    everything is over. ``before_start`` is called whenever a process is about to be started.
+
+    The best view and the pulses come first and never wait. Then the cameras, no more of which load at a time
+    than there are processors: a site answers while they come.
+    """
+
+    def __init__(
+        self,
+        config_path: Path,
+        config: Config,
+        environment: Mapping[str, str],
+        out: Path | None,
+        before_start: Callable[[], None] = lambda: None,
+    ) -> None:
+        self._before_start = before_start
+        self._environment = {**os.environ, **environment, SUPERVISED: "1"}
+        path = str(config_path)
+        self._out = out
+        self._places = asyncio.Semaphore(max(1, int(processors())))
+        """For cameras that load."""
+        first = [Child("bestview", ["bestview", path]), Child("sync", ["sync", path])]
+        cameras = [Child(it, ["camera", path, it], first, config.site.niceness) for it in config.camera_ids]
+        self.children = [*first, *cameras]
+
+    async def run(self) -> None:
+        """Run everything until the best-view service has nothing left to do, or this task is cancelled.
+
+        Raises:
+            UserError: a process refused its input; what it said stands in the log above.
+        """
+        watchers = [asyncio.create_task(self._watch(child), name=child.name) for child in self.children]
+        try:
+            over = asyncio.create_task(self.children[0].done.wait())
+            finished, _ = await asyncio.wait([over, *watchers], return_when=asyncio.FIRST_COMPLETED)
+            while over not in finished:
+                for watcher in finished:
+                    watcher.result()  # raises what a process refused
+                pending = [watcher for watcher in watchers if not watcher.done()]
+                finished, _ = await asyncio.wait([over, *pending], return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            await self._end(watchers)
+
+    def hang_up(self, name: str) -> None:
+        """Tell a process that its configuration is another; one that is to be started again will read it."""
+        for child in self.children:
+            if child.name == name and child.process is not None and child.process.returncode is None:
+                child.process.send_signal(signal.SIGHUP)
+
+    async def _watch(self, child: Child) -> None:
+        pause = _RETRY_FIRST_S
+        loop = asyncio.get_running_loop()
+        for other in child.awaits:
+            await other.started.wait()
+        while True:
+            async with self._places if child.awaits else contextlib.nullcontext():
+                started = loop.time()
+                process = await self._start(child)
+            code = await process.wait()
+            if code == OVER:
+                log.info("%s has ended", child.name)
+                child.done.set()
+                return
+            if code == UserError.code and child.restarts == 0:
+                raise UserError(f"{child.name} could not start")
+            if loop.time() - started > _SETTLED_S:
+                pause = _RETRY_FIRST_S
+            cause = _cause(code)
+            if (more := child.dies.happened(cause)) is not None:
+                log.warning("%s %s%s; starting it again in %.1f s", child.name, cause, more, pause)
+            await asyncio.sleep(pause)
+            pause = min(2 * pause, _RETRY_MAX_S)
+            child.restarts += 1
+
+    async def _start(self, child: Child) -> asyncio.subprocess.Process:
+        """Start a process, and give it once it has loaded, has died, or takes too long for others to wait."""
+        with started_pipe() as pipe:
+            try:
+                self._before_start()
+                process = child.process = await asyncio.create_subprocess_exec(
+                    sys.executable,
+                    "-m",
+                    "server.cli.main",
+                    *self._arguments(child),
+                    env={**self._environment, STARTED: str(pipe.given)},
+                    pass_fds=(pipe.given,),
+                    process_group=0,  # Ctrl-C in a terminal is for the supervisor alone
+                )
+            finally:
+                os.close(pipe.given)
+            make_nicer(process.pid, child.nicer)
+            await pipe.ended(_STARTS_WITHIN_S)
+        child.started.set()
+        return process
+
+    def _arguments(self, child: Child) -> Sequence[str]:
+        """Give a process's arguments; what a restarted best view decides is in files of its own."""
+        if self._out is None or child is not self.children[0]:
+            return child.arguments
+        out = self._out / f"restart-{child.restarts}" if child.restarts else self._out
+        return [*child.arguments, "--out", str(out)]
+
+    async def _end(self, watchers: Sequence[asyncio.Task[None]]) -> None:
+        for watcher in watchers:
+            watcher.cancel()
+        await asyncio.gather(*watchers, return_exceptions=True)
+        processes = [child.process for child in self.children if child.process is not None]
+        running = [process for process in processes if process.returncode is None]
+        for process in running:
+            process.terminate()
+        _, late = (
+            await asyncio.wait([asyncio.create_task(process.wait()) for process in running], timeout=_END_S)
+            if running
+            else ((), ())
+        )
+        if late:
+            for process in running:
+                if process.returncode is None:
+                    process.kill()
+            await asyncio.wait(late)
+
+
+def _cause(code: int) -> str:
+    if code == 0:
+        return "was told to end by somebody else"
+    return f"died (killed by signal {-code})" if code < 0 else f"died (exit code {code})"

@@ -1,0 +1,50 @@
+"""The process that sends the pulses."""
+
+from __future__ import annotations
+
+import errno
+import logging
+
+from camsync import PulseServer
+from server.config.pulse_passwords import pulse_clients, pulse_users
+from server.config.running_config import Running
+from server.supervisor.exposure_checks import check_pulses
+from server.supervisor.sighup import reloads
+from server.supervisor.startup_signal import say_started
+from server.system.errors import UserError
+
+log = logging.getLogger(__name__)
+
+
+async def sync_process(running: Running) -> None:
+    """Send pulses; pulse 0 waits for all cameras and best-view services.
+
+    Nothing that it goes by can change while it runs: of a configuration that is read again it says so.
+
+    Raises:
+        UserError: the port cannot be listened on, strangers could listen, or passwords cannot be read.
+    """
+    config = running.now
+    check_pulses(config)
+    sync = config.sync
+    server = PulseServer(
+        config.site.fps,
+        expect=pulse_clients(config),
+        start_timeout=sync.start_timeout_s,
+        host=sync.bind,
+        port=sync.port,
+        users=pulse_users(config),
+    )
+    try:
+        await server.start()
+    except OSError as error:
+        taken = error.errno == errno.EADDRINUSE
+        reason = "the port is in use" if taken else (error.strerror or error)
+        raise UserError(f"sync.port: cannot listen on {sync.bind}:{sync.port}: {reason}") from error
+    log.info("pulses at %g a second on %s:%d", config.site.fps, sync.bind, server.port)
+    say_started()
+    try:
+        async for reload in reloads(running):
+            log.info("%s", reload.line)
+    finally:
+        await server.stop()

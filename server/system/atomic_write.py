@@ -1,0 +1,108 @@
+"""Output that is whole or not there at all."""
+
+from __future__ import annotations
+
+import errno
+import os
+import shutil
+import tempfile
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from server.system.errors import UserError
+
+_FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS}
+"""What a disk says that takes no more, whoever writes."""
+
+
+def check_new_folder(out: Path) -> None:
+    """Make sure that a folder is not there yet, or empty.
+
+    Raises:
+        UserError: it is not.
+    """
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        raise UserError(f"{out}: is there already and is not an empty folder; name another, or remove it")
+
+
+def check_new_file(out: Path, *read: Path | None) -> None:
+    """Make sure that a file can take this place.
+
+    Raises:
+        UserError: a folder, a device or one of the files that are read has it.
+    """
+    if out.is_dir():
+        raise UserError(f"{out}: is a folder; name a file")
+    if not out.exists():
+        return
+    if not out.is_file():
+        raise UserError(f"{out}: is no ordinary file, and would be replaced by one; name another")
+    if any(it is not None and it.exists() and out.samefile(it) for it in read):
+        raise UserError(f"{out}: is read, and would be replaced; name another")
+
+
+@contextmanager
+def whole_folder(out: Path) -> Iterator[Path]:
+    """Give a folder to write into; it becomes ``out`` only when all went well.
+
+    Raises:
+        UserError: ``out`` is there already and not an empty folder, or cannot be made.
+    """
+    check_new_folder(out)
+    target = out.resolve()
+    with _cannot_write(out):
+        target.parent.mkdir(parents=True, exist_ok=True)
+        draft = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=target.parent))
+    try:
+        with _cannot_write(out, _FULL):
+            yield draft
+        with _cannot_write(out):
+            draft.chmod(0o777 & ~_umask())  # mkdtemp makes it for this user alone
+            draft.replace(target)
+    finally:
+        shutil.rmtree(draft, ignore_errors=True)
+
+
+@contextmanager
+def whole_file(out: Path, *read: Path | None) -> Iterator[Path]:
+    """Give a file to write; it becomes ``out``, in place of an older one, only when all went well.
+
+    ``read`` are the files that are read meanwhile: none of them is replaced.
+
+    Raises:
+        UserError: there cannot be a file ``out``; this is found out before anything else is done.
+    """
+    check_new_file(out, *read)
+    target = out.resolve()
+    with _cannot_write(out):
+        target.parent.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(prefix=f".{target.name}-", dir=target.parent)
+        os.close(handle)
+    draft = Path(name)
+    try:
+        with _cannot_write(out, _FULL):
+            yield draft
+        with _cannot_write(out):
+            draft.chmod(0o666 & ~_umask())
+            draft.replace(target)
+    finally:
+        draft.unlink(missing_ok=True)
+
+
+@contextmanager
+def _cannot_write(out: Path, only: Collection[int] | None = None) -> Iterator[None]:
+    """Say in one line that what is written cannot be; ``only`` if it is one of these errors."""
+    try:
+        yield
+    except OSError as error:
+        if only is not None and error.errno not in only:
+            raise
+        raise UserError(f"{out}: cannot write there: {error.strerror}") from error
+
+
+def _umask() -> int:
+    """Give the process's umask, which can only be read by setting it."""
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

@@ -1,0 +1,104 @@
+"""How a log line is written: for people, or as an object of JSON for programs.
+
+    04:31:03 INFO    bestview: camera c1 is gone
+    {"time":"2026-11-22T04:31:03.120Z","level":"INFO","process":"bestview","event":"camera c1 is gone",
+     "camera":"c1"}
+
+Which camera or object a line is about is taken from its template: ``log.info("camera %s is gone", camera)``.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import re
+from datetime import UTC, datetime
+from types import TracebackType
+
+import msgspec
+
+from server.system.address_redaction import without_addresses
+from server.system.errors import UserError
+
+_ExcInfo = tuple[type[BaseException], BaseException, TracebackType | None] | tuple[None, None, None]
+
+VARIABLE = "MYVIEW_LOG_FORMAT"
+_FORMATS = ("text", "json")
+_PLACE = re.compile(r"(?:\b(camera|object) )?%[-#0 +]*[0-9]*(?:\.[0-9]+)?([a-zA-Z%])")
+
+
+class TextLines(logging.Formatter):
+    """Writes lines for people, and tracebacks below them, in which errors' own words repeat no address."""
+
+    def formatException(self, ei: _ExcInfo) -> str:  # noqa: N802 — as logging calls it
+        """Give a traceback, each line up to where an address begins."""
+        return without_addresses(super().formatException(ei))
+
+
+class JsonLines(TextLines):
+    """Writes each record as one line of JSON, with its traceback inside, if there is one."""
+
+    def __init__(self, process: str) -> None:
+        super().__init__()
+        self._process = process
+
+    def format(self, record: logging.LogRecord) -> str:
+        """Give the line, without its end."""
+        time = datetime.fromtimestamp(record.created, UTC).isoformat(timespec="milliseconds")
+        line: dict[str, object] = {
+            "time": time.replace("+00:00", "Z"),
+            "level": record.levelname,
+            "process": self._process,
+            "logger": record.name,
+            "event": record.getMessage(),
+            **_subjects(record),
+        }
+        if record.exc_info:
+            line["traceback"] = self.formatException(record.exc_info)
+        sayable = {key: _sayable(value) if isinstance(value, str) else value for key, value in line.items()}
+        return msgspec.json.encode(sayable, enc_hook=lambda value: _sayable(str(value))).decode()
+
+
+def _sayable(text: str) -> str:
+    r"""Write what is no Unicode, as in the name of a file that is no UTF-8, as \udc80."""
+    return text.encode("utf-8", "backslashreplace").decode()
+
+
+def formatter(process: str) -> logging.Formatter:
+    """Give what writes the lines of a process, as MYVIEW_LOG_FORMAT says.
+
+    Raises:
+        UserError: it is no format.
+    """
+    if is_json():
+        return JsonLines(process)
+    name = process.replace("%", "%%")
+    return TextLines(f"%(asctime)s %(levelname)-7s {name}: %(message)s", datefmt="%H:%M:%S")
+
+
+def is_json() -> bool:
+    """Tell whether lines are for programs.
+
+    Raises:
+        UserError: MYVIEW_LOG_FORMAT is no format.
+    """
+    wanted = os.environ.get(VARIABLE) or "text"
+    if wanted not in _FORMATS:
+        raise UserError(f"environment: {VARIABLE}: is {wanted!r}, not {' or '.join(_FORMATS)}")
+    return wanted == "json"
+
+
+def _subjects(record: logging.LogRecord) -> dict[str, object]:
+    """Give whom a record is about: what its template names, and what was put there."""
+    if not isinstance(record.args, tuple) or not isinstance(record.msg, str):
+        return {}
+    values = iter(record.args)
+    subjects: dict[str, object] = {}
+    for place in _PLACE.finditer(record.msg):
+        what, kind = place.groups()
+        if kind == "%":
+            continue
+        value = next(values, None)
+        if what is not None and value is not None:
+            subjects.setdefault(what, value)
+    return subjects

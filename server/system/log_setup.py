@@ -1,0 +1,58 @@
+"""Log lines: one per event that matters, to standard error, never one per frame."""
+
+from __future__ import annotations
+
+import logging
+import os
+import sys
+import threading
+from types import TracebackType
+
+import typer
+
+from server.system.errors import UserError
+from server.system.log_format import JsonLines, formatter
+from server.system.printable import printable
+
+log = logging.getLogger("myview")
+
+
+def log_to_stderr(name: str) -> None:
+    """Log as this process; MYVIEW_LOG=DEBUG shows more, MYVIEW_LOG_FORMAT=json is for programs.
+
+    Raises:
+        UserError: MYVIEW_LOG is no level, or MYVIEW_LOG_FORMAT no format.
+    """
+    level = os.environ.get("MYVIEW_LOG", "INFO").upper()
+    if level not in logging.getLevelNamesMapping():
+        raise UserError(f"environment: MYVIEW_LOG: is {level!r}, not DEBUG, INFO, WARNING or ERROR")
+    handler = logging.StreamHandler(sys.stderr)
+    handler.setFormatter(formatter(name))
+    logging.basicConfig(level=level, handlers=[handler])
+    if _logs_json():  # then nothing else may stand between the lines
+        logging.captureWarnings(capture=True)
+        sys.excepthook = _uncaught
+        threading.excepthook = _uncaught_in_thread
+
+
+def say_failure(text: str) -> None:
+    """Say in one line why a command ends: as the log's last line where programs read it."""
+    if _logs_json():
+        log.error("%s", text)
+    else:
+        typer.echo(f"myview: {printable(text)}", err=True)
+
+
+def _logs_json() -> bool:
+    """Tell whether this process logs, and for programs."""
+    return any(isinstance(it.formatter, JsonLines) for it in logging.getLogger().handlers)
+
+
+def _uncaught(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+    if not issubclass(kind, KeyboardInterrupt):
+        log.critical("a mistake in MyView", exc_info=(kind, error, trace))
+
+
+def _uncaught_in_thread(failed: threading.ExceptHookArgs) -> None:
+    if failed.exc_value is not None:
+        _uncaught(failed.exc_type, failed.exc_value, failed.exc_traceback)

@@ -1,0 +1,1 @@
+"""Cameras of a drawn scene: projection, sensor noise, visibility."""

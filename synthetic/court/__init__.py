@@ -1,0 +1,1 @@
+"""A basketball court and the players on it."""

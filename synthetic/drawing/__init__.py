@@ -1,0 +1,1 @@
+"""Drawing a scene: ray casting, figures, shadows, compositing."""

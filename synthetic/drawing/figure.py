@@ -1,0 +1,116 @@
+"""Drawing one walker: shaded capsules, nearest last, smoothed by drawing large and shrinking."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from synthetic.cameras.pinhole import Floats, Perspective
+from synthetic.drawing.body import Body
+
+_ARC = 7  # corners of a capsule's end
+_SHIFT = 4  # fractional bits of cv2's coordinates
+_TALL = 280  # drawn pixels that a figure needs no more than: large figures are drawn at twice their size only
+_SUN = np.array([-0.55, -0.45, 0.70])  # towards the light
+# A limb is drawn several times: whole and dim, then ever narrower, brighter and towards the light.
+_TONES = np.array([0.72, 0.85, 0.96, 1.04])
+_GIRTHS = np.array([1.0, 0.85, 0.64, 0.38])
+_OFFSETS = np.array([0.0, 0.12, 0.25, 0.40])
+
+Bytes = NDArray[np.uint8]
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """A drawn walker: a patch whose top left corner is the picture's pixel ``(left, top)``."""
+
+    left: int
+    top: int
+    patch: Bytes  # (h, w, 4) blue, green, red times alpha, and alpha
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """The part of a figure's patch that lies within the picture."""
+
+    area: tuple[slice, slice]  # of the picture
+    patch: tuple[slice, slice]  # of the patch
+
+
+def clip(figure: Figure, view: Perspective) -> Part | None:
+    """Cut a figure to the picture, or give None where nothing of it is left."""
+    high, wide = figure.patch.shape[:2]
+    left, top = max(figure.left, 0), max(figure.top, 0)
+    right, bottom = min(figure.left + wide, view.width), min(figure.top + high, view.height)
+    if left >= right or top >= bottom:
+        return None
+    return Part(
+        (slice(top, bottom), slice(left, right)),
+        (slice(top - figure.top, bottom - figure.top), slice(left - figure.left, right - figure.left)),
+    )
+
+
+def draw_figure(view: Perspective, body: Body, joints: Floats, light: float) -> Figure | None:
+    """Draw a body by its joints ``(J, 3)`` in metres; `light` scales its colours.
+
+    The patch reaches beyond the picture's edge where the body does. None where the body is behind the camera.
+    """
+    pixels, depth = view.project(joints)
+    if depth.min() < 0.3:  # noqa: PLR2004 — metres; nobody can stand inside the lens
+        return None
+    scale = view.focal / depth
+    first, last = pixels[body.starts], pixels[body.ends]
+    radii = np.stack([body.radii[:, 0] * scale[body.starts], body.radii[:, 1] * scale[body.ends]], axis=1)
+    low = np.minimum(first - radii[:, :1], last - radii[:, 1:]).min(axis=0)
+    high = np.maximum(first + radii[:, :1], last + radii[:, 1:]).max(axis=0)
+    left, top = (int(np.floor(value)) - 1 for value in low)
+    width, height = int(np.ceil(high[0])) + 1 - left, int(np.ceil(high[1])) + 1 - top
+    fine = 2 if height * 2 >= _TALL else 4
+    corner = np.array([left, top])
+    outlines = _outlines(
+        (first - corner) * fine - 0.5, (last - corner) * fine - 0.5, radii * fine, _sunward(view)
+    )
+    middle = (depth[body.starts] + depth[body.ends]) / 2
+    away = np.array([middle[limbs].mean() for limbs in body.members]) - body.nearer
+    canvas = np.zeros((height * fine, width * fine, 4), dtype=np.uint8)
+    colours = np.clip(body.colours[:, None, ::-1] * _TONES[:, None] * (255 * light), 0, 255)
+    inks = np.concatenate([colours, np.full((*colours.shape[:2], 1), 255.0)], axis=2).tolist()
+    for member in np.argsort(-away, kind="stable").tolist():
+        limbs = body.members[member].tolist()
+        for tone in range(len(_TONES)):
+            for limb in limbs:
+                if tone < body.tones[limb]:
+                    cv2.fillConvexPoly(canvas, outlines[limb, tone], inks[limb][tone], cv2.LINE_8, _SHIFT)
+    patch = cv2.resize(canvas, (width, height), interpolation=cv2.INTER_AREA)
+    return Figure(left, top, np.asarray(patch, dtype=np.uint8))
+
+
+def _sunward(view: Perspective) -> Floats:
+    """Give the light's direction in the picture."""
+    across = view.axes[:2] @ _SUN
+    unit: Floats = across / np.linalg.norm(across)
+    return unit
+
+
+def _outlines(first: Floats, last: Floats, radii: Floats, sunward: Floats) -> NDArray[np.int32]:
+    """Give the outlines ``(L, T, 2 * _ARC, 2)`` of capsules in every tone, in cv2's fixed point."""
+    span = last - first
+    length = np.hypot(span[:, 0], span[:, 1])
+    angle = np.arctan2(span[:, 1], span[:, 0])
+    # Where one end swallows the other the outline is that end's circle.
+    tangent = np.arccos(np.clip((radii[:, 0] - radii[:, 1]) / np.maximum(length, 1e-6), -1, 1))
+    turn = np.linspace(0, 1, _ARC)
+    back = (angle + tangent)[:, None] + (2 * (np.pi - tangent))[:, None] * turn
+    front = (angle - tangent)[:, None] + (2 * tangent)[:, None] * turn
+    circles = [np.stack([np.cos(arc), np.sin(arc)], axis=-1) for arc in (back, front)]
+    ends = []
+    for centre, radius, circle in zip((first, last), radii.T, circles, strict=True):
+        middle = centre[:, None] + radius[:, None, None] * _OFFSETS[:, None] * sunward
+        rim = radius[:, None, None, None] * _GIRTHS[:, None, None] * circle[:, None]
+        ends.append(middle[:, :, None] + rim)
+    outline = np.concatenate(ends, axis=2)
+    fixed: NDArray[np.int32] = np.rint(outline * (1 << _SHIFT)).astype(np.int32)
+    return fixed

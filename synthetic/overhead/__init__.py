@@ -1,0 +1,1 @@
+"""A small room under an overhead camera."""

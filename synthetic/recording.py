@@ -1,0 +1,121 @@
+"""A scene written to disk: one video per camera, ground truth, and the cameras' homographies.
+
+The formats are those of the field's recordings: `c0.mp4` …, `gt/c0.txt` with MOTChallenge rows
+`frame,id,left,top,width,height,1,class,visible` (frames count from 1), and, where the scene has a floor,
+`ground.json`.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from contextlib import ExitStack
+from fractions import Fraction
+from pathlib import Path
+from typing import Self
+
+import av
+import numpy as np
+from numpy.typing import NDArray
+
+from server.system.atomic_write import whole_folder
+from synthetic.ground_truth import CameraTruth
+from synthetic.scene import Scene
+
+_PEDESTRIAN = 1  # MOTChallenge's class
+# Macroblock trees are off: with them x264 gives other bytes from one run to the next for the same pictures.
+_OPTIONS = {"crf": "21", "preset": "veryfast", "mbtree": "0"}
+_TIME_BASE = Fraction(1, 90_000)  # seconds
+
+Progress = Callable[[int, int], None]
+
+
+def write_recording(scene: Scene, out: Path, seconds: float, progress: Progress | None = None) -> None:
+    """Write the first `seconds` of a scene into the folder `out`, all of it or nothing.
+
+    `progress` is told the frames done and the frames to do, after each frame.
+
+    Raises:
+        ValueError: where `seconds` holds no frame, or where a side of the picture is odd.
+        UserError: where `out` is a file or a folder that is not empty, or cannot be made.
+        OSError: where the disk refuses.
+    """
+    frames = round(seconds * scene.fps)
+    if frames < 1:
+        raise ValueError(f"a recording needs at least one frame; {seconds} s at {scene.fps:g} fps has none")
+    if scene.width % 2 or scene.height % 2:
+        raise ValueError(f"a video's width and height must be even, not {scene.width} x {scene.height}")
+    with whole_folder(out) as draft:
+        _write(scene, draft, frames, progress)
+
+
+def _write(scene: Scene, folder: Path, frames: int, progress: Progress | None) -> None:
+    (folder / "gt").mkdir()
+    matrices = _homographies(scene)
+    if matrices:
+        ground = json.dumps({"unit": "m", "homography": matrices}, indent=1)
+        (folder / "ground.json").write_text(ground + "\n", encoding="ascii")
+    with ExitStack() as stack:
+        videos = [
+            stack.enter_context(_Video(folder / f"c{camera}.mp4", scene)) for camera in range(scene.cameras)
+        ]
+        tables = [
+            stack.enter_context((folder / "gt" / f"c{camera}.txt").open("w", encoding="ascii"))
+            for camera in range(scene.cameras)
+        ]
+        for frame in range(frames):
+            for camera, truth in enumerate(scene.truth(frame)):
+                videos[camera].add(scene.image(camera, frame), frame)
+                tables[camera].writelines(_rows(truth, frame))
+            if progress is not None:
+                progress(frame + 1, frames)
+
+
+def has_ground(scene: Scene) -> bool:
+    """Say whether a scene has a floor, and so a `ground.json`."""
+    return bool(_homographies(scene))
+
+
+def _homographies(scene: Scene) -> dict[str, list[list[float]]]:
+    found = {f"c{camera}": scene.homography(camera) for camera in range(scene.cameras)}
+    return {camera: matrix.tolist() for camera, matrix in found.items() if matrix is not None}
+
+
+def _rows(truth: CameraTruth, frame: int) -> list[str]:
+    rows = []
+    for number, box, visible in zip(
+        truth.ids.tolist(), truth.boxes.tolist(), truth.visible.tolist(), strict=True
+    ):
+        left, top, right, bottom = box
+        place = f"{left:g},{top:g},{right - left:g},{bottom - top:g}"
+        rows.append(f"{frame + 1},{number},{place},1,{_PEDESTRIAN},{visible:.3f}\n")
+    return rows
+
+
+class _Video:
+    """One camera's file; closes itself properly, also where an error ends the recording."""
+
+    def __init__(self, path: Path, scene: Scene) -> None:
+        self._container = av.open(str(path), "w")
+        # x264 starves the bitrate where the rate is not told beside the time base.
+        stream = self._container.add_stream("libx264", rate=Fraction(scene.fps).limit_denominator(1001))
+        stream.width, stream.height = scene.width, scene.height
+        stream.pix_fmt = "yuv420p"
+        stream.options = dict(_OPTIONS)
+        stream.time_base = stream.codec_context.time_base = _TIME_BASE
+        stream.codec_context.thread_count = 1  # the same bytes on every machine
+        self._stream, self._fps = stream, Fraction(scene.fps).limit_denominator(1001)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        if error[0] is None:
+            self._container.mux(self._stream.encode(None))
+        self._container.close()
+
+    def add(self, image: NDArray[np.uint8], frame: int) -> None:
+        """Encode a picture ``(H, W, 3)``, blue, green, red."""
+        picture = av.VideoFrame.from_ndarray(image, format="bgr24")
+        picture.pts, picture.time_base = round(frame / self._fps / _TIME_BASE), _TIME_BASE
+        self._container.mux(self._stream.encode(picture))

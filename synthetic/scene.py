@@ -1,0 +1,105 @@
+"""A synthetic scene: what its cameras see at any frame, and what is true there."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from synthetic.cameras.pinhole import Floats
+from synthetic.cameras.sensor_noise import expose
+from synthetic.catalog import scene_entry
+from synthetic.ground_truth import CameraTruth
+from synthetic.world import Asked
+
+
+class Scene:
+    """Objects that move before several cameras: a pure function of its arguments, endless in time.
+
+    Any frame may be asked for in any order in any process and is equal to the byte. What does not move
+    before a camera is painted when the camera is first asked for.
+
+    Args:
+        name: one of `scene_names()`.
+        cameras: how many cameras look, at most as many as the scene has places for; None: as many as suit it.
+        objects: how many people or fish there are; their ids count from 1; None: as many as suit the scene.
+        seed: of everything random, not negative.
+        width: of a picture, pixels.
+        height: of a picture, pixels.
+        fps: frames per second.
+
+    Raises:
+        ValueError: for an unknown name or a number out of its range, in one line.
+    """
+
+    def __init__(
+        self,
+        name: str = "room",
+        cameras: int | None = None,
+        objects: int | None = None,
+        seed: int = 0,
+        width: int = 640,
+        height: int = 360,
+        fps: float = 25.0,
+    ) -> None:
+        entry = scene_entry(name)
+        cameras = entry.cameras if cameras is None else cameras
+        objects = entry.objects if objects is None else objects
+        _check("cameras", cameras, 1, entry.most_cameras)
+        _check("objects", objects, 0, entry.most_objects)
+        _check("seed", seed, 0, 2**63 - 1)
+        _check("width", width, 64, 4096)
+        _check("height", height, 36, 4096)
+        _check("fps", fps, 1, 240)
+        self.name, self.cameras, self.objects, self.seed = name, cameras, objects, seed
+        self.width, self.height, self.fps = width, height, float(fps)
+        self.world = entry.world(Asked(cameras, objects, seed, width, height))
+
+    def image(self, camera: int, frame: int) -> NDArray[np.uint8]:
+        """Give a camera's picture ``(H, W, 3)``, blue, green, red. Cameras and frames count from 0."""
+        seconds = self._seconds(frame)
+        clean = self.world.picture(self._known(camera), seconds)
+        return expose(clean, camera, frame, seconds, self.seed)
+
+    def empty(self, camera: int, frame: int = 0) -> NDArray[np.uint8]:
+        """Give a camera's picture ``(H, W, 3)`` without the objects, noise and drift."""
+        return self.world.empty(self._known(camera), self._seconds(frame))
+
+    def truth(self, frame: int) -> tuple[CameraTruth, ...]:
+        """Say for every camera who is in its picture, where, and how much of them shows."""
+        seconds = self._seconds(frame)
+        return tuple(self.world.truth(camera, seconds) for camera in range(self.cameras))
+
+    def ground_position(self, frame: int) -> Floats:
+        """Say where everyone is: ``(objects, 2)`` metres; in a corridor that is off the room's floor."""
+        return self.world.positions(self._seconds(frame))
+
+    def inside(self, frame: int) -> NDArray[np.bool_]:
+        """Say who is in the room: ``(objects,)``."""
+        return self.world.inside(self._seconds(frame))
+
+    def homography(self, camera: int) -> Floats | None:
+        """Give the ``(3, 3)`` map from a camera's pixels (homogeneous) to the floor, in metres.
+
+        None in a scene without a floor to stand on.
+        """
+        return self.world.homography(self._known(camera))
+
+    @property
+    def floor(self) -> tuple[float, float]:
+        """The room's extent, west to east and south to north, metres."""
+        return self.world.extent
+
+    def _seconds(self, frame: int) -> float:
+        if frame < 0:
+            raise ValueError(f"scene {self.name}: frame {frame} is before the first, 0")
+        return frame / self.fps
+
+    def _known(self, camera: int) -> int:
+        if not 0 <= camera < self.cameras:
+            raise ValueError(f"scene {self.name}: there is no camera {camera} among {self.cameras}")
+        return camera
+
+
+def _check(what: str, value: float, low: float, high: float) -> None:
+    if not low <= value <= high:
+        raise ValueError(f"scene: {what} must be {low} to {high}, not {value}")

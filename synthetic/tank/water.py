@@ -1,0 +1,126 @@
+"""Light under water: what distance does to colours, the net of light on the ground, and shafts of sun.
+
+Colours are red, green, blue in 0..1.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from synthetic.cameras.pinhole import Floats, Perspective
+
+_MURK = np.array([0.125, 0.088, 0.084])  # of its light that a colour loses per metre
+_DEEP = np.array([0.035, 0.205, 0.265])
+_SHALLOW = np.array([0.30, 0.62, 0.63])
+TILE = 128  # pixels of the net of light, which repeats
+_TILE_METRES = 2.6
+_RAYS = 208  # in a row of the grid that makes the net
+_WAVES = ((1, 2), (2, -1), (-2, 2), (3, 1), (-1, 3), (2, 3), (4, -2), (-3, 3), (1, -5), (5, 2))  # per tile
+_STEEP = 0.115  # of the longest waves
+_SPEED = 0.115  # turns per second of a wave as long as a tile; longer ones turn more slowly
+_SOFT = 1.1  # pixels of the net: the sun is no point
+_SHADE, _LINES = 0.45, 95.0  # light that counts as none, and what is brighter by one is drawn by
+_COARSE = 16  # shafts are soft: they are drawn at a sixteenth of the size
+_SHAFTS = (
+    (9.0, 0.31, 0.0),
+    (15.0, -0.43, 2.1),
+    (23.0, 0.57, 4.4),
+)  # per radian; turns per second x 2 pi; phase
+
+Bytes = NDArray[np.uint8]
+
+
+def through(colours: Floats, metres: Floats, water: Floats) -> Floats:
+    """Look at colours ``(..., 3)`` through so many metres ``(...)`` of water, itself ``(..., 3)``."""
+    left = np.exp(-_MURK * metres[..., None])
+    seen: Floats = colours * left + water * (1 - left)
+    return seen
+
+
+def kept(metres: Floats) -> Floats:
+    """Say how much of its light a colour keeps through so many metres ``(...)``: ``(..., 3)``."""
+    left: Floats = np.exp(-_MURK * metres[..., None])
+    return left
+
+
+def open_water(rays: Floats) -> Floats:
+    """Give the colour of water ``(..., 3)`` that is looked into along unit vectors ``(..., 3)``."""
+    rise = np.clip((rays[..., 2] + 0.34) / 0.72, 0, 1)
+    share = (rise * rise * (3 - 2 * rise))[..., None]
+    water: Floats = _DEEP + (_SHALLOW - _DEEP) * share
+    return water
+
+
+@lru_cache(maxsize=1)
+def _waves() -> tuple[Floats, NDArray[np.float32], NDArray[np.float32]]:
+    """Give the waves W of the surface: their turns (W,) per second, and slopes on a grid of rays.
+
+    The slopes ``(2 W, 2 R)`` are towards x and y side by side, at the beginning and a quarter turn later; the
+    rays' own places ``(2, R)`` are in pixels of the net. All that repeats from tile to tile.
+    """
+    rng = np.random.default_rng(0xCA57)
+    axis = np.arange(_RAYS) * (2 * np.pi / _RAYS)
+    x, y = (part.ravel() for part in np.meshgrid(axis, axis))
+    turns, slopes = [], []
+    for along, across in _WAVES:
+        length = float(np.hypot(along, across))
+        turns.append(_SPEED * length**0.5 * float(rng.choice([-1, 1])))
+        phase = along * x + across * y + rng.uniform(0, 2 * np.pi)
+        height = _STEEP / length**1.6 * TILE / (2 * np.pi)
+        slopes += [
+            np.concatenate([part * height * along, part * height * across])
+            for part in (np.cos(phase), -np.sin(phase))
+        ]
+    grid = np.stack([x, y]) * (TILE / (2 * np.pi))
+    return np.array(turns), np.array(slopes, dtype=np.float32), grid.astype(np.float32)
+
+
+@lru_cache(maxsize=2)
+def light_net(seconds: float) -> Bytes:
+    """Give the net of light ``(TILE, TILE)`` at a moment: 0 is shade, 255 the brightest line.
+
+    Rays that fall on a grid of the surface are bent by the waves' slopes; where many come down it is bright.
+    """
+    turns, slopes, grid = _waves()
+    angles = 2 * np.pi * turns * seconds
+    now = np.stack([np.cos(angles), np.sin(angles)], axis=1).astype(np.float32).ravel()
+    # Whole tiles are added, so that cutting off the fraction rounds down everywhere.
+    column, row = (np.einsum("w,wr->r", now, slopes).reshape(2, -1) + grid + TILE).astype(np.int32) % TILE
+    rays = np.bincount(row * TILE + column, minlength=TILE * TILE).reshape(TILE, TILE)
+    tiled = np.pad(rays.astype(np.float32) * (TILE / _RAYS) ** 2, 4, mode="wrap")
+    light = cv2.GaussianBlur(tiled, (0, 0), _SOFT)[4:-4, 4:-4]
+    return np.asarray(np.clip((light - _SHADE) * _LINES, 0, 255), dtype=np.uint8)
+
+
+def net_pixels(points: Floats) -> Floats:
+    """Say where on the net of light world points ``(..., 3)`` lie: ``(..., 2)`` pixels, not wrapped.
+
+    The sun stands a little aside: light moves on as it falls.
+    """
+    metres = points[..., :2] + points[..., 2:] * np.array([0.25, 0.12])
+    pixels: Floats = metres * (TILE / _TILE_METRES)
+    return pixels
+
+
+class Shafts:
+    """The shafts of sunlight in one camera's picture."""
+
+    def __init__(self, view: Perspective) -> None:
+        self._size = (view.width, view.height)
+        wide, high = max(view.width // _COARSE, 2), max(view.height // _COARSE, 2)
+        x, y = np.meshgrid((np.arange(wide) + 0.5) / wide, (np.arange(high) + 0.5) / high)
+        # They come from a point above the picture and fade as they go down.
+        self._slant = np.arctan2(x - 0.38, y + 0.75)
+        self._fade = np.clip(1.05 - y, 0, 1) ** 1.3 * np.exp(-(((x - 0.40) / 0.55) ** 2))
+
+    def at(self, seconds: float) -> Bytes:
+        """Give the light ``(H, W, 3)``, blue, green, red, that shafts add to the picture."""
+        waves = [np.sin(rate * 4 * self._slant + turn * seconds + phase) for rate, turn, phase in _SHAFTS]
+        glow = np.clip(0.35 + sum(waves) / 3, 0, 1) ** 1.5 * self._fade
+        light = (glow[..., None] * np.array([0.155, 0.165, 0.13]) * 255).astype(np.float32)
+        whole = cv2.resize(light, self._size, interpolation=cv2.INTER_CUBIC)
+        return np.asarray(np.clip(whole, 0, 255), dtype=np.uint8)

@@ -1,0 +1,1 @@
+"""How people walk: routes, gatherings, collision avoidance."""

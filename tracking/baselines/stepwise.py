@@ -1,0 +1,232 @@
+"""Trackers that decide frame by frame, and never change their mind: the survey's.
+
+All of them begin, match and end objects alike, so that what is measured is how each follows them. A detection
+that overlaps nobody is somebody new, who counts from the third frame in a row. In each frame the objects are
+matched with the detections by one assignment over the overlaps (IoU). Who is matched with none for
+`patience` frames is gone, and their number with them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Generic, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracking.appearance_samples import add_appearance_samples
+from tracking.assignment import assign_pairs
+from tracking.baselines.prediction_method import Method
+from tracking.boxes import BOX_SIDES, Floats, iou
+from tracking.detectors.base import Image
+from tracking.model.object_state import mean_histogram
+from tracking.solvers.base import OCCLUDED, SolveReport
+from tracking.types import Detections
+from tracking.window import WindowResult, WindowSettings, WindowTrack
+
+S = TypeVar("S")
+_NO_PICTURE: Image = np.empty((0, 0, 3), dtype=np.uint8)
+
+
+@dataclass(frozen=True, slots=True)
+class StepwiseSettings:
+    """When objects begin, match and end.
+
+    Raises:
+        ValueError: a share is none, or a number of frames makes no sense.
+    """
+
+    birth_score: float = 0.5  # least score of a detection that somebody new begins with
+    apart: float = 0.3  # overlap (IoU) with a known object above which a detection is not somebody new
+    match: float = 0.3  # least overlap (IoU) of an object and the detection it is matched with
+    confirm: int = 3  # frames in a row in which somebody new must be matched
+    patience: int = 25  # frames without a match after which an object is gone
+    unseen: int = 5  # frames without a match in which a method that looks at the picture is believed
+
+    def __post_init__(self) -> None:
+        shares = (self.birth_score, self.apart, self.match)
+        if not all(0.0 <= share <= 1.0 for share in shares):
+            raise ValueError(f"birth_score, apart and match are shares between 0 and 1, not {shares}")
+        if self.confirm < 1 or self.patience < 1 or self.unseen < 0:
+            raise ValueError("confirm and patience must be at least 1 frame, unseen at least 0")
+
+
+@dataclass(slots=True)
+class Followed(Generic[S]):
+    """Somebody who is followed."""
+
+    number: int
+    """0: not told of yet."""
+    known: S
+    box: Floats
+    serial: int
+    """Nobody else has it, whether they are told of or not."""
+    matches: int = 1
+    away: int = 0
+    """Frames since the last match."""
+    shown: dict[int, tuple[Floats, int]] = field(default_factory=dict)
+    """By frame of the window: the box, and which detection it is, -1 for none."""
+
+
+class StepwiseTracker(Generic[S]):
+    """Follows everybody by a method. What it says of a frame is final at once."""
+
+    def __init__(
+        self, method: Method[S], window: WindowSettings, settings: StepwiseSettings | None = None
+    ) -> None:
+        self._method, self._window = method, window
+        self._settings = settings or StepwiseSettings()
+        self._objects: list[Followed[S]] = []
+        self._ended: list[Followed[S]] = []
+        """Those who are gone since the last result."""
+        self._numbers = self._serials = 0
+        self._seen: dict[int, Detections] = {}
+        self._first: int | None = None
+        self._last: int | None = None
+
+    def push(self, frame: int, detections: Detections, image: Image | None = None) -> WindowResult | None:
+        """Take a frame; give a result where one or more windows end.
+
+        A frame number that is left out is a frame of which nothing is known. After a gap longer than
+        `forget_after` of the window everybody is forgotten, and the frames of the gap are in no result.
+
+        Raises:
+            ValueError: the frame number is not larger than the last one.
+        """
+        if self._last is not None and frame <= self._last:
+            raise ValueError(f"frame {frame} came after frame {self._last}")
+        if self._last is not None and frame - self._last > self._window.forget_after:
+            return self._start_again(frame, detections, image)
+        if self._last is not None:
+            self._pass_by(frame - self._last - 1)
+        if self._first is None:
+            self._first = frame
+        self._seen[frame] = detections
+        self._step(frame, detections, image)
+        stride, before = self._window.stride, self._first - 1 if self._last is None else self._last
+        self._last = frame
+        return self._result(frame) if (frame + 1) // stride > (before + 1) // stride else None
+
+    def flush(self) -> WindowResult | None:
+        """End the recording. `None` where everything was told already."""
+        if self._first is None or self._last is None or self._last < self._first:
+            return None
+        return self._result(self._last)
+
+    def _start_again(self, frame: int, detections: Detections, image: Image | None) -> WindowResult | None:
+        """After a long gap: end what was before, so that no result has to span the gap."""
+        result = self.flush()
+        self._objects, self._seen = [], {frame: detections}
+        self._first = self._last = frame
+        self._step(frame, detections, image)
+        return result
+
+    def _pass_by(self, frames: int) -> None:
+        """Let frames go by of which nothing is known."""
+        for item in self._objects:
+            item.away += frames
+        self._end_some()
+
+    def _step(self, frame: int, detections: Detections, image: Image | None) -> None:
+        moved = self._method.move(image, [item.known for item in self._objects])
+        for item, box in zip(self._objects, moved, strict=True):
+            item.box = box if not np.isnan(box).any() else item.box
+        taken = self._match(frame, detections)
+        for item in self._objects:
+            if frame not in item.shown:
+                item.away += 1
+                if item.matches < self._settings.confirm:
+                    item.away = self._settings.patience  # nobody yet, and not there
+                elif self._method.sees and item.away <= self._settings.unseen:
+                    item.shown[frame] = (item.box, OCCLUDED)
+        self._end_some()
+        self._begin(frame, detections, taken, image)
+
+    def _match(self, frame: int, detections: Detections) -> NDArray[np.bool_]:
+        """Match objects with detections; say which are taken, `(K,)`."""
+        taken = np.zeros(len(detections), dtype=np.bool_)
+        if not self._objects or not len(detections):
+            return taken
+        places = np.stack([item.box for item in self._objects])
+        overlaps = iou(places[:, None], detections.boxes[None])
+        for row, column in zip(*assign_pairs(overlaps, max(self._settings.match, 1e-9)), strict=True):
+            item = self._objects[row]
+            item.box = self._method.found(item.known, detections.boxes[column])
+            item.matches, item.away = item.matches + 1, 0
+            item.shown[frame] = (item.box, int(column))
+            taken[column] = True
+        return taken
+
+    def _begin(
+        self, frame: int, detections: Detections, taken: NDArray[np.bool_], image: Image | None
+    ) -> None:
+        """Take in whoever a detection shows that is at nobody, the surest first."""
+        if image is None:
+            if self._method.sees:
+                return  # there is nothing to know them by
+            image = _NO_PICTURE
+        order = np.argsort(-detections.scores, kind="stable")
+        for place in (int(it) for it in order if not taken[it]):
+            box = detections.boxes[place]
+            if detections.scores[place] < self._settings.birth_score:
+                break
+            near = [item.box for item in self._objects]
+            if near and float(iou(box[None], np.stack(near)).max()) > self._settings.apart:
+                continue
+            self._serials += 1
+            item = Followed(0, self._method.begin(image, box), box, self._serials)
+            item.shown[frame] = (box, place)
+            self._objects.append(item)
+
+    def _end_some(self) -> None:
+        gone = [item for item in self._objects if item.away >= self._settings.patience]
+        self._ended += [item for item in gone if item.matches >= self._settings.confirm]
+        self._objects = [item for item in self._objects if item.away < self._settings.patience]
+
+    def _result(self, last: int) -> WindowResult:
+        """Tell of all frames that were not told of yet."""
+        first = last if self._first is None else self._first
+        frames = range(first, last + 1)
+        told = [item for item in self._everybody() if self._counts(item)]
+        for item in told:
+            if not item.number:
+                self._numbers += 1
+                item.number = self._numbers
+        told = sorted((item for item in told if item.shown), key=lambda item: item.number)
+        seen = [self._seen.get(frame, Detections.empty(self._bins())) for frame in frames]
+        tracks = [self._track(item, frames, seen) for item in told]
+        states = [
+            np.array([item.shown[it][1] if it in item.shown else OCCLUDED for it in frames], dtype=np.int64)
+            for item in told
+        ]
+        report = SolveReport(self._method.name, 0.0, 0.0, integral=False, conflicts=0, rounds=0)
+        result = WindowResult(first, last, last, add_appearance_samples(tracks, states, first, seen), report)
+        for item in self._everybody():
+            # Who does not count yet is not told of; when they do, it is from the next window on.
+            item.shown = {}
+        self._ended, self._seen, self._first = [], {}, last + 1
+        return result
+
+    def _everybody(self) -> Iterable[Followed[S]]:
+        """Give all of whom there may be something to tell."""
+        return (*self._ended, *self._objects)
+
+    def _counts(self, item: Followed[S]) -> bool:
+        """Whether somebody is surely somebody."""
+        return item.matches >= self._settings.confirm
+
+    def _bins(self) -> int:
+        return next((seen.histograms.shape[1] for seen in self._seen.values()), 0)
+
+    def _track(self, item: Followed[S], frames: range, seen: list[Detections]) -> WindowTrack:
+        boxes = np.full((len(frames), BOX_SIDES), np.nan)
+        looks, scores = [], 0.0
+        for row, frame in enumerate(frames):
+            if frame in item.shown:
+                boxes[row], place = item.shown[frame]
+                if place != OCCLUDED:
+                    looks.append(seen[row].histograms[place])
+                    scores += float(seen[row].scores[place])
+        histogram = mean_histogram(np.stack(looks)) if looks else np.empty(self._bins())
+        return WindowTrack(item.number, boxes, boxes, histogram, scores / len(frames))

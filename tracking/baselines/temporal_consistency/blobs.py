@@ -1,0 +1,106 @@
+"""Blobs: contiguous foreground that may be one person, several, or nobody (section 3)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from tracking.baselines.temporal_consistency.background import YuvBackground
+from tracking.baselines.temporal_consistency.color_histogram import uv_histogram
+from tracking.baselines.temporal_consistency.settings import BlobSettings
+from tracking.boxes import Floats
+from tracking.detectors.base import Image, Mask
+
+_MEDIAN = 3
+"""Pixels of the median filter that takes lonely pixels out."""
+_MOST_GROWN = 0.1
+"""Of the picture's width, by how much the foreground grows at most."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Blob:
+    """One blob of one picture, in pixels of the working picture.
+
+    Attributes:
+        box: `(4,)`, left, top, right, bottom.
+        shape: `(h, w)`, 255 where the box is filled.
+        area: pixels that are.
+        colours: `(64,)`, shares of the colours of its foreground.
+    """
+
+    box: Floats
+    shape: Mask
+    area: int
+    colours: Floats
+
+    @property
+    def middle(self) -> Floats:
+        """Where it is, `(2,)`: the middle of its box."""
+        return (self.box[:2] + self.box[2:]) / 2.0
+
+
+class Blobs:
+    """Finds the blobs of one camera's pictures; they get fewer and larger the nearer people stand.
+
+    Attributes:
+        size: of the working picture, width and height.
+        metre: pixels of it that are a metre of floor.
+    """
+
+    def __init__(self, size: tuple[int, int], room_m: float, settings: BlobSettings) -> None:
+        """Look at pictures of a size (width, height) in pixels that show `room_m` metres of floor across."""
+        self._settings = settings
+        width, height = size
+        scale = min(1.0, settings.work_width / width)
+        self.size = max(round(width * scale), 1), max(round(height * scale), 1)
+        self.metre = self.size[0] / room_m
+        self._least = settings.least_m2 * self.metre**2
+        # However little floor is in the picture: more than a part of it joins nothing that belongs together.
+        grow = 2 * round(min(settings.grow_m * self.metre, self.size[0] * _MOST_GROWN)) + 1
+        self._grow = np.asarray(cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (grow, grow)), dtype=np.uint8)
+        self._background: YuvBackground | None = None
+
+    @property
+    def ready(self) -> bool:
+        """Whether the background is known."""
+        return self._background is not None
+
+    def small(self, image: Image) -> Image:
+        """Give the working picture."""
+        if (image.shape[1], image.shape[0]) == self.size:
+            return image
+        return np.asarray(cv2.resize(image, self.size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+
+    def prepare(self, images: Sequence[Image]) -> None:
+        """Learn the background from working pictures.
+
+        Raises:
+            ValueError: there is none.
+        """
+        self._background = YuvBackground(images, self._settings)
+
+    def find(self, image: Image, *, learn: bool) -> tuple[Blob, ...]:
+        """Give the blobs of a working picture, from left to right; none while the background is unknown.
+
+        `learn`: what is around them goes into the background.
+        """
+        if self._background is None:
+            return ()
+        seen = np.asarray(cv2.medianBlur(self._background.foreground(image), _MEDIAN), dtype=np.uint8)
+        grown = np.asarray(cv2.dilate(seen, self._grow), dtype=np.uint8)
+        if learn:
+            self._background.learn(image, np.asarray(cv2.bitwise_not(grown), dtype=np.uint8))
+        count, labels, stats, _ = cv2.connectedComponentsWithStats(grown, connectivity=8)
+        found = []
+        for label in range(1, count):
+            left, top, wide, high, area = stats[label].tolist()
+            if area < self._least:
+                continue
+            part = slice(top, top + high), slice(left, left + wide)
+            shape = np.where(labels[part] == label, np.uint8(255), np.uint8(0))
+            box = np.array([left, top, left + wide, top + high], dtype=np.float64)
+            found.append(Blob(box, shape, area, uv_histogram(image[part], shape & seen[part])))
+        return tuple(sorted(found, key=lambda blob: tuple(blob.box.tolist())))

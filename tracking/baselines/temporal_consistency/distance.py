@@ -1,0 +1,78 @@
+"""How far somebody has gone from blob to blob, and what that costs (section 3.1)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracking.baselines.temporal_consistency.blobs import Blob
+from tracking.baselines.temporal_consistency.settings import TemporalSettings
+from tracking.boxes import Floats, intersections
+
+_HEIGHT, _MIDDLE, _WIDTH = 50.0, 2.0, 0.15
+"""Of the sigmoid in g(x)."""
+
+
+def encloses(first: Floats, second: Floats) -> bool:
+    """Say whether one of two boxes `(4,)` lies within the other."""
+    out = bool((first[:2] <= second[:2]).all() and (first[2:] >= second[2:]).all())
+    return out or bool((second[:2] <= first[:2]).all() and (second[2:] >= first[2:]).all())
+
+
+def distance_score(before: Blob, after: Blob, metre: float, settings: TemporalSettings) -> float:
+    """Give d_s in metres, `metre` being one in pixels.
+
+    0 where one box is within the other, `partly` where they overlap, else `apart` and the gap between them.
+    """
+    if encloses(before.box, after.box):
+        return 0.0
+    if float(intersections(before.box, after.box)) > 0.0:
+        return settings.partly
+    return settings.apart + gap(before, after) / metre
+
+
+def gap(first: Blob, second: Blob) -> float:
+    """Give the pixels between two blobs on the line from middle to middle.
+
+    Of edges, not of middles: who leaves a crowd moves its middle further than anybody has gone.
+    """
+    start, end = first.middle, second.middle
+    length = math.hypot(*(end - start).tolist())
+    steps = max(math.ceil(length), 1)
+    line = start + (end - start) * np.linspace(0.0, 1.0, steps + 1)[:, None]
+    leaves = np.flatnonzero(_inside(first, line))
+    enters = np.flatnonzero(_inside(second, line))
+    # A middle may lie beside its blob, and so may the whole line.
+    last, next_ = int(leaves[-1]) if leaves.size else 0, int(enters[0]) if enters.size else steps
+    return length * max(next_ - last, 0) / steps
+
+
+def _inside(blob: Blob, points: Floats) -> NDArray[np.bool_]:
+    """Say which points `(N, 2)` lie in a blob, `(N,)`."""
+    columns, rows = np.floor(points - blob.box[:2]).astype(np.int64).T
+    high, wide = blob.shape.shape
+    within = (columns >= 0) & (columns < wide) & (rows >= 0) & (rows < high)
+    found = np.zeros(len(points), dtype=np.bool_)
+    found[within] = blob.shape[rows[within], columns[within]] > 0
+    return found
+
+
+def penalty(share: float) -> float:
+    """Give g(x): x up to 1, the way that is walked in the time; beyond, a sigmoid that climbs to 51."""
+    if share <= 1.0:
+        return share
+    return _HEIGHT / (math.exp(-(share - _MIDDLE) / _WIDTH) + 1.0) + 1.0
+
+
+def penalties(
+    before: Sequence[Blob], after: Sequence[Blob], seconds: float, metre: float, settings: TemporalSettings
+) -> Floats:
+    """Give f_dist for going from each blob to each of `seconds` later, `(B', B)`."""
+    allowed = settings.speed * seconds
+    costs = [
+        [penalty(distance_score(old, new, metre, settings) / allowed) for new in after] for old in before
+    ]
+    return np.array(costs, dtype=np.float64).reshape(len(before), len(after))

@@ -1,0 +1,90 @@
+"""Who comes and who has gone. The report counts people by hand, and leaves doors to others (section 2.2)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tracking.baselines.temporal_consistency.blobs import Blob
+from tracking.baselines.temporal_consistency.distance import distance_score
+from tracking.baselines.temporal_consistency.settings import TemporalSettings
+from tracking.baselines.temporal_consistency.window import Commitment, Stage, TemporalWindow
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Unclaimed:
+    """A blob that has been nobody's in so many decided stages in a row."""
+
+    blob: Blob
+    stages: int
+
+
+class Newcomers:
+    """Says which blobs are somebody new, and who has been nowhere for too long."""
+
+    def __init__(self, settings: TemporalSettings, metre: float) -> None:
+        self._settings, self._metre = settings, metre
+        self._unclaimed: list[_Unclaimed] = []
+        self._away: dict[int, int] = {}
+        """By number: since how many decided stages they have been nowhere."""
+
+    def come(self, window: TemporalWindow, done: Commitment) -> list[int]:
+        """Give the blobs of a stage just decided that are somebody new, the largest first.
+
+        Such a blob is nobody's, as large as a person, and stays so from stage to stage for `confirm` of them;
+        what the window says of the stages after it counts, too.
+        """
+        claimed = set(done.blobs.values())
+        least = self._settings.person_m2 * self._metre**2
+        new, unclaimed = [], []
+        for at, blob in enumerate(done.stage.blobs):
+            if at in claimed or blob.area < least:
+                continue
+            before = max((it.stages for it in self._unclaimed if self._near(it.blob, blob)), default=0)
+            if before + 1 + self._goes_on(window, blob) >= self._settings.confirm:
+                new.append(at)
+            else:
+                unclaimed.append(_Unclaimed(blob, before + 1))
+        self._unclaimed = unclaimed
+        room = max(self._settings.most_people - len(window.people), 0)
+        return sorted(new, key=lambda at: -done.stage.blobs[at].area)[:room]
+
+    def gone(self, done: Commitment, stage_s: float) -> set[int]:
+        """Give the numbers of those who have been nowhere for `forget_s`."""
+        self._away = {
+            number: self._away.get(number, 0) + 1
+            for number, at in done.blobs.items()
+            if at == done.stage.nowhere
+        }
+        gone = {
+            number for number, stages in self._away.items() if stages * stage_s >= self._settings.forget_s
+        }
+        for number in gone:
+            del self._away[number]
+        return gone
+
+    def _goes_on(self, window: TemporalWindow, blob: Blob) -> int:
+        """Count the waiting stages in a row in which a blob near it is nobody's on the best path."""
+        if window.path is None:
+            return 0
+        count = 0
+        for stage, chosen in zip(window.waiting, window.path.blobs, strict=True):
+            free = np.setdiff1d(np.arange(len(stage.blobs)), chosen)
+            near = [stage.blobs[at] for at in free.tolist() if self._near(blob, stage.blobs[at])]
+            if not near:
+                break
+            blob, count = near[0], count + 1
+        return count
+
+    def _near(self, before: Blob, after: Blob) -> bool:
+        """Say whether somebody can have gone from one to the other in a stage."""
+        reach = self._settings.speed * self._settings.stage_s
+        return distance_score(before, after, self._metre, self._settings) <= reach
+
+
+def first_people(stage: Stage, settings: TemporalSettings, metre: float) -> list[tuple[int, int]]:
+    """Number the blobs of a first stage that are as large as a person: pairs of number and blob."""
+    least = settings.person_m2 * metre**2
+    large = [at for at, blob in enumerate(stage.blobs) if blob.area >= least]
+    return [(number + 1, at) for number, at in enumerate(large[: settings.most_people])]

@@ -1,0 +1,214 @@
+"""Follows everybody in one camera's pictures by temporal consistency."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from tracking.baselines.temporal_consistency.blobs import Blobs
+from tracking.baselines.temporal_consistency.initiation import Newcomers, first_people
+from tracking.baselines.temporal_consistency.settings import TemporalSettings
+from tracking.baselines.temporal_consistency.trajectories import Stops, Trails
+from tracking.baselines.temporal_consistency.window import Commitment, Stage, TemporalWindow
+from tracking.baselines.temporal_consistency.window_tracks import told_tracks
+from tracking.boxes import Floats
+from tracking.detectors.base import Image
+from tracking.solvers.base import SolveReport
+from tracking.types import Detections
+from tracking.window import WindowResult, WindowSettings
+
+
+class TemporalTracker:
+    """Person-to-blob matching over a window of samples. What is decided of a sample is final.
+
+    It looks at the pictures alone: a detection only says how the person looks whom it shows.
+    """
+
+    def __init__(
+        self, window: WindowSettings, settings: TemporalSettings | None = None, fps: float = 25.0
+    ) -> None:
+        """Give results every `stride` frames of `window`, of a recording with `fps` frames a second."""
+        self._window, self._settings, self._fps = window, settings or TemporalSettings(), fps
+        self._every = self._settings.stage_frames(fps)
+        self._blobs: Blobs | None = None
+        self._scale = 1.0
+        """Pixels of the picture in one of the working picture."""
+        self._learned: list[Image] = []
+        self._pictures = 0
+        """Pictures seen while the background is learned."""
+        self._numbers = 0
+        self._seen: dict[int, Detections] = {}
+        self._bins = 0
+        self._first: int | None = None
+        """The first frame that is not final."""
+        self._last: int | None = None
+        self._people: TemporalWindow | None = None
+        self._newcomers: Newcomers | None = None
+        self._trails = Trails()
+        self._stops: Stops = {}
+        self._final: int | None = None
+        """The last decided frame."""
+        self._next_stage = 0
+
+    def prepare(self, images: Iterable[Image]) -> None:
+        """Learn the background from pictures of a recording, before its first frame; of none, as it goes."""
+        small = [self._blobs_of(image).small(image) for image in images]
+        if small and self._blobs is not None:
+            self._blobs.prepare(small)
+
+    def push(self, frame: int, detections: Detections, image: Image | None = None) -> WindowResult | None:
+        """Take a frame; give a result where one or more windows end.
+
+        A frame without a picture is one of which nothing is known; the sample is taken from the next one.
+        After a gap longer than `forget_after` of the window everybody is forgotten, and the frames of the gap
+        are in no result.
+
+        Raises:
+            ValueError: the frame number is not larger than the last one.
+        """
+        last = self._last
+        if last is not None and frame <= last:
+            raise ValueError(f"frame {frame} came after frame {last}")
+        ended = None
+        if last is not None and frame - last > self._window.forget_after:
+            ended = self.flush()
+            self._forget()
+            self._first, last = None, None
+        if self._first is None:
+            self._first = frame
+        self._last = frame
+        self._seen[frame], self._bins = detections, detections.histograms.shape[1]
+        if image is not None:
+            self._look(frame, image)
+        self._keep_up(frame)
+        stride, before = self._window.stride, self._first - 1 if last is None else last
+        if ended is not None:
+            return ended
+        return self._result() if (frame + 1) // stride > (before + 1) // stride else None
+
+    def flush(self) -> WindowResult | None:
+        """End the recording: all frames become final. `None` where they were already."""
+        if self._first is None or self._last is None or self._last < self._first:
+            return None
+        while (done := None if self._people is None else self._people.commit()) is not None:
+            self._decided(done)
+        self._final = self._last
+        return self._result()
+
+    def _forget(self) -> None:
+        """Forget everybody, but not the room."""
+        self._people, self._newcomers = None, None
+        self._trails, self._stops = Trails(), {}
+        self._final, self._next_stage = None, 0
+
+    def _look(self, frame: int, image: Image) -> None:
+        """Find the blobs of a picture, and decide what can be decided with them."""
+        blobs = self._blobs_of(image)
+        small = blobs.small(image)
+        if not blobs.ready:
+            self._bootstrap(blobs, small)
+            return
+        due = frame >= self._next_stage
+        found = blobs.find(small, learn=due)
+        boxes = np.array([blob.box for blob in found]).reshape(-1, 4) * self._scale
+        self._trails.add(frame, boxes)
+        if not due or (self._settings.closed and not found):
+            return  # nobody can be nowhere: the sample is taken later
+        self._next_stage = (frame // self._every + 1) * self._every
+        self._sample(Stage(frame, found), blobs)
+
+    def _keep_up(self, frame: int) -> None:
+        """Decide without the samples that did not come, where there was no picture for long."""
+        oldest = frame - self._settings.lag(self._fps)
+        while self._people is not None and self._final is not None and self._final < oldest:
+            done = self._people.commit()
+            if done is None:
+                self._final = oldest
+            else:
+                self._decided(done)
+
+    def _bootstrap(self, blobs: Blobs, small: Image) -> None:
+        settings = self._settings.blobs
+        taken = (self._pictures + 1) * settings.samples // settings.bootstrap_frames
+        if taken > self._pictures * settings.samples // settings.bootstrap_frames:
+            self._learned.append(small)
+        self._pictures += 1
+        if self._pictures >= settings.bootstrap_frames:
+            blobs.prepare(self._learned)
+            self._learned = []
+
+    def _sample(self, stage: Stage, blobs: Blobs) -> None:
+        if self._people is None or self._newcomers is None:
+            first = first_people(stage, self._settings, blobs.metre)
+            if self._settings.closed and not first:
+                return  # who is there is only counted once
+            self._people = TemporalWindow(self._settings, blobs.size, blobs.metre, 1.0 / self._fps)
+            self._newcomers = Newcomers(self._settings, blobs.metre)
+            self._people.begin(stage, [(self._numbers + number, at) for number, at in first])
+            self._numbers += len(first)
+            self._decided(Commitment(stage, {it.number: it.at for it in self._people.people}))
+        elif (done := self._people.push(stage)) is not None:
+            self._decided(done)
+
+    def _decided(self, done: Commitment) -> None:
+        """Keep what was decided, and see who has come and who has gone."""
+        for number, at in done.blobs.items():
+            self._stops.setdefault(number, []).append((done.stage.frame, self._box(done.stage, at)))
+        self._final = max(done.stage.frame, -1 if self._final is None else self._final)
+        if self._settings.closed or self._people is None or self._newcomers is None:
+            return
+        self._people.remove(self._newcomers.gone(done, self._settings.stage_s))
+        for at in self._newcomers.come(self._people, done):
+            self._numbers += 1
+            self._people.add(self._numbers, at)
+            self._stops[self._numbers] = [(done.stage.frame, self._box(done.stage, at))]
+
+    def _box(self, stage: Stage, at: int) -> Floats | None:
+        """Give a blob's box in pixels of the camera's picture."""
+        return None if at == stage.nowhere else stage.blobs[at].box * self._scale
+
+    def _result(self) -> WindowResult:
+        """Tell of all frames that are not final yet, or have become so just now."""
+        assert self._first is not None  # noqa: S101 — there was a frame
+        assert self._last is not None  # noqa: S101
+        first, last = self._first, self._last
+        frames = range(first, last + 1)
+        # Where nobody is followed yet, nothing that comes changes what was not seen.
+        final = last if self._final is None else max(min(self._final, last), first - 1)
+        seen = [self._seen.get(frame, Detections.empty(self._bins)) for frame in frames]
+        tracks = told_tracks(self._all_stops(), self._trails, seen, first, final)
+        result = WindowResult(first, last, final, tracks, self._report())
+        self._drop(final)
+        return result
+
+    def _all_stops(self) -> Stops:
+        """Give where everybody is at samples: what was decided, then the best path as it stands."""
+        if self._people is None or self._people.path is None:
+            return self._stops
+        stops = {number: list(it) for number, it in self._stops.items()}
+        for stage, chosen in zip(self._people.waiting, self._people.path.blobs.tolist(), strict=True):
+            for person, at in zip(self._people.people, chosen, strict=True):
+                stops.setdefault(person.number, []).append((stage.frame, self._box(stage, at)))
+        return stops
+
+    def _drop(self, final: int) -> None:
+        """Forget the frames that are final, but for the last sample of everybody who is followed."""
+        self._first = final + 1
+        self._seen = {frame: it for frame, it in self._seen.items() if frame > final}
+        self._trails.forget_to(final)
+        here = set() if self._people is None else {it.number for it in self._people.people}
+        self._stops = {number: stops[-1:] for number, stops in self._stops.items() if number in here}
+
+    def _report(self) -> SolveReport:
+        path = None if self._people is None else self._people.path
+        cost, exact = (path.cost, path.exact) if path is not None else (0.0, True)
+        bound = cost if exact else 0.0
+        return SolveReport("temporal", cost, bound, integral=exact, conflicts=0, rounds=0)
+
+    def _blobs_of(self, image: Image) -> Blobs:
+        if self._blobs is None:
+            size = (int(image.shape[1]), int(image.shape[0]))
+            self._blobs = Blobs(size, self._settings.room_m, self._settings.blobs)
+            self._scale = size[0] / self._blobs.size[0]
+        return self._blobs

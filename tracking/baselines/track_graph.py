@@ -1,0 +1,185 @@
+"""The track graph: who merges into a group is known again when it splits (Todor 2009, chapter 7).
+
+Tracks are followed by a Kalman filter and assignment. Somebody who is no longer detected where somebody else
+covers them merges into that one's track, which is of several people from then on. Somebody new who begins
+beside such a track splits from it: when they were seen for some frames, `who_left` says who they are, and who
+the one is that goes on. The original sees a whole recording first; here a split is decided after some frames,
+and what was told before that stays.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import cv2
+import numpy as np
+
+from tracking.baselines.kalman import Kalman
+from tracking.baselines.stepwise import StepwiseSettings, StepwiseTracker
+from tracking.baselines.track_groups import GraphSettings, Group, Leaving, Look, Person
+from tracking.baselines.track_links import End, who_left
+from tracking.boxes import Floats, areas, intersections
+from tracking.detectors.base import Image
+from tracking.solvers.base import OCCLUDED
+from tracking.types import Detections
+from tracking.window import WindowSettings
+
+_VELOCITY = slice(4, 6)
+"""Of the filter's state: that of the middle."""
+
+
+class TrackGraph(StepwiseTracker[cv2.KalmanFilter]):
+    """Tracks, groups of them, and who comes out of a group."""
+
+    def __init__(
+        self,
+        window: WindowSettings,
+        settings: StepwiseSettings | None = None,
+        graph: GraphSettings | None = None,
+    ) -> None:
+        super().__init__(Kalman(), window, settings)
+        self._graph = graph or GraphSettings()
+        self._looks: dict[int, Look] = {}
+        self._groups: dict[int, Group] = {}
+        self._leaving: dict[int, Leaving] = {}
+
+    def _step(self, frame: int, detections: Detections, image: Image | None) -> None:
+        super()._step(frame, detections, image)
+        self._tidy(frame)
+        self._learn(frame, detections)
+        self._merge(frame)
+        self._leave(frame)
+        self._split()
+
+    def _everybody(self) -> Iterable[Person]:
+        return (*super()._everybody(), *(item for group in self._groups.values() for item in group.hidden))
+
+    def _counts(self, item: Person) -> bool:
+        return super()._counts(item) and item.serial not in self._leaving
+
+    def _tidy(self, frame: int) -> None:
+        """Let go of groups whose track ended, of who is in one for long, and of who came out and is gone."""
+        alive = {item.serial for item in self._objects}
+        self._leaving = {
+            it: who
+            for it, who in self._leaving.items()
+            if it in alive and who.group_of.serial in alive and who.group_of.serial in self._groups
+        }
+        for serial, group in list(self._groups.items()):
+            long = [frame - end.frame > self._graph.remember for end in group.ends[1:]]
+            gone = [serial not in alive or it for it in long]
+            self._ended += [item for item, it in zip(group.hidden, gone, strict=True) if it]
+            group.ends[1:] = [end for end, it in zip(group.ends[1:], gone, strict=True) if not it]
+            group.hidden = [item for item, it in zip(group.hidden, gone, strict=True) if not it]
+            if not group.hidden:
+                del self._groups[serial]
+        known = {item.serial for item in self._everybody()}
+        self._looks = {serial: look for serial, look in self._looks.items() if serial in known}
+
+    def _learn(self, frame: int, detections: Detections) -> None:
+        """See how everybody looks who is matched: alone, come out of a group, or the rest of one."""
+        for item in self._objects:
+            _, place = item.shown.get(frame, (item.box, OCCLUDED))
+            if place == OCCLUDED:
+                continue
+            histogram = detections.histograms[place]
+            if item.serial in self._leaving:
+                self._leaving[item.serial].out.add(histogram)
+            elif item.serial in self._groups:
+                for who in self._leaving.values():
+                    if who.group_of is item:
+                        who.rest.add(histogram)
+            else:
+                self._looks.setdefault(item.serial, Look.none(detections)).add(histogram)
+
+    def _merge(self, frame: int) -> None:
+        """Let those who are not detected any more into the track of whoever covers them."""
+        sure = [item for item in self._objects if self._counts(item)]
+        for item in sure:
+            hosts = [it for it in sure if it.away == 0 and it in self._objects]
+            if item.away < self._graph.gone or not hosts:
+                continue
+            shared = intersections(np.stack([it.box for it in hosts]), item.box)
+            best = int(np.argmax(shared))
+            if shared[best] >= self._graph.covered * float(areas(item.box)):
+                self._join(hosts[best], item, frame)
+
+    def _join(self, host: Person, item: Person, frame: int) -> None:
+        """Merge two tracks; `item` may be of several people itself."""
+        group = self._groups.setdefault(host.serial, Group([self._end(host, frame)]))
+        merged = self._groups.pop(item.serial, None)
+        group.ends += [self._end(item, frame)] if merged is None else merged.ends
+        group.hidden += [item] if merged is None else [item, *merged.hidden]
+        self._objects.remove(item)
+        self._leaving = {it: who for it, who in self._leaving.items() if who.group_of is not item}
+
+    def _end(self, item: Person, frame: int) -> End:
+        """Say how somebody goes into a group."""
+        step = np.asarray(item.known.statePost, dtype=np.float64)[_VELOCITY, 0]
+        return _ended(frame, item.box, step, self._looks[item.serial].mean)
+
+    def _leave(self, frame: int) -> None:
+        """Note who is new beside a group: they came out of it."""
+        hosts = [it for it in self._objects if it.serial in self._groups]
+        for item in self._objects:
+            if item.matches > 1 or frame not in item.shown or not hosts:
+                continue
+            near = intersections(np.stack([self._around(it.box) for it in hosts]), item.box)
+            host = hosts[int(np.argmax(near))]
+            if near.max() > 0.0 and item is not host:
+                look, rest = (Look(np.zeros_like(self._looks[host.serial].total)) for _ in range(2))
+                self._leaving[item.serial] = Leaving(item, host, frame, item.box, host.box, look, rest)
+
+    def _around(self, box: Floats) -> Floats:
+        margin = self._graph.beside * (box[2] - box[0])
+        return np.asarray(box + np.array([-margin, -margin, margin, margin]))
+
+    def _split(self) -> None:
+        """Decide who those are that came out of a group and were seen for long enough."""
+        for serial, who in list(self._leaving.items()):
+            enough = who.person.matches >= self._graph.wait and who.rest.frames and who.out.frames
+            group = self._groups.get(who.group_of.serial)
+            if not enough and group is not None:
+                continue
+            del self._leaving[serial]
+            if group is None:
+                continue
+            still = np.zeros(2)
+            out = _ended(who.first, who.box, still, who.out.mean)
+            rest = _ended(who.first, who.rest_box, still, who.rest.mean)
+            left = who_left(group.ends, out, rest, self._graph.close, self._graph.unlike)
+            if left is not None:
+                self._part(who, group, left)
+
+    def _part(self, who: Leaving, group: Group, left: int) -> None:
+        """Give tracks to those whose they are: the `left`th of a group came out of it."""
+        host = who.group_of
+        del self._groups[host.serial]
+        followed, place = host, left
+        if left == 0:
+            # Who is followed was the one who left: the next of the group is followed in their place.
+            followed, place = group.hidden[0], 1
+            self._objects.append(followed)
+            _take_over(followed, host, who.first)
+            _take_over(host, who.person, who.first)
+            group.ends[0], group.ends[1] = group.ends[1], group.ends[0]
+        else:
+            self._objects.append(group.hidden[left - 1])
+            _take_over(group.hidden[left - 1], who.person, who.first)
+        self._objects.remove(who.person)
+        del group.ends[place], group.hidden[place - 1]
+        if group.hidden:
+            self._groups[followed.serial] = group
+        for other in self._leaving.values():
+            other.group_of = followed if other.group_of is host else other.group_of
+
+
+def _ended(frame: int, box: Floats, step: Floats, look: Floats) -> End:
+    return End(frame, (box[:2] + box[2:]) / 2, step, float(box[3] - box[1]), look)
+
+
+def _take_over(item: Person, track: Person, first: int) -> None:
+    """Let a person go on as a track, with what it showed from the frame `first` on."""
+    item.known, item.box, item.away = track.known, track.box, track.away
+    item.shown.update({frame: track.shown[frame] for frame in track.shown if frame >= first})
+    track.shown = {frame: it for frame, it in track.shown.items() if frame < first}

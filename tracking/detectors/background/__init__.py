@@ -1,0 +1,1 @@
+"""People as foreground: background models, foreground explanation, height model."""

@@ -1,0 +1,244 @@
+"""The standard detector: people as what differs from a learned background."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from typing import Literal, Protocol, TypeVar
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from tracking.appearance import GREY_LEVELS
+from tracking.detectors.background.box_filter import Band, BoxFilter, BoxFilterSettings
+from tracking.detectors.background.box_shrinking import shrink
+from tracking.detectors.background.foreground_fit import ExplainSettings, Explanation, explain
+from tracking.detectors.background.grid import Grid
+from tracking.detectors.background.height_model import (
+    Floor,
+    HeightLine,
+    HeightLineLearner,
+    HeightLineSettings,
+)
+from tracking.detectors.background.median import MedianBackground, MedianSettings
+from tracking.detectors.background.mog2 import Mog2Background, Mog2Settings
+from tracking.detectors.background.segmentation import Split
+from tracking.detectors.background.shadow import ShadowSettings
+from tracking.detectors.background.static_foreground import GhostSettings
+from tracking.detectors.base import Image, Mask
+from tracking.detectors.color_histogram import Looks, LooksSettings
+from tracking.detectors.validation import at_least_one, checked_image
+from tracking.types import Detections
+
+# Pixels of the working picture per cell of the box filter, on each axis.
+CELL = 2
+
+
+@dataclass(frozen=True, slots=True)
+class BackgroundSettings:
+    """The background-subtraction detector of paper IV.A.2.
+
+    Raises:
+        ValueError: nothing to look at ahead, no picture to work on, or so many bins do not fit.
+    """
+
+    model: Literal["median", "mog2"] = "median"  # how the background is learned
+    work_width: int = 360  # pixels; wider pictures are made smaller first
+    bins: int = 64  # bins of the grey histograms
+    ahead_frames: int = 500  # of a recording, seen before the first is searched; 0: none
+    ahead_every: int = 20  # of these, one in so many is looked at
+    ignore: tuple[tuple[tuple[float, float], ...], ...] = ()  # polygons of (x, y) in pixels to ignore
+    outside: float = 0.25  # people may be out of the picture by this share of the picture's height
+    looks: LooksSettings = field(default_factory=LooksSettings)
+    median: MedianSettings = field(default_factory=MedianSettings)
+    shadows: ShadowSettings = field(default_factory=ShadowSettings)
+    mog2: Mog2Settings = field(default_factory=Mog2Settings)
+    ghosts: GhostSettings = field(default_factory=GhostSettings)
+    boxes: BoxFilterSettings = field(default_factory=BoxFilterSettings)
+    heights: HeightLineSettings = field(default_factory=HeightLineSettings)
+    hypotheses: ExplainSettings = field(default_factory=ExplainSettings)
+
+    def __post_init__(self) -> None:
+        if self.ahead_frames < 0 or self.ahead_every < 1:
+            raise ValueError("ahead_frames must be at least 0, and ahead_every at least 1")
+        at_least_one(self, "work_width")
+        if not 1 <= self.bins <= GREY_LEVELS:
+            raise ValueError(f"bins must be 1 to {GREY_LEVELS}, not {self.bins}")
+
+
+def paper_boxes(settings: BackgroundSettings) -> BackgroundSettings:
+    """Give the settings with all off that is not in the paper (IV.A.2).
+
+    What is left are full boxes over place and height, each by itself, and grey histograms.
+    """
+    return replace(
+        settings,
+        looks=replace(settings.looks, colour=False),
+        shadows=replace(settings.shadows, use=False),
+        boxes=replace(settings.boxes, body="box"),
+        heights=replace(settings.heights, use=False),
+        hypotheses=replace(settings.hypotheses, use=False),
+    )
+
+
+_SPAN = 0.5
+"""Of a person's height, about what they are wide and deep from above."""
+
+
+S = TypeVar("S", bound=BackgroundSettings)
+
+
+def seen_from_above(settings: S) -> S:
+    """Give the settings for a camera that looks straight down: people are as wide as long, and have no line.
+
+    Their least size is half of what they are tall where they stand upright.
+    """
+    boxes = replace(settings.boxes, body="box", aspect=1.0, least_height=_SPAN * settings.boxes.least_height)
+    return replace(settings, boxes=boxes, heights=replace(settings.heights, use=False))
+
+
+PAPER_BOXES = paper_boxes(BackgroundSettings())
+"""The paper's box filters, as `PAPER_COSTS` are its costs."""
+
+
+class _Background(Protocol):
+    def split(self, image: Image) -> Split | None: ...
+
+    def learn(self, foreground: Mask, occupied: Mask) -> None: ...
+
+
+class BackgroundDetector:
+    """Finds standing people in the foreground of one camera. Deterministic, about a second to warm up."""
+
+    def __init__(self, settings: BackgroundSettings | None = None, floor: Floor | None = None) -> None:
+        """Begin with an empty memory; `floor` is what was measured of it in the pictures."""
+        self.settings = settings or BackgroundSettings()
+        self._looks = Looks(self.settings.looks, self.settings.bins)
+        self._floor = floor
+        self._learner = HeightLineLearner(self.settings.heights)
+        self._background: _Background = (
+            MedianBackground(self.settings.median, self.settings.ghosts, self.settings.shadows)
+            if self.settings.model == "median"
+            else Mog2Background(self.settings.mog2)
+        )
+        self._shape: tuple[int, ...] | None = None
+        self._grid: Grid | None = None
+        self._filter: BoxFilter | None = None
+        self._line: HeightLine | None = None
+        self._band: Band | None = None
+        self.blind = True
+        """Whether the last frame could not be searched, since the background was not known."""
+
+    def prepare(self, images: Iterable[Image], every: int) -> None:
+        """Learn the empty scene and how tall people look from frames of a recording, before its first one.
+
+        Args:
+            images: people may come and go in them; they are taken one by one, and kept small.
+            every: how many frames each of them stands for.
+
+        Raises:
+            ValueError: not `(H, W, 3)` uint8 pictures of one size.
+        """
+        background = self._background
+        if not isinstance(background, MedianBackground):
+            return
+        small = [self._grid_of(image).shrunk(image) for image in images]
+        background.prepare(small)
+        for image in small:
+            split = background.glance(image)
+            if split is not None and self._grid is not None:
+                self._learner.watch(
+                    _cleaned(split.foreground & self._grid.visible), self._grid.visible, every
+                )
+
+    def detect(self, image: Image, frame: int | None = None) -> Detections:  # noqa: ARG002 — Detector
+        """Give the hypotheses of the next frame; none while the background is not known yet.
+
+        Raises:
+            ValueError: not an `(H, W, 3)` uint8 picture, or another size than before.
+        """
+        grid = self._grid_of(image)
+        small = grid.shrunk(image)
+        split = self._background.split(small)
+        self.blind = split is None
+        if split is None:
+            return Detections.empty(self.bins)
+        mask = _cleaned(split.foreground & grid.visible)
+        self._learner.watch(mask, grid.visible)
+        found = self._hypotheses(mask, split.shadow & grid.visible & ~mask, grid)
+        boxes = grid.to_work(found.boxes)
+        self._background.learn(mask, _occupied(boxes[: found.people], mask.shape))
+        return Detections(grid.to_picture(boxes), found.scores, self._looks.rows(small, boxes, mask))
+
+    @property
+    def bins(self) -> int:
+        """The length of a row of the histograms."""
+        return self._looks.bins
+
+    @property
+    def height_line(self) -> HeightLine | None:
+        """How tall people are where, in pixels of the working picture; None: not known yet."""
+        return self._learner.line
+
+    def _hypotheses(self, mask: Mask, shadow: Mask, grid: Grid) -> Explanation:
+        settings = self.settings
+        foreground = grid.cells(mask)
+        empty = np.maximum(grid.weight - foreground - grid.cells(shadow), 0.0)
+        cost = np.asarray(settings.boxes.background_cost * empty, dtype=np.float32)
+        if self._filter is None:
+            self._filter = BoxFilter(grid.weight, mask.shape[0] // CELL, settings.boxes)
+        peaks = self._filter.peaks(foreground - cost, self._heights(grid))
+        explaining = settings.hypotheses
+        if not self._learner.sure:
+            fewer = min(explaining.most_people, explaining.most_unsure)
+            explaining = replace(explaining, most_people=fewer)
+        found = explain(peaks, foreground, cost, grid.weight, explaining)
+        return Explanation(shrink(found.boxes, foreground, grid.weight), found.scores, found.people)
+
+    def _heights(self, grid: Grid) -> Band | None:
+        """Give the heights that are possible, in cells; the same object for as long as the line stays."""
+        line, heights = self._learner.line, self.settings.heights
+        if line is not self._line:
+            self._line = line
+            self._band = None
+            if line is not None:
+                self._band = Band(
+                    line.in_cells(CELL, grid.margin), heights.tolerance, heights.doubt, heights.least_height
+                )
+        return self._band
+
+    def _grid_of(self, image: Image) -> Grid:
+        checked_image(image)
+        if self._grid is None:
+            self._shape = image.shape
+            self._grid = Grid(
+                image.shape[:2], self.settings.work_width, CELL, self.settings.outside, self.settings.ignore
+            )
+            if self._floor is not None:
+                floor = self._floor.in_rows(self._grid.scale)
+                self._learner = HeightLineLearner(self.settings.heights, floor, self._grid.rows)
+        if image.shape != self._shape:
+            raise ValueError(f"the frames' size changed from {self._shape} to {image.shape}")
+        return self._grid
+
+
+# Closing joins a head to its shoulders where the hair looks like the wall behind.
+_CLOSE = np.ones((5, 3), dtype=np.uint8)
+# Around a person nothing is learned either: shadows of feet, hands, and the box may be a little off.
+_AROUND = 0.15
+
+
+def _cleaned(mask: Mask) -> Mask:
+    """Take out lonely pixels and close small holes."""
+    return np.asarray(cv2.morphologyEx(cv2.medianBlur(mask, 5), cv2.MORPH_CLOSE, _CLOSE), dtype=np.uint8)
+
+
+def _occupied(boxes: npt.NDArray[np.float64], shape: tuple[int, ...]) -> Mask:
+    """Give a mask `shape` that is 255 where somebody is."""
+    occupied = np.zeros(shape, dtype=np.uint8)
+    for left, top, right, bottom in boxes:
+        x, y = _AROUND * (right - left), _AROUND * (bottom - top)
+        rows = slice(max(int(top - y), 0), int(bottom + y) + 1)
+        occupied[rows, max(int(left - x), 0) : int(right + x) + 1] = 255
+    return occupied

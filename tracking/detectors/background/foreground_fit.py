@@ -1,0 +1,182 @@
+"""A small set of people who explain the foreground, and their runners-up."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from tracking.boxes import iou
+from tracking.detectors.background.box_filter import Peaks
+from tracking.detectors.background.silhouette import integral
+from tracking.detectors.base import Plane
+
+
+@dataclass(frozen=True, slots=True)
+class ExplainSettings:
+    """Which hypotheses of a frame are handed on."""
+
+    use: bool = True  # false: the boxes as the scan found them, each by itself (the paper)
+    most_people: int = 40  # people that a frame's foreground is explained by at most
+    most_unsure: int = (
+        10  # and while it is not known well how tall people are: many small ones explain anything
+    )
+    least_share: float = (
+        0.3  # least gain of a further person, in areas of the part of the body that nobody covers
+    )
+    most_hypotheses: int = 16  # K: hypotheses handed on, people and runners-up, where people are few
+    runners_up: int = 8  # handed on beside the people however many these are
+    apart: float = 0.55  # runners-up overlap (IoU) what is handed on already by less than this
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Explanation:
+    """Hypotheses `(K, 4)` in cells; scores `(K,)` in [0, 1]; the first `people` explain the foreground.
+
+    Where nothing was explained, all of them may be people, and `people` is at least as many as there are.
+    """
+
+    boxes: npt.NDArray[np.float64]
+    scores: npt.NDArray[np.float64]
+    people: int
+
+
+def explain(
+    peaks: Peaks, foreground: Plane, cost: Plane, weight: Plane, settings: ExplainSettings
+) -> Explanation:
+    """Choose the people who explain most, one after the other, move each of them, then add runners-up.
+
+    The gain of a body is the foreground inside that nobody explains yet, less the background inside (a
+    linear form of the log-likelihood `P(foreground) = 1 - (1 - e) prod (1 - t_k)`). The score of a
+    person is that gain, beside all the others, over the part of the body that none of them covers; of a
+    runner-up, what the people leave to it, so that a second box on the same person scores near 0.
+
+    Args:
+        peaks: candidates, in cells.
+        foreground: share of foreground per cell, `(H, W)`.
+        cost: what each cell costs a body that covers it for the background in it, `(H, W)`.
+        weight: 1 where the picture counts, `(H, W)`.
+        settings: how many.
+    """
+    search = Search(peaks, foreground, cost, weight, settings)
+    chosen = search.people() if settings.use else []
+    shares = search.shares()
+    scores = []
+    for index in chosen:
+        search.remove(index)
+        scores.append(float(search.shares()[index]))
+        search.add(index)
+    people = len(chosen) if settings.use else settings.most_hypotheses
+    for index in _runners_up(peaks.boxes, chosen, settings):
+        chosen.append(index)
+        scores.append(float(shares[index]))
+    return Explanation(peaks.boxes[chosen].reshape(-1, 4), np.clip(scores, 0.0, 1.0), people)
+
+
+# How often each person is looked for again, given the others: the first choice was made without them.
+_MOVES = 2
+
+
+# A body of which less is visible than this share counts as if so much were: a hand proves nobody.
+_LEAST_VISIBLE = 0.6
+
+
+class Search:
+    """Greedy choice, then moves and removals.
+
+    Attributes:
+        gains: `(P,)`, what each candidate gains beside the chosen.
+        visible: `(P,)`, cells of it that none of them covers.
+    """
+
+    def __init__(
+        self, peaks: Peaks, foreground: Plane, cost: Plane, weight: Plane, settings: ExplainSettings
+    ) -> None:
+        self._peaks = peaks
+        self._settings = settings
+        self.gains = peaks.gains.copy()
+        self.visible = peaks.sizes.copy()
+        # What a covered cell no longer adds to the gain of the others, and to what is visible of them.
+        self._lost = np.stack([np.maximum(foreground - cost, 0.0), weight], axis=-1)
+        self._covers = np.zeros(weight.shape, dtype=np.int32)
+        self._extent = peaks.corners.extent
+
+    def people(self) -> list[int]:
+        """Give the indices of the chosen, in the order in which they were first chosen."""
+        chosen: list[int] = []
+        while len(chosen) < self._settings.most_people:
+            best = self._best(chosen)
+            if best is None:
+                break
+            chosen.append(best)
+            self.add(best)
+        for _ in range(_MOVES):
+            before = list(chosen)
+            for index in before:
+                self.remove(index)
+                best = self._best([other for other in chosen if other != index])
+                place = chosen.index(index)
+                chosen[place : place + 1] = [] if best is None else [best]
+                if best is not None:
+                    self.add(best)
+            if chosen == before:
+                break
+        return chosen
+
+    def shares(self) -> npt.NDArray[np.float64]:
+        """Give each candidate's gain beside the chosen, in areas of what is visible of its body, `(P,)`."""
+        least = _LEAST_VISIBLE * self._peaks.sizes
+        return np.asarray(self._peaks.priors * self.gains / np.maximum(self.visible, least))
+
+    def add(self, index: int) -> None:
+        """Let a candidate cover its cells."""
+        place, inside = self._peaks.corners.around(index), self._peaks.corners.covered(index)
+        self._lose(place, inside & (self._covers[place] == 0), -1.0)
+        self._covers[place] += inside
+
+    def remove(self, index: int) -> None:
+        """Let it no longer do so."""
+        place, inside = self._peaks.corners.around(index), self._peaks.corners.covered(index)
+        self._covers[place] -= inside
+        self._lose(place, inside & (self._covers[place] == 0), 1.0)
+
+    def _lose(self, place: tuple[slice, slice], cells: npt.NDArray[np.bool_], sign: float) -> None:
+        """Change gains and visible parts by what the cells are worth, of the bodies on this piece."""
+        lost = integral(self._lost[place] * cells[..., None].astype(np.float32))
+        (top, bottom), (left, right) = ((it.start, it.stop) for it in place)
+        lefts, tops, rights, bottoms = self._extent
+        near = np.flatnonzero((lefts < right) & (rights > left) & (tops < bottom) & (bottoms > top))
+        change = self._peaks.corners.only(near).within(place).sums(lost)
+        self.gains[near] += sign * change[:, 0]
+        self.visible[near] += sign * change[:, 1]
+
+    def _best(self, chosen: list[int]) -> int | None:
+        """Give the candidate that gains most beside the chosen; `None` where none gains enough."""
+        if not len(self.gains):
+            return None
+        shares = self.shares()
+        gains = np.where(shares >= self._settings.least_share, shares * self._peaks.sizes, -np.inf)
+        gains[chosen] = -np.inf
+        best = int(np.argmax(gains))
+        return best if np.isfinite(gains[best]) else None
+
+
+def _runners_up(boxes: npt.NDArray[np.float64], chosen: list[int], settings: ExplainSettings) -> list[int]:
+    """Give the next best candidates that differ enough from each other and from the chosen."""
+    if not len(boxes):
+        return []
+    overlaps = iou(boxes[:, None], boxes[None])
+    nearest = overlaps[chosen].max(axis=0, initial=0.0)
+    nearest[chosen] = np.inf
+    extra: list[int] = []
+    most = settings.most_hypotheses
+    if settings.use:
+        most = max(most, len(chosen) + settings.runners_up)
+    for index in range(len(boxes)):
+        if len(chosen) + len(extra) >= most:
+            break
+        if nearest[index] < settings.apart:
+            extra.append(index)
+            nearest = np.maximum(nearest, overlaps[index])
+    return extra

@@ -1,0 +1,145 @@
+"""A background that neither absorbs people nor keeps their ghosts: the median of the first frames."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from tracking.detectors.background.gain import channel_gains, scaled
+from tracking.detectors.background.segmentation import Split
+from tracking.detectors.background.shadow import ShadowSettings, shadow_mask
+from tracking.detectors.background.static_foreground import GhostFinder, GhostSettings
+from tracking.detectors.base import Image, Mask
+from tracking.detectors.validation import at_least_one
+
+
+@dataclass(frozen=True, slots=True)
+class MedianSettings:
+    """The gain-compensated median background.
+
+    Raises:
+        ValueError: no frames to learn from, or in no steps.
+    """
+
+    bootstrap_frames: int = 50  # frames whose median is the first background (2 s at 25 frames/s)
+    samples: int = 15  # how many of the bootstrap frames enter the median; odd
+    threshold: float = 24.0  # grey levels by which the most different channel of a pixel must differ
+    learn_every: int = 5  # frames between two updates of the background
+    learn_rate: float = 0.02  # share of the new frame in each update, where nobody is
+    restart_share: float = 0.6  # share of the picture in the foreground that means: the light changed
+    restart_frames: int = 15  # frames that it must last before the background is learned anew
+
+    def __post_init__(self) -> None:
+        at_least_one(self, "bootstrap_frames", "samples", "learn_every")
+
+
+class MedianBackground:
+    """A background model of one camera: the median of the first frames, updated where nobody is.
+
+    Usable after half of the bootstrap; the median is taken again at its end.
+    """
+
+    def __init__(self, settings: MedianSettings, ghosts: GhostSettings, shadows: ShadowSettings) -> None:
+        self._settings = settings
+        self._ghosts = GhostFinder(ghosts)
+        self._shadows = shadows
+        self._samples: list[Image] = []
+        self._frames = 0
+        self._flooded = 0
+        self._exact: npt.NDArray[np.float32] | None = None
+        self._rounded: Image | None = None
+        self._last: tuple[Image, npt.NDArray[np.float64]] | None = None
+        """The frame last seen, and its gains."""
+
+    def prepare(self, images: Sequence[Image]) -> None:
+        """Take the background from pictures seen before the first frame; without any, learn it as it goes."""
+        for image in images:
+            self._sample(image)
+        if self._samples:
+            self._take_median()
+            self._frames, self._samples = self._settings.bootstrap_frames, []
+
+    def glance(self, image: Image) -> Split | None:
+        """Tell foreground from shadow and background in a picture that is not the next frame."""
+        return None if self._rounded is None else self._compared(image, self._rounded)[0]
+
+    def split(self, image: Image) -> Split | None:
+        """Tell foreground from shadow and background; `None` while the background is not known yet."""
+        self._bootstrap(image)
+        self._frames += 1
+        if self._rounded is None:
+            return None
+        split, gains = self._compared(image, self._rounded)
+        self._last = image, gains
+        self._watch_for_new_light(split.foreground | split.shadow)
+        return split
+
+    def learn(self, foreground: Mask, occupied: Mask) -> None:
+        """Update the background with the frame last seen, except where somebody is.
+
+        Args:
+            foreground: `(H, W)`, the cleaned foreground of that frame.
+            occupied: `(H, W)`, 255 where somebody is.
+        """
+        if self._exact is None or self._rounded is None or self._last is None:
+            return
+        looks, learns = self._ghosts.due(), self._frames % self._settings.learn_every == 0
+        if not (looks or learns):
+            return
+        # The frame as it would look at the background's gain.
+        level = scaled(self._last[0], 1.0 / self._last[1])
+        ghosts = self._ghosts.find(level, self._rounded, foreground) if looks else None
+        if ghosts is not None:
+            self._exact[ghosts > 0] = level[ghosts > 0]
+        if learns:
+            free = cv2.bitwise_not(occupied)
+            cv2.accumulateWeighted(level, self._exact, self._settings.learn_rate, mask=free)
+        elif ghosts is None:
+            return
+        self._rounded = np.rint(self._exact).astype(np.uint8)
+
+    def _compared(self, image: Image, background: Image) -> tuple[Split, npt.NDArray[np.float64]]:
+        """Give what differs from the background at the picture's gains, and the gains."""
+        gains = channel_gains(image, background)
+        expected = scaled(background, gains)
+        blue, green, red = cv2.split(cv2.absdiff(image, expected))
+        difference = cv2.max(cv2.max(blue, green), red)
+        _, binary = cv2.threshold(difference, self._settings.threshold, 255, cv2.THRESH_BINARY)
+        mask = np.asarray(binary, dtype=np.uint8)
+        shadow = shadow_mask(image, expected, mask, self._shadows)
+        return Split(mask & ~shadow, shadow), gains
+
+    def _bootstrap(self, image: Image) -> None:
+        settings = self._settings
+        if self._frames >= settings.bootstrap_frames:
+            return
+        # Spread the samples evenly, the last one on the last frame.
+        taken = (self._frames + 1) * settings.samples // settings.bootstrap_frames
+        if taken > self._frames * settings.samples // settings.bootstrap_frames:
+            self._sample(image)
+        done = self._frames + 1
+        if done in {(settings.bootstrap_frames + 1) // 2, settings.bootstrap_frames} and self._samples:
+            self._take_median()
+        if done == settings.bootstrap_frames:
+            self._samples = []
+
+    def _sample(self, image: Image) -> None:
+        first = self._samples[0] if self._samples else image
+        self._samples.append(scaled(image, 1.0 / channel_gains(image, first)))
+
+    def _take_median(self) -> None:
+        ordered = np.sort(np.stack(self._samples), axis=0)
+        self._rounded = np.asarray(ordered[len(ordered) // 2], dtype=np.uint8)
+        self._exact = self._rounded.astype(np.float32)
+
+    def _watch_for_new_light(self, mask: Mask) -> None:
+        flooded = cv2.countNonZero(mask) > self._settings.restart_share * mask.size
+        self._flooded = self._flooded + 1 if flooded else 0
+        if self._flooded >= self._settings.restart_frames:
+            self._frames = 0
+            self._flooded = 0
+            self._samples = []

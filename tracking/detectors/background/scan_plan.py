@@ -1,0 +1,114 @@
+"""Where the scan for people looks, worked out once and used for as long as the height line stays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from tracking.boxes import Floats
+from tracking.detectors.background.silhouette import Part
+
+# Steps of the scan in a box's height: what a coarse grid misses, the moves of `find_peaks` find.
+STEPS_A_HEIGHT = 16
+# Nothing else may be better within these shares of a box's height and width.
+_PEAK_ROWS, _PEAK_COLUMNS = 0.1, 0.25
+
+_Read: TypeAlias = tuple[slice, slice]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HeightPlan:
+    """The places of the bodies of one height, in cells.
+
+    Attributes:
+        size: width and height.
+        tops: `(R,)` rows of the top left corners.
+        lefts: `(C,)` their columns.
+        priors: `(R, 1)`, the factor on the gain in each row.
+        least: gain from which a place counts.
+        around: a peak is the best of its surroundings of this size, `(rows, columns)` of places.
+        reads: for each part, where the integral has its right lower, right upper, left lower and left upper
+            corner at every place.
+    """
+
+    size: tuple[int, int]
+    tops: npt.NDArray[np.int64]
+    lefts: npt.NDArray[np.int64]
+    priors: Floats
+    least: float
+    around: npt.NDArray[np.uint8]
+    reads: tuple[tuple[_Read, _Read, _Read, _Read], ...]
+
+    def peaks(self, sums: Floats) -> tuple[Floats, Floats]:
+        """Give the local maxima of the gain, whose integral is `sums`: boxes `(P, 4)` and gains `(P,)`."""
+        gains = np.zeros((len(self.tops), len(self.lefts)))
+        for right_bottom, right_top, left_bottom, left_top in self.reads:
+            gains += sums[right_bottom]
+            gains -= sums[right_top]
+            gains -= sums[left_bottom]
+            gains += sums[left_top]
+        gains *= self.priors
+        if gains.max() < self.least:
+            return _NO_BOXES, _NO_GAINS
+        highest = cv2.dilate(gains, self.around, borderType=cv2.BORDER_REPLICATE)
+        found = np.flatnonzero((gains >= highest) & (gains >= self.least))
+        rows, columns = np.divmod(found, len(self.lefts))
+        left, top = self.lefts[columns], self.tops[rows]
+        boxes = np.stack([left, top, left + self.size[0], top + self.size[1]], axis=1).astype(np.float64)
+        return boxes, gains.ravel()[found]
+
+
+_NO_BOXES, _NO_GAINS = np.empty((0, 4)), np.empty(0)
+
+
+def plan_height(
+    shape: tuple[int, int], size: tuple[int, int], parts: tuple[Part, ...], priors: Floats, least_gain: float
+) -> HeightPlan | None:
+    """Plan one height; `None` where no body of it is possible.
+
+    Args:
+        shape: of the plane, in cells.
+        size: width and height of the boxes, in cells.
+        parts: what of a box is body.
+        priors: `(H,)` the factor on the gain for each row of the feet, 0 where this height is impossible.
+        least_gain: gain from which a place counts, in areas of the body.
+    """
+    width, height = size
+    step = max(1, height // STEPS_A_HEIGHT)
+    tops, lefts = np.arange(0, shape[0] - height, step), np.arange(0, shape[1] - width, step)
+    possible = np.flatnonzero(priors[tops + height])
+    if not (possible.size and lefts.size):
+        return None
+    tops = tops[possible[0] : possible[-1] + 1]
+    area = sum((part.right - part.left) * (part.bottom - part.top) for part in parts) * width * height
+    around = (
+        2 * max(int(_PEAK_ROWS * height / step), 1) + 1,
+        2 * max(int(_PEAK_COLUMNS * width / step), 1) + 1,
+    )
+
+    def read(along: float, down: float) -> _Read:
+        x, y = round(along * width), round(down * height)
+        rows = slice(int(tops[0]) + y, int(tops[-1]) + y + 1, step)
+        return rows, slice(int(lefts[0]) + x, int(lefts[-1]) + x + 1, step)
+
+    return HeightPlan(
+        size=size,
+        tops=tops,
+        lefts=lefts,
+        priors=priors[tops + height][:, None],
+        least=least_gain * area,
+        around=np.ones(around, dtype=np.uint8),
+        reads=tuple(
+            (
+                read(part.right, part.bottom),
+                read(part.right, part.top),
+                read(part.left, part.bottom),
+                read(part.left, part.top),
+            )
+            for part in parts
+        ),
+    )

@@ -1,0 +1,1 @@
+"""Neural detectors, run by onnxruntime."""

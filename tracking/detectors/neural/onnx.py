@@ -1,0 +1,157 @@
+"""A neural detector of the user's: any YOLO-style ONNX file, run by onnxruntime on the processor."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from tracking.boxes import Floats
+from tracking.detectors.base import Image
+from tracking.detectors.color_histogram import Looks
+from tracking.detectors.ignore_mask import Ignored, Polygons
+from tracking.detectors.neural.yolo_output import Layout, decoded
+from tracking.detectors.non_maximum_suppression import best_apart
+from tracking.detectors.validation import checked_image
+from tracking.types import Detections
+
+_INPUTS: dict[str, type[np.floating]] = {"tensor(float)": np.float32, "tensor(float16)": np.float16}
+_DIMENSIONS = 4
+# Grey of the bars beside the picture, as in YOLO's training.
+_BARS = 114
+
+
+@dataclass(frozen=True, slots=True)
+class OnnxSettings:
+    """A YOLO-style network in an ONNX file.
+
+    Raises:
+        ValueError: a setting makes no sense.
+    """
+
+    model: Path | None = None  # the file
+    layout: Layout = "auto"  # how its output is written; auto: by its shape
+    classes: tuple[int, ...] = (0,)  # the classes that are people; 0 in COCO
+    least_score: float = 0.25  # boxes below this score are left out
+    apart: float = 0.7  # of two boxes that overlap (IoU) by more, the one of lower score is left out
+    size: int = 640  # pixels a side that pictures are fitted into, where the file leaves it open
+    threads: int = 1  # threads of one network; there is a process for each camera already
+    most: int = 100  # boxes handed on at most
+
+    def __post_init__(self) -> None:
+        if not self.classes or min(self.classes) < 0:
+            raise ValueError(f"classes are numbers from 0, at least one, not {list(self.classes)}")
+        if not 0.0 <= self.least_score <= 1.0:
+            raise ValueError(f"least_score is a share between 0 and 1, not {self.least_score}")
+        if self.size < 1 or self.threads < 1 or self.most < 1:
+            raise ValueError("size, threads and most must be at least 1")
+
+
+class OnnxDetector:
+    """Finds people with a network; remembers nothing.
+
+    Raises:
+        ValueError: no file is named, or it is no network that takes a picture and gives boxes as YOLO's do.
+        OSError: the file cannot be read.
+        ImportError: onnxruntime is not installed.
+    """
+
+    blind = False
+
+    def __init__(self, settings: OnnxSettings, looks: Looks | None = None, ignore: Polygons = ()) -> None:
+        self.settings = settings
+        self._looks = looks or Looks()
+        self._ignored = Ignored(ignore)
+        if settings.model is None:
+            raise ValueError("no model is named: the path of an ONNX file")
+        self._session = _opened(settings.model, settings.threads)
+        self._name, self._size, self._type = _input_of(self._session, settings)
+        # A blank picture now, so that a network that does not fit is found out before the first frame.
+        try:
+            self.detect(np.zeros((*self._size, 3), dtype=np.uint8))
+        except ValueError as error:
+            raise ValueError(f"{settings.model}: {error}") from error
+
+    @property
+    def bins(self) -> int:
+        """The length of a row of the histograms."""
+        return self._looks.bins
+
+    def detect(self, image: Image, frame: int | None = None) -> Detections:  # noqa: ARG002 — Detector
+        """Give the people of a frame, best first.
+
+        Raises:
+            ValueError: not an `(H, W, 3)` uint8 picture, or the network's output is not as YOLO's.
+        """
+        checked_image(image)
+        planes, factor, bars = self._letterbox(image)
+        found = decoded(self._run(planes), self.settings.layout, self.settings.classes)
+        limits = np.array([image.shape[1], image.shape[0]] * 2, dtype=np.float64)
+        boxes = np.clip((found.boxes - bars) / factor, 0.0, limits)
+        kept = (found.scores >= self.settings.least_score) & self._ignored.leaves(image.shape, boxes)
+        boxes, scores = boxes[kept], found.scores[kept]
+        best = best_apart(boxes, scores, self.settings.apart, self.settings.most)
+        return Detections(boxes[best], scores[best], self._looks.rows(image, boxes[best]))
+
+    def _run(self, planes: npt.NDArray[np.floating]) -> npt.NDArray[np.floating]:
+        try:
+            return np.asarray(self._session.run(None, {self._name: planes})[0])
+        except Exception as error:  # onnxruntime has no common class of its own
+            raise ValueError(f"the network cannot be run: {_first_line(error)}") from error
+
+    def _letterbox(self, image: Image) -> tuple[npt.NDArray[np.floating], float, Floats]:
+        """Fit the picture undistorted into the middle of the input `(1, 3, h, w)`, red green blue, 0 to 1.
+
+        Gives it, its scale, and the bars left and above, `(4,)` as for a box.
+        """
+        height, width = self._size
+        factor = min(height / image.shape[0], width / image.shape[1])
+        wide, tall = round(image.shape[1] * factor), round(image.shape[0] * factor)
+        left, top = (width - wide) // 2, (height - tall) // 2
+        canvas = np.full((height, width, 3), _BARS, dtype=np.uint8)
+        canvas[top : top + tall, left : left + wide] = cv2.resize(image, (wide, tall))
+        planes = cv2.dnn.blobFromImage(canvas, scalefactor=1.0 / 255.0, swapRB=True)
+        return planes.astype(self._type, copy=False), factor, np.array([left, top] * 2, dtype=np.float64)
+
+
+def _opened(model: Path, threads: int) -> Any:
+    """Open the file with onnxruntime, which is imported only here: it is an extra."""
+    try:
+        import onnxruntime  # noqa: PLC0415
+    except ImportError as error:
+        raise ImportError("onnxruntime is not installed: pip install 'myview[onnx]'") from error
+    content = model.read_bytes()
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = threads
+    options.inter_op_num_threads = 1
+    options.log_severity_level = 4  # errors are raised; nothing is printed besides
+    try:
+        return onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
+    except Exception as error:  # onnxruntime has no common class of its own
+        raise ValueError(f"{model}: is not a usable ONNX file: {_first_line(error)}") from error
+
+
+def _input_of(session: Any, settings: OnnxSettings) -> tuple[str, tuple[int, int], type[np.floating]]:
+    """Give the input's name, its height and width, and its type."""
+    inputs = session.get_inputs()
+    shape = list(inputs[0].shape)
+    fits = len(inputs) == 1 and len(shape) == _DIMENSIONS and shape[0] in {1, None} | _names(shape[:1])
+    if not (fits and shape[1] in {3, None} | _names(shape[1:2]) and inputs[0].type in _INPUTS):
+        raise ValueError(
+            f"{settings.model}: takes {inputs[0].type} {shape}, not a picture of floats (1, 3, height, width)"
+        )
+    height, width = (side if isinstance(side, int) else settings.size for side in shape[2:])
+    return str(inputs[0].name), (height, width), _INPUTS[inputs[0].type]
+
+
+def _names(sides: list[Any]) -> set[Any]:
+    """Give those sides that the file leaves open: they have a name instead of a number."""
+    return {side for side in sides if isinstance(side, str)}
+
+
+def _first_line(error: Exception) -> str:
+    return " ".join(str(error).split())[:200]

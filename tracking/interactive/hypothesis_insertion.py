@@ -1,0 +1,82 @@
+"""Who is pointed at where nothing like them is found: a hypothesis at that place, of their size.
+
+Where a detector takes two bodies for one, or overlooks somebody, there is no place for who is pointed at to
+be in. So one is made: theirs alone, and in nobody's way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracking.boxes import Floats, areas
+from tracking.interactive.corrections import Pointing, pointed_at
+from tracking.model.network import Network
+from tracking.types import Detections
+
+_ALIKE = 1.6
+"""Factor between the areas of somebody and a box that is still theirs; two bodies side by side have more."""
+
+Places = Mapping[int, Mapping[int, int]]
+"""Which observation was made for whom: the index by object, by frame."""
+
+
+def place_of(pointing: Pointing, size: Floats) -> Floats:
+    """Give the box `(4,)` of somebody of a size `(2,)`, across and down, around what is pointed at."""
+    middle = np.array([pointing.x, pointing.y])
+    return np.concatenate([middle - size / 2.0, middle + size / 2.0])
+
+
+def is_found(pointing: Pointing, size: Floats, boxes: Floats) -> bool:
+    """Say whether any of the boxes `(K, 4)` may be whom somebody of that size points at."""
+    ratio = areas(boxes) / max(float(size[0] * size[1]), 1.0)
+    return bool((pointed_at(pointing, boxes) & (ratio < _ALIKE) & (ratio > 1.0 / _ALIKE)).any())
+
+
+def with_place(seen: Detections, box: Floats, look: Floats) -> Detections:
+    """Add an observation that no detector has made: of score 0, so that nobody new begins with it."""
+    return Detections(
+        np.concatenate([seen.boxes, box[None]]),
+        np.append(seen.scores, 0.0),
+        np.concatenate([seen.histograms, look[None, : seen.histograms.shape[1]]]),
+    )
+
+
+def with_places(network: Network, first: int, ids: Sequence[int], places: Places, change: float) -> Network:
+    """Give the network of a window from the frame `first` where what was made for somebody is theirs alone.
+
+    To others such a place is none. It conflicts with nothing, since what is found there is one box of
+    several. A way of less than a body to it or from it costs at most `change`, what a usual change does: a
+    hand trembles more than people move.
+    """
+    frames = [m for m in range(network.frames) if places.get(first + m)]
+    if not frames:
+        return network
+    node, source, pair = network.node.copy(), network.source.copy(), network.pair.copy()
+    conflicts, owners = network.conflicts.copy(), np.asarray(ids)
+    for m in frames:
+        for who, k in places[first + m].items():
+            node[owners != who, m, k] = np.inf
+            conflicts[m, k] = conflicts[m, :, k] = False
+            conflicts[m, k, k] = True
+            here = network.boxes[0, m, k]
+            if m == 0:
+                source[owners == who, k] = np.minimum(source[owners == who, k], change)
+            else:
+                near = _near(here, network.boxes[0, m - 1])
+                ways = pair[:, m - 1, :-1, k]
+                ways[:, near] = np.minimum(ways[:, near], change)
+            if m < network.frames - 1:
+                near = _near(here, network.boxes[0, m + 1])
+                ways = pair[:, m, k, :-1]
+                ways[:, near] = np.minimum(ways[:, near], change)
+    return replace(network, node=node, source=source, pair=pair, conflicts=conflicts)
+
+
+def _near(box: Floats, boxes: Floats) -> NDArray[np.bool_]:
+    """Say which of the boxes `(K, 4)` are no more than a body's size from a box, `(K,)`."""
+    middle, middles = (box[:2] + box[2:]) / 2.0, (boxes[:, :2] + boxes[:, 2:]) / 2.0
+    return np.asarray(((middles - middle) ** 2).sum(axis=1) <= areas(box))

@@ -1,0 +1,118 @@
+"""Who was pointed at late: where the identity was lost, and what is to be said of the frames since then."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracking.boxes import Floats, heights, normalized_distance
+from tracking.interactive.corrections import Pointing, farness
+from tracking.interactive.swap_margins import exchanges
+from tracking.interactive.window_memory import Memory
+from tracking.model.network import build_network
+from tracking.model.object_state import Template
+from tracking.model.settings import CostSettings
+from tracking.solvers.base import OCCLUDED
+from tracking.types import Detections
+
+_SURE = 0.5
+"""How far (`farness`) a track may be from the point to be the one that is pointed at."""
+
+
+def carried(pointing: Pointing, memory: Memory, costs: CostSettings, since: int) -> list[Pointing]:
+    """Give what a pointing at somebody else's track says of the frames before it, back to `since`.
+
+    Somebody, a, is pointed at who was said to be elsewhere, or hidden, while b was said to be there. The two
+    have exchanged their identities from some frame on: from that one on from which exchanging the tracks, as
+    they were found, costs least (`exchanges`, with only the two and their own boxes in it, and nothing said
+    of where they should be by now); where b began while a was hidden, since b began. From there on a was
+    where b was said to be, and b where a was. Empty where a is what is pointed at, or nobody else is,
+    and where a may just be behind b.
+    """
+    a, b = pointing.object, _instead(pointing, memory)
+    if b is None:
+        return []
+    frames = [n for n in sorted(memory.where) if since <= n <= pointing.frame]
+    states = np.array([[memory.where[n].get(k, OCCLUDED) for n in frames] for k in (a, b)])
+    if _covered(states != OCCLUDED):
+        return []
+    start = _start(states, [memory.seen.get(n) for n in frames], costs)
+    return [
+        Pointing(n, ours, *_aim(memory.seen[n].boxes[state]))
+        for place, n in enumerate(frames)
+        if start <= place < len(frames) - 1
+        for ours, state in ((a, states[1, place]), (b, states[0, place]))
+        if state != OCCLUDED
+    ]
+
+
+def _instead(pointing: Pointing, memory: Memory) -> int | None:
+    """Give the track that is at the point instead of the one that is pointed at, if there is one."""
+    there = memory.where.get(pointing.frame, {})
+    far = {
+        number: float(farness(pointing, memory.seen[pointing.frame].boxes[state]))
+        for number, state in there.items()
+    }
+    if not far:
+        return None
+    nearest = min(far, key=lambda number: (far[number], number != pointing.object, number))
+    return nearest if nearest != pointing.object and far[nearest] < _SURE else None
+
+
+def _covered(seen: NDArray[np.bool_]) -> bool:
+    """Say whether a may be behind b: a, the first of `(2, M)`, is hidden at last, and b was there before."""
+    shown = np.flatnonzero(seen[0])
+    return bool(len(shown) and not seen[0, -1] and seen[1, : shown[-1] + 1].any())
+
+
+def _aim(box: Floats) -> tuple[float, float, float]:
+    """Give the middle of a box, and the reach of who points at it exactly."""
+    x, y = (box[:2] + box[2:]) / 2.0
+    return float(x), float(y), max(float(heights(box)) / 4.0, 1.0)
+
+
+def _start(states: NDArray[np.int64], frames: Sequence[Detections | None], costs: CostSettings) -> int:
+    """Give the place of the first frame in which two tracks, states `(2, M)`, have changed places."""
+    seen = states != OCCLUDED
+    began = int(seen[1].argmax())
+    if began > 0 and not seen[0, began:].any():
+        return began
+    rows = [np.unique(column[column != OCCLUDED]) for column in states.T]
+    bins = next(it.histograms.shape[1] for it in frames if it is not None)
+    few = [_only(it, row, bins) for it, row in zip(frames, rows, strict=True)]
+    local = np.array(
+        [
+            [OCCLUDED if k == OCCLUDED else int(np.searchsorted(row, k)) for k in pair]
+            for pair, row in zip(states.T, rows, strict=True)
+        ]
+    ).T
+    if seen.any(axis=1).all():
+        templates = [_template(n, row, few) for n, row in enumerate(local)]
+        found = exchanges(build_network(templates, few, costs), local)
+        if np.isfinite(found.margins[0, 1]):
+            return int(found.frames[0, 1])
+    return _nearest(local, few)
+
+
+def _template(number: int, states: NDArray[np.int64], frames: Sequence[Detections]) -> Template:
+    """Give an object as it was first seen; where that is the first frame, it cannot have been elsewhere."""
+    m = int((states != OCCLUDED).argmax())
+    found = frames[m]
+    return Template(number, found.histograms[states[m]], found.boxes[states[m]] if m == 0 else None)
+
+
+def _only(seen: Detections | None, rows: NDArray[np.int64], bins: int) -> Detections:
+    if seen is None or not len(rows):
+        return Detections.empty(bins)
+    return Detections(seen.boxes[rows], seen.scores[rows], seen.histograms[rows])
+
+
+def _nearest(states: NDArray[np.int64], frames: Sequence[Detections]) -> int:
+    """Give where two who are both seen were nearest to each other, in heights; else where b is first seen."""
+    both = np.flatnonzero((states != OCCLUDED).all(axis=0))
+    if not len(both):
+        return int(np.flatnonzero(states[1] != OCCLUDED)[0]) if (states[1] != OCCLUDED).any() else 0
+    apart = [float(normalized_distance(*frames[m].boxes[states[:, m]])) for m in both.tolist()]
+    return int(both[len(apart) - 1 - int(np.argmin(apart[::-1]))])

@@ -1,0 +1,117 @@
+"""The trackers by name: the network program, and what it is measured beside."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from importlib import import_module
+from typing import Any, Protocol, runtime_checkable
+
+from tracking.baselines.prediction_method import Method
+from tracking.baselines.stepwise import StepwiseTracker
+from tracking.baselines.temporal_consistency import TemporalSettings
+from tracking.detectors.base import Image
+from tracking.interactive import AssistedTracker, AssistSettings
+from tracking.model.settings import CostSettings
+from tracking.solvers.base import Solver
+from tracking.tracker import OnlineTracker
+from tracking.types import Detections
+from tracking.window import WindowResult, WindowSettings
+
+DEFAULT_TRACKER = "lp"
+"""Multiple object tracking as one linear program in a moving window: MyView's own."""
+
+TEMPORAL = "temporal"
+"""Person-to-blob matching over a window of samples: it has settings of its own."""
+
+# Imported when asked for: a camera with the default tracker loads none of them.
+_METHODS = {
+    "kalman": ("tracking.baselines.kalman", "Kalman"),
+    "klt": ("tracking.baselines.optical_flow", "OpticalFlow"),
+    "mcmc": ("tracking.baselines.mcmc", "Mcmc"),
+    "mean-shift": ("tracking.baselines.mean_shift", "MeanShift"),
+    "separated-particles": ("tracking.baselines.separated_particles", "SeparatedParticles"),
+    "occlusion-cues": ("tracking.baselines.occlusion_cues", "OcclusionCues"),
+    "particle": ("tracking.baselines.particle_filter", "ParticleFilters"),
+}
+
+_GRAPH = "track-graph"
+
+
+class Tracker(Protocol):
+    """Follows everybody in one camera's pictures. Deterministic, and bounded in memory."""
+
+    def push(self, frame: int, detections: Detections, image: Image | None = None) -> WindowResult | None:
+        """Take a frame: what was found in it, and its picture where there is one; a result where windows end.
+
+        Raises:
+            ValueError: the frame number is not larger than the last one.
+        """
+        ...
+
+    def flush(self) -> WindowResult | None:
+        """End the recording: all frames become final. `None` where they were already."""
+        ...
+
+
+@runtime_checkable
+class Preparing(Protocol):
+    """A tracker that learns the room from pictures of a recording, before its first frame."""
+
+    def prepare(self, images: Iterable[Image]) -> None:
+        """Learn from some pictures; from none as it goes."""
+        ...
+
+
+def tracker_names() -> tuple[str, ...]:
+    """Give the names of all trackers."""
+    return (DEFAULT_TRACKER, *sorted((*_METHODS, TEMPORAL, _GRAPH)))
+
+
+def needs_pictures(name: str) -> bool:
+    """Say whether a tracker looks at the pictures itself.
+
+    Raises:
+        ValueError: no tracker has that name.
+    """
+    return name == TEMPORAL or (name not in {DEFAULT_TRACKER, _GRAPH} and bool(_method_of(name).sees))
+
+
+def tracker_named(
+    name: str,
+    window: WindowSettings,
+    costs: CostSettings,
+    solver: Callable[[], Solver],
+    temporal: TemporalSettings | None = None,
+    fps: float = 25.0,
+    assist: AssistSettings | None = None,
+) -> Tracker:
+    """Give a new tracker for `fps` frames a second.
+
+    Only the network program has costs, a solver and an operator's help (where `assist` is enabled it is an
+    `AssistedTracker`), and only temporal consistency `temporal`.
+
+    Raises:
+        ValueError: no tracker has that name.
+    """
+    if name == DEFAULT_TRACKER:
+        if assist is not None and assist.enabled:
+            return AssistedTracker(window, costs, solver(), assist)
+        return OnlineTracker(window, costs, solver())
+    if name == TEMPORAL:
+        made: Tracker = import_module("tracking.baselines.temporal_consistency.tracker").TemporalTracker(
+            window, temporal, fps
+        )
+        return made
+    if name == _GRAPH:
+        from tracking.baselines.track_graph import TrackGraph  # noqa: PLC0415 — loaded when asked for
+
+        return TrackGraph(window)
+    return StepwiseTracker(_method_of(name)(), window)
+
+
+def _method_of(name: str) -> type[Method[Any]]:
+    if name not in _METHODS:
+        raise ValueError(f"no tracker is called {name!r}; there are {', '.join(tracker_names())}")
+    module, method = _METHODS[name]
+    found: type[Method[Any]] = getattr(import_module(module), method)
+    return found
