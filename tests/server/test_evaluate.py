@@ -171,7 +171,7 @@ def test_without_the_library_the_extra_is_named(
     refused: Printed, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for name in [*sys.modules]:
-        if name.startswith(("tracking.evaluation", "server.cli.evaluate.track_scores", "motrics")):
+        if name.startswith(("tracking.evaluation", "server.cli.evaluate", "motrics")):
             monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "motrics", None)
     tracks = write(tmp_path / "c0.txt", people((1,)))

@@ -12,14 +12,8 @@ from rich.table import Table
 
 from server.cli.evaluate.file_pairing import pair_up
 from server.system.errors import UserError
+from tracking.evaluation import HEADINGS, CameraScores, Recording, cells, evaluate_cameras
 from tracking.motchallenge import MotRow, read_rows
-
-try:
-    from tracking.evaluation import HEADINGS, CameraScores, Recording, cells, evaluate_cameras
-except ModuleNotFoundError as missing:
-    if missing.name != "motrics":
-        raise
-    raise UserError("evaluate: needs a library for the scores: pip install 'myview[evaluate]'") from missing
 
 
 def read_recordings(tracks: Sequence[Path], truth: Sequence[Path]) -> dict[str, Recording]:
