@@ -26,7 +26,7 @@ from benchmarks.surroundings import parser
 from server.camera.encoding.encoder import Encoder
 from server.camera.pipeline import CameraPipeline
 from server.config.loader import build_config
-from server.config.sections import Encode, Site
+from server.config.sections import EncodeSettings, SiteSettings
 from server.config.site_config import Config
 from synthetic import Scene
 
@@ -74,15 +74,18 @@ WAYS = (
 )
 
 
-def record(path: Path, site: Site, frames: int) -> Path:
+def record(path: Path, site: SiteSettings, frames: int) -> Path:
     """Write the room as the site's own encoder sends it."""
-    scene, encoder = Scene("room", 3, 4, 1, site.width, site.height, site.fps), Encoder(site, Encode())
+    scene, encoder = (
+        Scene("room", 3, 4, 1, site.width, site.height, site.fps),
+        Encoder(site, EncodeSettings()),
+    )
     units = (encoder.encode(pulse, scene.image(0, _START + pulse)) for pulse in range(frames))
     path.write_bytes(b"".join(unit.data for unit in units))
     return path
 
 
-def measure(way: Way, film: Path, site: Site, frames: int) -> Cost:
+def measure(way: Way, film: Path, site: SiteSettings, frames: int) -> Cost:
     """Run a camera over a recording."""
     pipeline = CameraPipeline(_config(way, film, site), "c0")
     spent, sizes, error = np.zeros(3), 0, 0.0
@@ -112,7 +115,7 @@ def _squared(one: NDArray[Any], other: NDArray[Any]) -> float:
     return float(np.mean((one.astype(np.float32) - other.astype(np.float32)) ** 2))
 
 
-def _config(way: Way, film: Path, site: Site) -> Config:
+def _config(way: Way, film: Path, site: SiteSettings) -> Config:
     content = {
         "site": site.model_dump(),
         "encode": way.encode,
@@ -140,7 +143,7 @@ def main() -> None:
     options.add_argument("--rounds", type=int, default=3)
     chosen = options.parse_args()
     width, height = map(int, chosen.size.split("x"))
-    site, report = Site(width=width, height=height), Report()
+    site, report = SiteSettings(width=width, height=height), Report()
     with tempfile.TemporaryDirectory() as folder:
         film = record(Path(folder) / "room.h264", site, chosen.frames)
         rounds = [[measure(way, film, site, chosen.frames) for way in WAYS] for _ in range(chosen.rounds)]

@@ -18,7 +18,7 @@ from pathlib import Path
 from benchmarks.report import Report
 from benchmarks.surroundings import parser
 from server.camera.encoding.encoder import Encoder
-from server.config.sections import Encode, Site
+from server.config.sections import EncodeSettings, SiteSettings
 from server.media.containers.fmp4 import Sample, fragment
 from server.media.h264.annexb import nal_units, sample
 from server.media.rendering_messages import Canvas
@@ -62,7 +62,7 @@ class Cost:
 class Stage:
     """A stream of the room with true boxes."""
 
-    def __init__(self, site: Site, encode: Encode) -> None:
+    def __init__(self, site: SiteSettings, encode: EncodeSettings) -> None:
         scene = Scene("room", 3, 4, 1, site.width, site.height, site.fps)
         self.site, self.gop = site, encode.gop
         self._images = [scene.image(0, _START + place) for place in range(_DRAWN)]
@@ -179,7 +179,7 @@ def main() -> None:
     chosen = options.parse_args()
     width, height = map(int, chosen.size.split("x"))
     report = Report()
-    stage = Stage(Site(width=width, height=height), Encode())
+    stage = Stage(SiteSettings(width=width, height=height), EncodeSettings())
     rows = []
     for wish in wishes(stage.site.fps):
         costs = [asyncio.run(measure(stage, wish, chosen.gops)) for _ in range(chosen.runs)]

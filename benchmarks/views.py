@@ -8,7 +8,7 @@ from typing import Any
 
 from benchmarks.surroundings import CannotRunError
 from server.camera.sources.opening import open_video
-from server.cli.render.video_info import look_at
+from server.cli.render.video_info import read_video_info
 from synthetic import Scene, write_recording
 
 ROOM = "room"
@@ -38,7 +38,7 @@ class Views:
     @property
     def site(self) -> dict[str, Any]:
         """The configuration's site: rate and size of the first view."""
-        first = look_at(self.videos[0])
+        first = read_video_info(self.videos[0])
         return {"name": "bench", "fps": first.fps, "width": first.size[0], "height": first.size[1]}
 
     @property

@@ -24,7 +24,7 @@ import matplotlib as mpl
 from benchmarks.peers.plot import plot
 from benchmarks.report import Report
 from benchmarks.surroundings import CannotRunError, finish, parser
-from server.cli.track.command import Frame, final_rows, loaded_for, searched
+from server.cli.track.command import DetectedFrame, config_for_video, detect_frames, final_rows
 from tracking import CostSettings, WindowSettings, create_solver
 from tracking.baselines import Preparing, tracker_named, tracker_names
 from tracking.evaluation import HEADINGS, Scores, cells, evaluate, perfect_association
@@ -43,7 +43,7 @@ class View:
     """One camera's pictures, what was found in them, and who is really there."""
 
     name: str
-    frames: Sequence[Frame]
+    frames: Sequence[DetectedFrame]
     truth: Sequence[MotRow]
     fps: float
 
@@ -68,7 +68,9 @@ def views(data: Path, most: int | None) -> list[View]:
         video, truth = data / scene / f"{name}.mp4", data / scene / "gt" / f"{name}.txt"
         if video.is_file() and truth.is_file():
             frames = [
-                it for it in searched(loaded_for(video, None, None)) if most is None or it.number < most
+                it
+                for it in detect_frames(config_for_video(video, None, None))
+                if most is None or it.number < most
             ]
             rows = [row for row in read_rows(truth) if row.frame <= len(frames)]
             found.append(View(f"{scene} {name}", frames, rows, rate))

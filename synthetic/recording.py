@@ -18,7 +18,7 @@ import av
 import numpy as np
 from numpy.typing import NDArray
 
-from server.system.atomic_write import whole_folder
+from server.system.atomic_write import atomic_folder
 from synthetic.ground_truth import CameraTruth
 from synthetic.scene import Scene
 
@@ -45,7 +45,7 @@ def write_recording(scene: Scene, out: Path, seconds: float, progress: Progress 
         raise ValueError(f"a recording needs at least one frame; {seconds} s at {scene.fps:g} fps has none")
     if scene.width % 2 or scene.height % 2:
         raise ValueError(f"a video's width and height must be even, not {scene.width} x {scene.height}")
-    with whole_folder(out) as draft:
+    with atomic_folder(out) as draft:
         _write(scene, draft, frames, progress)
 
 

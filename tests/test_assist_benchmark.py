@@ -16,13 +16,13 @@ from benchmarks.assist.school import school
 from benchmarks.assist.table import texts
 from benchmarks.assist.watch import FISH, Watched, watch
 from benchmarks.experiments.scene import Truth
-from server.config.sections import Flags
+from server.config.sections import FlagSettings
 from tracking import Detections
 from tracking.interactive import RiskEvent, RiskReason
 
 FRAMES = 200
 FPS = 25.0
-ALL = Flags(per_minute=600, risk=0.0)
+ALL = FlagSettings(per_minute=600, risk=0.0)
 
 
 def _truth() -> Truth:
@@ -122,7 +122,7 @@ def test_who_was_lost_long_ago_is_seen_again_when_they_were_still_there() -> Non
 
 
 def test_flags_go_to_the_riskiest_and_once_to_the_same_two() -> None:
-    desk = Desk(Flags(per_minute=2), FPS)
+    desk = Desk(FlagSettings(per_minute=2), FPS)
     desk.begin()
     first = desk.raised(10, [_trouble((1, 2), 10, 0.2), _trouble((3, 4), 10, 0.8), _trouble((5, 6), 10, 0.5)])
     assert [it.objects for it in first] == [(3, 4), (5, 6)]

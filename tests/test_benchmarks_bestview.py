@@ -26,7 +26,7 @@ from benchmarks.bestview.watch import Rows
 from benchmarks.bestview.ways import Way, outcome, visible_rows
 from benchmarks.bestview.why import Losses, losses
 from server.cli.evaluate.choices_file import Choice
-from server.messaging.messages import CameraTracks, Track
+from server.messaging.messages import CameraTracks, TrackMessage
 from tracking.motchallenge import MotRow
 
 FRAMES = 60
@@ -145,7 +145,7 @@ def test_a_cameras_own_tracks_are_what_was_final() -> None:
             final_to=final_to,
             ended=ended,
             shed=[],
-            tracks=[Track(id=3, boxes=boxes, confidence=1.0)],
+            tracks=[TrackMessage(id=3, boxes=boxes, confidence=1.0)],
             solve=None,
         )
 

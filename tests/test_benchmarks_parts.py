@@ -20,7 +20,7 @@ from benchmarks.render import __main__ as render
 from benchmarks.stopwatch import Stopwatch
 from benchmarks.surroundings import SKIPPED, CannotRunError
 from benchmarks.views import find_views
-from server.messaging.messages import CameraTracks, FrameHead, GopChoices
+from server.messaging.messages import CameraTracks, FrameHeader, GopChoices
 
 FPS, GOP, LOOKAHEAD, STRIDE = 25.0, 10, 20, 5
 START = 1_000.0
@@ -30,9 +30,9 @@ def due(pulse: int) -> float:
     return START + pulse / FPS
 
 
-def head(pulse: int) -> FrameHead:
+def head(pulse: int) -> FrameHeader:
     at = due(pulse)
-    return FrameHead(pulse=pulse, key=False, boot=1, due=at, taken=at + 0.01, encoded=at + 0.015)
+    return FrameHeader(pulse=pulse, key=False, boot=1, due=at, taken=at + 0.01, encoded=at + 0.015)
 
 
 def window(camera: str, last: int, solved_at: float) -> CameraTracks:

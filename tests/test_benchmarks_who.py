@@ -11,7 +11,7 @@ import pytest
 from benchmarks.bestview.parts import own_parts
 from benchmarks.bestview.who import Agreement, Met
 from server.config.loader import build_config
-from server.messaging.messages import Box, CameraTracks, Track
+from server.messaging.messages import Box, CameraTracks, TrackMessage
 from tracking.motchallenge import MotRow
 
 CROSSING = range(40, 50)
@@ -61,7 +61,9 @@ def test_of_two_boxes_at_one_person_one_counts() -> None:
 
 
 def said(boxes: Sequence[Sequence[Box | None]], frames: int) -> CameraTracks:
-    tracks = [Track(id=number, boxes=list(it), confidence=1.0) for number, it in enumerate(boxes, start=1)]
+    tracks = [
+        TrackMessage(id=number, boxes=list(it), confidence=1.0) for number, it in enumerate(boxes, start=1)
+    ]
     return CameraTracks(
         camera="c0",
         boot=0,

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from benchmarks.codecs import WAYS, Cost, measure, middle, record
-from server.config.sections import Site
+from server.config.sections import SiteSettings
 
-SITE = Site(width=160, height=96)
+SITE = SiteSettings(width=160, height=96)
 FRAMES = 20
 
 

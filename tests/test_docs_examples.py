@@ -22,7 +22,7 @@ from patience import PATIENCE
 from prometheus_client import CollectorRegistry
 
 from server.cli.main import app as command_line
-from server.config.sections import Http
+from server.config.sections import HttpSettings
 from server.http.api.schema import CameraInfo, Choice, ObjectInfo, SiteInfo
 from server.http.app import make_app, serving
 from server.http.app_keys import METRICS
@@ -78,7 +78,7 @@ async def site(by_hand: Any) -> AsyncIterator[str]:
     """Serve a site in which two people have been seen; give its address."""
     service = by_hand.FedService(by_hand.small_config())
     service.decider.people._registry = by_hand.TrackNumbers()
-    async with serving(make_app(service), Http(port=0)) as port:
+    async with serving(make_app(service), HttpSettings(port=0)) as port:
         service.come(*by_hand.CAMERAS)
         for epoch in range(3):
             service.feed(epoch, {"c0": {1: by_hand.SMALL, 2: by_hand.SMALL}, "c1": {1: by_hand.LARGE}})

@@ -5,11 +5,11 @@ from __future__ import annotations
 import asyncio
 
 from benchmarks.overlay import Stage, Wish, measure
-from server.config.sections import Encode, Site
+from server.config.sections import EncodeSettings, SiteSettings
 
 
 def test_boxes_cost_more_than_no_boxes_and_no_more_for_another_viewer() -> None:
-    stage = Stage(Site(width=320, height=180), Encode())
+    stage = Stage(SiteSettings(width=320, height=180), EncodeSettings())
     nothing, one, more = (
         asyncio.run(measure(stage, wish, 4)) for wish in (Wish("nothing"), Wish("one", 1), Wish("more", 10))
     )

@@ -29,7 +29,7 @@ from benchmarks.assist.operator import Person
 from benchmarks.assist.watch import Watched, watch
 from benchmarks.report import Report
 from benchmarks.surroundings import parser
-from server.config.sections import Flags
+from server.config.sections import FlagSettings
 
 _ANY = 600
 """Flags a minute: as many as there are."""
@@ -48,7 +48,9 @@ def measure(options: argparse.Namespace) -> None:
     report, kind = Report(), kinds(options.objects, options.seconds)[options.kind]
     alone = [watch(clip, kind.setup) for clip in kind.clips(options.clips, first=0 if options.even else 1)]
     points = assist_curve.curve(alone, Person())
-    few, any_number = (Flags(per_minute=most, risk=options.risk) for most in (options.per_minute, _ANY))
+    few, any_number = (
+        FlagSettings(per_minute=most, risk=options.risk) for most in (options.per_minute, _ANY)
+    )
     people = [
         (f"{few.per_minute} flags a minute", Person(), few),
         ("any number of flags", Person(), any_number),
@@ -69,7 +71,9 @@ def measure(options: argparse.Namespace) -> None:
     report.save(options.out / f"{name}.txt")
 
 
-def _helped(alone: list[Watched], kind: Kind, person: Person, flags: Flags) -> list[tuple[Watched, Watched]]:
+def _helped(
+    alone: list[Watched], kind: Kind, person: Person, flags: FlagSettings
+) -> list[tuple[Watched, Watched]]:
     """Watch the clips once more, one after the other, with somebody at the screen."""
     desk = Desk(flags, alone[0].clip.fps)
     return [(it, watch(it.clip, kind.setup, person, desk)) for it in alone]
@@ -131,8 +135,8 @@ def main() -> None:
     options.add_argument("--objects", type=int, help="how many of them; else nine fish, ten players")
     options.add_argument("--clips", type=int, default=56, help="how many")
     options.add_argument("--seconds", type=float, default=20.0, help="of each")
-    options.add_argument("--per-minute", type=int, default=Flags().per_minute, help="flags at most")
-    options.add_argument("--risk", type=float, default=Flags().risk, help="from which one is raised")
+    options.add_argument("--per-minute", type=int, default=FlagSettings().per_minute, help="flags at most")
+    options.add_argument("--risk", type=float, default=FlagSettings().risk, help="from which one is raised")
     options.add_argument("--even", action="store_true", help="the seeds that risks were learned on")
     options.add_argument("--sweep", action="store_true", help="other operators, too")
     options.add_argument("--quick", action="store_true", help="4 clips")

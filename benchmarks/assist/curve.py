@@ -12,7 +12,7 @@ from benchmarks.assist.cases import tells
 from benchmarks.assist.desk import Desk
 from benchmarks.assist.operator import Person
 from benchmarks.assist.watch import Watched
-from server.config.sections import Flags
+from server.config.sections import FlagSettings
 from tracking.interactive import RiskEvent
 
 RISKS = (0.6, 0.5, 0.45, 0.4, 0.35, 0.3, 0.25, 0.2, 0.15, 0.1, 0.0)
@@ -52,10 +52,10 @@ class Point:
 
 def curve(watched: Sequence[Watched], person: Person) -> list[Point]:
     """Give what is foreseen from each of the risks on in clips that nobody helped with."""
-    return [_point(watched, person, Flags(per_minute=_MANY, risk=risk)) for risk in RISKS]
+    return [_point(watched, person, FlagSettings(per_minute=_MANY, risk=risk)) for risk in RISKS]
 
 
-def _point(watched: Sequence[Watched], person: Person, settings: Flags) -> Point:
+def _point(watched: Sequence[Watched], person: Person, settings: FlagSettings) -> Point:
     flags = foreseen = 0
     desk = Desk(settings, watched[0].clip.fps)
     for it in watched:

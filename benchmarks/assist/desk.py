@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from server.config.sections import Flags
+from server.config.sections import FlagSettings
 from server.service.operator_assist.flag_budget import Budget
 from tracking.interactive import RiskEvent
 
@@ -15,7 +15,7 @@ _MOST = 1000
 class Desk:
     """Raises flags. The clips follow each other as if they were one recording."""
 
-    def __init__(self, settings: Flags, fps: float) -> None:
+    def __init__(self, settings: FlagSettings, fps: float) -> None:
         self._budget = Budget(settings, fps)
         self._same = settings.answer_s * fps
         self._began = self._last = 0

@@ -11,13 +11,13 @@ from benchmarks.assist.clips import Clip
 from benchmarks.assist.desk import Desk
 from benchmarks.assist.failures import Failure, failures
 from benchmarks.assist.operator import Flag, Operator, Person
-from server.config.sections import Flags
+from server.config.sections import FlagSettings
 from tracking import CostSettings, WindowResult, WindowSettings, create_solver
 from tracking.boxes import Floats
 from tracking.interactive import AssistedTracker, AssistSettings, Pointing, RiskEvent
 from tracking.solvers import DEFAULT_SOLVER
 
-_ALL = Flags(per_minute=600, risk=0.0)
+_ALL = FlagSettings(per_minute=600, risk=0.0)
 _BATCH = 3
 """Frames of which pointings are sent together: a tenth of a second."""
 

@@ -10,7 +10,7 @@ from typing import Any
 from benchmarks.bestview.watch import Rows, Watched, in_file, in_pictures, sure_rows
 from benchmarks.surroundings import CannotRunError
 from benchmarks.views import Views, find_views
-from server.cli.evaluate.ground_truth import Truth, truth_of
+from server.cli.evaluate.ground_truth import SceneTruth, build_truth
 from server.cli.render.video_info import Size
 from server.config.loader import build_config
 from server.config.site_config import Config
@@ -63,9 +63,9 @@ class Case:
         site = self.content["site"]
         return dict.fromkeys(self.gt, (site["width"], site["height"]))
 
-    def truth(self) -> Truth:
+    def truth(self) -> SceneTruth:
         """Give how well everybody could be seen."""
-        return truth_of(self.gt, self.sizes, self.least_shown)
+        return build_truth(self.gt, self.sizes, self.least_shown)
 
     def watch(self, *, ground: bool = True) -> Watched:
         """Let every camera look for people by itself; how tall they are where it may know from the ground."""

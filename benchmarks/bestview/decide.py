@@ -16,7 +16,7 @@ from bestview import NO_CAMERA, EpisodeKey, IdentityUpdate, LocalTrack, size_qua
 from server.cli.evaluate.choices_file import Choice, read_choices
 from server.config.site_config import Config
 from server.messaging.epochs import closing_epoch
-from server.messaging.messages import Box, CameraTracks, Track
+from server.messaging.messages import Box, CameraTracks, TrackMessage
 from server.service.decision_files.recorder import Recorder
 from server.service.ingest.epoch_aligner import Aligner
 from server.service.view_selection.decider import Decider, homographies
@@ -104,7 +104,7 @@ def _said(
             ended=place == len(spans) - 1,
             shed=[],
             tracks=[
-                Track(
+                TrackMessage(
                     id=number + 1,
                     boxes=[boxes.get((person, frame)) for frame in range(first, last + 1)],
                     confidence=1.0,

@@ -13,8 +13,8 @@ from benchmarks.bestview.ways import visible_rows
 from benchmarks.report import Report
 from bestview import NO_CAMERA, ViewScore, choose_views, score_views
 from server.cli.evaluate.choices_file import views_of
-from server.cli.evaluate.ground_truth import Truth
-from server.config.sections import Encode, View
+from server.cli.evaluate.ground_truth import SceneTruth
+from server.config.sections import EncodeSettings, ViewSettings
 
 STRIDE = 5
 """Frames between two windows of the tracker, as by default; its delay is that of the true site."""
@@ -23,8 +23,8 @@ GOPS = (1, 5, 10, 25)
 SWITCH_COSTS_S = (0.0, 0.1, 0.2, 0.3, 0.5, 1.0)
 GOES_ON_S = (0.0, 0.25, 0.5, 1.0, 2.0)
 QUICK_LOOKAHEADS, QUICK_GOPS, QUICK_SWITCH_COSTS_S, QUICK_GOES_ON_S = (10, 25), (1, 10), (0.1, 0.3), (0.0,)
-DEFAULT_LOOKAHEAD, DEFAULT_GOP = View().lookahead, Encode().gop
-DEFAULT_SWITCH_COST_S, DEFAULT_GOES_ON_S = View().switch_cost_s, View().goes_on_s
+DEFAULT_LOOKAHEAD, DEFAULT_GOP = ViewSettings().lookahead, EncodeSettings().gop
+DEFAULT_SWITCH_COST_S, DEFAULT_GOES_ON_S = ViewSettings().switch_cost_s, ViewSettings().goes_on_s
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +66,7 @@ def settings_of(*, quick: bool) -> Iterator[Setting]:
             yield Setting(DEFAULT_LOOKAHEAD, DEFAULT_GOP, DEFAULT_SWITCH_COST_S, goes_on)
 
 
-def sweep(case: Case, truth: Truth, *, quick: bool) -> list[Swept]:
+def sweep(case: Case, truth: SceneTruth, *, quick: bool) -> list[Swept]:
     """Try them all."""
     fps = case.config().site.fps
     rows = visible_rows(case, truth)
@@ -95,7 +95,7 @@ def sweep(case: Case, truth: Truth, *, quick: bool) -> list[Swept]:
 
 
 def _known_whole(
-    truth: Truth, gop: int, switch_cost: float
+    truth: SceneTruth, gop: int, switch_cost: float
 ) -> np.ndarray[tuple[int, int], np.dtype[np.int64]]:
     """Give the optimum whose cuts are where a GOP begins."""
     people, frames = truth.views.cost.shape[:2]

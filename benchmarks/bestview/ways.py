@@ -24,9 +24,9 @@ from benchmarks.occupancy.rows import occupancy_rows
 from benchmarks.peers.environment import PEERS, PeerEnvironment
 from bestview import ViewScore
 from server.cli.evaluate.choices_file import Choice
-from server.cli.evaluate.ground_truth import Truth, people_of_objects
-from server.cli.evaluate.view_scores import judge
-from server.cli.render.site_file import SiteFacts
+from server.cli.evaluate.ground_truth import SceneTruth, people_of_objects
+from server.cli.evaluate.view_scores import evaluate_views
+from server.cli.render.site_file import SiteInfo
 from server.service.view_selection.decider import homographies
 from tracking.evaluation import CameraScores, Recording, evaluate_cameras
 from tracking.motchallenge import MotRow, format_rows
@@ -61,7 +61,7 @@ class Outcome:
     views: ViewScore
 
 
-def visible_rows(case: Case, truth: Truth) -> dict[str, list[MotRow]]:
+def visible_rows(case: Case, truth: SceneTruth) -> dict[str, list[MotRow]]:
     """Give the true boxes of those who are visible: what a camera that misses nothing would find."""
     place = {person: index for index, person in enumerate(truth.people)}
     return {
@@ -89,7 +89,7 @@ class Seen:
 
 def ways(
     case: Case,
-    truth: Truth,
+    truth: SceneTruth,
     seen: Watched,
     blind: Watched,
     peers: PeerEnvironment | None,
@@ -170,7 +170,7 @@ def _lists(rows: Rows) -> dict[str, list[MotRow]]:
     return {camera: list(found) for camera, found in rows.items()}
 
 
-def outcome(case: Case, truth: Truth, way: Way) -> Outcome:
+def outcome(case: Case, truth: SceneTruth, way: Way) -> Outcome:
     """Score a way."""
     recordings = {camera: Recording(case.gt[camera], way.rendering.tracks[camera]) for camera in case.gt}
     if way.given:
@@ -182,12 +182,12 @@ def outcome(case: Case, truth: Truth, way: Way) -> Outcome:
 
 
 def score_choices(
-    case: Case, truth: Truth, choices: Sequence[Choice], person_of: Mapping[int, int]
+    case: Case, truth: SceneTruth, choices: Sequence[Choice], person_of: Mapping[int, int]
 ) -> ViewScore:
     """Score choices against the truth, as `myview evaluate --views` does."""
     config = case.config()
-    facts = SiteFacts(config.site.fps, config.view.switch_cost_s, case.sizes)
-    return judge(truth, choices, person_of, facts).total
+    facts = SiteInfo(config.site.fps, config.view.switch_cost_s, case.sizes)
+    return evaluate_views(truth, choices, person_of, facts).total
 
 
 def _peer_tracks(peers: PeerEnvironment, boxes: Rows) -> dict[str, list[MotRow]]:

@@ -10,7 +10,7 @@ import numpy as np
 from benchmarks.bestview.cases import Case
 from benchmarks.bestview.ways import LEAST_IOU, Way
 from server.cli.evaluate.choices_file import views_of
-from server.cli.evaluate.ground_truth import Truth, people_of_objects
+from server.cli.evaluate.ground_truth import SceneTruth, people_of_objects
 from tracking.boxes import iou
 from tracking.evaluation import Recording
 from tracking.motchallenge import MotRow
@@ -35,7 +35,7 @@ class Losses:
     missed: float
 
 
-def losses(case: Case, truth: Truth, way: Way) -> Losses:
+def losses(case: Case, truth: SceneTruth, way: Way) -> Losses:
     """Tell apart what keeps people from being visible in the chosen view.
 
     Raises:
@@ -57,7 +57,9 @@ def losses(case: Case, truth: Truth, way: Way) -> Losses:
     return Losses(*(np.count_nonzero(it) / frames for it in counts))
 
 
-def _met(truth: Truth, tracks: Mapping[str, list[MotRow]], person_of: Mapping[int, int]) -> tuple[Mask, Mask]:
+def _met(
+    truth: SceneTruth, tracks: Mapping[str, list[MotRow]], person_of: Mapping[int, int]
+) -> tuple[Mask, Mask]:
     """Give (K, N) whether people's own number was at them where they are visible, and whether another was."""
     own: Mask = np.zeros(truth.views.counted.shape, dtype=bool)
     others = own.copy()

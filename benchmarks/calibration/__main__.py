@@ -23,7 +23,7 @@ from benchmarks.report import Report
 from benchmarks.surroundings import CannotRunError, parser
 from benchmarks.views import Views, find_views
 from bestview.calibration import CalibrationError, Track, Walk, WalkCalibration, calibrate_walks
-from server.cli.calibrate.walk_input import Picture, walks_from_tracks
+from server.cli.calibrate.walk_input import VideoFormat, walks_from_tracks
 from server.cli.evaluate.track_scores import evaluate_recordings, read_recordings
 from server.cli.generated_config import config_for_videos
 from server.cli.render.renderer import render
@@ -57,7 +57,7 @@ def draw(folder: Path, people: int) -> Room:
     scene = Scene("room", 3, people, 1, *_ROOM_SIZE, _ROOM_FPS)
     write_recording(scene, folder, _ROOM_S, lambda _done, _total: None)
     tracks = _tracked(find_views(folder.parent, folder.name), folder / "tracked", None)
-    picture = Picture(_ROOM_SIZE, _ROOM_FPS)
+    picture = VideoFormat(_ROOM_SIZE, _ROOM_FPS)
     matrices = json.loads((folder / "ground.json").read_text(encoding="ascii"))["homography"]
     return Room(
         people,
@@ -111,7 +111,7 @@ def terrace_rows(report: Report, data: Path, folder: Path, out: Path) -> None:
     settings.write_text(yaml.safe_dump({"site": views.site, "cameras": views.cameras}), encoding="utf-8")
     size = (views.site["width"], views.site["height"])
     tracks = _tracked(views, folder / "terrace", settings)
-    walked = walks_from_tracks([tracks], Picture(size, views.site["fps"]))
+    walked = walks_from_tracks([tracks], VideoFormat(size, views.site["fps"]))
     found = calibrate_walks(walked.walks, walk_settings(walked.fps, _SHIFT_S), _PERSON)
     _plot(found, out / "calibration_terrace.png")
     ours = folder / "terrace.json"
@@ -153,7 +153,7 @@ def auditorium_rows(report: Report, data: Path, folder: Path, out: Path) -> None
     for camera in _AUDITORIUM:
         given = Recording(camera, source / "det" / f"{camera}.txt.gz", source / "gt" / f"{camera}.txt.gz")
         write_rows(tracks / f"{camera}.txt", track(given))
-    walked = walks_from_tracks([tracks], Picture(size, 30.0))
+    walked = walks_from_tracks([tracks], VideoFormat(size, 30.0))
     found = calibrate_walks(walked.walks, walk_settings(walked.fps, 0.0), _PERSON)
     _plot(found, out / "calibration_auditorium.png")
     ground = folder / "auditorium.json"

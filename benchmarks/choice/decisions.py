@@ -13,7 +13,7 @@ from bestview import EpisodeKey, IdentityUpdate, LocalTrack, QualitySettings
 from server.config.loader import build_config
 from server.config.site_config import Config
 from server.messaging.epochs import end_of_epoch
-from server.messaging.messages import CameraTracks, Glimpse, Track
+from server.messaging.messages import AppearanceHistogram, CameraTracks, TrackMessage
 from server.service.decision_state import Board
 from server.service.identity.camera_window import Reader
 from server.service.identity.people import People
@@ -50,16 +50,16 @@ class Crowd:
         for number in range(count):
             last = end_of_epoch(number, stride)
             first = max(0, last - window + 1)
-            said: dict[str, list[Track]] = {camera: [] for camera in config.camera_ids}
+            said: dict[str, list[TrackMessage]] = {camera: [] for camera in config.camera_ids}
             for person in range(self.people):
                 feet = begin[person] + walk[person] * np.arange(first, last + 1)[:, None]
                 tall = height[person]
                 boxes = (feet[:, [0, 1, 0, 1]] + np.array([-0.2, -1.0, 0.2, 0.0]) * tall).tolist()
-                track = Track(
+                track = TrackMessage(
                     id=person,
                     boxes=[(a, b, c, d) for a, b, c, d in boxes],
                     confidence=0.7,
-                    looks=[Glimpse(first=first, last=first, histogram=[float(person + 1)])],
+                    looks=[AppearanceHistogram(first=first, last=first, histogram=[float(person + 1)])],
                 )
                 for camera in cameras[person]:
                     said[config.camera_ids[camera]].append(track)
@@ -147,7 +147,7 @@ def _config(crowd: Crowd, gop: int, quality: dict[str, float]) -> Config:
     )
 
 
-def _message(camera: str, epoch: int, first: int, last: int, tracks: list[Track]) -> CameraTracks:
+def _message(camera: str, epoch: int, first: int, last: int, tracks: list[TrackMessage]) -> CameraTracks:
     return CameraTracks(
         camera=camera,
         boot=1,

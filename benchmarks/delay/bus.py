@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import msgspec
 import zenoh
 
-from server.messaging.messages import CameraTracks, FrameHead, GopChoices, camera_of
+from server.messaging.messages import CameraTracks, FrameHeader, GopChoices, camera_of_key
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +47,7 @@ class Marks:
     shed: int = 0
     """Frames that were missed or not searched for people, all cameras together."""
 
-    def video(self, camera: str, head: FrameHead, received: float) -> None:
+    def video(self, camera: str, head: FrameHeader, received: float) -> None:
         """Note a frame."""
         self.frames[camera, head.pulse] = Frame(head.due, head.taken, head.encoded, received)
 
@@ -65,13 +65,15 @@ class Marks:
 def listening(address: str) -> Iterator[Marks]:
     """Listen to the site whose router is at the address, as any outsider could."""
     marks = Marks()
-    head, tracks = msgspec.json.Decoder(FrameHead), msgspec.json.Decoder(CameraTracks)
+    head, tracks = msgspec.json.Decoder(FrameHeader), msgspec.json.Decoder(CameraTracks)
     choices = msgspec.json.Decoder(GopChoices)
 
     def on_video(sample: zenoh.Sample) -> None:
         received = time.time()
         if sample.attachment is not None:
-            marks.video(camera_of(str(sample.key_expr)), head.decode(sample.attachment.to_bytes()), received)
+            marks.video(
+                camera_of_key(str(sample.key_expr)), head.decode(sample.attachment.to_bytes()), received
+            )
 
     def on_tracks(sample: zenoh.Sample) -> None:
         marks.tracks(tracks.decode(sample.payload.to_bytes()))

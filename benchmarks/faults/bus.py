@@ -19,11 +19,11 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import Protocol
 
-from server.config.sections import Zenoh
+from server.config.sections import ZenohSettings
 from server.messaging.bus import Bus
 from server.messaging.inbox import Message
-from server.messaging.messages import Keys, camera_of
-from server.supervisor.shutdown import end_with_parent, run_process
+from server.messaging.messages import ZenohKeys, camera_of_key
+from server.supervisor.shutdown import run_process, terminate_with_parent
 
 SITE = "faults"
 SHARE = 0.3
@@ -88,7 +88,7 @@ class Crossing:
 
     def publish(self, key: str, payload: bytes, attachment: bytes | None = None) -> None:
         """Send a message."""
-        for receiver in self._receivers(camera_of(key), kind_of(key)):
+        for receiver in self._receivers(camera_of_key(key), kind_of(key)):
             receiver.publish(key, payload, attachment)
 
     def _receivers(self, camera: str, kind: str) -> list[Sends]:
@@ -100,7 +100,7 @@ class Crossing:
 class _Presence:
     """Says at the best view's router who is there, by a session each."""
 
-    def __init__(self, settings: Zenoh) -> None:
+    def __init__(self, settings: ZenohSettings) -> None:
         self._settings = settings
         self._there: dict[str, Bus] = {}
 
@@ -128,10 +128,10 @@ class _Known:
 
 
 async def _run() -> None:
-    there = Zenoh(connect=sys.argv[1])
+    there = ZenohSettings(connect=sys.argv[1])
     listens = dict(word.split("=", 1) for word in sys.argv[2:])
-    near = {camera: Bus.router(Zenoh(listen=address)) for camera, address in listens.items()}
-    far, keys, presence = Bus.client(there), Keys(SITE), _Presence(there)
+    near = {camera: Bus.router(ZenohSettings(listen=address)) for camera, address in listens.items()}
+    far, keys, presence = Bus.client(there), ZenohKeys(SITE), _Presence(there)
     way = Way(Crossing(near, far))
     for camera, router in near.items():
         for what in _FROM_CAMERAS:
@@ -152,7 +152,7 @@ async def _run() -> None:
 
 def main() -> None:
     """Run until told to end."""
-    end_with_parent()
+    terminate_with_parent()
     run_process(_run)
 
 

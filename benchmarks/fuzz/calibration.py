@@ -19,7 +19,7 @@ from benchmarks.fuzz.target import Target, folder, refused
 from bestview.calibration import CalibrationError, fit_cameras
 from server.cli.calibrate import calibration
 from server.cli.calibrate.points_file import COLUMNS, read_points
-from server.config.loader import build_config, with_files
+from server.config.loader import build_config, resolve_paths
 from server.service.calibration import floor_plan
 from server.service.calibration.floor_map import covered
 from server.service.calibration.floor_plan import PlanView
@@ -77,7 +77,7 @@ class _Files(Target):
 
     def lay_out(self) -> None:
         """Read ground.json as a site does, and lay its floor out."""
-        for camera in with_files(self._site, where="site", folder=self._path).cameras:
+        for camera in resolve_paths(self._site, where="site", folder=self._path).cameras:
             if camera.ground is not None:
                 covered(np.array(camera.ground, dtype=np.float64), (640, 360), (640, 360))
 

@@ -15,7 +15,7 @@ from pydantic import TypeAdapter
 from benchmarks.fuzz.mutate import as_json, damaged, odd, otherwise
 from benchmarks.fuzz.site import site
 from benchmarks.fuzz.target import Target, folder, refused
-from server.config.loader import build_config, changed_view, load_config
+from server.config.loader import build_config, change_view_settings, load_config
 from server.config.site_config import Config
 from server.config.tokens_file import read_tokens
 from server.http.operator.settings import settings_of
@@ -208,7 +208,7 @@ class Tried(Target):
         if not isinstance(changes, dict):
             return False
         try:
-            view = changed_view(self._view, changes, "to try out")
+            view = change_view_settings(self._view, changes, "to try out")
         except UserError as error:
             return refused(error)
         self._service.decider.choose_by(view)

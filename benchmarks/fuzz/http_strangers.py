@@ -21,7 +21,7 @@ from benchmarks.fuzz.http_site import EPOCHS, Served, judged
 from benchmarks.fuzz.mutate import as_json, damaged
 from benchmarks.fuzz.site import STRIDE, one_each, pictures
 from benchmarks.fuzz.target import Target, folder
-from server.config.tokens_file import digest_of
+from server.config.tokens_file import token_digest
 from server.http.access.access_control import ACCESS
 from server.http.access.sessions import _Session
 from server.http.app_keys import SERVICE
@@ -71,7 +71,7 @@ class Strangers(Target):
         self._folder = folder()
         tokens = Path(self._folder.name) / "tokens.yaml"
         listed: list[dict[str, object]] = [
-            {"name": f"token {who}", "sha256": digest_of(SECRETS[who]), **rights}
+            {"name": f"token {who}", "sha256": token_digest(SECRETS[who]), **rights}
             for who, rights in _RIGHTS.items()
         ]
         tokens.write_text(yaml.safe_dump({"tokens": listed}))
@@ -83,7 +83,9 @@ class Strangers(Target):
             self._served.service.decider.people.roll.call(number, name)
         self._access = self._served.app[ACCESS]
         ends = time.monotonic() + 1e9
-        self._sessions = {digest_of(_COOKIES[who]): _Session(digest_of(SECRETS[who]), ends) for who in _WHO}
+        self._sessions = {
+            token_digest(_COOKIES[who]): _Session(token_digest(SECRETS[who]), ends) for who in _WHO
+        }
         self._paths = [it for it in self._served.described if not it[0].endswith(_MADE)]
         self._pictures = {
             "c0": _windows(0, 0.5) - _windows(1, 0.0),
@@ -191,7 +193,7 @@ def _nearly(rng: Random, secret: str) -> str:
     if rng.random() < 0.5:
         return secret
     if rng.random() < 0.2:
-        return digest_of(secret)
+        return token_digest(secret)
     hurt = damaged(rng, secret.encode()).decode("utf-8", "surrogateescape")
     return hurt.replace("\r", "").replace("\n", "") if rng.random() < 0.8 else hurt
 

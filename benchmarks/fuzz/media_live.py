@@ -20,7 +20,7 @@ from server.camera.passthrough.compatibility import MisfitError, Wanted
 from server.camera.passthrough.stream_source import OwnStream
 from server.camera.sources.live_stream import Stream
 from server.camera.sources.opening import Opened
-from server.config.sections import Sound
+from server.config.sections import SoundSettings
 from server.system.errors import UserError
 
 _FRAMES = 2 * STRIDE + 3
@@ -74,7 +74,7 @@ class Live(Scripts):
     def feed(self, data: bytes) -> bool:
         """Decode it, or pass its access units on."""
         self._path.write_bytes(data[1:])
-        sound = LiveSound(Sound(source="c0"), FPS)
+        sound = LiveSound(SoundSettings(source="c0"), FPS)
         try:
             if data[:1] == b"P":
                 self._watch(_OwnOnce(str(self._path), {}, sound, self._wanted), range(_FRAMES))

@@ -10,7 +10,7 @@ import numpy as np
 
 from benchmarks.fuzz.mutate import damaged
 from benchmarks.fuzz.target import Target, folder, refused
-from server.cli.calibrate.walk_input import Picture, walks_from_tracks
+from server.cli.calibrate.walk_input import VideoFormat, walks_from_tracks
 from server.system.errors import UserError
 from tracking.detectors.mot_file import MotFileDetector
 from tracking.motchallenge import MotRow, format_rows, parse_rows, read_rows
@@ -136,7 +136,7 @@ class Walks(_Files):
     def feed(self, data: bytes) -> bool:
         """Take it for a walk."""
         try:
-            walks_from_tracks([self.written(data)], Picture(None, None))
+            walks_from_tracks([self.written(data)], VideoFormat(None, None))
         except UserError as error:
             return refused(error)
         return True

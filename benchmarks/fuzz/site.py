@@ -12,28 +12,28 @@ import numpy as np
 
 from server.camera.encoding.encoder import AccessUnit, Encoder
 from server.config.loader import build_config
-from server.config.sections import Encode, Site
+from server.config.sections import EncodeSettings, SiteSettings
 from server.config.site_config import Config
 from server.messaging.epochs import end_of_epoch
 from server.messaging.inbox import Message
 from server.messaging.messages import (
+    AppearanceHistogram,
+    AudioHeader,
     CameraStatus,
     CameraTracks,
-    FrameHead,
-    Glimpse,
-    Keys,
-    Solve,
-    SoundHead,
-    ThumbHead,
-    Track,
+    FrameHeader,
+    SolverReport,
+    ThumbnailHeader,
+    TrackMessage,
+    ZenohKeys,
 )
-from server.messaging.operator_messages import Trouble
+from server.messaging.operator_messages import RiskEvent
 from server.service.service import BestViewService
 
 WIDTH, HEIGHT, FPS = 64, 48, 25
 GOP = STRIDE = 5
 CAMERAS = ("c0", "c1")
-KEYS = Keys("hall")
+KEYS = ZenohKeys("hall")
 _GROUND = [[0.1, 0.0, 0.0], [0.0, 0.2, 0.0], [0.0, 0.01, 0.1]]
 _SOUND_BYTES = 40
 _BINS = 8
@@ -63,7 +63,7 @@ def site(*, codec: Literal["h264", "vp8"] = "h264", **changes: Any) -> Config:
 
 def pictures(seed: int, frames: int, codec: Literal["h264", "vp8"] = "h264") -> tuple[AccessUnit, ...]:
     """Encode pictures that differ from camera to camera (by seed) and from frame to frame."""
-    encoder = Encoder(Site(width=WIDTH, height=HEIGHT, fps=FPS), Encode(gop=GOP, codec=codec))
+    encoder = Encoder(SiteSettings(width=WIDTH, height=HEIGHT, fps=FPS), EncodeSettings(gop=GOP, codec=codec))
     rng = np.random.default_rng(seed)
     made = rng.integers(0, 255, (frames, HEIGHT // 8, WIDTH // 8, 3), dtype=np.uint8)
     return tuple(
@@ -74,7 +74,7 @@ def pictures(seed: int, frames: int, codec: Literal["h264", "vp8"] = "h264") -> 
 
 def video(camera: str, unit: AccessUnit, boot: int = 1) -> Message:
     """Give a frame as it comes from the bus."""
-    head = FrameHead(
+    head = FrameHeader(
         pulse=unit.pulse,
         key=unit.key,
         boot=boot,
@@ -101,24 +101,24 @@ def word(rng: Random, camera: str, epoch: int) -> CameraTracks:
         shed=[first] if rng.random() < 0.1 else [],
         alone=[],
         tracks=[_track(rng, person, first) for person in range(1, rng.randrange(1, 5))],
-        solve=Solve(objective=1.0, bound=1.0, gap=0.0, integral=True, rounds=1),
+        solve=SolverReport(objective=1.0, bound=1.0, gap=0.0, integral=True, rounds=1),
         solved_at=(first + STRIDE) / FPS,
         troubles=[
-            Trouble(reason="alike", tracks=[1, 2], pulse=first + 9, margin=rng.random(), risk=rng.random())
+            RiskEvent(reason="alike", tracks=[1, 2], pulse=first + 9, margin=rng.random(), risk=rng.random())
         ],
         mended_from=first if rng.random() < 0.1 else None,
     )
 
 
-def _track(rng: Random, person: int, first: int) -> Track:
+def _track(rng: Random, person: int, first: int) -> TrackMessage:
     left, top = rng.uniform(0, WIDTH - 16), rng.uniform(0, 16)
     boxes = [(left + step, top, left + step + 8.0, top + 24.0) for step in range(STRIDE)]
-    look = Glimpse(
+    look = AppearanceHistogram(
         first=first,
         last=first + STRIDE - 1,
         histogram=[float(place == person % _BINS) for place in range(_BINS)],
     )
-    return Track(
+    return TrackMessage(
         id=person, boxes=[*boxes], confidence=1.0, looks=[look], sharpness=rng.choice((None, rng.random()))
     )
 
@@ -128,9 +128,11 @@ def one_each(rng: Random, camera: str, epoch: int) -> CameraTracks:
     number, first = CAMERAS.index(camera), epoch * STRIDE
     boxes = [(4.0 + 40 * number, 10.0 + 8 * number, 14.0 + 40 * number, 34.0 + 8 * number)] * STRIDE
     looks = [
-        Glimpse(first=first, last=first + STRIDE - 1, histogram=[float(it == number) for it in range(8)])
+        AppearanceHistogram(
+            first=first, last=first + STRIDE - 1, histogram=[float(it == number) for it in range(8)]
+        )
     ]
-    track = Track(id=1, boxes=[*boxes], confidence=1.0, looks=looks, sharpness=0.5)
+    track = TrackMessage(id=1, boxes=[*boxes], confidence=1.0, looks=looks, sharpness=0.5)
     return msgspec.structs.replace(word(rng, camera, epoch), tracks=[track], shed=[])
 
 
@@ -141,7 +143,7 @@ def tracks(message: CameraTracks) -> Message:
 
 def thumbnail(camera: str, pulse: int) -> Message:
     """Give a small picture as it comes from the bus."""
-    head = ThumbHead(track=1, boot=1, pulse=pulse)
+    head = ThumbnailHeader(track=1, boot=1, pulse=pulse)
     return Message(KEYS.camera(camera, "thumbs/1"), b"\xff\xd8jpeg", msgspec.json.encode(head))
 
 
@@ -164,7 +166,7 @@ def status(camera: str, pulse: int) -> Message:
 
 def sound(epoch: int) -> Message:
     """Give the sound of an epoch as it comes from the bus."""
-    head = SoundHead(first=epoch * 9, sizes=[_SOUND_BYTES] * 9)
+    head = AudioHeader(first=epoch * 9, sizes=[_SOUND_BYTES] * 9)
     return Message(KEYS.sound, bytes(_SOUND_BYTES * 9), msgspec.json.encode(head))
 
 

@@ -39,8 +39,8 @@ from server.media.audio.audio_format import SoundFormat
 from server.media.stream_format import Agreement
 from server.messaging.epochs import end_of_epoch
 from server.messaging.inbox import Message
-from server.messaging.messages import Found
-from server.messaging.operator_messages import POINTS_MOST, Pointed, Pointings
+from server.messaging.messages import FrameDetections
+from server.messaging.operator_messages import OPERATOR_POINTS_MAX, OperatorPoint, OperatorPoints
 from server.service.ingest.epoch_aligner import Aligner
 from server.service.ingest.ingest import Intake
 from server.service.streaming.audio_buffer import SoundShelf
@@ -113,7 +113,7 @@ class Words(Scripts):
         script: Script = []
         for pulse in range(3):
             boxes = [(1.0, 2.0, 9.0, 30.0, 0.9)] * rng.randrange(3)
-            told = Found(camera="c1", boot=1, size=(WIDTH, HEIGHT), pulse=pulse, boxes=boxes)
+            told = FrameDetections(camera="c1", boot=1, size=(WIDTH, HEIGHT), pulse=pulse, boxes=boxes)
             message = Message(KEYS.camera("c1", "found"), msgspec.json.encode(told), b"")
             it = wrong(rng, message) if rng.random() < 0.7 else message
             script.append((it.key, it.payload, b""))
@@ -144,9 +144,9 @@ class Places(Scripts):
         """Give some words of the best view."""
         script: Script = []
         for pulse in range(3):
-            place = Pointed(pulse=pulse, track=1, x=9.0, y=9.0, reach=rng.random() + 0.1)
+            place = OperatorPoint(pulse=pulse, track=1, x=9.0, y=9.0, reach=rng.random() + 0.1)
             points = [place] * rng.randrange(3)
-            payload = msgspec.json.encode(Pointings(boot=1, points=points))
+            payload = msgspec.json.encode(OperatorPoints(boot=1, points=points))
             message = Message(KEYS.camera("c0", "pointing"), payload, b"")
             it = wrong(rng, message) if rng.random() < 0.7 else message
             script.append((it.key, it.payload, b""))
@@ -158,7 +158,7 @@ class Places(Scripts):
         for key, payload, _ in _script.decode(data):
             self.messages += 1
             heard.put(Message(key, payload, b""))
-            assert len(heard.take()) <= POINTS_MOST
+            assert len(heard.take()) <= OPERATOR_POINTS_MAX
         return not heard.bad_messages
 
 

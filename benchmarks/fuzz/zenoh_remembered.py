@@ -11,8 +11,8 @@ from benchmarks.fuzz.target import Scripts
 from benchmarks.fuzz.zenoh_wrong import wrong
 from server.messaging.epochs import end_of_epoch
 from server.messaging.inbox import Message
-from server.messaging.messages import UNREADABLE
-from server.messaging.retained_state import Known, Remembered
+from server.messaging.messages import DECODE_ERRORS
+from server.messaging.retained_state import IdentitySnapshot, PersonSnapshot
 from server.service.identity.people import People
 from server.service.identity.state_replication import Remembering
 from server.service.ingest.epoch_aligner import Epoch
@@ -35,7 +35,7 @@ class Memories(Scripts):
         script = []
         for _ in range(_SAID):
             camera = rng.choice(CAMERAS)
-            said = Remembered(
+            said = IdentitySnapshot(
                 pulse=rng.randrange(40),
                 boot=rng.randrange(1, 3),
                 next=rng.randrange(1, 9),
@@ -48,8 +48,8 @@ class Memories(Scripts):
         return msgspec.msgpack.encode((rng.randrange(1000), script))
 
     @staticmethod
-    def _somebody(rng: Random) -> Known:
-        return Known(
+    def _somebody(rng: Random) -> PersonSnapshot:
+        return PersonSnapshot(
             number=rng.randrange(1, 8),
             tracks=[rng.randrange(5) for _ in range(rng.randrange(3))],
             also=[rng.randrange(1, 8) for _ in range(rng.randrange(3))],
@@ -72,7 +72,7 @@ class Memories(Scripts):
             self.messages += 1
             try:
                 it.heard(Message(key, payload, b""))
-            except UNREADABLE:
+            except DECODE_ERRORS:
                 wrong += 1
         rng = Random(seed)
         for epoch in range(_EPOCHS):
@@ -85,5 +85,5 @@ class Memories(Scripts):
                 "a number that is another's is somebody's"
             )
         for payload in told:
-            msgspec.json.decode(payload, type=Remembered)
+            msgspec.json.decode(payload, type=IdentitySnapshot)
         return not wrong

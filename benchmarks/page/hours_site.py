@@ -15,7 +15,7 @@ from aiohttp import web
 
 from benchmarks.surroundings import ROOT
 from server.camera.encoding.encoder import Encoder
-from server.config.sections import Encode, Site
+from server.config.sections import EncodeSettings, SiteSettings
 from server.media.containers.fmp4 import init_segment, rebased, ticks
 from server.media.stream_format import Agreement
 from server.service.streaming.frame_buffer import Shelf
@@ -71,8 +71,8 @@ class FastSite:
         return app
 
     def _loop(self, seed: int) -> list[bytes]:
-        site, rng = Site(width=_WIDTH, height=_HEIGHT, fps=_FPS), np.random.default_rng(seed)
-        encoder, shelf = Encoder(site, Encode(gop=_GOP)), Shelf(_FPS, _LOOP, self._agreement)
+        site, rng = SiteSettings(width=_WIDTH, height=_HEIGHT, fps=_FPS), np.random.default_rng(seed)
+        encoder, shelf = Encoder(site, EncodeSettings(gop=_GOP)), Shelf(_FPS, _LOOP, self._agreement)
         small = rng.integers(0, 255, (_LOOP, _HEIGHT // 16, _WIDTH // 16, 3), dtype=np.uint8)
         for pulse, picture in enumerate(small.repeat(16, axis=1).repeat(16, axis=2)):
             unit = encoder.encode(pulse, picture)

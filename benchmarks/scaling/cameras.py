@@ -22,8 +22,8 @@ from server.camera.encoding.encoder import AccessUnit, Encoder
 from server.config.loader import load_config
 from server.config.site_config import Config
 from server.messaging.bus import Bus
-from server.messaging.messages import CameraTracks, FrameHead, Keys, ThumbHead
-from server.supervisor.shutdown import end_with_parent
+from server.messaging.messages import CameraTracks, FrameHeader, ThumbnailHeader, ZenohKeys
+from server.supervisor.shutdown import terminate_with_parent
 
 _THUMBS_EVERY = 5
 """Epochs."""
@@ -35,7 +35,7 @@ async def serve(config: Config, hall: Hall, cameras: range) -> None:
     """Publish until told to end."""
     boot = time.time_ns() // 1_000_000
     trackers = {camera: Tracker(hall, camera, boot) for camera in cameras}
-    keys, bus = Keys(config.site.name), Bus.client(config.zenoh)
+    keys, bus = ZenohKeys(config.site.name), Bus.client(config.zenoh)
     encoder = Encoder(config.site, config.encode)
     grey = np.full((HEIGHT, WIDTH, 3), 128, dtype=np.uint8)
     gop = [encoder.encode(frame, grey) for frame in range(config.encode.gop)]
@@ -64,29 +64,29 @@ async def serve(config: Config, hall: Hall, cameras: range) -> None:
 
 
 def _frames(
-    bus: Bus, keys: Keys, hall: Hall, cameras: range, pulse: int, gop: list[AccessUnit], boot: int
+    bus: Bus, keys: ZenohKeys, hall: Hall, cameras: range, pulse: int, gop: list[AccessUnit], boot: int
 ) -> None:
     unit = gop[pulse % len(gop)]
     now = time.time()
-    head = FrameHead(pulse=pulse, key=unit.key, boot=boot, due=now, taken=now, encoded=now)
+    head = FrameHeader(pulse=pulse, key=unit.key, boot=boot, due=now, taken=now, encoded=now)
     attachment = msgspec.json.encode(head)
     for camera in cameras:
         bus.publish(keys.camera(hall.ids[camera], "video"), unit.data, attachment)
 
 
-def _tracks(bus: Bus, keys: Keys, message: CameraTracks) -> None:
+def _tracks(bus: Bus, keys: ZenohKeys, message: CameraTracks) -> None:
     bus.publish(keys.camera(message.camera, "tracks"), msgspec.json.encode(message))
 
 
-def _thumbnails(bus: Bus, keys: Keys, message: CameraTracks) -> None:
+def _thumbnails(bus: Bus, keys: ZenohKeys, message: CameraTracks) -> None:
     for track in message.tracks:
-        head = ThumbHead(track=track.id, boot=message.boot, pulse=message.last)
+        head = ThumbnailHeader(track=track.id, boot=message.boot, pulse=message.last)
         bus.publish(keys.camera(message.camera, f"thumbs/{track.id}"), _THUMB, msgspec.json.encode(head))
 
 
 def main() -> None:
     """Read the command line and run."""
-    end_with_parent()
+    terminate_with_parent()
     path, per_camera, first, count = sys.argv[1], *map(int, sys.argv[2:])
     config = load_config(Path(path))
     hall = Hall(len(config.cameras), per_camera)

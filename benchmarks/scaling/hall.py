@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from server.messaging.messages import CameraTracks, Glimpse, Track
+from server.messaging.messages import AppearanceHistogram, CameraTracks, TrackMessage
 from tracking.boxes import Floats
 
 WIDTH, HEIGHT = 640, 360
@@ -145,7 +145,7 @@ class Tracker:
         final_to = max(first - 1, last - (WINDOW - STRIDE))
         view = self._hall.view(self._camera, places, epoch * self._hall.cameras + self._camera)
         tracks = [
-            Track(
+            TrackMessage(
                 id=self._number(person, epoch),
                 boxes=[None if np.isnan(box[0]) else tuple(box) for box in rows],
                 confidence=0.8,
@@ -167,11 +167,11 @@ class Tracker:
             solve=None,
         )
 
-    def _looks(self, person: int, first: int, final_to: int) -> list[Glimpse]:
+    def _looks(self, person: int, first: int, final_to: int) -> list[AppearanceHistogram]:
         if final_to < first:
             return []
         histogram = self._hall.histograms[person].round(5).tolist()
-        return [Glimpse(first=first, last=final_to, histogram=histogram)]
+        return [AppearanceHistogram(first=first, last=final_to, histogram=histogram)]
 
     def _number(self, person: int, epoch: int) -> int:
         if epoch - self._seen.get(person, -_LOST_EPOCHS - 1) > _LOST_EPOCHS:

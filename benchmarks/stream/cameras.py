@@ -19,17 +19,17 @@ from benchmarks.scaling.hall import STRIDE, WINDOW, Hall, Tracker
 from camsync import PulseClient
 from server.camera.encoding.encoder import AccessUnit, Encoder
 from server.config.loader import load_config
-from server.config.sections import Encode, Site
+from server.config.sections import EncodeSettings, SiteSettings
 from server.config.site_config import Config
 from server.messaging.bus import Bus
-from server.messaging.messages import FrameHead, Keys
-from server.supervisor.shutdown import end_with_parent
+from server.messaging.messages import FrameHeader, ZenohKeys
+from server.supervisor.shutdown import terminate_with_parent
 from synthetic import Scene
 
 CAMERAS = 4
-SITE = Site(name="stream", width=352, height=288, fps=25)
+SITE = SiteSettings(name="stream", width=352, height=288, fps=25)
 """CIF."""
-ENCODE = Encode()
+ENCODE = EncodeSettings()
 _START = 200
 """The scene's first frame: people are in sight."""
 
@@ -58,7 +58,7 @@ async def serve(config: Config, films: list[list[AccessUnit]], hall: Hall) -> No
     """Publish until told to end."""
     boot = time.time_ns() // 1_000_000
     trackers = [Tracker(hall, camera, boot) for camera in range(hall.cameras)]
-    keys, bus = Keys(config.site.name), Bus.client(config.zenoh)
+    keys, bus = ZenohKeys(config.site.name), Bus.client(config.zenoh)
     there = asyncio.Event()
     bus.watch_alive(keys.bestview("alive"), lambda _, alive: there.set() if alive else None)
     await there.wait()
@@ -71,7 +71,7 @@ async def serve(config: Config, films: list[list[AccessUnit]], hall: Hall) -> No
                 now = time.time()
                 for name, film in zip(hall.ids, films, strict=True):
                     unit = film[pulse.number % len(film)]
-                    head = FrameHead(
+                    head = FrameHeader(
                         pulse=pulse.number, key=unit.key, boot=boot, due=pulse.due, taken=now, encoded=now
                     )
                     bus.publish(keys.camera(name, "video"), unit.data, msgspec.json.encode(head))
@@ -87,7 +87,7 @@ async def serve(config: Config, films: list[list[AccessUnit]], hall: Hall) -> No
 
 def main() -> None:
     """Read the command line and run."""
-    end_with_parent()
+    terminate_with_parent()
     config = load_config(Path(sys.argv[1]))
     asyncio.run(serve(config, load(Path(sys.argv[2])), Hall(CAMERAS, int(sys.argv[3]))))
 

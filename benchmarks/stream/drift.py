@@ -11,11 +11,11 @@ import msgspec
 from benchmarks.scaling.hall import STRIDE, WINDOW, Hall, Tracker
 from benchmarks.stream.cameras import CAMERAS, ENCODE, SITE
 from server.camera.encoding.encoder import AccessUnit
-from server.config.sections import Camera
+from server.config.sections import CameraSettings
 from server.config.site_config import Config
 from server.media.containers.fmp4 import ticks
 from server.messaging.inbox import Message
-from server.messaging.messages import FrameHead, GopChoices, Keys
+from server.messaging.messages import FrameHeader, GopChoices, ZenohKeys
 from server.service.service import BestViewService
 from server.service.streaming.broadcaster import Piece
 from server.service.streaming.media_chunk import Footage
@@ -51,7 +51,7 @@ class Source:
 
     def __init__(self, service: BestViewService, films: Sequence[Sequence[AccessUnit]], hall: Hall) -> None:
         self._service, self._films, self._hall = service, films, hall
-        self._keys = Keys(service.config.site.name)
+        self._keys = ZenohKeys(service.config.site.name)
         self._trackers = [Tracker(hall, camera, _BOOT) for camera in range(CAMERAS)]
         for name in hall.ids:
             service.intake.alive(self._keys.camera(name, "alive"), there=True)
@@ -61,7 +61,7 @@ class Source:
         service = self._service
         for name, film in zip(self._hall.ids, self._films, strict=True):
             unit = film[number % len(film)]
-            head = FrameHead(pulse=number, key=unit.key, boot=_BOOT, due=0.0, taken=0.0, encoded=0.0)
+            head = FrameHeader(pulse=number, key=unit.key, boot=_BOOT, due=0.0, taken=0.0, encoded=0.0)
             service.intake.video(self._message(name, "video", unit.data, msgspec.json.encode(head)))
         service.pulse = number
         if (number + 1) % STRIDE:
@@ -80,7 +80,7 @@ async def drift(films: Sequence[Sequence[AccessUnit]], pulses: int) -> Drift:
     """Let so many pulses pass through the service, without a bus, and watch a camera as it is decided."""
     hall = Hall(CAMERAS, _PER_CAMERA)
     cameras = [
-        Camera(id=name, source=f"rtsp://{name}/", ground=ground.tolist())
+        CameraSettings(id=name, source=f"rtsp://{name}/", ground=ground.tolist())
         for name, ground in zip(hall.ids, hall.grounds, strict=True)
     ]
     service = BestViewService(Config(site=SITE, encode=ENCODE, cameras=cameras))

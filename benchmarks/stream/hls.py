@@ -14,7 +14,7 @@ from benchmarks.scaling.hall import Hall
 from benchmarks.stream.cameras import CAMERAS, ENCODE, SITE
 from benchmarks.stream.drift import Source
 from server.camera.encoding.encoder import AccessUnit
-from server.config.sections import Camera, Http
+from server.config.sections import CameraSettings, HttpSettings
 from server.config.site_config import Config
 from server.http.app import make_app, serving
 from server.messaging.messages import GopChoices
@@ -74,7 +74,7 @@ async def hls_delays(films: Sequence[Sequence[AccessUnit]], seconds: float) -> t
     """Serve a camera as late as a best view, in real time; give what is seen without parts, and with them."""
     hall = Hall(CAMERAS, _PER_CAMERA)
     cameras = [
-        Camera(id=name, source=f"rtsp://{name}/", ground=ground.tolist())
+        CameraSettings(id=name, source=f"rtsp://{name}/", ground=ground.tolist())
         for name, ground in zip(hall.ids, hall.grounds, strict=True)
     ]
     service = BestViewService(Config(site=SITE, encode=ENCODE, cameras=cameras))
@@ -96,7 +96,7 @@ async def hls_delays(films: Sequence[Sequence[AccessUnit]], seconds: float) -> t
 
     players = [_Player(clock, decided) for _ in range(2)]
     async with (
-        serving(make_app(service), Http(port=0)) as port,
+        serving(make_app(service), HttpSettings(port=0)) as port,
         aiohttp.ClientSession(f"http://127.0.0.1:{port}/cameras/{hall.ids[0]}/hls/") as session,
     ):
         going = asyncio.create_task(go_on())

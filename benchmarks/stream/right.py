@@ -13,13 +13,13 @@ import numpy as np
 
 from benchmarks.stream.splice import Cut
 from server.camera.encoding.encoder import AccessUnit, Encoder
-from server.config.sections import Camera, Encode, Site
+from server.config.sections import CameraSettings, EncodeSettings, SiteSettings
 from server.config.site_config import Config
 from server.service.streaming.broadcaster import Piece
 from server.service.streaming.media_chunk import Footage
 
-_SITE = Site(name="right", width=64, height=48, fps=25)
-_ENCODE = Encode()
+_SITE = SiteSettings(name="right", width=64, height=48, fps=25)
+_ENCODE = EncodeSettings()
 _CAMERAS = 4
 _BLOCK = 8
 """Pixels of one colour: large enough to be seen after encoding."""
@@ -45,7 +45,7 @@ class Right:
         return self.contained == ts == self.frames and not self.alike
 
 
-def films(frames: int, seed: int, encode: Encode = _ENCODE) -> list[list[AccessUnit]]:
+def films(frames: int, seed: int, encode: EncodeSettings = _ENCODE) -> list[list[AccessUnit]]:
     """Encode pictures of random colours for each camera, no two alike."""
     rng, made = np.random.default_rng(seed), []
     for _ in range(_CAMERAS):
@@ -70,7 +70,7 @@ def schedule(gops: int, cuts: int, seed: int) -> list[int]:
     return chosen
 
 
-async def judge(frames: int, cuts: int, *, seed: int = 0, encode: Encode = _ENCODE) -> Right:
+async def judge(frames: int, cuts: int, *, seed: int = 0, encode: EncodeSettings = _ENCODE) -> Right:
     """Splice so many frames, decode what a viewer is sent, and compare with each camera's own decode."""
     made = films(frames, seed, encode)
     chosen = schedule(frames // encode.gop, cuts, seed)
@@ -94,11 +94,11 @@ async def judge(frames: int, cuts: int, *, seed: int = 0, encode: Encode = _ENCO
 
 
 async def _watch(
-    made: Sequence[Sequence[AccessUnit]], chosen: Sequence[int], encode: Encode
+    made: Sequence[Sequence[AccessUnit]], chosen: Sequence[int], encode: EncodeSettings
 ) -> tuple[list[Piece], Cut]:
     """Give what one viewer of one object is sent, from the first GOP to the last."""
     names = [f"c{number}" for number in range(_CAMERAS)]
-    cameras = [Camera(id=name, source="rtsp://nowhere/") for name in names]
+    cameras = [CameraSettings(id=name, source="rtsp://nowhere/") for name in names]
     cut = Cut(made, Config(site=_SITE, encode=encode, cameras=cameras))
     pieces: list[Piece] = []
     viewer = None

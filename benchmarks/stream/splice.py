@@ -14,7 +14,7 @@ from av.codec.context import Flags
 
 from benchmarks.stream.cameras import CAMERAS, ENCODE, SITE
 from server.camera.encoding.encoder import AccessUnit, Encoder
-from server.config.sections import Camera
+from server.config.sections import CameraSettings
 from server.config.site_config import Config
 from server.media.codec import agreement_for
 from server.service.streaming.broadcaster import Piece
@@ -53,7 +53,7 @@ class Cut:
 
 def cif_config() -> Config:
     """Give the site of the films."""
-    cameras = [Camera(id=name, source="rtsp://nowhere/") for name in _NAMES]
+    cameras = [CameraSettings(id=name, source="rtsp://nowhere/") for name in _NAMES]
     return Config(site=SITE, encode=ENCODE, cameras=cameras)
 
 

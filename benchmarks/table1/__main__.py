@@ -30,7 +30,7 @@ from benchmarks.table1.measure import REAL_TIME, Measured, Row, measured, summed
 from benchmarks.table1.plot import plot
 from benchmarks.table1.words import WORDS, Words
 from benchmarks.yardsticks import View
-from server.cli.track.command import loaded_for, searched
+from server.cli.track.command import config_for_video, detect_frames
 from synthetic import Scene, write_recording
 from tracking.baselines import tracker_names
 from tracking.motchallenge import read_rows
@@ -63,7 +63,7 @@ def drawn(seconds: float) -> Iterator[View]:
 
 
 def _searched(name: str, video: Path, truth: Path, fps: float) -> View:
-    return View(name, list(searched(loaded_for(video, None, None))), read_rows(truth), fps)
+    return View(name, list(detect_frames(config_for_video(video, None, None))), read_rows(truth), fps)
 
 
 def _shortened(view: View, frames: int) -> View:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from server.camera.detector_setup import FittedDetections, Observer, make_detector
 from server.camera.sources import Recording, Source
-from server.config.sections import Camera
+from server.config.sections import CameraSettings
 from server.config.site_config import Config
-from server.media.letterbox import Fit
+from server.media.letterbox import Letterbox
 from tracking.detectors import BackgroundDetector
 
 
-def ready_detector(config: Config, camera: Camera, source: Source, fit: Fit) -> Observer:
+def ready_detector(config: Config, camera: CameraSettings, source: Source, fit: Letterbox) -> Observer:
     """Give a camera's detector, ready for the first frame where the source is a recording.
 
     A live camera's learns as it goes.

@@ -10,11 +10,11 @@ from typing import Protocol
 import numpy as np
 
 from bestview import camera_height, horizon
-from server.config.ground_unit import METRES
-from server.config.sections import Camera
+from server.config.ground_unit import UNITS_PER_METER
+from server.config.sections import CameraSettings
 from server.config.sections.detect import DetectSettings
 from server.config.site_config import Config
-from server.media.letterbox import Fit, Image
+from server.media.letterbox import Image, Letterbox
 from server.system.errors import UserError
 from tracking import Detections
 from tracking.detectors import (
@@ -47,7 +47,7 @@ class Observer(Detector, Protocol):
         ...
 
 
-def make_detector(config: Config, camera: Camera, fit: Fit) -> Observer:
+def make_detector(config: Config, camera: CameraSettings, fit: Letterbox) -> Observer:
     """Give the detector of a camera; its boxes are in the site's picture.
 
     Raises:
@@ -71,9 +71,9 @@ _LEAST_SLOPE, _MOST_SLOPE = 0.03, 1.5
 """A person's height over the camera's: cameras at 1.1 to 57 metres. Beyond these the unit is another."""
 
 
-def _floor(config: Config, camera: Camera, fit: Fit) -> Floor | None:
+def _floor(config: Config, camera: CameraSettings, fit: Letterbox) -> Floor | None:
     """Give what the ground says about people's heights in the site's picture; None: nothing."""
-    per_metre = METRES.get(camera.ground_unit or "")
+    per_metre = UNITS_PER_METER.get(camera.ground_unit or "")
     if camera.ground is None:
         return None
     homography = np.array(camera.ground, dtype=np.float64)
@@ -128,7 +128,7 @@ class FittedDetections:
 
     blind = False
 
-    def __init__(self, file: MotFileDetector, fit: Fit, settings: DetectSettings) -> None:
+    def __init__(self, file: MotFileDetector, fit: Letterbox, settings: DetectSettings) -> None:
         self._file, self._fit = file, fit
         self._looks = Looks(settings.looks, settings.bins)
         self._counted: Callable[[int], int] = int

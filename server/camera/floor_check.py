@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from bestview import shows_floor
-from server.config.sections import Camera
+from server.config.sections import CameraSettings
 from server.system.errors import UserError
 
 
-def check_floor(camera: Camera, size: tuple[int, int]) -> None:
+def check_floor(camera: CameraSettings, size: tuple[int, int]) -> None:
     """Refuse a homography by which nothing of the camera's own picture (width, height) is floor.
 
     Raises:

@@ -9,13 +9,13 @@ import msgspec
 
 from camsync import Spell
 from server.messaging.inbox import Message
-from server.messaging.messages import UNREADABLE
-from server.messaging.operator_messages import POINTS_MOST, Pointings
+from server.messaging.messages import DECODE_ERRORS
+from server.messaging.operator_messages import OPERATOR_POINTS_MAX, OperatorPoints
 from tracking.interactive import Pointing
 
 log = logging.getLogger(__name__)
 
-_DECODER = msgspec.json.Decoder(Pointings)
+_DECODER = msgspec.json.Decoder(OperatorPoints)
 
 
 class Pointed:
@@ -23,7 +23,7 @@ class Pointed:
 
     def __init__(self, camera: str, boot: int) -> None:
         self._camera, self._boot = camera, boot
-        self._waiting: deque[Pointing] = deque(maxlen=POINTS_MOST)
+        self._waiting: deque[Pointing] = deque(maxlen=OPERATOR_POINTS_MAX)
         self.taken = 0
         """Places that the tracker was given."""
         self.bad_messages = 0
@@ -33,7 +33,7 @@ class Pointed:
         """Take a message in; what is said of another run's tracks is of nobody here."""
         try:
             said = _DECODER.decode(message.payload)
-        except UNREADABLE as error:
+        except DECODE_ERRORS as error:
             self.bad_messages += 1
             if (more := self._bad.happened(str(error))) is not None:
                 told = "camera %s: a message on %s is none: %s%s"

@@ -20,9 +20,9 @@ from server.camera.sources import Image, Source, open_source
 from server.camera.track_messages import Reporter
 from server.camera.tracker_setup import ready_tracker
 from server.config.site_config import Config
-from server.media.letterbox import Fit
-from server.messaging.messages import CameraTracks, Found
-from server.messaging.operator_messages import POINTS_MOST
+from server.media.letterbox import Letterbox
+from server.messaging.messages import CameraTracks, FrameDetections
+from server.messaging.operator_messages import OPERATOR_POINTS_MAX
 from tracking import Detections, create_solver
 from tracking.interactive import Pointing
 
@@ -48,7 +48,7 @@ class Searched:
     image: Image | None
     detections: Detections
     looked: bool
-    word: Found | None
+    word: FrameDetections | None
     left_out: bool = False
 
     @property
@@ -88,7 +88,7 @@ class CameraPipeline:
         self.why_encoded = own.why
         """Why it is not, where it could have been; empty: nobody wished it."""
         self.source: Source = own.source or open_source(camera, site, listener, ready=ready)
-        self._fit = Fit(self.source.size, (site.width, site.height))
+        self._fit = Letterbox(self.source.size, (site.width, site.height))
         check_floor(camera, self.source.size)
         self._encoder = Passing(own.source) if own.source else Encoder(site, config.encode)
         self._detector = (
@@ -115,7 +115,7 @@ class CameraPipeline:
         self.begins = camera.offset if self.source.recorded else 0
         """The pulse at which the pictures begin."""
         self._last: int | None = None
-        self._pointings: deque[Pointing] = deque(maxlen=POINTS_MOST)
+        self._pointings: deque[Pointing] = deque(maxlen=OPERATOR_POINTS_MAX)
         self._without = 0
         """Pulses since the last picture."""
         self._patience = round(_WAITS_S * site.fps) + config.encode.gop
@@ -198,7 +198,7 @@ class CameraPipeline:
             result = result if anew is None else mended(result, anew)
         return self._measured(self._reporter.regular(result), searched.image)
 
-    def last_word(self, end: int) -> Found | None:
+    def last_word(self, end: int) -> FrameDetections | None:
         """Give what the other cameras are told when the recording has no frame ``end``."""
         return None if self.witness is None else self.witness.word(end, None, ended=True)
 

@@ -28,15 +28,15 @@ from server.config.pulse_passwords import pulse_login
 from server.config.site_config import Config
 from server.messaging.bus import Bus
 from server.messaging.messages import (
+    AudioHeader,
+    CameraState,
     CameraStatus,
     CameraTracks,
-    CameraWord,
-    FrameHead,
-    Keys,
-    SoundHead,
-    ThumbHead,
+    FrameHeader,
+    ThumbnailHeader,
+    ZenohKeys,
 )
-from server.system.address_redaction import shown_endpoint
+from server.system.address_redaction import redact_endpoint
 
 log = logging.getLogger(__name__)
 
@@ -78,7 +78,7 @@ class CameraProcess:
         self._login = pulse_login(config, camera_id)
         self._boot = time.time_ns() // 1_000_000
         self._clock = steady_unix_clock()  # of pulses and all that is measured from them
-        self._keys = Keys(config.site.name)
+        self._keys = ZenohKeys(config.site.name)
         self._sound = open_sound(config, camera_id)
         listener = self._sound if isinstance(self._sound, LiveSound) else None
         self._pipeline = CameraPipeline(config, camera_id, self._boot, listener)
@@ -99,7 +99,7 @@ class CameraProcess:
         self._exchange = Exchange(config, camera_id, self._pipeline.witness, self._backlog.maxsize)
         self._pointed = Pointed(camera_id, self._boot)
         self._meter = Meter(fps)
-        self._state: CameraWord = "starting"
+        self._state: CameraState = "starting"
         self._end = 0
         """The first pulse that the recording has no frame for, once it is over."""
         self._bus: Bus | None = None
@@ -157,7 +157,7 @@ class CameraProcess:
             log.warning(
                 "camera %s: no best-view service at %s yet",
                 self._id,
-                shown_endpoint(self._config.zenoh.connect),
+                redact_endpoint(self._config.zenoh.connect),
             )
 
     async def _follow_pulses(self) -> None:
@@ -203,7 +203,7 @@ class CameraProcess:
         self._state = "live"
         taken = self._clock()
         unit = await self._in(self._video, lambda: self._pipeline.encode(pulse.number, image))
-        head = FrameHead(
+        head = FrameHeader(
             pulse=pulse.number,
             key=unit.key,
             boot=self._boot,
@@ -222,7 +222,7 @@ class CameraProcess:
         if sound is None:
             return
         for run in runs(await self._in(self._video, lambda: sound.at(pulse))):
-            head = SoundHead(first=run[0].number, sizes=[len(frame.data) for frame in run])
+            head = AudioHeader(first=run[0].number, sizes=[len(frame.data) for frame in run])
             if self._bus is not None:
                 data = b"".join(frame.data for frame in run)
                 self._bus.publish(self._keys.sound, data, msgspec.json.encode(head))
@@ -276,7 +276,7 @@ class CameraProcess:
     async def _send_thumbnails(self, image: Image, tracks: CameraTracks) -> None:
         pictures = await self._in(self._tracking, lambda: thumbnails(image, tracks))
         for track, jpeg in pictures.items():
-            head = ThumbHead(track=track, boot=self._boot, pulse=tracks.last)
+            head = ThumbnailHeader(track=track, boot=self._boot, pulse=tracks.last)
             self._publish(f"thumbs/{track}", jpeg, msgspec.json.encode(head))
 
     async def _tell_status(self) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from server.messaging.inbox import Message
-from server.messaging.retained_state import REMEMBERED_MOST
+from server.messaging.retained_state import SNAPSHOT_BYTES_MAX
 
 
 class Keeping:
@@ -20,7 +20,7 @@ class Keeping:
 
     def put(self, message: Message) -> None:
         """Take a word in the place of the one before; one that is too long is not kept."""
-        if len(message.payload) <= REMEMBERED_MOST:
+        if len(message.payload) <= SNAPSHOT_BYTES_MAX:
             self._kept = message.payload
 
     def service(self, there: bool) -> None:

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 import tracking
 from server.messaging.epochs import closing_epoch, epoch_of_window
-from server.messaging.messages import Box, CameraTracks, Glimpse, Solve, Track
-from server.messaging.number_types import FARTHEST
-from server.messaging.operator_messages import TROUBLES_MOST, Trouble
+from server.messaging.messages import AppearanceHistogram, Box, CameraTracks, SolverReport, TrackMessage
+from server.messaging.number_types import COORDINATE_MAX
+from server.messaging.operator_messages import RISK_EVENTS_MAX, RiskEvent
 from tracking import SolveReport, WindowResult, WindowTrack, types
 
 _LOOK_DIGITS = 5
@@ -79,7 +79,7 @@ class Reporter:
             alone=_taken(self._alone),
             tracks=[_track(track) for track in result.tracks],
             solve=_solve(result.report),
-            troubles=[_trouble(it) for it in result.troubles[:TROUBLES_MOST]],
+            troubles=[_trouble(it) for it in result.troubles[:RISK_EVENTS_MAX]],
             mended_from=result.revised_from,
         )
 
@@ -91,9 +91,9 @@ def _taken(noted: list[int]) -> list[int]:
     return taken
 
 
-def _track(track: WindowTrack) -> Track:
+def _track(track: WindowTrack) -> TrackMessage:
     # With short moments of hiding filled in: they are no reason to show somebody from elsewhere.
-    return Track(
+    return TrackMessage(
         id=track.id,
         boxes=[_box(row) for row in track.interpolated],
         confidence=float(track.confidence),
@@ -101,8 +101,8 @@ def _track(track: WindowTrack) -> Track:
     )
 
 
-def _trouble(trouble: types.RiskEvent) -> Trouble:
-    return Trouble(
+def _trouble(trouble: types.RiskEvent) -> RiskEvent:
+    return RiskEvent(
         reason=trouble.reason,
         tracks=list(trouble.objects),
         pulse=max(trouble.frame, 0),
@@ -111,20 +111,20 @@ def _trouble(trouble: types.RiskEvent) -> Trouble:
     )
 
 
-def _glimpse(look: tracking.AppearanceSample) -> Glimpse:
+def _glimpse(look: tracking.AppearanceSample) -> AppearanceHistogram:
     shares = [round(float(share), _LOOK_DIGITS) for share in look.histogram]
-    return Glimpse(first=look.first, last=look.last, histogram=shares)
+    return AppearanceHistogram(first=look.first, last=look.last, histogram=shares)
 
 
 def _box(row: NDArray[np.float64]) -> Box | None:
-    left, top, right, bottom = (float(side) for side in np.clip(row, -FARTHEST, FARTHEST))
+    left, top, right, bottom = (float(side) for side in np.clip(row, -COORDINATE_MAX, COORDINATE_MAX))
     return None if np.isnan(left) else (left, top, right, bottom)
 
 
-def _solve(report: SolveReport | None) -> Solve | None:
+def _solve(report: SolveReport | None) -> SolverReport | None:
     if report is None:
         return None
-    return Solve(
+    return SolverReport(
         objective=report.objective,
         bound=report.bound,
         gap=report.gap,

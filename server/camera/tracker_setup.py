@@ -9,10 +9,10 @@ import numpy as np
 
 from bestview import to_ground
 from server.camera.sources import Source
-from server.config.ground_unit import METRES
-from server.config.sections import Camera
+from server.config.ground_unit import UNITS_PER_METER
+from server.config.sections import CameraSettings
 from server.config.site_config import Config
-from server.media.letterbox import Fit
+from server.media.letterbox import Letterbox
 from tracking import Solver
 from tracking.baselines import Preparing, Tracker, tracker_named
 from tracking.baselines.temporal_consistency import TemporalSettings
@@ -21,10 +21,10 @@ from tracking.baselines.temporal_consistency import TemporalSettings
 def ready_tracker(
     config: Config,
     name: str,
-    camera: Camera,
+    camera: CameraSettings,
     source: Source | None,
     solver: Callable[[], Solver],
-    fit: Fit | None = None,
+    fit: Letterbox | None = None,
     *,
     ready: bool = True,
 ) -> Tracker:
@@ -34,7 +34,7 @@ def ready_tracker(
     ahead.
     """
     track = config.track
-    seen = fit or (None if source is None else Fit(source.size, source.size))
+    seen = fit or (None if source is None else Letterbox(source.size, source.size))
     settings = track.temporal if seen is None else _measured(track.temporal, camera, seen)
     tracker = tracker_named(
         name, track.window, track.costs, solver, settings, config.site.fps, assist=track.assist
@@ -45,9 +45,9 @@ def ready_tracker(
     return tracker
 
 
-def _measured(settings: TemporalSettings, camera: Camera, fit: Fit) -> TemporalSettings:
+def _measured(settings: TemporalSettings, camera: CameraSettings, fit: Letterbox) -> TemporalSettings:
     """Take how much floor a picture is wide, black columns and all, from the ground where it is in metres."""
-    per_metre = METRES.get(camera.ground_unit or "")
+    per_metre = UNITS_PER_METER.get(camera.ground_unit or "")
     if camera.ground is None or per_metre is None:
         return settings
     width, height = fit.size

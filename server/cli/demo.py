@@ -15,7 +15,7 @@ import typer
 from server.cli.generated_config import demo_config, free_port
 from server.supervisor.startup_checks import check_port_free
 from server.supervisor.supervisor import Supervisor
-from server.system.processors import processors
+from server.system.processors import available_processors
 
 log = logging.getLogger(__name__)
 
@@ -28,7 +28,7 @@ _FIRST_BYTES = 4096
 """More than the head of a stream: with so many bytes the first picture has come."""
 
 
-def rate_for(there: float) -> float:
+def demo_fps(there: float) -> float:
     """Give the frames a second that so many processors can do."""
     return next(rate for least, rate in _RATES.items() if there >= least)
 
@@ -44,9 +44,9 @@ async def run_demo(
     if port is not None:
         check_port_free("127.0.0.1", port, "--port")
     chosen = port or free_port(_PORT if port is None else 0)
-    there = processors()
+    there = available_processors()
     with tempfile.TemporaryDirectory(prefix="myview-demo-") as folder:
-        path, config = demo_config(Path(folder), chosen, fps or rate_for(there))
+        path, config = demo_config(Path(folder), chosen, fps or demo_fps(there))
         typer.echo(_rate_line(config.site.fps, there))
         supervisor = asyncio.create_task(Supervisor(path, config, {}, None).run())
         invite = asyncio.create_task(_invite(f"http://127.0.0.1:{chosen}/", open_browser=open_browser))
@@ -62,7 +62,7 @@ async def run_demo(
 
 def _rate_line(fps: float, there: float) -> str:
     line = f"Three cameras at {fps:g} frames a second"
-    if fps != rate_for(there):
+    if fps != demo_fps(there):
         return line
     have = f"{there:.3g} processor{'s' if there > 1 else ''}"
     return f"{line}, which {have} can do (MYVIEW_SITE__FPS takes another rate)"

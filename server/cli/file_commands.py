@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from server.system.atomic_write import whole_folder
+from server.system.atomic_write import atomic_folder
 from server.system.errors import UserError
 
 SEVERAL = {"render": ("--det",), "evaluate": ("--gt", "--tracks", "--videos")}
@@ -46,7 +46,7 @@ def render(
         ground=ground,
         detections=det or [],
     )
-    with whole_folder(out) as folder, bar("frames") as progress:
+    with atomic_folder(out) as folder, bar("frames") as progress:
         task = progress.add_task("rendering", total=total_frames(videos, loaded.site.fps))
         numbers = render_views(loaded, folder, lambda done: progress.update(task, completed=done))
     who = ", ".join(map(str, numbers)) if numbers else "nobody"
@@ -138,12 +138,12 @@ def evaluate(
     ] = None,
 ) -> None:
     """Score tracks (HOTA, MOTA, IDF1, identity switches) and choices of views against ground truth."""
-    from server.cli.evaluate.command import Asked
+    from server.cli.evaluate.command import EvaluateOptions
     from server.cli.evaluate.command import evaluate as score
     from server.cli.evaluate.site_facts import SiteOptions
 
     site = SiteOptions(size, fps, switch_cost)
-    score(Asked(truth, tracks or [], views, videos or [], site, iou, visible, json_file, plots))
+    score(EvaluateOptions(truth, tracks or [], views, videos or [], site, iou, visible, json_file, plots))
 
 
 def scene(

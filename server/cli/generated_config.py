@@ -10,11 +10,11 @@ from typing import Any
 
 import yaml
 
-from server.cli.render.video_info import look_at
+from server.cli.render.video_info import read_video_info
 from server.config.loader import build_config
 from server.config.site_config import Config
-from server.config.source_address import SourceKind, kind_of
-from server.system.address_redaction import shown
+from server.config.source_address import SourceKind, source_kind
+from server.system.address_redaction import redact_address
 from server.system.errors import UserError
 
 _NAME_CHARACTERS = 32
@@ -78,10 +78,10 @@ def camera_name(video: Path) -> str:
 
 
 def _check_recorded(video: Path) -> None:
-    if kind_of(str(video)) not in {SourceKind.FILE, SourceKind.FOLDER}:
-        raise UserError(f"{shown(str(video))}: is not a recorded video or a folder of images")
+    if source_kind(str(video)) not in {SourceKind.FILE, SourceKind.FOLDER}:
+        raise UserError(f"{redact_address(str(video))}: is not a recorded video or a folder of images")
     if not video.exists():
-        raise UserError(f"{shown(str(video))}: no such file or folder")
+        raise UserError(f"{redact_address(str(video))}: no such file or folder")
 
 
 def _cameras_of(content: Mapping[str, Any], where: str) -> list[dict[str, Any]]:
@@ -93,9 +93,11 @@ def _cameras_of(content: Mapping[str, Any], where: str) -> list[dict[str, Any]]:
 
 def _site_like(videos: Sequence[Path]) -> dict[str, Any]:
     """Take rate and size from views; a size that H.264 cannot store is rounded down by a pixel."""
-    first = look_at(videos[0])
+    first = read_video_info(videos[0])
     width, height = first.size
-    rates = (first.fps, *(look_at(it).fps for it in videos[1:])) if first.fps is None else (first.fps,)
+    rates = (
+        (first.fps, *(read_video_info(it).fps for it in videos[1:])) if first.fps is None else (first.fps,)
+    )
     rate = next((fps for fps in rates if fps is not None), None)
     said = {} if rate is None else {"fps": rate}
     return {**said, "width": width - width % 2, "height": height - height % 2}

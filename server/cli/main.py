@@ -16,9 +16,9 @@ import typer
 from server.cli import file_commands, operation_commands, site_commands, token_commands, viewer_commands
 from server.cli.calibrate.command import calibrate
 from server.cli.repeated_options import one_value_per_flag
-from server.supervisor.shutdown import SUPERVISED, end_with_parent
-from server.system.address_redaction import shown
-from server.system.descriptors import raise_limit
+from server.supervisor.shutdown import SUPERVISED_VARIABLE, terminate_with_parent
+from server.system.address_redaction import redact_address
+from server.system.descriptors import raise_descriptor_limit
 from server.system.errors import UserError
 from server.system.log_setup import say_failure
 
@@ -90,9 +90,9 @@ def main() -> None:
     """Run the command line; no traceback for bad input."""
     # All memory goes with the process: to look for cycles in a thousand modules first takes half a second.
     atexit.register(gc.freeze)
-    raise_limit()
-    if os.environ.get(SUPERVISED):
-        end_with_parent()
+    raise_descriptor_limit()
+    if os.environ.get(SUPERVISED_VARIABLE):
+        terminate_with_parent()
     # So that what is half-written is tidied away; what runs until it is told to end writes nothing before it
     # has its own handler, and until then ends at once.
     if signal.getsignal(signal.SIGINT) == signal.SIG_DFL:
@@ -119,7 +119,7 @@ def _fail(error: Exception) -> None:
         sys.exit(0)
     if isinstance(error, OSError) and error.filename is not None and error.errno in _NO_WAY:
         # Of a path that leads nowhere, wherever it is first looked into.
-        say_failure(f"{shown(str(error.filename))}: {error.strerror}")
+        say_failure(f"{redact_address(str(error.filename))}: {error.strerror}")
         sys.exit(_BAD_INPUT)
     raise error
 

@@ -12,7 +12,7 @@ from typing import Annotated
 
 import typer
 
-from server.supervisor.shutdown import run_until_told
+from server.supervisor.shutdown import run_until_signal
 
 
 def doctor(
@@ -49,4 +49,4 @@ def status(
         if not asyncio.run(status_once(url, token, as_json=as_json)):
             raise typer.Exit(1)
     else:
-        asyncio.run(run_until_told(lambda: status_live(url, token, as_json=as_json)))
+        asyncio.run(run_until_signal(lambda: status_live(url, token, as_json=as_json)))

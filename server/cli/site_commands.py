@@ -18,7 +18,7 @@ from server.system.errors import UserError
 from server.system.log_setup import log_to_stderr
 
 if TYPE_CHECKING:
-    from server.config.running_config import Running
+    from server.config.running_config import ActiveConfig
 
 ConfigPath = Annotated[Path, typer.Argument(metavar="CONFIG", help="The site's configuration, a YAML file.")]
 _UP_LETS_GO_S = 1.9
@@ -28,17 +28,17 @@ LogFolder = Annotated[
 ]
 
 
-def _read(config: Path) -> Running:
+def _read(config: Path) -> ActiveConfig:
     """Read the configuration that a process runs by, which may be asked for again from then on.
 
     Raises:
         UserError: it cannot be read, or something in it is wrong.
     """
-    from server.config.running_config import Running
-    from server.supervisor.sighup import mind_hang_ups
+    from server.config.running_config import ActiveConfig
+    from server.supervisor.sighup import record_early_sighups
 
-    mind_hang_ups()
-    return Running(config)
+    record_early_sighups()
+    return ActiveConfig(config)
 
 
 def sync(config: ConfigPath) -> None:
@@ -55,7 +55,7 @@ def camera(
 ) -> None:
     """Run one camera: take, encode, track, publish: one process of a site."""
     from server.supervisor.camera_process import camera_process
-    from server.system.niceness import be_nicer
+    from server.system.niceness import lower_own_priority
 
     log_to_stderr(camera_id)
     running = _read(config)
@@ -65,7 +65,7 @@ def camera(
         )
 
     def run() -> Coroutine[Any, Any, None]:
-        be_nicer(running.now.site.niceness)  # a supervisor has seen to that before
+        lower_own_priority(running.now.site.niceness)  # a supervisor has seen to that before
         return camera_process(running, camera_id)
 
     run_process(run)
@@ -90,7 +90,7 @@ def up(
     out: LogFolder = None,
 ) -> None:
     """Run a whole site on this machine: every process, watched and restarted."""
-    from server.supervisor.site import check_exposed, run_up
+    from server.supervisor.site import check_exposure, run_up
     from server.supervisor.startup_checks import check_ports, check_recordings
 
     log_to_stderr("up")
@@ -99,7 +99,7 @@ def up(
     running = _read(config)
     if out is not None:
         check_new_folder(out)
-    check_exposed(running.now)
+    check_exposure(running.now)
     check_ports(running.now)
     check_recordings(running.now)
     run_process(lambda: run_up(running, environment, out), let_go_s=_UP_LETS_GO_S)

@@ -25,10 +25,10 @@ def token(
     import yaml
     from pydantic import ValidationError
 
-    from server.config.tokens_file import Token, digest_of
+    from server.config.tokens_file import Token, token_digest
 
     given = secrets.token_urlsafe(_BYTES)
-    line = {"name": name, "sha256": digest_of(given), "role": "operate" if operate else "watch"}
+    line = {"name": name, "sha256": token_digest(given), "role": "operate" if operate else "watch"}
     limits = {"object": number, "camera": camera}
     made = datetime.now(UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
     content = {**line, **{key: it for key, it in limits.items() if it is not None}, "made": made}

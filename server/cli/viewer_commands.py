@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from server.supervisor.shutdown import run_until_told
+from server.supervisor.shutdown import run_until_signal
 
 
 def watch(
@@ -38,4 +38,4 @@ def watch(
     """List who is there, or watch or record somebody's best view."""
     from server.cli.watch import run_watch
 
-    asyncio.run(run_until_told(lambda: run_watch(url, number, out, seconds, start, end, token)))
+    asyncio.run(run_until_signal(lambda: run_watch(url, number, out, seconds, start, end, token)))

@@ -13,7 +13,7 @@ from rich.table import Table
 from client import AwayError as ServerAway
 from client import ClientError, HttpSettings, Progress, objects, watch
 from server.system.atomic_write import check_new_file
-from server.system.errors import AwayError, UserError
+from server.system.errors import UnavailableError, UserError
 
 _TELL_EVERY_S = 1.0
 
@@ -30,7 +30,7 @@ async def run_watch(
     """List who is there, or follow somebody.
 
     Raises:
-        AwayError: the server cannot be reached.
+        UnavailableError: the server cannot be reached.
         UserError: it does not know them, or the file cannot be written.
     """
     if number is None and (out or seconds is not None or start or end):
@@ -44,7 +44,7 @@ async def run_watch(
             return
         watched = await watch(url, number, out, seconds, _Teller(), start=start, end=end, settings=settings)
     except ServerAway as error:
-        raise AwayError(f"watch: {error}") from error
+        raise UnavailableError(f"watch: {error}") from error
     except (ClientError, ValueError) as error:
         raise UserError(f"watch: {error}") from error
     except OSError as error:
@@ -53,7 +53,7 @@ async def run_watch(
     where = f" in {out}" if out else ""
     typer.echo(f"object {number}: {watched.seconds:.1f} s, {watched.cuts} cuts{where}")
     if not watched.complete:
-        raise AwayError("watch: the server went away before the end")
+        raise UnavailableError("watch: the server went away before the end")
 
 
 def _file_at(out: Path | None) -> int | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from urllib.parse import quote
 
-from server.config.sections import Camera
+from server.config.sections import CameraSettings
 from server.config.site_config import Config
 from server.system.errors import UserError
 
@@ -12,7 +12,7 @@ PLACE = "{password}"
 """Where the password goes in an address."""
 
 
-def with_password(config: Config, camera_id: str) -> Config:
+def fill_in_password(config: Config, camera_id: str) -> Config:
     """Fill in one camera's password; only that camera's process needs the file.
 
     Raises:
@@ -26,7 +26,7 @@ def with_password(config: Config, camera_id: str) -> Config:
     return config.model_copy(update={"cameras": cameras})
 
 
-def _quoted(camera: Camera) -> str:
+def _quoted(camera: CameraSettings) -> str:
     """Read the password, written as it may stand in an address."""
     assert camera.password is not None  # noqa: S101 — it was asked for
     where = f"cameras.{camera.id}.password: the file"  # not by its name: some write the password there

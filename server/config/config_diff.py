@@ -14,7 +14,7 @@ _RESOLVED = "ground"
 """The file of all homographies: what is in it has become each camera's own."""
 
 
-def differing(one: Config, other: Config) -> tuple[str, ...]:
+def changed_keys(one: Config, other: Config) -> tuple[str, ...]:
     """Name the settings that are not the same, in the order of the reference.
 
     They are named as ``view.switch_cost_s`` and ``cameras.c0.source``; ``cameras`` alone says that there are

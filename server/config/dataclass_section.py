@@ -10,7 +10,7 @@ from typing import Any, get_type_hints
 from pydantic import BeforeValidator
 from pydantic_core import PydanticCustomError
 
-from server.config.values import shortened
+from server.config.values import abbreviate
 
 
 def validated(settings: type) -> BeforeValidator:
@@ -40,7 +40,7 @@ def _check(settings: type, value: Any, place: str) -> None:
             raise PydanticCustomError(
                 "unknown_key",
                 "{place}unknown key '{key}'; {hint}",
-                {"place": place, "key": shortened(str(key)), "hint": hint},
+                {"place": place, "key": abbreviate(str(key)), "hint": hint},
             )
         if dataclasses.is_dataclass(types[key]):
             _check(types[key], inner, f"{place}{key}: ")

@@ -12,8 +12,8 @@ from typing import Any
 
 import yaml
 
-from server.config.values import shortened
-from server.system.address_redaction import shown
+from server.config.values import abbreviate
+from server.system.address_redaction import redact_address
 
 _NO_VALUES = frozenset({"tag:yaml.org,2002:merge", "tag:yaml.org,2002:value"})
 """Keys ``<<`` and ``=``, which stand for nothing but themselves."""
@@ -27,8 +27,8 @@ class DuplicateKeyError(ValueError):
     def __init__(self, key: str, first: int, second: int) -> None:
         lines = f"lines {first} and {second}" if first != second else f"line {first}"
         super().__init__(
-            f"{shortened(shown(key))!a} is there twice, in {lines}, and only the last would count: keep one, "
-            "with all that belongs to it"
+            f"{abbreviate(redact_address(key))!a} occurs twice, in {lines}; only the last one would "
+            "count: keep one, with everything that belongs to it"
         )
 
 

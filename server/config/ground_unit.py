@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 
-METRES = {"m": 1.0, "cm": 100.0, "mm": 1000.0}
+UNITS_PER_METER = {"m": 1.0, "cm": 100.0, "mm": 1000.0}
 """So many of each are a metre."""
 _MEANT = {
     "m": ("meter", "meters", "metre", "metres"),
@@ -17,7 +17,7 @@ _CLOSE = 0.8
 """How like one of these a word is that was meant for it (difflib's ratio)."""
 
 
-def checked_unit(unit: object) -> str:
+def check_unit(unit: object) -> str:
     """Give the unit back; any word will do, but not one that was meant for metres and is not taken for them.
 
     Raises:
@@ -25,12 +25,12 @@ def checked_unit(unit: object) -> str:
     """
     if not isinstance(unit, str) or not unit.strip() or not unit.isprintable():
         raise ValueError(f'{repr(unit)[:_SHOWN]} is no unit; it is a word, such as "m"')
-    if unit in METRES:
+    if unit in UNITS_PER_METER:
         return unit
     word = unit.strip(" .").lower()
     names = {name: short for short, names in _MEANT.items() for name in names}
     close = difflib.get_close_matches(word, names, n=1, cutoff=_CLOSE)
-    meant = word if word in METRES else names[close[0]] if close else None
+    meant = word if word in UNITS_PER_METER else names[close[0]] if close else None
     if meant is not None:
         raise ValueError(f"{unit!r} is not understood; did you mean {meant!r}?")
     return unit

@@ -17,11 +17,11 @@ from pydantic_settings import SettingsError
 from bestview import checked_homography, turns
 from server.config.duplicate_keys import DuplicateKeyError, parse_json
 from server.config.environment import check_environment
-from server.config.ground_unit import checked_unit
-from server.config.sections import Camera, View, Zenoh, ZenohTls
+from server.config.ground_unit import check_unit
+from server.config.sections import CameraSettings, ViewSettings, ZenohSettings, ZenohTlsSettings
 from server.config.site_config import Config
-from server.config.source_address import resolved
-from server.config.values import check_camera_name, check_numbers, check_values, shortened
+from server.config.source_address import resolve_source
+from server.config.values import abbreviate, check_camera_name, check_numbers, check_values
 from server.config.yaml_file import read_yaml
 from server.system.errors import UserError
 
@@ -62,10 +62,10 @@ def build_config(content: Mapping[str, Any], *, where: str, folder: Path) -> Con
     except SettingsError as error:
         raise UserError(f"{where}: environment: {error}; a list, or a whole section, must be JSON") from error
     check_numbers(config.model_dump(), where)
-    return with_files(config, where=where, folder=folder)
+    return resolve_paths(config, where=where, folder=folder)
 
 
-def with_files(config: Config, *, where: str, folder: Path) -> Config:
+def resolve_paths(config: Config, *, where: str, folder: Path) -> Config:
     """Read the ground that a configuration names, and resolve all its paths.
 
     Raises:
@@ -81,7 +81,7 @@ def with_files(config: Config, *, where: str, folder: Path) -> Config:
     detect = replace(config.detect, onnx=onnx)
     sound = config.sound
     if sound.source is not None and sound.source not in config.camera_ids:
-        sound = sound.model_copy(update={"source": resolved(sound.source, folder)})
+        sound = sound.model_copy(update={"source": resolve_source(sound.source, folder)})
     record = config.record
     if record.folder is not None:
         record = record.model_copy(update={"folder": folder / record.folder})
@@ -105,9 +105,11 @@ def _who_may(config: Config, folder: Path) -> dict[str, Any]:
     }
 
 
-def _bus_files(zenoh: Zenoh, folder: Path) -> Zenoh:
-    named = {name: getattr(zenoh.tls, name) for name in ZenohTls.model_fields}
-    tls = ZenohTls(**{name: None if it is None else (folder / it).absolute() for name, it in named.items()})
+def _bus_files(zenoh: ZenohSettings, folder: Path) -> ZenohSettings:
+    named = {name: getattr(zenoh.tls, name) for name in ZenohTlsSettings.model_fields}
+    tls = ZenohTlsSettings(
+        **{name: None if it is None else (folder / it).absolute() for name, it in named.items()}
+    )
     return zenoh.model_copy(update={"tls": tls, "users": _users(zenoh.users, folder)})
 
 
@@ -115,7 +117,7 @@ def _users(path: Path | None, folder: Path) -> Path | None:
     return None if path is None else (folder / path).absolute()
 
 
-def changed_view(view: View, changes: Mapping[str, Any], where: str) -> View:
+def change_view_settings(view: ViewSettings, changes: Mapping[str, Any], where: str) -> ViewSettings:
     """Give the settings of the choice with some of them changed, checked as those of a file are.
 
     Raises:
@@ -123,7 +125,7 @@ def changed_view(view: View, changes: Mapping[str, Any], where: str) -> View:
     """
     check_values(changes, where)
     try:
-        return View.model_validate(_merged(view.model_dump(), changes))
+        return ViewSettings.model_validate(_merged(view.model_dump(), changes))
     except ValidationError as error:
         raise UserError(_one_line(where, error, ("view",))) from None
 
@@ -137,7 +139,9 @@ def _merged(content: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str,
     return merged
 
 
-def _resolved(camera: Camera, homographies: Mapping[str, Any], unit: str | None, folder: Path) -> Camera:
+def _resolved(
+    camera: CameraSettings, homographies: Mapping[str, Any], unit: str | None, folder: Path
+) -> CameraSettings:
     """Make paths absolute and fill in the ground homography from the file for all cameras, and its unit."""
     ground, ground_unit = camera.ground, camera.ground_unit
     if ground is None:
@@ -146,14 +150,14 @@ def _resolved(camera: Camera, homographies: Mapping[str, Any], unit: str | None,
     update = {
         "ground": ground,
         "ground_unit": ground_unit,
-        "source": resolved(camera.source, folder),
+        "source": resolve_source(camera.source, folder),
         "password": folder / camera.password if camera.password else None,
         "detections": detections,
     }
     return camera.model_copy(update=update)
 
 
-def _one_side(cameras: Sequence[Camera]) -> None:
+def _one_side(cameras: Sequence[CameraSettings]) -> None:
     """Refuse homographies of which one sees the floor as from above and another as from below.
 
     Raises:
@@ -191,7 +195,7 @@ def _homographies(path: Path, where: str) -> tuple[dict[str, list[list[float]]],
         except ValueError as error:
             raise UserError(f"{where}: ground: {path}: {error}") from error
     try:
-        return matrices, None if content.get("unit") is None else checked_unit(content["unit"])
+        return matrices, None if content.get("unit") is None else check_unit(content["unit"])
     except ValueError as error:
         raise UserError(f"{where}: ground: {path}: unit: {error}") from error
 
@@ -210,7 +214,7 @@ def _one_line(where: str, error: ValidationError, within: tuple[str, ...] = ()) 
 
 def _plain(detail: ErrorDetails, within: tuple[str, ...]) -> str:
     loc = (*within, *detail["loc"])
-    place = ".".join(shortened(str(part)) for part in loc)
+    place = ".".join(abbreviate(str(part)) for part in loc)
     message = detail["msg"].removeprefix("Value error, ")
     if detail["type"] == "extra_forbidden":
         close = difflib.get_close_matches(str(loc[-1]), _known_keys(loc[:-1]), n=1)
@@ -223,7 +227,7 @@ def _known_keys(section: tuple[int | str, ...]) -> list[str]:
     model: Any = Config
     for part in section:
         if isinstance(part, int):
-            model = Camera
+            model = CameraSettings
         elif isinstance(model, type) and issubclass(model, BaseModel) and part in model.model_fields:
             model = model.model_fields[part].annotation
     return list(model.model_fields) if isinstance(model, type) and issubclass(model, BaseModel) else []

@@ -9,13 +9,13 @@ from pathlib import Path
 
 import yaml
 
-from server.config.config_diff import differing
+from server.config.config_diff import changed_keys
 from server.config.loader import build_config, load_config, read_content
 from server.config.site_config import Config
 from server.system.errors import UserError
-from server.system.file_state import State, state_of
+from server.system.file_state import FileState, file_state
 
-IN_FORCE = "MYVIEW_IN_FORCE"
+ACTIVE_CONFIG_VARIABLE = "MYVIEW_IN_FORCE"
 """In the environment of what `myview up` starts: where it keeps the configuration that the site runs by.
 
 A process that has to be started again must not go by a file that nobody has said is to be in force.
@@ -23,7 +23,7 @@ A process that has to be started again must not go by a file that nobody has sai
 
 
 @dataclass(frozen=True, slots=True)
-class OnDisk:
+class ConfigFileState:
     """How the file on the disk is different from what runs."""
 
     error: str
@@ -37,7 +37,7 @@ class OnDisk:
         return bool(self.error or self.waiting)
 
 
-class Running:
+class ActiveConfig:
     """What a process runs by. ``now`` is set anew when something else has come into force.
 
     Raises:
@@ -47,7 +47,7 @@ class Running:
     def __init__(self, path: Path) -> None:
         self.path = path
         self.now = self.wanted()
-        self._seen: tuple[State | None, ...] = ()
+        self._seen: tuple[FileState | None, ...] = ()
         self._file: Config | UserError = self.now
 
     def wanted(self) -> Config:
@@ -56,19 +56,19 @@ class Running:
         Raises:
             UserError: it cannot be read, or something in it is wrong.
         """
-        kept = os.environ.get(IN_FORCE)
-        if kept is None or not is_ours(Path(kept)):
+        kept = os.environ.get(ACTIVE_CONFIG_VARIABLE)
+        if kept is None or not is_owned_by_this_user(Path(kept)):
             return load_config(self.path)
         return build_config(read_content(Path(kept)), where=str(self.path), folder=self.path.parent)
 
-    def on_disk(self) -> OnDisk:
+    def on_disk(self) -> ConfigFileState:
         """Say how the file is different from what runs; it is read when it has changed.
 
         One that is wrong is read each time: what it refers to, and may be wrong itself, is not known.
         """
         folder = self.path.parent
         ground = self._file.ground if isinstance(self._file, Config) else None
-        seen = (state_of(self.path), None if ground is None else state_of(folder / ground))
+        seen = (file_state(self.path), None if ground is None else file_state(folder / ground))
         if seen != self._seen or isinstance(self._file, UserError):
             self._seen = seen
             try:
@@ -76,11 +76,11 @@ class Running:
             except UserError as error:
                 self._file = error
         if isinstance(self._file, UserError):
-            return OnDisk(str(self._file), ())
-        return OnDisk("", differing(self.now, self._file))
+            return ConfigFileState(str(self._file), ())
+        return ConfigFileState("", changed_keys(self.now, self._file))
 
 
-def is_ours(path: Path) -> bool:
+def is_owned_by_this_user(path: Path) -> bool:
     """Tell whether a file or folder is there and belongs to this process's user: no other says what runs."""
     try:
         found = path.lstat()
@@ -89,7 +89,7 @@ def is_ours(path: Path) -> bool:
     return found.st_uid == os.geteuid() and not stat.S_ISLNK(found.st_mode)
 
 
-def written(config: Config, folder: Path) -> str:
+def serialize_config(config: Config, folder: Path) -> str:
     """Write a configuration as a file that says the same from anywhere: all paths in it are absolute.
 
     ``folder`` is where its own file lies.

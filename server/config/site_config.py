@@ -16,7 +16,19 @@ from pydantic import Field, model_validator
 from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, SettingsConfigDict
 
 from server.config.dataclass_section import validated
-from server.config.sections import Access, Camera, Encode, Http, Record, Site, Sound, Sync, Track, View, Zenoh
+from server.config.sections import (
+    AccessSettings,
+    CameraSettings,
+    EncodeSettings,
+    HttpSettings,
+    RecordSettings,
+    SiteSettings,
+    SoundSettings,
+    SyncSettings,
+    TrackSettings,
+    ViewSettings,
+    ZenohSettings,
+)
 from server.config.sections.detect import DetectSettings
 from tracking.baselines import TEMPORAL
 
@@ -36,21 +48,21 @@ class Config(BaseSettings):
         env_nested_delimiter="__",
     )
 
-    site: Site = Site()
-    sync: Sync = Sync()
-    zenoh: Zenoh = Zenoh()
-    encode: Encode = Encode()
-    cameras: Annotated[list[Camera], Field(min_length=1)]
+    site: SiteSettings = SiteSettings()
+    sync: SyncSettings = SyncSettings()
+    zenoh: ZenohSettings = ZenohSettings()
+    encode: EncodeSettings = EncodeSettings()
+    cameras: Annotated[list[CameraSettings], Field(min_length=1)]
     ground: Path | None = None
     """A JSON file with one homography per camera; a camera's own `ground` goes before it."""
-    sound: Sound = Sound()
+    sound: SoundSettings = SoundSettings()
     detect: Annotated[DetectSettings, validated(DetectSettings)] = DetectSettings()
     """Finding people in a picture; by default by background subtraction and box filters (paper, IV.A.2)."""
-    track: Track = Track()
-    view: View = View()
-    http: Http = Http()
-    access: Access = Access()
-    record: Record = Record()
+    track: TrackSettings = TrackSettings()
+    view: ViewSettings = ViewSettings()
+    http: HttpSettings = HttpSettings()
+    access: AccessSettings = AccessSettings()
+    record: RecordSettings = RecordSettings()
 
     @classmethod
     def settings_customise_sources(
@@ -88,7 +100,7 @@ class Config(BaseSettings):
         """The frames that a view must be looked ahead for at least: its tracks no longer change then."""
         return self.encode.gop + self.track.lag(self.site.fps)
 
-    def check_lookahead(self, view: View) -> None:
+    def check_lookahead(self, view: ViewSettings) -> None:
         """Check that these settings look far enough ahead.
 
         Raises:
@@ -144,7 +156,7 @@ class Config(BaseSettings):
         """The cameras that look straight down."""
         return frozenset(it.id for it in self.cameras if it.kind == "overhead")
 
-    def camera(self, camera_id: str) -> Camera:
+    def camera(self, camera_id: str) -> CameraSettings:
         """Give one camera.
 
         Raises:

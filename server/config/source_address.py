@@ -24,7 +24,7 @@ class SourceKind(Enum):
     """A camera: its newest picture at every pulse."""
 
 
-def kind_of(source: str) -> SourceKind:
+def source_kind(source: str) -> SourceKind:
     """Tell the kind of a source from how it is written."""
     if source.startswith("scene:"):
         return SourceKind.SCENE
@@ -47,7 +47,7 @@ def is_device(source: str) -> bool:
         return True  # it is there, and not for this user
 
 
-def is_missing(path: str) -> bool:
+def path_is_missing(path: str) -> bool:
     """Tell whether nothing is at a path; what only cannot be reached is not missing: opening it says why."""
     try:
         Path(path).stat()
@@ -58,7 +58,7 @@ def is_missing(path: str) -> bool:
     return False
 
 
-def resolved(source: str, folder: Path) -> str:
+def resolve_source(source: str, folder: Path) -> str:
     """Make a relative path relative to ``folder`` (the configuration's); leave addresses and scenes alone.
 
     What looks like an address, or like one without its protocol, and is no file, is none: ``rtsp:host``.
@@ -66,4 +66,4 @@ def resolved(source: str, folder: Path) -> str:
     if source.startswith("scene:") or "://" in source:
         return source
     path = str((folder / source).absolute())
-    return source if (has_protocol(source) or is_login(source)) and is_missing(path) else path
+    return source if (has_protocol(source) or is_login(source)) and path_is_missing(path) else path

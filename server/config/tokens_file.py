@@ -13,8 +13,8 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import AwareDatetime, Field, ValidationError, model_validator
 
-from server.config.sections.base import Name, Section
-from server.config.values import check_values, shortened
+from server.config.sections.base import Identifier, Section
+from server.config.values import abbreviate, check_values
 from server.config.yaml_file import read_yaml
 from server.system.errors import UserError
 
@@ -30,7 +30,7 @@ class Token(Section):
     role: Role
     object: Annotated[int, Field(ge=1, le=999_999_999)] | None = None
     """Nobody but this person's views."""
-    camera: Name | None = None
+    camera: Identifier | None = None
     """Nothing but this camera."""
     made: AwareDatetime | None = None
     """When it was made. Where people have been numbered anew since, its object is void."""
@@ -49,7 +49,7 @@ class Token(Section):
         return self
 
 
-def digest_of(token: str) -> str:
+def token_digest(token: str) -> str:
     """Give what the file knows of a token: its SHA-256, in hex."""
     return hashlib.sha256(token.encode(errors="surrogatepass")).hexdigest()  # heads may hold any bytes
 
@@ -83,7 +83,7 @@ def _token(path: Path, number: int, content: Any) -> Token:
         return Token.model_validate(content)
     except ValidationError as error:
         first = error.errors()[0]
-        place = ".".join(["tokens", str(number), *(shortened(str(it)) for it in first["loc"])])
+        place = ".".join(["tokens", str(number), *(abbreviate(str(it)) for it in first["loc"])])
         said = "unknown key" if first["type"] == "extra_forbidden" else first["msg"]
         line = f"{path}: {place}: {said.removeprefix('Value error, ')}"
         raise UserError(" ".join(line.split())) from None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from server.system.address_redaction import shown
+from server.system.address_redaction import redact_address
 from server.system.errors import UserError
 
 _DEEPEST = 32
@@ -18,9 +18,9 @@ _LONGEST_NAME = 64
 _HOLDING = (dict, list, tuple, set)
 
 
-def shortened(key: str) -> str:
+def abbreviate(key: str) -> str:
     """Give a key as a line can name it: it may be as long as its file, or an address by mistake."""
-    key = shown(key)
+    key = redact_address(key)
     return key if len(key) <= _SHOWN else f"{key[:_SHOWN]}…"
 
 
@@ -65,13 +65,13 @@ def check_numbers(content: Any, where: str) -> None:
 
 def _named(place: tuple[Any, ...]) -> str:
     """Give the way to a value as a line begins with it, in a line whatever the keys are."""
-    words = (shortened(" ".join(it.split())) if isinstance(it, str) else _short(it) for it in place)
+    words = (abbreviate(" ".join(it.split())) if isinstance(it, str) else _short(it) for it in place)
     return f"{'.'.join(words)}: " if place else ""
 
 
 def _short(key: Any) -> str:
     """Give a key that is no text; Python writes no number of thousands of digits."""
-    return "…" if isinstance(key, int) and abs(key) > _LARGEST else shortened(str(key))
+    return "…" if isinstance(key, int) and abs(key) > _LARGEST else abbreviate(str(key))
 
 
 def _inside(content: Any, where: str) -> Iterator[tuple[tuple[Any, ...], Any]]:

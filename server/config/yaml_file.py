@@ -99,13 +99,13 @@ def _words(error: yaml.YAMLError) -> str:
     return " ".join(" ".join(parts).split())
 
 
-def one_line(value: Any) -> str:
+def dump_yaml_inline(value: Any) -> str:
     """Write a value as it may stand behind its key."""
     written: str = yaml.dump(value, Dumper=SafeDumper, default_flow_style=True, width=_WIDTH)
     return written.removesuffix("\n...\n").strip()
 
 
-def as_lines(content: Any) -> str:
+def dump_yaml(content: Any) -> str:
     """Write what a file holds, a line each, in its own order."""
     written: str = yaml.dump(content, Dumper=SafeDumper, sort_keys=False)
     return written

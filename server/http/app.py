@@ -11,8 +11,8 @@ from contextlib import AsyncExitStack, asynccontextmanager
 from aiohttp import web
 
 from camsync import Spell
-from server.config.running_config import OnDisk
-from server.config.sections import Http
+from server.config.running_config import ConfigFileState
+from server.config.sections import HttpSettings
 from server.config.site_config import Config
 from server.http import static_files
 from server.http.access import sign_in
@@ -42,7 +42,7 @@ from server.http.streams.sending import break_off
 from server.http.tls import Certificate
 from server.service.rendering.renderer import Pictures
 from server.service.service import BestViewService
-from server.system.descriptors import FOR_OPERATORS, limit, places
+from server.system.descriptors import FOR_OPERATORS, connection_limit, descriptor_limit
 from server.system.errors import UserError
 
 log = logging.getLogger(__name__)
@@ -90,7 +90,7 @@ async def _has_begun(request: web.Request, response: web.StreamResponse) -> None
 
 
 def make_app(
-    service: BestViewService, on_disk: Callable[[], OnDisk] = lambda: OnDisk("", ())
+    service: BestViewService, on_disk: Callable[[], ConfigFileState] = lambda: ConfigFileState("", ())
 ) -> web.Application:
     """Give the application on top of a service; `on_disk` says how the configuration's file differs.
 
@@ -143,7 +143,7 @@ def make_app(
 
 
 @asynccontextmanager
-async def serving(app: web.Application, settings: Http) -> AsyncIterator[int]:
+async def serving(app: web.Application, settings: HttpSettings) -> AsyncIterator[int]:
     """Serve the application; give the port.
 
     Raises:
@@ -177,8 +177,8 @@ async def serving(app: web.Application, settings: Http) -> AsyncIterator[int]:
 
 def _bounds(config: Config) -> Bounds:
     """Return how many connections are taken: as many as are wanted, where that many files may be open."""
-    http, descriptors = config.http, limit()
-    most = places(config, descriptors)
+    http, descriptors = config.http, descriptor_limit()
+    most = connection_limit(config, descriptors)
     if most < http.connections:
         log.warning(
             "%d files may be open (ulimit -n): %d connections are taken, not %d (http.connections_max)",

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from aiohttp import web
 from prometheus_client import CollectorRegistry
 
-from server.config.running_config import OnDisk
+from server.config.running_config import ConfigFileState
 from server.http.api.events import Events
 from server.http.hls.sessions import Readers
 from server.service.rendering.renderer import Pictures
@@ -17,5 +17,5 @@ SERVICE = web.AppKey("service", BestViewService)
 EVENTS = web.AppKey("events", Events)
 READERS = web.AppKey("readers", Readers)
 PICTURES = web.AppKey("pictures", Pictures)
-ON_DISK: web.AppKey[Callable[[], OnDisk]] = web.AppKey("on disk")
+ON_DISK: web.AppKey[Callable[[], ConfigFileState]] = web.AppKey("on disk")
 METRICS = web.AppKey("metrics", CollectorRegistry)

@@ -6,10 +6,10 @@ import logging
 import ssl
 from pathlib import Path
 
-from server.config.sections import Tls
+from server.config.sections import TlsSettings
 from server.http.periodic import again_and_again
 from server.system.errors import UserError
-from server.system.file_state import State, state_of
+from server.system.file_state import FileState, file_state
 
 log = logging.getLogger(__name__)
 
@@ -36,7 +36,7 @@ class Certificate:
         self.context.sni_callback = self._hand_over
 
     @classmethod
-    def of(cls, settings: Tls) -> Certificate | None:
+    def of(cls, settings: TlsSettings) -> Certificate | None:
         """Read what a configuration names; None: it names nothing.
 
         Raises:
@@ -87,8 +87,8 @@ class Certificate:
             ) from error
         return context
 
-    def _state(self) -> tuple[State | None, ...]:
-        return tuple(state_of(it) for it in (self._certificate, self._key))
+    def _state(self) -> tuple[FileState | None, ...]:
+        return tuple(file_state(it) for it in (self._certificate, self._key))
 
 
 def _no_password() -> str:

@@ -10,7 +10,7 @@ Floats = NDArray[np.float64]
 Image = NDArray[np.uint8]
 
 
-class Fit:
+class Letterbox:
     """Scales a picture to the site's size without distorting it; what is left over stays black.
 
     Sizes are (width, height) in pixels.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Literal
 
-from server.config.sections import Site
+from server.config.sections import SiteSettings
 from server.media.audio.audio_format import SoundFormat
 from server.media.containers.fmp4 import Sample, fragment, init_segment, rebased, sample_of, ticks
 from server.media.gap_filler import NO_CAMERAS, Bridge, H264Bridge
@@ -64,7 +64,7 @@ class Agreement:
         return fragment([Sample(sample(nal_units(access_unit)), key)], pulse, fps)
 
     def head(
-        self, site: Site, sound: SoundFormat | None = None, *, pulses: int | None = None
+        self, site: SiteSettings, sound: SoundFormat | None = None, *, pulses: int | None = None
     ) -> bytes | None:
         """Give what a player needs before the first fragment; None before the first key frame.
 

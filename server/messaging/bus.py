@@ -9,11 +9,11 @@ from typing import Any, Self
 import zenoh
 
 from server.config.password_file import password_of
-from server.config.sections import Zenoh
+from server.config.sections import ZenohSettings
 from server.messaging.bus_access import SETTING
 from server.messaging.inbox import Inbox, Message
-from server.messaging.messages import camera_of
-from server.system.address_redaction import shown_endpoint
+from server.messaging.messages import camera_of_key
+from server.system.address_redaction import redact_endpoint
 from server.system.errors import UserError
 
 _DROP_AFTER_US = 20_000
@@ -36,7 +36,7 @@ class Bus:
         self._undeclare: list[Callable[[], None]] = []
 
     @classmethod
-    def router(cls, settings: Zenoh, access: Mapping[str, Any] | None = None) -> Self:
+    def router(cls, settings: ZenohSettings, access: Mapping[str, Any] | None = None) -> Self:
         """Open the session that all others connect to (the best-view service's).
 
         ``access`` is zenoh's access control: what each user of ``settings.users`` may.
@@ -57,12 +57,12 @@ class Bus:
             return cls(zenoh.open(config))
         except zenoh.ZError as error:
             raise UserError(
-                f"zenoh.listen: cannot listen on {shown_endpoint(settings.listen)}; is the port in use?"
+                f"zenoh.listen: cannot listen on {redact_endpoint(settings.listen)}; is the port in use?"
                 + (" Are zenoh.tls.certificate and key a pair?" if settings.tls.key is not None else "")
             ) from error
 
     @classmethod
-    def client(cls, settings: Zenoh, user: str | None = None) -> Self:
+    def client(cls, settings: ZenohSettings, user: str | None = None) -> Self:
         """Open a session of the site's router; it need not be there yet, and may go and come back.
 
         It hears the router's process, which is the best-view service, and is heard by it; not other clients.
@@ -75,7 +75,7 @@ class Bus:
         return cls._connected(settings, "peer", user)
 
     @classmethod
-    def second(cls, settings: Zenoh, user: str | None = None) -> Self:
+    def second(cls, settings: ZenohSettings, user: str | None = None) -> Self:
         """Open the like for a further best-view service, which hears all of the router's clients.
 
         Raises:
@@ -85,7 +85,7 @@ class Bus:
         return cls._connected(settings, "router", user)
 
     @classmethod
-    def hearing(cls, settings: Zenoh, user: str | None = None) -> Self:
+    def hearing(cls, settings: ZenohSettings, user: str | None = None) -> Self:
         """Open a session that hears the router's other clients, too.
 
         The router must be there; later it may go and come back. Blocks for some seconds at most.
@@ -101,11 +101,11 @@ class Bus:
         except zenoh.ZError as error:
             refused = "" if settings.users is None else ", or who is there refuses this user"
             raise UserError(
-                f"zenoh.connect: nobody is at {shown_endpoint(settings.connect)}{refused}"
+                f"zenoh.connect: nobody is at {redact_endpoint(settings.connect)}{refused}"
             ) from error
 
     @classmethod
-    def _connected(cls, settings: Zenoh, mode: str, user: str | None) -> Self:
+    def _connected(cls, settings: ZenohSettings, mode: str, user: str | None) -> Self:
         config = _config(settings, mode, user)
         config.insert_json5("connect/timeout_ms", "-1")  # keep trying in the background
         config.insert_json5("connect/exit_on_failure", "false")
@@ -118,7 +118,7 @@ class Bus:
             return cls(zenoh.open(config))
         except zenoh.ZError:
             raise UserError(
-                f"zenoh.connect: cannot use {shown_endpoint(settings.connect)}: has zenoh this protocol, "
+                f"zenoh.connect: cannot use {redact_endpoint(settings.connect)}: has zenoh this protocol, "
                 "and is all right that stands behind the port?"
             ) from None
 
@@ -189,14 +189,14 @@ class Bus:
 
 def _sender(message: Message) -> str:
     """Return whose a message is: one camera's are no other's."""
-    return camera_of(message.key)
+    return camera_of_key(message.key)
 
 
 def _size(message: Message) -> int:
     return len(message.payload) + len(message.attachment)
 
 
-def _config(settings: Zenoh, mode: str, user: str | None) -> zenoh.Config:
+def _config(settings: ZenohSettings, mode: str, user: str | None) -> zenoh.Config:
     config = zenoh.Config()
     for key, value in {
         "mode": mode,

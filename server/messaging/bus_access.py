@@ -7,7 +7,7 @@ from typing import Any
 
 from server.config.password_file import read_users
 from server.config.site_config import Config
-from server.messaging.messages import Keys, pulse_client
+from server.messaging.messages import ZenohKeys, pulse_client
 
 SETTING = "zenoh.users"
 _SENDS = ["put", "delete", "liveliness_token"]
@@ -20,7 +20,7 @@ _SERVICES = 64
 """Best-view services that a site may have, beside the first."""
 
 
-def access_of(config: Config) -> dict[str, Any] | None:
+def access_control_of(config: Config) -> dict[str, Any] | None:
     """Give what each user of a site's bus may; None: whoever reaches it may everything.
 
     Raises:
@@ -29,10 +29,10 @@ def access_of(config: Config) -> dict[str, Any] | None:
     if config.zenoh.users is None:
         return None
     users = list(read_users(config.zenoh.users, SETTING))
-    return access_rules(config.site.name, config.camera_ids, config.sounding, users)
+    return build_access_control(config.site.name, config.camera_ids, config.sounding, users)
 
 
-def access_rules(
+def build_access_control(
     site: str, cameras: Sequence[str], sounding: str | None, users: Sequence[str]
 ) -> dict[str, Any]:
     """Give what each user may, as zenoh's ``access_control``: what is not said is denied.
@@ -41,7 +41,7 @@ def access_rules(
     and what the best-view services alone say to it: where the operator points, and what to remember.
     Further best-view services may everything. Any other user may hear everything, and send nothing.
     """
-    keys = Keys(site)
+    keys = ZenohKeys(site)
     everything = f"myview/{site}/**"
     found, hears, services = keys.camera("*", "found"), keys.camera("*", "hears"), keys.bestview("**")
     rules = [

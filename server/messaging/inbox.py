@@ -21,7 +21,7 @@ _BYTES_MAX = 1 << 26
 """Bytes of one sender that are held for it."""
 _SENDERS_MAX = 1024
 """Senders that are told apart; more of them are taken for one."""
-TURN_S = 0.02
+DRAIN_SLICE_S = 0.02
 """How long items are handled at a time, but for the last of them: then others have their turn of the loop."""
 
 Item = TypeVar("Item")
@@ -50,7 +50,7 @@ class Inbox(Generic[Item]):
         self,
         handler: Callable[[Item], None],
         pending_max: int = PENDING_MAX,
-        turn_s: float = TURN_S,
+        turn_s: float = DRAIN_SLICE_S,
         *,
         whose: Callable[[Item], str] = lambda _: "",
         size: Callable[[Item], int] = lambda _: 0,

@@ -7,17 +7,17 @@ floats are written with as many digits as they need.
 ========================================  =======================================  =====================
 key                                       payload                                  attachment
 ========================================  =======================================  =====================
-``myview/SITE/camera/ID/video``           one access unit, Annex B H.264 or VP8    :class:`FrameHead`
+``myview/SITE/camera/ID/video``           one access unit, Annex B H.264 or VP8    :class:`FrameHeader`
 ``myview/SITE/camera/ID/tracks``          :class:`CameraTracks`
 ``myview/SITE/camera/ID/status``          :class:`CameraStatus`
-``myview/SITE/camera/ID/thumbs/LOCAL``    JPEG of one person                       :class:`ThumbHead`
-``myview/SITE/camera/ID/found``           :class:`Found`
-``myview/SITE/camera/ID/pointing``        :class:`server.messaging.operator_messages.Pointings`
-``myview/SITE/camera/ID/remember``        :class:`server.messaging.retained_state.Remembered`
+``myview/SITE/camera/ID/thumbs/LOCAL``    JPEG of one person                       :class:`ThumbnailHeader`
+``myview/SITE/camera/ID/found``           :class:`FrameDetections`
+``myview/SITE/camera/ID/pointing``        :class:`server.messaging.operator_messages.OperatorPoints`
+``myview/SITE/camera/ID/remember``        :class:`server.messaging.retained_state.IdentitySnapshot`
 ``myview/SITE/camera/ID/remembered``      the same, to a service that has come; empty: nothing
 ``myview/SITE/camera/ID/hears``           liveliness token: it hears what the other cameras find
 ``myview/SITE/camera/ID/alive``           liveliness token
-``myview/SITE/sound``                     frames of sound, one after the other     :class:`SoundHead`
+``myview/SITE/sound``                     frames of sound, one after the other     :class:`AudioHeader`
 ``myview/SITE/bestview/choices``          :class:`GopChoices`
 ``myview/SITE/bestview/INDEX/choices``    of a further service that shares the site
 ``myview/SITE/bestview/alive``            liveliness token
@@ -32,10 +32,10 @@ from typing import Annotated, Literal
 
 import msgspec
 
-from server.messaging.number_types import LAST_PULSE, Coordinate, Cost, Duration, Number, Pixels, Pulse, Time
-from server.messaging.operator_messages import TROUBLES_MOST, Trouble
+from server.messaging.number_types import PULSE_MAX, Coordinate, Cost, Duration, Number, Pixels, Pulse, Time
+from server.messaging.operator_messages import RISK_EVENTS_MAX, RiskEvent
 
-UNREADABLE = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
+DECODE_ERRORS = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
 """What a decoder raises: it is no JSON or other JSON, it is no text, it is nested without end."""
 
 Box = tuple[Coordinate, Coordinate, Coordinate, Coordinate]
@@ -45,7 +45,7 @@ NumberedBox = tuple[int, float, float, float, float]
 """A person's number, and their box: left, top, right, bottom in pixels of the site's picture."""
 
 
-class FrameHead(msgspec.Struct, frozen=True, kw_only=True):
+class FrameHeader(msgspec.Struct, frozen=True, kw_only=True):
     """What one access unit is. Times are unix seconds by the camera's clock."""
 
     pulse: Pulse
@@ -62,33 +62,37 @@ class FrameHead(msgspec.Struct, frozen=True, kw_only=True):
     encoded: Time
 
 
-BINS_MOST = 1024
+HISTOGRAM_BINS_MAX = 1024
 """Bins of a histogram; more would tell nobody apart better."""
 
 
-class Glimpse(msgspec.Struct, frozen=True, kw_only=True):
+class AppearanceHistogram(msgspec.Struct, frozen=True, kw_only=True):
     """How a person looks in consecutive frames in which nobody else is in the box."""
 
     first: Pulse
     last: Pulse
-    histogram: Annotated[list[Annotated[float, msgspec.Meta(le=1e6)]], msgspec.Meta(max_length=BINS_MOST)]
+    histogram: Annotated[
+        list[Annotated[float, msgspec.Meta(le=1e6)]], msgspec.Meta(max_length=HISTOGRAM_BINS_MAX)
+    ]
     """The mean of these frames' histograms."""
 
 
-SOUND_MOST = 16_384
+AUDIO_FRAMES_MAX = 16_384
 """Frames of sound in one message at most: those of some minutes, whatever a frame lasts."""
 
 
-class SoundHead(msgspec.Struct, frozen=True, kw_only=True):
+class AudioHeader(msgspec.Struct, frozen=True, kw_only=True):
     """Which frames of the site's sound these are (:mod:`server.media.audio.audio_format`)."""
 
     first: Number
     """The number of the first: a frame has 1024 samples of AAC, 960 of Opus, counted from pulse 0."""
-    sizes: Annotated[list[Annotated[int, msgspec.Meta(ge=1, le=8184)]], msgspec.Meta(max_length=SOUND_MOST)]
+    sizes: Annotated[
+        list[Annotated[int, msgspec.Meta(ge=1, le=8184)]], msgspec.Meta(max_length=AUDIO_FRAMES_MAX)
+    ]
     """Bytes of each; a transport stream can say no more than 8191 with its head."""
 
 
-class Track(msgspec.Struct, frozen=True, kw_only=True):
+class TrackMessage(msgspec.Struct, frozen=True, kw_only=True):
     """One person in one camera over a window."""
 
     id: Number
@@ -96,13 +100,13 @@ class Track(msgspec.Struct, frozen=True, kw_only=True):
     boxes: list[Box | None]
     """One per frame of the window; null where the person is hidden."""
     confidence: Cost
-    looks: list[Glimpse] = []
+    looks: list[AppearanceHistogram] = []
     """Where nobody else was in the boxes, in the frames up to ``final_to``; in their order."""
     sharpness: Annotated[float, msgspec.Meta(ge=0, le=1)] | None = None
     """How sharp the picture of the person is; null where nobody has measured it."""
 
 
-class Solve(msgspec.Struct, frozen=True, kw_only=True):
+class SolverReport(msgspec.Struct, frozen=True, kw_only=True):
     """How well the window's program was solved."""
 
     objective: Cost
@@ -112,7 +116,7 @@ class Solve(msgspec.Struct, frozen=True, kw_only=True):
     rounds: Number
 
 
-TRACKS_MOST = 1000
+TRACKS_MAX = 1000
 """People that a camera follows in one window at most: more than any picture has room for."""
 
 
@@ -127,9 +131,9 @@ class CameraTracks(msgspec.Struct, frozen=True, kw_only=True):
     """Which of the site's windows: it ends with pulse (epoch + 1) · stride - 1, or with the recording."""
     first: Pulse
     """First frame (pulse number) of the window."""
-    last: Annotated[int, msgspec.Meta(ge=-1, le=LAST_PULSE)]
+    last: Annotated[int, msgspec.Meta(ge=-1, le=PULSE_MAX)]
     """Last frame; -1 or before ``first`` where there was none."""
-    final_to: Annotated[int, msgspec.Meta(ge=-LAST_PULSE, le=LAST_PULSE)]
+    final_to: Annotated[int, msgspec.Meta(ge=-PULSE_MAX, le=PULSE_MAX)]
     """Every frame up to this one never changes again."""
     ended: bool
     """The recording is over: nothing follows."""
@@ -140,15 +144,15 @@ class CameraTracks(msgspec.Struct, frozen=True, kw_only=True):
     recording begins or while the detector does not know its background yet."""
     alone: list[Pulse] = []
     """Frames in which people were followed without what some other camera found: its word was not there."""
-    tracks: Annotated[list[Track], msgspec.Meta(max_length=TRACKS_MOST)]
-    solve: Solve | None
+    tracks: Annotated[list[TrackMessage], msgspec.Meta(max_length=TRACKS_MAX)]
+    solve: SolverReport | None
     solved_at: Time = 0.0
     """When the window was solved, unix seconds by the camera's clock; 0 offline."""
     search_s: Duration | None = None
     """Seconds that it took to look for people in a frame, the mean of this epoch's; null offline."""
     solve_s: Duration | None = None
     """Seconds that it took to follow everybody to the end of the window; null offline."""
-    troubles: Annotated[list[Trouble], msgspec.Meta(max_length=TROUBLES_MOST)] = []
+    troubles: Annotated[list[RiskEvent], msgspec.Meta(max_length=RISK_EVENTS_MAX)] = []
     """What the tracker foresees, where it is set to."""
     mended_from: Pulse | None = None
     """The first frame, final before, that somebody's pointing has changed; null: none has."""
@@ -157,11 +161,11 @@ class CameraTracks(msgspec.Struct, frozen=True, kw_only=True):
 ScoredBox = tuple[Coordinate, Coordinate, Coordinate, Coordinate, Annotated[float, msgspec.Meta(ge=0, le=1)]]
 """Left, top, right, bottom in pixels of the camera's own picture, and how sure the detector is."""
 
-FOUND_MOST = 100
+FRAME_DETECTIONS_MAX = 100
 """Boxes that a camera tells the others of one frame at most; those that it is surest of."""
 
 
-class Found(msgspec.Struct, frozen=True, kw_only=True):
+class FrameDetections(msgspec.Struct, frozen=True, kw_only=True):
     """What a camera found in one frame, before it follows anybody: for the other cameras."""
 
     camera: str
@@ -169,13 +173,13 @@ class Found(msgspec.Struct, frozen=True, kw_only=True):
     size: tuple[Pixels, Pixels]
     """Width and height of the camera's own picture."""
     pulse: Pulse
-    boxes: Annotated[list[ScoredBox], msgspec.Meta(max_length=FOUND_MOST)] | None
+    boxes: Annotated[list[ScoredBox], msgspec.Meta(max_length=FRAME_DETECTIONS_MAX)] | None
     """Null: nobody was looked for, so that it says nothing."""
     ended: bool = False
     """The recording has no frame for this pulse: nothing follows."""
 
 
-CameraWord = Literal["starting", "live", "away", "ended"]
+CameraState = Literal["starting", "live", "away", "ended"]
 """How a camera is; away: its source gives no pictures now."""
 
 
@@ -184,8 +188,8 @@ class CameraStatus(msgspec.Struct, frozen=True, kw_only=True):
 
     camera: str
     boot: Number
-    state: CameraWord
-    pulse: Annotated[int, msgspec.Meta(ge=-1, le=LAST_PULSE)]
+    state: CameraState
+    pulse: Annotated[int, msgspec.Meta(ge=-1, le=PULSE_MAX)]
     fps: Duration
     """Frames taken in the last second or so."""
     missed: Number
@@ -209,7 +213,7 @@ class CameraStatus(msgspec.Struct, frozen=True, kw_only=True):
     round_trip: Time
 
 
-class ThumbHead(msgspec.Struct, frozen=True, kw_only=True):
+class ThumbnailHeader(msgspec.Struct, frozen=True, kw_only=True):
     """Which person a thumbnail shows."""
 
     track: Number
@@ -217,7 +221,7 @@ class ThumbHead(msgspec.Struct, frozen=True, kw_only=True):
     pulse: Pulse
 
 
-class Cut(msgspec.Struct, frozen=True, kw_only=True):
+class ViewCut(msgspec.Struct, frozen=True, kw_only=True):
     """A change of view."""
 
     object: int
@@ -226,14 +230,14 @@ class Cut(msgspec.Struct, frozen=True, kw_only=True):
     to_camera: str = msgspec.field(name="to")
 
 
-class Merged(msgspec.Struct, frozen=True, kw_only=True):
+class PersonMerge(msgspec.Struct, frozen=True, kw_only=True):
     """Two numbers turned out to be one person: ``lost`` is never used again."""
 
     kept: int
     lost: int
 
 
-class Parted(msgspec.Struct, frozen=True, kw_only=True):
+class PersonSplit(msgspec.Struct, frozen=True, kw_only=True):
     """Whom a camera showed as ``kept`` turned out to be ``parted``, somebody else."""
 
     kept: int
@@ -249,10 +253,10 @@ class GopChoices(msgspec.Struct, frozen=True, kw_only=True):
     choices: dict[int, str]
     boxes: dict[str, list[list[NumberedBox]]]
     """Per camera and frame: object, left, top, right, bottom."""
-    cuts: list[Cut]
-    merged: list[Merged] = []
+    cuts: list[ViewCut]
+    merged: list[PersonMerge] = []
     """What has turned out since the GOP before, as ``split``."""
-    split: list[Parted] = []
+    split: list[PersonSplit] = []
 
 
 _CAMERA_PART = 3
@@ -264,7 +268,7 @@ def pulse_client(index: int) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class Keys:
+class ZenohKeys:
     """The zenoh key expressions of a site."""
 
     site: str
@@ -283,7 +287,7 @@ class Keys:
         return f"myview/{self.site}/bestview/{f'{index}/' if index else ''}{what}"
 
 
-def camera_of(key: str) -> str:
+def camera_of_key(key: str) -> str:
     """Give the camera id inside a camera's key; empty where there is none."""
     parts = key.split("/")
     return parts[_CAMERA_PART] if len(parts) > _CAMERA_PART else ""

@@ -6,10 +6,10 @@ from typing import Annotated
 
 import msgspec
 
-LAST_PULSE = 2**40
+PULSE_MAX = 2**40
 """A thousand years at 25 frames a second; the bound keeps times within 64 bits."""
 
-Pulse = Annotated[int, msgspec.Meta(ge=0, le=LAST_PULSE)]
+Pulse = Annotated[int, msgspec.Meta(ge=0, le=PULSE_MAX)]
 """A frame number."""
 
 Pixels = Annotated[int, msgspec.Meta(ge=1, le=2**16)]
@@ -25,7 +25,7 @@ Cost = Annotated[float, msgspec.Meta(ge=-1e12, le=1e12)]
 Duration = Annotated[float, msgspec.Meta(ge=0, le=1e6)]
 """Seconds."""
 
-FARTHEST = 1e6
+COORDINATE_MAX = 1e6
 """Pixels from a picture's corner, either way; what is farther is as far."""
 
-Coordinate = Annotated[float, msgspec.Meta(ge=-FARTHEST, le=FARTHEST)]
+Coordinate = Annotated[float, msgspec.Meta(ge=-COORDINATE_MAX, le=COORDINATE_MAX)]

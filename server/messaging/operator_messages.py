@@ -8,18 +8,18 @@ import msgspec
 
 from server.messaging.number_types import Coordinate, Cost, Number, Pulse
 
-TROUBLES_MOST = 32
+RISK_EVENTS_MAX = 32
 """Troubles that a camera tells of one window at most; the riskiest ones."""
 
-TroubleReason = Literal["alike", "fading", "gap", "exchange"]
+RiskReason = Literal["alike", "fading", "gap", "exchange"]
 """Two who look alike are about to cross; somebody fades into the background; the window is not proven; two
 solutions in which two people are exchanged cost nearly the same."""
 
 
-class Trouble(msgspec.Struct, frozen=True, kw_only=True):
+class RiskEvent(msgspec.Struct, frozen=True, kw_only=True):
     """Where a camera's tracker may soon take people for each other, or lose somebody."""
 
-    reason: TroubleReason
+    reason: RiskReason
     tracks: Annotated[list[Number], msgspec.Meta(max_length=2)]
     """Whom it is about, first whom to point at; none: the window."""
     pulse: Pulse
@@ -30,15 +30,15 @@ class Trouble(msgspec.Struct, frozen=True, kw_only=True):
     """How likely it is to go wrong unless somebody helps."""
 
 
-POINTS_MOST = 256
+OPERATOR_POINTS_MAX = 256
 """Places that are pointed at in one message at most: ten seconds at 25 frames a second."""
 
 
-REACH_LEAST = 1.0
+TOLERANCE_MIN = 1.0
 """Pixels by which any pointing may be off: nobody points better."""
 
 
-class Pointed(msgspec.Struct, frozen=True, kw_only=True):
+class OperatorPoint(msgspec.Struct, frozen=True, kw_only=True):
     """Whom a track follows is at this place, says somebody who sees it."""
 
     pulse: Pulse
@@ -46,13 +46,13 @@ class Pointed(msgspec.Struct, frozen=True, kw_only=True):
     x: Coordinate
     """Pixels of the site's picture, as ``y`` and ``reach``."""
     y: Coordinate
-    reach: Annotated[float, msgspec.Meta(ge=REACH_LEAST, le=1e4)]
+    reach: Annotated[float, msgspec.Meta(ge=TOLERANCE_MIN, le=1e4)]
     """How far off the pointing may be."""
 
 
-class Pointings(msgspec.Struct, frozen=True, kw_only=True):
+class OperatorPoints(msgspec.Struct, frozen=True, kw_only=True):
     """What an operator points at in one camera's picture."""
 
     boot: Number
     """The run of the camera whose tracks are named."""
-    points: Annotated[list[Pointed], msgspec.Meta(max_length=POINTS_MOST)]
+    points: Annotated[list[OperatorPoint], msgspec.Meta(max_length=OPERATOR_POINTS_MAX)]

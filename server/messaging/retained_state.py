@@ -14,41 +14,41 @@ import msgspec
 
 from server.messaging.number_types import Number, Pulse
 
-NUMBER_MOST = 999_999_999
+PERSON_NUMBER_MAX = 999_999_999
 """As many digits as an address may have."""
-REMEMBERED_MOST = 1 << 20
+SNAPSHOT_BYTES_MAX = 1 << 20
 """Bytes that a camera keeps at most."""
-ALSO_MOST = 64
+ALIASES_MAX = 64
 """Old numbers of one person that are told; the newest."""
-NAME_MOST = 40
+NAME_LENGTH_MAX = 40
 """Letters of a name."""
 
 UnixTime = Annotated[float, msgspec.Meta(ge=0, le=1e12)]
 """Seconds."""
-PersonNumber = Annotated[int, msgspec.Meta(ge=1, le=NUMBER_MOST)]
+PersonNumber = Annotated[int, msgspec.Meta(ge=1, le=PERSON_NUMBER_MAX)]
 
 
-class Known(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+class PersonSnapshot(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     """Somebody whom the camera follows."""
 
     number: PersonNumber
     tracks: list[Number]
     """Those that follow them, by the camera's own numbers."""
-    also: Annotated[list[PersonNumber], msgspec.Meta(max_length=ALSO_MOST)] = []
+    also: Annotated[list[PersonNumber], msgspec.Meta(max_length=ALIASES_MAX)] = []
     """Numbers that turned out to be theirs."""
-    name: Annotated[str, msgspec.Meta(max_length=NAME_MOST)] = ""
+    name: Annotated[str, msgspec.Meta(max_length=NAME_LENGTH_MAX)] = ""
     by_hand: bool = False
     """Somebody said that several numbers are theirs."""
 
 
-class Remembered(msgspec.Struct, frozen=True, kw_only=True):
+class IdentitySnapshot(msgspec.Struct, frozen=True, kw_only=True):
     """Whom one camera follows, as of a pulse."""
 
     pulse: Pulse
     boot: Number
     """The run of the camera whose tracks are named."""
-    next: Annotated[int, msgspec.Meta(ge=1, le=NUMBER_MOST + 1)]
+    next: Annotated[int, msgspec.Meta(ge=1, le=PERSON_NUMBER_MAX + 1)]
     """The first number that nobody was given yet in the whole site."""
     since: UnixTime
     """When numbers began: since then none was given twice."""
-    people: list[Known]
+    people: list[PersonSnapshot]

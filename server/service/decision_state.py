@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bestview import Merge, Split
-from server.messaging.messages import Cut, GopChoices, Merged, Parted
+from server.messaging.messages import GopChoices, PersonMerge, PersonSplit, ViewCut
 from server.service.view_selection.decider import GopDecision, ObjectChoice
 from server.service.view_selection.explanation import Explanation
 from server.service.view_selection.recent_reasons import Reason, Reasons, Standing
@@ -45,10 +45,12 @@ class Board:
             boxes=decision.boxes,
             cuts=cuts,
             merged=[
-                Merged(kept=it.kept, lost=it.lost) for it in decision.corrections if isinstance(it, Merge)
+                PersonMerge(kept=it.kept, lost=it.lost)
+                for it in decision.corrections
+                if isinstance(it, Merge)
             ],
             split=[
-                Parted(kept=it.kept, parted=it.parted, camera=it.camera)
+                PersonSplit(kept=it.kept, parted=it.parted, camera=it.camera)
                 for it in decision.corrections
                 if isinstance(it, Split)
             ],
@@ -84,10 +86,10 @@ class Board:
         )
 
 
-def _cut(choice: ObjectChoice, pulse: int) -> Cut | None:
+def _cut(choice: ObjectChoice, pulse: int) -> ViewCut | None:
     if choice.camera is None or choice.before is None or choice.camera == choice.before:
         return None
-    return Cut(object=choice.number, pulse=pulse, from_camera=choice.before, to_camera=choice.camera)
+    return ViewCut(object=choice.number, pulse=pulse, from_camera=choice.before, to_camera=choice.camera)
 
 
 def reason(choice: ObjectChoice, why: Explanation) -> str:

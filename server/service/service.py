@@ -14,13 +14,13 @@ import msgspec
 
 from camsync import Login, PulseClient, Spell
 from server.config.pulse_passwords import pulse_login
-from server.config.sections import View
+from server.config.sections import ViewSettings
 from server.config.site_config import Config
 from server.media.codec import agreement_for
 from server.messaging.bus import Bus
-from server.messaging.bus_access import access_of
+from server.messaging.bus_access import access_control_of
 from server.messaging.inbox import Inbox, Message
-from server.messaging.messages import GopChoices, Keys, pulse_client
+from server.messaging.messages import GopChoices, ZenohKeys, pulse_client
 from server.service.calibration.walk_session import Walking
 from server.service.decision_files.live_recorder import LiveRecorder
 from server.service.decision_state import Board
@@ -112,7 +112,7 @@ class BestViewService:
         self._recorder: LiveRecorder | None = None
         self._bus: Bus | None = None
         self.pulse_login: Login | None = None  # of whom the pulse server asks for none
-        self._keys = Keys(config.site.name)
+        self._keys = ZenohKeys(config.site.name)
         self._changed = asyncio.Event()
         self._without_pulses = False
         """Whether the first pulse is not waited for any more."""
@@ -128,7 +128,7 @@ class BestViewService:
         if index:
             self._bus = bus = Bus.second(zenoh, pulse_client(index))
         else:
-            self._bus = bus = Bus.router(zenoh, access_of(self.config))
+            self._bus = bus = Bus.router(zenoh, access_control_of(self.config))
         handlers = {
             "video": self.intake.video,
             "tracks": self._tracks,
@@ -222,7 +222,7 @@ class BestViewService:
         except OSError as error:
             raise UserError(f"{out}: cannot write there: {error.strerror}") from error
 
-    def choose_by(self, view: View) -> None:
+    def choose_by(self, view: ViewSettings) -> None:
         """Choose views by other settings from the next GOP on, as far as a running service can.
 
         Raises:

@@ -7,46 +7,46 @@ import logging
 from pathlib import Path
 
 from camsync import SyncError
-from server.config.running_config import Running
+from server.config.running_config import ActiveConfig
 from server.http.app import make_app, serving
 from server.service.service import BestViewService
 from server.supervisor.exposure_checks import check_bus, check_viewers
-from server.supervisor.scene_ground import with_scene_ground
+from server.supervisor.scene_ground import add_scene_ground
 from server.supervisor.sighup import reloads
-from server.supervisor.startup_signal import say_started
-from server.system.errors import AwayError, UserError
+from server.supervisor.startup_signal import signal_started
+from server.system.errors import UnavailableError, UserError
 
 log = logging.getLogger(__name__)
 
 
-async def bestview_process(running: Running, out: Path | None = None) -> None:
+async def bestview_process(running: ActiveConfig, out: Path | None = None) -> None:
     """Run the best-view service with its page, streams and API.
 
     Raises:
         UserError: a port or the output folder cannot be had, or strangers could come in.
-        AwayError: it lost the pulses for good.
+        UnavailableError: it lost the pulses for good.
     """
     config = running.now
     check_viewers(config)
     if config.view.share.index == 0:
         check_bus(config)  # the others are no router
-    service = BestViewService(with_scene_ground(config), out)
+    service = BestViewService(add_scene_ground(config), out)
     following = asyncio.create_task(_follow(running, service), name="reload")
     try:
         service.open()
         async with serving(make_app(service, running.on_disk), config.http) as port:
             scheme = "http" if config.http.tls.key is None else "https"
             log.info("page, streams and API on %s://%s:%d/", scheme, config.http.host, port)
-            say_started()
+            signal_started()
             await service.run()
     except SyncError as error:
-        raise AwayError(f"bestview: {error}") from error
+        raise UnavailableError(f"bestview: {error}") from error
     finally:
         following.cancel()
         service.close()
 
 
-async def _follow(running: Running, service: BestViewService) -> None:
+async def _follow(running: ActiveConfig, service: BestViewService) -> None:
     """Go by a configuration that is read again, as far as a running service can."""
     async for reload in reloads(running):
         try:

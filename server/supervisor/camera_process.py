@@ -8,47 +8,47 @@ import logging
 
 from camsync import Spell, SyncError
 from server.camera.process import CameraProcess
-from server.config.camera_password import with_password
-from server.config.running_config import Running
+from server.config.camera_password import fill_in_password
+from server.config.running_config import ActiveConfig
 from server.config.site_config import Config
-from server.config.source_address import SourceKind, kind_of
-from server.supervisor.reload import Reload
+from server.config.source_address import SourceKind, source_kind
+from server.supervisor.reload import ReloadPlan
 from server.supervisor.sighup import reloads
 from server.supervisor.startup_checks import check_recording
-from server.supervisor.startup_signal import say_started
-from server.system.errors import AwayError, UserError
+from server.supervisor.startup_signal import signal_started
+from server.system.errors import UnavailableError, UserError
 
 log = logging.getLogger(__name__)
 
 _RETRY_FIRST_S, _RETRY_MAX_S = 0.5, 10.0
 
 
-async def camera_process(running: Running, camera_id: str) -> None:
+async def camera_process(running: ActiveConfig, camera_id: str) -> None:
     """Run one camera; when a configuration that is read again changes what it goes by, it begins anew.
 
     A network camera or device that does not answer yet is waited for.
 
     Raises:
         UserError: its source cannot be opened.
-        AwayError: it lost the pulses for good, or cannot begin anew.
+        UnavailableError: it lost the pulses for good, or cannot begin anew.
     """
-    if kind_of(running.now.camera(camera_id).source) is SourceKind.STREAM:
-        say_started()  # opening it is mostly waiting for a network or a device, which keeps no processor
+    if source_kind(running.now.camera(camera_id).source) is SourceKind.STREAM:
+        signal_started()  # opening it is mostly waiting for a network or a device, which keeps no processor
     anew = asyncio.Event()
     following = asyncio.create_task(_follow(running, camera_id, anew), name="reload")
     try:
         camera = await _made(running, camera_id, anew, begun=False)
-        say_started()
+        signal_started()
         while not await _run(camera, anew):
             camera = await _made(running, camera_id, anew, begun=True)
     except SyncError as error:
-        raise AwayError(f"camera {camera_id}: {error}") from error
+        raise UnavailableError(f"camera {camera_id}: {error}") from error
     finally:
         following.cancel()
         await asyncio.gather(following, return_exceptions=True)
 
 
-async def _made(running: Running, camera_id: str, anew: asyncio.Event, *, begun: bool) -> CameraProcess:
+async def _made(running: ActiveConfig, camera_id: str, anew: asyncio.Event, *, begun: bool) -> CameraProcess:
     """Make it as soon as its source can be opened, by what is in force then; ``anew`` says that this changed.
 
     To end instead, and be started again, would load all libraries each time. Once the site has begun, as it
@@ -59,14 +59,14 @@ async def _made(running: Running, camera_id: str, anew: asyncio.Event, *, begun:
         anew.clear()
         try:
             camera = await asyncio.to_thread(_opened, running.now, camera_id)
-        except AwayError as error:
+        except UnavailableError as error:
             if (more := away.happened(str(error))) is not None:
                 log.warning("%s%s; it is tried again", error, more)
             begun = True
         except UserError as error:
             if not begun:
                 raise
-            raise AwayError(str(error)) from error  # whoever looks after this process starts it again
+            raise UnavailableError(str(error)) from error  # whoever looks after this process starts it again
         else:
             if ended := away.over():
                 log.info("camera %s: it answers, after %.0f s", camera_id, ended.seconds)
@@ -77,7 +77,7 @@ async def _made(running: Running, camera_id: str, anew: asyncio.Event, *, begun:
 
 
 def _opened(config: Config, camera_id: str) -> CameraProcess:
-    return CameraProcess(with_password(config, camera_id), camera_id)
+    return CameraProcess(fill_in_password(config, camera_id), camera_id)
 
 
 async def _run(camera: CameraProcess, anew: asyncio.Event) -> bool:
@@ -95,8 +95,8 @@ async def _run(camera: CameraProcess, anew: asyncio.Event) -> bool:
         await asyncio.gather(run, waiting, return_exceptions=True)
 
 
-async def _follow(running: Running, camera_id: str, anew: asyncio.Event) -> None:
-    def check(_: Config, reload: Reload) -> None:
+async def _follow(running: ActiveConfig, camera_id: str, anew: asyncio.Event) -> None:
+    def check(_: Config, reload: ReloadPlan) -> None:
         if camera_id in reload.cameras:
             check_recording(reload.now, camera_id)
 

@@ -7,7 +7,7 @@ import re
 
 from server.config.site_config import Config
 from server.config.tokens_file import read_tokens
-from server.system.address_redaction import shown_endpoint
+from server.system.address_redaction import redact_endpoint
 from server.system.errors import UserError
 
 _AUTHORITY = re.compile(r"[a-z]+/(?P<host>[^\s?#]+):[0-9]+")
@@ -50,7 +50,7 @@ def check_bus(config: Config) -> None:
         return
     found = _AUTHORITY.match(zenoh.listen)
     if found is None or not is_loopback(found["host"].strip("[]")):
-        what = f"zenoh.listen: {shown_endpoint(zenoh.listen)} lets other machines send frames and tracks"
+        what = f"zenoh.listen: {redact_endpoint(zenoh.listen)} lets other machines send frames and tracks"
         _check_network(config, what, "let it be tls/ and name zenoh.users")
 
 

@@ -26,7 +26,7 @@ _SYNC_PORT = "7400"
 _TIMEOUT_S = 5.0
 
 
-class UnwellError(Exception):
+class UnhealthyError(Exception):
     """What is wrong, in one line."""
 
 
@@ -34,13 +34,13 @@ def check_pulses() -> None:
     """See whether the pulse server greets.
 
     Raises:
-        UnwellError: it does not.
+        UnhealthyError: it does not.
         OSError: nobody is there.
     """
     address = "127.0.0.1", int(os.environ.get("MYVIEW_SYNC__PORT", _SYNC_PORT))
     with socket.create_connection(address, timeout=_TIMEOUT_S) as server:
         if not server.recv(64).startswith(b"MYVIEW-SYNC"):
-            raise UnwellError("what answers is no pulse server")
+            raise UnhealthyError("what answers is no pulse server")
 
 
 def check_service() -> None:
@@ -56,14 +56,16 @@ def check_camera(camera: str) -> None:
     """See whether the best view gets a camera's frames: all the way from its source to the viewers' side.
 
     Raises:
-        UnwellError: it does not.
+        UnhealthyError: it does not.
         OSError: the best view is away.
     """
     known = {it["camera"]: it for it in json.loads(_asked("/api/cameras"))["cameras"]}
     if camera not in known:
-        raise UnwellError(f"the best view knows no camera {camera}, or the token is for another one")
+        raise UnhealthyError(f"the best view knows no camera {camera}, or the token is for another one")
     if known[camera]["state"] != "live" or not known[camera]["fps"] > 0:
-        raise UnwellError(f"{camera} is {known[camera]['state']}: {known[camera]['message'] or 'no frames'}")
+        raise UnhealthyError(
+            f"{camera} is {known[camera]['state']}: {known[camera]['message'] or 'no frames'}"
+        )
 
 
 def _asked(path: str) -> bytes:
@@ -101,7 +103,7 @@ def check(words: Sequence[str]) -> None:
     """Check what is asked for.
 
     Raises:
-        UnwellError, OSError, ValueError, KeyError, TypeError, HTTPException: it is not well, or nobody knows.
+        UnhealthyError, OSError, ValueError, KeyError, TypeError, HTTPException: the check failed.
     """
     match words:
         case ["sync"]:
@@ -111,14 +113,14 @@ def check(words: Sequence[str]) -> None:
         case ["camera", camera]:
             check_camera(camera)
         case _:
-            raise UnwellError("what is to be checked is sync, bestview or camera ID")
+            raise UnhealthyError("what is to be checked is sync, bestview or camera ID")
 
 
 def main(words: Sequence[str]) -> int:
     """Give the exit code."""
     try:
         check(words)
-    except (UnwellError, OSError, ValueError, KeyError, TypeError, http.client.HTTPException) as error:
+    except (UnhealthyError, OSError, ValueError, KeyError, TypeError, http.client.HTTPException) as error:
         print(f"{' '.join(words)}: {' '.join(str(error).split())}")  # noqa: T201 — the engine keeps it
         return 1
     return 0

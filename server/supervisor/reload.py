@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from server.config.config_diff import differing
-from server.config.sections import TUNED, Camera, Track
+from server.config.config_diff import changed_keys
+from server.config.sections import LIVE_VIEW_SETTINGS, CameraSettings, TrackSettings
 from server.config.site_config import Config
 
-_LIVE = tuple(f"view.{name}" for name in TUNED)
+_LIVE = tuple(f"view.{name}" for name in LIVE_VIEW_SETTINGS)
 """The best view takes these over from one GOP to the next."""
 _OF_A_CAMERA = ("source", "password", "offset", "at_end", "h264", "options", "ignore", "detections")
 """What nobody but the camera's own process goes by."""
-_TRACK = tuple(name for name in Track.model_fields if name != "backlog_s")
+_TRACK = tuple(name for name in TrackSettings.model_fields if name != "backlog_s")
 _OF_CAMERAS = ("detect", *(f"track.{name}" for name in _TRACK))
 """What all cameras' processes go by, and nobody else."""
 _EPOCHS = ("track.window.window", "track.window.stride")
@@ -24,7 +24,7 @@ _OF_THE_BEST_VIEW = ("view", "http", "access", "record")
 
 
 @dataclass(frozen=True, slots=True)
-class Reload:
+class ReloadPlan:
     """What another configuration changes.
 
     Attributes:
@@ -54,10 +54,10 @@ class Reload:
         return f"the configuration was read again: {told or 'nothing in it has changed'}"
 
 
-def reloaded(running: Config, wanted: Config) -> Reload:
+def plan_reload(running: Config, wanted: Config) -> ReloadPlan:
     """Sort out what another configuration changes in a running site."""
-    keys = differing(running, wanted)
-    view = running.view.model_copy(update={name: getattr(wanted.view, name) for name in TUNED})
+    keys = changed_keys(running, wanted)
+    view = running.view.model_copy(update={name: getattr(wanted.view, name) for name in LIVE_VIEW_SETTINGS})
     live = _of(keys, _LIVE)
     try:
         running.check_lookahead(view)
@@ -82,7 +82,7 @@ def reloaded(running: Config, wanted: Config) -> Reload:
             "cameras": [_camera(running, wanted, it, names_of_own) for it in running.camera_ids],
         }
     )
-    return Reload(now, live, anew, best_view, tuple(key for key in waiting if key not in best_view))
+    return ReloadPlan(now, live, anew, best_view, tuple(key for key in waiting if key not in best_view))
 
 
 def _of(keys: Sequence[str], sections: Sequence[str]) -> tuple[str, ...]:
@@ -98,13 +98,13 @@ def _kept(running: Config, wanted: Config, keys: Sequence[str]) -> tuple[str, ..
     return (*late, "window") if any(key in _EPOCHS for key in keys) else late
 
 
-def _track(running: Config, wanted: Config, kept: Sequence[str]) -> Track:
+def _track(running: Config, wanted: Config, kept: Sequence[str]) -> TrackSettings:
     """Take over how people are followed, but not when windows end and frames are final."""
     names = [name for name in _TRACK if name not in kept]
     return running.track.model_copy(update={name: getattr(wanted.track, name) for name in names})
 
 
-def _camera(running: Config, wanted: Config, camera_id: str, names: Sequence[str]) -> Camera:
+def _camera(running: Config, wanted: Config, camera_id: str, names: Sequence[str]) -> CameraSettings:
     """Take over what only the camera's own process goes by."""
     before = running.camera(camera_id)
     if running.camera_ids != wanted.camera_ids:

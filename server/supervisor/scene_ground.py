@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from server.config.sections import Camera, Site
+from server.config.sections import CameraSettings, SiteSettings
 from server.config.site_config import Config
-from server.config.source_address import SourceKind, kind_of
+from server.config.source_address import SourceKind, source_kind
 
 
-def with_scene_ground(config: Config) -> Config:
+def add_scene_ground(config: Config) -> Config:
     """Give the configuration with the floor of every camera of a synthetic scene that has none of its own.
 
     Raises:
@@ -16,8 +16,8 @@ def with_scene_ground(config: Config) -> Config:
     return config.model_copy(update={"cameras": [_calibrated(it, config.site) for it in config.cameras]})
 
 
-def _calibrated(camera: Camera, site: Site) -> Camera:
-    if camera.ground is not None or kind_of(camera.source) is not SourceKind.SCENE:
+def _calibrated(camera: CameraSettings, site: SiteSettings) -> CameraSettings:
+    if camera.ground is not None or source_kind(camera.source) is not SourceKind.SCENE:
         return camera
     from server.camera.sources.synthetic import Stage  # noqa: PLC0415 — it draws, and other sites need not load it
 

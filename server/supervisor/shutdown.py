@@ -20,15 +20,15 @@ log = logging.getLogger(__name__)
 
 _PR_SET_PDEATHSIG = 1
 _ENDING = (signal.SIGINT, signal.SIGTERM)
-SUPERVISED = "MYVIEW_SUPERVISED"
+SUPERVISED_VARIABLE = "MYVIEW_SUPERVISED"
 """Set in the environment of a process that a supervisor looks after."""
-OVER = 4
+EXIT_FINISHED = 4
 """The code by which such a process says that nothing is left to do; 0 is that of one told to end."""
 _LET_GO_S = 1.2
 """How long a process has to let go of everything; a camera that is silent is waited for longer."""
 
 
-async def run_until_told(
+async def run_until_signal(
     main: Callable[[], Coroutine[Any, Any, None]],
     told: Callable[[], None] = lambda: None,
     *,
@@ -58,7 +58,7 @@ async def run_until_told(
     return True
 
 
-def end_with_parent() -> None:
+def terminate_with_parent() -> None:
     """Ask the kernel to end this process when its supervisor is gone (Linux; elsewhere nothing)."""
     with contextlib.suppress(OSError, AttributeError):
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
@@ -74,9 +74,9 @@ def run_process(
     Who is told to end has so many seconds to let go of everything. Then the process ends all the same: a
     thread may be held up by a camera that says nothing, and whoever stops a site would wait for that, too.
     """
-    over = asyncio.run(run_until_told(main, lambda: _end_after(let_go_s), hang_up=hang_up))
-    if over and os.environ.get(SUPERVISED):
-        sys.exit(OVER)
+    over = asyncio.run(run_until_signal(main, lambda: _end_after(let_go_s), hang_up=hang_up))
+    if over and os.environ.get(SUPERVISED_VARIABLE):
+        sys.exit(EXIT_FINISHED)
 
 
 def _end_after(seconds: float) -> None:
@@ -90,12 +90,12 @@ def _end_after(seconds: float) -> None:
 
 
 @contextmanager
-def ending_later() -> Iterator[None]:
+def defer_termination() -> Iterator[None]:
     """Put off SIGINT and SIGTERM until the block is over; only in the main thread.
 
     The mask alone would not do: a library's thread may take the signal, and Python then runs the
     handler here all the same.  It is set too because children inherit it: one that is told to end while
-    it still starts would say so with a traceback.  They call :func:`end_at_once_again`.
+    it still starts would say so with a traceback.  They call :func:`restore_termination`.
     """
     came: list[int] = []
     before = {number: signal.signal(number, lambda number, _: came.append(number)) for number in _ENDING}
@@ -110,6 +110,6 @@ def ending_later() -> Iterator[None]:
             signal.raise_signal(came[0])
 
 
-def end_at_once_again() -> None:
-    """In a child that was started within :func:`ending_later`: let SIGINT and SIGTERM through."""
+def restore_termination() -> None:
+    """In a child that was started within :func:`defer_termination`: let SIGINT and SIGTERM through."""
     signal.pthread_sigmask(signal.SIG_UNBLOCK, _ENDING)

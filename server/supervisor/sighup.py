@@ -10,29 +10,29 @@ import sys
 import termios
 from collections.abc import AsyncGenerator, AsyncIterator, Callable
 
-from server.config.running_config import Running
+from server.config.running_config import ActiveConfig
 from server.config.site_config import Config
-from server.supervisor.reload import Reload, reloaded
+from server.supervisor.reload import ReloadPlan, plan_reload
 from server.system.errors import UserError
 
 log = logging.getLogger(__name__)
 
-Check = Callable[[Config, Reload], None]
+Check = Callable[[Config, ReloadPlan], None]
 """Looks whether what is wanted can be; raises UserError where it cannot."""
 
 _early: list[int] = []
 """The signals that came before anybody waited for them."""
 
 
-def mind_hang_ups() -> None:
-    """Keep in mind each SIGHUP from now on, for :func:`hang_ups`; only in the main thread.
+def record_early_sighups() -> None:
+    """Keep in mind each SIGHUP from now on, for :func:`sighups`; only in the main thread.
 
     Called before the configuration is read: what is written while the process starts is then read again.
     """
     signal.signal(signal.SIGHUP, lambda number, _: _early.append(number))
 
 
-async def hang_ups() -> AsyncGenerator[None, None]:
+async def sighups() -> AsyncGenerator[None, None]:
     """Give a turn for each time that SIGHUP has come; those that come meanwhile are one.
 
     When it came because the terminal was closed, the process is told to end instead.
@@ -52,13 +52,13 @@ async def hang_ups() -> AsyncGenerator[None, None]:
             yield
 
 
-async def reloads(running: Running, check: Check = lambda *_: None) -> AsyncIterator[Reload]:
+async def reloads(running: ActiveConfig, check: Check = lambda *_: None) -> AsyncIterator[ReloadPlan]:
     """Read the configuration again whenever SIGHUP comes, and give what it changes.
 
     What is wrong is said in one line, and leaves in force what is. Whoever is given a change sets
     ``running.now`` once it is in force.
     """
-    async for _ in hang_ups():
+    async for _ in sighups():
         try:
             reload = await asyncio.to_thread(_read, running, check)
         except UserError as error:
@@ -69,9 +69,9 @@ async def reloads(running: Running, check: Check = lambda *_: None) -> AsyncIter
             yield reload
 
 
-def _read(running: Running, check: Check) -> Reload:
+def _read(running: ActiveConfig, check: Check) -> ReloadPlan:
     wanted = running.wanted()
-    reload = reloaded(running.now, wanted)
+    reload = plan_reload(running.now, wanted)
     check(wanted, reload)
     return reload
 

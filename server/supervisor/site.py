@@ -10,10 +10,15 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from camsync import Spell
-from server.config.running_config import IN_FORCE, Running, is_ours, written
+from server.config.running_config import (
+    ACTIVE_CONFIG_VARIABLE,
+    ActiveConfig,
+    is_owned_by_this_user,
+    serialize_config,
+)
 from server.config.site_config import Config
 from server.supervisor.exposure_checks import check_bus, check_pulses, check_viewers
-from server.supervisor.reload import Reload
+from server.supervisor.reload import ReloadPlan
 from server.supervisor.sighup import reloads
 from server.supervisor.startup_checks import check_recording
 from server.supervisor.supervisor import Supervisor
@@ -25,7 +30,7 @@ _APART_S = 4.0
 """Between two cameras that begin anew, so that the others show whom the first one showed."""
 
 
-async def run_up(running: Running, environment: Mapping[str, str], out: Path | None) -> None:
+async def run_up(running: ActiveConfig, environment: Mapping[str, str], out: Path | None) -> None:
     """Run a site until the best-view service has nothing left to do, or this task is cancelled.
 
     Raises:
@@ -37,7 +42,7 @@ async def run_up(running: Running, environment: Mapping[str, str], out: Path | N
         supervisor = Supervisor(
             running.path,
             running.now,
-            {**environment, IN_FORCE: str(kept)},
+            {**environment, ACTIVE_CONFIG_VARIABLE: str(kept)},
             out,
             before_start=lambda: _keep(running, kept, failing),
         )
@@ -51,7 +56,7 @@ async def run_up(running: Running, environment: Mapping[str, str], out: Path | N
             await asyncio.gather(following, return_exceptions=True)
 
 
-def check_exposed(config: Config) -> None:
+def check_exposure(config: Config) -> None:
     """Refuse a site that is open to others by accident.
 
     Raises:
@@ -61,7 +66,7 @@ def check_exposed(config: Config) -> None:
         check(config)
 
 
-async def _follow(running: Running, supervisor: Supervisor, keep: Callable[[], None]) -> None:
+async def _follow(running: ActiveConfig, supervisor: Supervisor, keep: Callable[[], None]) -> None:
     """Tell those processes whose settings have changed, whenever the configuration is read again."""
     async for reload in reloads(running, _check):
         log.info("%s", reload.line)
@@ -87,20 +92,20 @@ def _folder() -> tempfile.TemporaryDirectory[str]:
         raise UserError(f"cannot make a temporary folder (TMPDIR names where): {reason}") from error
 
 
-def _check(wanted: Config, reload: Reload) -> None:
-    check_exposed(wanted)
+def _check(wanted: Config, reload: ReloadPlan) -> None:
+    check_exposure(wanted)
     for camera in reload.cameras:
         check_recording(reload.now, camera)
 
 
-def _keep(running: Running, kept: Path, failing: Spell) -> None:
+def _keep(running: ActiveConfig, kept: Path, failing: Spell) -> None:
     """Write down what the site runs by, for processes that begin: all of it or nothing."""
     new = kept.with_suffix(".new")
     try:
         kept.parent.mkdir(mode=0o700, exist_ok=True)
-        if not is_ours(kept.parent):  # it was tidied away, and somebody else took the name
+        if not is_owned_by_this_user(kept.parent):  # it was tidied away, and somebody else took the name
             raise PermissionError(errno.EACCES, "its folder is somebody else's")
-        new.write_text(written(running.now, running.path.parent), encoding="utf-8")
+        new.write_text(serialize_config(running.now, running.path.parent), encoding="utf-8")
         new.replace(kept)
     except OSError as error:
         if (more := failing.happened(str(error.strerror))) is not None:

@@ -7,7 +7,7 @@ import socket
 from server.camera.audio import open_sound
 from server.camera.pipeline import CameraPipeline
 from server.config.site_config import Config
-from server.config.source_address import SourceKind, kind_of
+from server.config.source_address import SourceKind, source_kind
 from server.system.errors import UserError
 
 
@@ -57,5 +57,5 @@ def check_recording(config: Config, camera: str) -> None:
     Raises:
         UserError: it cannot be opened, or its file of detections.
     """
-    if kind_of(config.camera(camera).source) is not SourceKind.STREAM:
+    if source_kind(config.camera(camera).source) is not SourceKind.STREAM:
         CameraPipeline(config, camera, ready=False).close()

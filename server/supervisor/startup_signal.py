@@ -13,18 +13,18 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-STARTED = "MYVIEW_STARTED_FD"
+STARTED_FD_VARIABLE = "MYVIEW_STARTED_FD"
 """In the environment of a process that a supervisor starts: the descriptor that it closes once loaded."""
 
 
-def say_started() -> None:
+def signal_started() -> None:
     """Tell the supervisor, if there is one, that this process has loaded; saying it again does nothing."""
     with contextlib.suppress(ValueError, OSError):
-        os.close(int(os.environ.pop(STARTED, "")))
+        os.close(int(os.environ.pop(STARTED_FD_VARIABLE, "")))
 
 
 @dataclass(frozen=True, slots=True)
-class Pipe:
+class StartupPipe:
     """Its end tells that a process has started, or has died.
 
     Attributes:
@@ -50,10 +50,10 @@ class Pipe:
 
 
 @contextmanager
-def started_pipe() -> Iterator[Pipe]:
+def open_startup_pipe() -> Iterator[StartupPipe]:
     """Open a pipe; its supervisor's end is closed with the block, the other one by whoever hands it on."""
     own, given = os.pipe()
     try:
-        yield Pipe(own, given)
+        yield StartupPipe(own, given)
     finally:
         os.close(own)

@@ -14,11 +14,11 @@ from pathlib import Path
 
 from camsync import Spell
 from server.config.site_config import Config
-from server.supervisor.shutdown import OVER, SUPERVISED
-from server.supervisor.startup_signal import STARTED, started_pipe
+from server.supervisor.shutdown import EXIT_FINISHED, SUPERVISED_VARIABLE
+from server.supervisor.startup_signal import STARTED_FD_VARIABLE, open_startup_pipe
 from server.system.errors import UserError
-from server.system.niceness import make_nicer
-from server.system.processors import processors
+from server.system.niceness import lower_priority
+from server.system.processors import available_processors
 
 log = logging.getLogger(__name__)
 
@@ -53,7 +53,7 @@ class Child:
 class Supervisor:
     """Starts one process each for the pulses, every camera and the best view; restarts what dies.
 
-    A camera whose recording is over says so (`OVER`) and stays so; when the best-view service does,
+    A camera whose recording is over says so (`EXIT_FINISHED`) and stays so; when the best-view service does,
     everything is over. ``before_start`` is called whenever a process is about to be started.
 
     The best view and the pulses come first and never wait. Then the cameras, no more of which load at a time
@@ -69,10 +69,10 @@ class Supervisor:
         before_start: Callable[[], None] = lambda: None,
     ) -> None:
         self._before_start = before_start
-        self._environment = {**os.environ, **environment, SUPERVISED: "1"}
+        self._environment = {**os.environ, **environment, SUPERVISED_VARIABLE: "1"}
         path = str(config_path)
         self._out = out
-        self._places = asyncio.Semaphore(max(1, int(processors())))
+        self._places = asyncio.Semaphore(max(1, int(available_processors())))
         """For cameras that load."""
         first = [Child("bestview", ["bestview", path]), Child("sync", ["sync", path])]
         cameras = [Child(it, ["camera", path, it], first, config.site.niceness) for it in config.camera_ids]
@@ -112,7 +112,7 @@ class Supervisor:
                 started = loop.time()
                 process = await self._start(child)
             code = await process.wait()
-            if code == OVER:
+            if code == EXIT_FINISHED:
                 log.info("%s has ended", child.name)
                 child.done.set()
                 return
@@ -129,7 +129,7 @@ class Supervisor:
 
     async def _start(self, child: Child) -> asyncio.subprocess.Process:
         """Start a process, and give it once it has loaded, has died, or takes too long for others to wait."""
-        with started_pipe() as pipe:
+        with open_startup_pipe() as pipe:
             try:
                 self._before_start()
                 process = child.process = await asyncio.create_subprocess_exec(
@@ -137,13 +137,13 @@ class Supervisor:
                     "-m",
                     "server.cli.main",
                     *self._arguments(child),
-                    env={**self._environment, STARTED: str(pipe.given)},
+                    env={**self._environment, STARTED_FD_VARIABLE: str(pipe.given)},
                     pass_fds=(pipe.given,),
                     process_group=0,  # Ctrl-C in a terminal is for the supervisor alone
                 )
             finally:
                 os.close(pipe.given)
-            make_nicer(process.pid, child.nicer)
+            lower_priority(process.pid, child.nicer)
             await pipe.ended(_STARTS_WITHIN_S)
         child.started.set()
         return process

@@ -7,16 +7,16 @@ import logging
 
 from camsync import PulseServer
 from server.config.pulse_passwords import pulse_clients, pulse_users
-from server.config.running_config import Running
+from server.config.running_config import ActiveConfig
 from server.supervisor.exposure_checks import check_pulses
 from server.supervisor.sighup import reloads
-from server.supervisor.startup_signal import say_started
+from server.supervisor.startup_signal import signal_started
 from server.system.errors import UserError
 
 log = logging.getLogger(__name__)
 
 
-async def sync_process(running: Running) -> None:
+async def sync_process(running: ActiveConfig) -> None:
     """Send pulses; pulse 0 waits for all cameras and best-view services.
 
     Nothing that it goes by can change while it runs: of a configuration that is read again it says so.
@@ -42,7 +42,7 @@ async def sync_process(running: Running) -> None:
         reason = "the port is in use" if taken else (error.strerror or error)
         raise UserError(f"sync.port: cannot listen on {sync.bind}:{sync.port}: {reason}") from error
     log.info("pulses at %g a second on %s:%d", config.site.fps, sync.bind, server.port)
-    say_started()
+    signal_started()
     try:
         async for reload in reloads(running):
             log.info("%s", reload.line)

@@ -41,7 +41,7 @@ def is_login(source: str) -> bool:
     return _LOGIN.match(source) is not None
 
 
-def shown(source: str) -> str:
+def redact_address(source: str) -> str:
     """Give a source, or another address or path, as it may be shown: of an address its protocol and host.
 
     ``rtsp://name:password@10.0.0.1/live`` is shown as ``rtsp://10.0.0.1/...``. Where an @ stands behind what
@@ -68,7 +68,7 @@ def _shown_place(rest: str) -> str:
     return f"{place}/{_MORE}" if login or beyond.strip("/") else f"{place}{beyond}"
 
 
-def shown_endpoint(endpoint: str) -> str:
+def redact_endpoint(endpoint: str) -> str:
     """Give zenoh's ``protocol/host:port`` without the settings that may stand behind it: keys, for one."""
     found = _ENDPOINT.match(endpoint)
     if found is None:
@@ -76,7 +76,7 @@ def shown_endpoint(endpoint: str) -> str:
     return found[0] if found.end() == len(endpoint) else f"{found[0]} {_MORE}"
 
 
-def without_addresses(text: str) -> str:
+def redact_addresses(text: str) -> str:
     """Give others' words, such as a traceback, with each line only up to where an address begins."""
     return "".join(_cut(line) for line in text.splitlines(keepends=True))
 

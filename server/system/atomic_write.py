@@ -43,7 +43,7 @@ def check_new_file(out: Path, *read: Path | None) -> None:
 
 
 @contextmanager
-def whole_folder(out: Path) -> Iterator[Path]:
+def atomic_folder(out: Path) -> Iterator[Path]:
     """Give a folder to write into; it becomes ``out`` only when all went well.
 
     Raises:
@@ -65,7 +65,7 @@ def whole_folder(out: Path) -> Iterator[Path]:
 
 
 @contextmanager
-def whole_file(out: Path, *read: Path | None) -> Iterator[Path]:
+def atomic_file(out: Path, *read: Path | None) -> Iterator[Path]:
     """Give a file to write; it becomes ``out``, in place of an older one, only when all went well.
 
     ``read`` are the files that are read meanwhile: none of them is replaced.

@@ -6,7 +6,7 @@ import asyncio
 import os
 import sys
 
-from server.system.niceness import make_nicer
+from server.system.niceness import lower_priority
 
 _NICER = 5
 """Somebody waits for what it does, but everybody for the service; cameras yield to both (`site.niceness`)."""
@@ -27,5 +27,5 @@ async def start_child(module: str) -> asyncio.subprocess.Process:
         env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
         process_group=0,  # Ctrl-C in a terminal is for the service alone
     )
-    make_nicer(process.pid, _NICER)
+    lower_priority(process.pid, _NICER)
     return process

@@ -10,7 +10,7 @@ _TIMEX_BYTES = 512
 """More than struct timex has."""
 
 
-def clock_is_kept() -> bool | None:
+def is_clock_synchronized() -> bool | None:
     """Tell whether NTP keeps this machine's clock, as the system has it; None: the system does not say."""
     try:
         state: int = ctypes.CDLL(None).adjtimex(ctypes.create_string_buffer(_TIMEX_BYTES))

@@ -21,7 +21,7 @@ _KEPT_PER_DRAWING = 4
 """The pipes of a process that decodes, and its number."""
 
 
-def raise_limit() -> None:
+def raise_descriptor_limit() -> None:
     """Let this process, and those that it starts, have as many descriptors open as the system lets it."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     most = _within(hard)
@@ -30,12 +30,12 @@ def raise_limit() -> None:
             resource.setrlimit(resource.RLIMIT_NOFILE, (most, hard))
 
 
-def limit() -> int:
+def descriptor_limit() -> int:
     """Return how many descriptors this process may have open."""
     return _within(resource.getrlimit(resource.RLIMIT_NOFILE)[0])
 
 
-def places(config: Config, descriptors: int) -> int:
+def connection_limit(config: Config, descriptors: int) -> int:
     """Compute how many connections are taken at once where a process may have so many descriptors open.
 
     Recording, bus, drawing and operators have theirs whatever viewers do. Who watches the past may have a

@@ -11,7 +11,7 @@ class UserError(Exception):
     code: ClassVar[int] = 2
 
 
-class AwayError(UserError):
+class UnavailableError(UserError):
     """Something that this process needs is not there now: trying again later may help, and is done."""
 
     code: ClassVar[int] = 3

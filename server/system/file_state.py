@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-State = tuple[int, int, int]
+FileState = tuple[int, int, int]
 
 
-def state_of(path: Path) -> State | None:
+def file_state(path: Path) -> FileState | None:
     """Give what changes when a file does, or is replaced by another; None: there is none."""
     try:
         now = path.stat()

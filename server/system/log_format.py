@@ -17,7 +17,7 @@ from types import TracebackType
 
 import msgspec
 
-from server.system.address_redaction import without_addresses
+from server.system.address_redaction import redact_addresses
 from server.system.errors import UserError
 
 _ExcInfo = tuple[type[BaseException], BaseException, TracebackType | None] | tuple[None, None, None]
@@ -32,7 +32,7 @@ class TextLines(logging.Formatter):
 
     def formatException(self, ei: _ExcInfo) -> str:  # noqa: N802 — as logging calls it
         """Give a traceback, each line up to where an address begins."""
-        return without_addresses(super().formatException(ei))
+        return redact_addresses(super().formatException(ei))
 
 
 class JsonLines(TextLines):

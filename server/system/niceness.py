@@ -10,7 +10,7 @@ import os
 _NICEST = 19
 
 
-def be_nicer(by: int) -> None:
+def lower_own_priority(by: int) -> None:
     """Make this process nicer by so much than the one that has started it.
 
     Called before it has threads: each has a niceness of its own, and begins with that of who begins it.
@@ -18,7 +18,7 @@ def be_nicer(by: int) -> None:
     _nicer(0, _niceness(os.getppid()) + by)
 
 
-def make_nicer(pid: int, by: int) -> None:
+def lower_priority(pid: int, by: int) -> None:
     """Make a process that this one has just started nicer by so much than this one.
 
     What it starts with, libraries that load above all, is then as nice; it may be gone already.

@@ -11,7 +11,7 @@ _GROUPS = Path("/sys/fs/cgroup")
 _OF_THIS = Path("/proc/self/cgroup")
 
 
-def processors(groups: Path = _GROUPS, of_this: Path = _OF_THIS) -> float:
+def available_processors(groups: Path = _GROUPS, of_this: Path = _OF_THIS) -> float:
     """Give their number: those it may run on, or the share of them that a container is given.
 
     ``groups`` is where the kernel's control groups are, ``of_this`` says which are this process's.

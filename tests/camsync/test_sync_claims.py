@@ -199,4 +199,4 @@ def test_a_number_beyond_the_last_pulse_is_no_pulse(number: int) -> None:
 
 
 def test_the_last_pulse_is_the_same_on_the_bus() -> None:
-    assert number_types.LAST_PULSE == LAST_PULSE < 2**53
+    assert number_types.PULSE_MAX == LAST_PULSE < 2**53

@@ -18,10 +18,10 @@ from running_site import RunningSite, bounded, running
 
 from client import Gop
 from server.cli.generated_config import DEMO, free_port
-from server.config.sections import Zenoh
+from server.config.sections import ZenohSettings
 from server.messaging.bus import Bus
 from server.messaging.inbox import Message
-from server.messaging.messages import CameraTracks, Keys
+from server.messaging.messages import CameraTracks, ZenohKeys
 from server.service.identity.local_numbers import Followed
 
 pytestmark = [
@@ -67,9 +67,9 @@ async def test_a_best_view_that_is_killed_shows_the_same_people_under_the_same_a
     async with running(config) as site:
         await site.until(lambda: bool(site.gops and site.gops[-1].choices), "somebody is shown")
         words: list[CameraTracks] = []
-        bus = await asyncio.to_thread(Bus.hearing, Zenoh(connect=site.config["zenoh"]["connect"]))
+        bus = await asyncio.to_thread(Bus.hearing, ZenohSettings(connect=site.config["zenoh"]["connect"]))
         try:
-            bus.subscribe(Keys("e2e").camera("*", "tracks"), lambda it: words.append(read(it)))
+            bus.subscribe(ZenohKeys("e2e").camera("*", "tracks"), lambda it: words.append(read(it)))
             for _ in range(2):
                 await killed(site, words)
         finally:

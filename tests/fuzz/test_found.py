@@ -18,8 +18,8 @@ from client.mp4_writer import write_plain
 from client.webm import ElementReader, WebmError, cluster_time
 from server.camera.peers.detection_exchange import Exchange
 from server.cli.calibrate.points_file import read_points
-from server.config.loader import build_config, changed_view, load_config
-from server.config.sections import View
+from server.config.loader import build_config, change_view_settings, load_config
+from server.config.sections import ViewSettings
 from server.config.tokens_file import read_tokens
 from server.http.app import make_app, serving
 from server.media.audio.audio_format import SoundFormat
@@ -119,7 +119,7 @@ def test_a_number_beyond_all_measure_is_none_in_the_environment_either(
 
 def test_settings_to_try_out_must_be_text() -> None:
     with pytest.raises(UserError, match="characters that are none"):
-        changed_view(View(), {"\ud800": 1}, "to try out")
+        change_view_settings(ViewSettings(), {"\ud800": 1}, "to try out")
 
 
 @pytest.mark.parametrize(

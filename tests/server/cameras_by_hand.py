@@ -13,19 +13,19 @@ import numpy as np
 from bestview import EpisodeKey, IdentityUpdate, LocalTrack
 from server.camera.encoding.encoder import AccessUnit, Encoder
 from server.config.loader import build_config
-from server.config.sections import Encode, Site
+from server.config.sections import EncodeSettings, SiteSettings
 from server.config.site_config import Config
 from server.messaging.epochs import end_of_epoch
 from server.messaging.inbox import Message
 from server.messaging.messages import (
+    AppearanceHistogram,
     Box,
     CameraStatus,
     CameraTracks,
-    FrameHead,
-    Glimpse,
-    Keys,
-    ThumbHead,
-    Track,
+    FrameHeader,
+    ThumbnailHeader,
+    TrackMessage,
+    ZenohKeys,
 )
 from server.service.ingest.epoch_aligner import Epoch
 from server.service.service import BestViewService
@@ -59,7 +59,9 @@ def encoded(
     seed: int, frames: int = 40, *, gop: int = GOP, crf: int = 23, codec: Literal["h264", "vp8"] = "h264"
 ) -> tuple[AccessUnit, ...]:
     """Encode pictures that differ from camera to camera (by seed) and from frame to frame."""
-    encoder = Encoder(Site(width=WIDTH, height=HEIGHT, fps=FPS), Encode(gop=gop, crf=crf, codec=codec))
+    encoder = Encoder(
+        SiteSettings(width=WIDTH, height=HEIGHT, fps=FPS), EncodeSettings(gop=gop, crf=crf, codec=codec)
+    )
     rng = np.random.default_rng(seed)
     pictures = rng.integers(0, 255, (frames, HEIGHT // 8, WIDTH // 8, 3), dtype=np.uint8)
     return tuple(
@@ -87,13 +89,13 @@ def word(camera: str, epoch: int, boxes: Mapping[int, Box | None], **changes: An
         ended=False,
         shed=[],
         tracks=[
-            Track(
+            TrackMessage(
                 id=track,
                 boxes=[box] * STRIDE,
                 confidence=1.0,
                 looks=[]
                 if box is None
-                else [Glimpse(first=last - STRIDE + 1, last=last, histogram=look(track))],
+                else [AppearanceHistogram(first=last - STRIDE + 1, last=last, histogram=look(track))],
             )
             for track, box in boxes.items()
         ],
@@ -109,19 +111,19 @@ def epoch_of(number: int, *words: CameraTracks) -> Epoch:
 
 def video(camera: str, unit: AccessUnit, boot: int = 1) -> Message:
     """Give a frame as it comes from the bus."""
-    head = FrameHead(pulse=unit.pulse, key=unit.key, boot=boot, due=0.0, taken=0.0, encoded=0.0)
-    return Message(Keys("hall").camera(camera, "video"), unit.data, msgspec.json.encode(head))
+    head = FrameHeader(pulse=unit.pulse, key=unit.key, boot=boot, due=0.0, taken=0.0, encoded=0.0)
+    return Message(ZenohKeys("hall").camera(camera, "video"), unit.data, msgspec.json.encode(head))
 
 
 def tracks(message: CameraTracks) -> Message:
     """Give a word as it comes from the bus."""
-    return Message(Keys("hall").camera(message.camera, "tracks"), msgspec.json.encode(message), b"")
+    return Message(ZenohKeys("hall").camera(message.camera, "tracks"), msgspec.json.encode(message), b"")
 
 
 def thumbnail(camera: str, track: int, jpeg: bytes, pulse: int = 0, boot: int = 1) -> Message:
     """Give a small picture as it comes from the bus."""
-    head = ThumbHead(track=track, boot=boot, pulse=pulse)
-    return Message(Keys("hall").camera(camera, f"thumbs/{track}"), jpeg, msgspec.json.encode(head))
+    head = ThumbnailHeader(track=track, boot=boot, pulse=pulse)
+    return Message(ZenohKeys("hall").camera(camera, f"thumbs/{track}"), jpeg, msgspec.json.encode(head))
 
 
 def status(camera: str, **changes: Any) -> Message:
@@ -139,7 +141,7 @@ def status(camera: str, **changes: Any) -> Message:
         round_trip=0.001,
     )
     payload = msgspec.json.encode(msgspec.structs.replace(told, **changes))
-    return Message(Keys("hall").camera(camera, "status"), payload, b"")
+    return Message(ZenohKeys("hall").camera(camera, "status"), payload, b"")
 
 
 class TrackNumbers:
@@ -168,8 +170,8 @@ class FedService(BestViewService):
         """Let cameras be there, which remember nobody."""
         for camera in cameras:
             for part in (self.intake, self.remembering):
-                part.alive(Keys("hall").camera(camera, "alive"), there=True)
-            self.remembering.heard(Message(Keys("hall").camera(camera, "remembered"), b"", b""))
+                part.alive(ZenohKeys("hall").camera(camera, "alive"), there=True)
+            self.remembering.heard(Message(ZenohKeys("hall").camera(camera, "remembered"), b"", b""))
 
     def feed(self, epoch: int, seen: Mapping[str, Mapping[int, Box | None]]) -> None:
         """Send an epoch's frames and words of the cameras in ``seen``, and decide."""

@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from patience import PATIENCE
 
 from server.camera.encoding.encoder import AccessUnit, Encoder
-from server.config.sections import Http
+from server.config.sections import HttpSettings
 from server.http.app import make_app, serving
 from server.messaging.epochs import end_of_epoch
-from server.messaging.messages import Box, GopChoices, Track
+from server.messaging.messages import Box, GopChoices, TrackMessage
 from synthetic import Scene
 
 SIZE = (320, 180)
@@ -79,7 +79,7 @@ class Drawn(Hall):
                 for unit in units(number, MOST)[first : first + STRIDE]:
                     self.service.intake.video(video(camera, unit))
                 seen = [
-                    Track(id=person, boxes=places, confidence=1.0)
+                    TrackMessage(id=person, boxes=places, confidence=1.0)
                     for person, places in boxes(number, first, STRIDE).items()
                 ]
                 self.service.intake.tracks(tracks(word(camera, epoch, {}, tracks=seen, size=SIZE)))
@@ -102,7 +102,7 @@ async def drawn_room(**changes: object) -> AsyncIterator[Drawn]:
     app = make_app(service)
     async with (
         asyncio.timeout(2 * PATIENCE),
-        serving(app, Http(port=0)) as port,
+        serving(app, HttpSettings(port=0)) as port,
         aiohttp.ClientSession(f"http://127.0.0.1:{port}") as session,
     ):
         hall = Drawn(service, session, port, app, told)

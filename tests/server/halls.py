@@ -11,7 +11,7 @@ import pytest
 from cameras_by_hand import CAMERAS, LARGE, SMALL, FedService, TrackNumbers, small_config
 from patience import PATIENCE
 
-from server.config.sections import Http
+from server.config.sections import HttpSettings
 from server.http.app import make_app, serving
 
 A, B = CAMERAS
@@ -38,7 +38,7 @@ async def opened(*, patience: float = PATIENCE, **changes: Any) -> AsyncIterator
     service.decider.people._registry = TrackNumbers()  # type: ignore[assignment]
     async with (
         asyncio.timeout(patience),
-        serving(make_app(service), Http(port=0, **changes.get("http", {}))) as port,
+        serving(make_app(service), HttpSettings(port=0, **changes.get("http", {}))) as port,
         aiohttp.ClientSession(f"http://127.0.0.1:{port}") as session,
     ):
         yield Hall(service, session, port)

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 
 from server.camera.audio import Frame, RecordedSound, runs
 from server.camera.encoding.encoder import AccessUnit, Encoder
-from server.config.sections import Encode, Site
+from server.config.sections import EncodeSettings, SiteSettings
 from server.messaging.inbox import Message
-from server.messaging.messages import Keys, SoundHead
+from server.messaging.messages import AudioHeader, ZenohKeys
 
 WIDTH, HEIGHT, FPS = 64, 48, 25
 EVERY = 20
@@ -84,7 +84,7 @@ def _some_sound(number: int, rate: int, layout: str) -> av.AudioFrame:
 @cache
 def flashing(recording: Path) -> tuple[AccessUnit, ...]:
     """Give the recording's pictures as a camera of the hall sends them."""
-    encoder = Encoder(Site(width=64, height=48, fps=FPS), Encode(gop=GOP))
+    encoder = Encoder(SiteSettings(width=64, height=48, fps=FPS), EncodeSettings(gop=GOP))
     with av.open(str(recording)) as container:
         pictures = [it.to_ndarray(format="bgr24") for it in container.decode(video=0)]
     return tuple(encoder.encode(pulse, picture) for pulse, picture in enumerate(pictures))
@@ -103,9 +103,9 @@ def messages(frames: list[Frame]) -> list[Message]:
     """Give frames of sound as they come from the bus."""
     return [
         Message(
-            Keys("hall").sound,
+            ZenohKeys("hall").sound,
             b"".join(frame.data for frame in run),
-            msgspec.json.encode(SoundHead(first=run[0].number, sizes=[len(frame.data) for frame in run])),
+            msgspec.json.encode(AudioHeader(first=run[0].number, sizes=[len(frame.data) for frame in run])),
         )
         for run in runs(frames)
     ]

@@ -14,7 +14,7 @@ from cameras_by_hand import LARGE, SMALL, tracks, word
 from halls import A, B, Hall, see
 from tokens_by_hand import bearer, locked, token_of
 
-from server.messaging.operator_messages import Trouble
+from server.messaging.operator_messages import RiskEvent
 
 
 @pytest.fixture
@@ -104,8 +104,8 @@ async def test_flags_are_of_who_may_be_seen_alone(site: Hall, monkeypatch: pytes
         "server.service.operator_assist.flag_budget._ONE_S", -1.0
     )  # both have a flag, though they are of one
     troubles = [
-        Trouble(reason="alike", tracks=[1, 2], pulse=19, margin=0.5, risk=0.5),
-        Trouble(reason="fading", tracks=[2], pulse=19, margin=0.5, risk=0.5),
+        RiskEvent(reason="alike", tracks=[1, 2], pulse=19, margin=0.5, risk=0.5),
+        RiskEvent(reason="fading", tracks=[2], pulse=19, margin=0.5, risk=0.5),
     ]
     said = word(A, 3, {1: SMALL, 2: SMALL}, troubles=troubles)
     async with site.session.get("/api/events", headers=bearer("family")) as theirs:

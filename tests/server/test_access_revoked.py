@@ -17,12 +17,12 @@ from cameras_by_hand import CAMERAS, SMALL
 from halls import A, B, Hall
 from tokens_by_hand import LATER, bearer, line_of, locked, token_of, write_tokens
 
-from server.config.tokens_file import digest_of
+from server.config.tokens_file import token_digest
 from server.http.access.csrf import CHANGES
 from server.http.access.token_file import TokenFile
 from server.messaging.inbox import Message
-from server.messaging.messages import Keys
-from server.messaging.retained_state import Remembered
+from server.messaging.messages import ZenohKeys
+from server.messaging.retained_state import IdentitySnapshot
 
 
 @pytest.fixture(autouse=True)
@@ -179,8 +179,8 @@ async def test_a_person_s_token_is_void_when_people_were_numbered_anew_since(
         )
         hall.service.come(*CAMERAS)
         if remembered is not None:
-            said = Remembered(pulse=0, boot=1, next=9, since=remembered, people=[])
-            key = Keys("hall").camera("c0", "remembered")
+            said = IdentitySnapshot(pulse=0, boot=1, next=9, since=remembered, people=[])
+            key = ZenohKeys("hall").camera("c0", "remembered")
             hall.service.remembering.heard(Message(key, msgspec.json.encode(said), b""))
         while True:  # the file of tokens is looked at now and then
             await asyncio.sleep(0.1)
@@ -205,7 +205,7 @@ class Looked:
         self.file = TokenFile(write_tokens(path, line_of("desk")))
 
     def has(self, name: str) -> bool:
-        return self.file.find(digest_of(token_of(name))) is not None
+        return self.file.find(token_digest(token_of(name))) is not None
 
 
 @pytest.fixture

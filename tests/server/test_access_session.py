@@ -15,7 +15,7 @@ from aiohttp.test_utils import make_mocked_request
 from halls import Hall, opened
 from tokens_by_hand import bearer, line_of, locked, token_of, write_tokens
 
-from server.config.tokens_file import digest_of
+from server.config.tokens_file import token_digest
 from server.http.access.access_control import COOKIE, Access, Holder
 from server.http.access.csrf import CHANGES
 from server.http.access.local_requests import is_from_here
@@ -242,11 +242,11 @@ async def test_who_signs_in_to_another_service_of_the_machine_stays_signed_in_he
 def test_a_session_ends_and_so_does_the_oldest_of_very_many_of_one_token() -> None:
     now = [0.0]
     sessions = Sessions(lambda: now[0])
-    keys = [digest_of(sessions.open("a")) for _ in range(1024)]
-    other = digest_of(sessions.open("b"))
+    keys = [token_digest(sessions.open("a")) for _ in range(1024)]
+    other = token_digest(sessions.open("b"))
     assert [sessions.token(it) for it in (keys[0], keys[-1], other)] == ["a", "a", "b"]
     now[0] = 1.0
-    new = digest_of(sessions.open("a"))
+    new = token_digest(sessions.open("a"))
     assert [sessions.token(it) for it in (keys[0], keys[1], new, other)] == [None, "a", "a", "b"]
     now[0] = 12 * 3600.0
     assert [sessions.token(it) for it in (keys[1], new)] == [None, "a"]
@@ -293,7 +293,7 @@ def test_nobody_is_told_to_wait_for_no_time(tmp_path: Path) -> None:
     assert isinstance(answer, web.Response)
     assert loads(answer.text or "")["error"].endswith("try again in 1 s")
     now[0] = 12.0
-    assert access.known(request, token_of("desk")) == Holder(digest_of(token_of("desk")))
+    assert access.known(request, token_of("desk")) == Holder(token_digest(token_of("desk")))
 
 
 async def test_a_cookie_that_has_run_out_is_no_wrong_token(site: Hall) -> None:

@@ -7,8 +7,8 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from passwords_by_hand import HOST, PASSWORDS, PLACES, tells
 
-from server.config.source_address import SourceKind, kind_of
-from server.system.address_redaction import shown, shown_endpoint, without_addresses
+from server.config.source_address import SourceKind, source_kind
+from server.system.address_redaction import redact_address, redact_addresses, redact_endpoint
 
 
 @pytest.mark.parametrize(
@@ -40,34 +40,34 @@ from server.system.address_redaction import shown, shown_endpoint, without_addre
 def test_of_an_address_protocol_and_host_are_shown_and_a_path_is_as_it_is(
     address: str, expected: str
 ) -> None:
-    assert shown(address) == expected
-    assert shown(expected) == expected, "what was shown may be shown again"
+    assert redact_address(address) == expected
+    assert redact_address(expected) == expected, "what was shown may be shown again"
 
 
 @given(st.sampled_from(PLACES), PASSWORDS)
 @example(PLACES[0], "ps/w")
 @example(PLACES[0], "pa@q/xz")
 def test_nothing_of_a_password_is_shown_wherever_it_stands(place: str, password: str) -> None:
-    told = shown(place.format(password))
+    told = redact_address(place.format(password))
     assert not tells(told, password, without=place), told
-    assert shown(told) == told
+    assert redact_address(told) == told
 
 
 @given(PASSWORDS.filter(lambda it: not set(it) & set("/?#")))
 def test_the_host_is_shown_where_it_is_surely_that(password: str) -> None:
-    assert shown(f"rtsp://user:{password}@{HOST}:554/live") == f"rtsp://{HOST}:554/..."
+    assert redact_address(f"rtsp://user:{password}@{HOST}:554/live") == f"rtsp://{HOST}:554/..."
 
 
 @given(st.text())
 def test_any_text_can_be_shown(text: str) -> None:
-    assert isinstance(shown(text) + shown_endpoint(text), str)
+    assert isinstance(redact_address(text) + redact_endpoint(text), str)
 
 
 @pytest.mark.parametrize(
     "source", ["rtsp:me:secret@10.0.0.1/", "concat:a|b", "srt://10.0.0.1:9", "/dev/video7"]
 )
 def test_what_ffmpeg_would_open_by_a_protocol_is_no_file(source: str) -> None:
-    assert kind_of(source) is SourceKind.STREAM
+    assert source_kind(source) is SourceKind.STREAM
 
 
 @pytest.mark.parametrize(
@@ -81,13 +81,13 @@ def test_what_ffmpeg_would_open_by_a_protocol_is_no_file(source: str) -> None:
     ],
 )
 def test_of_an_endpoint_of_the_bus_its_settings_are_not_shown(endpoint: str, expected: str) -> None:
-    assert shown_endpoint(endpoint) == expected
+    assert redact_endpoint(endpoint) == expected
 
 
 @given(st.sampled_from([it for it in PLACES if not it.startswith(("rtsp//", "user:"))]), PASSWORDS)
 def test_others_words_end_where_an_address_begins(place: str, password: str) -> None:
     text = f"Traceback\n  File a.py, line 3\nOSError: [Errno 5] Failed: '{place.format(password)}'\nmore\n"
-    told = without_addresses(text)
+    told = redact_addresses(text)
     assert not tells(told, password, without=f"{place}{text.partition('Failed')[0]}Failed: '...\nmore\n"), (
         told
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import cast
 
 from bestview import Merge, Split
-from server.messaging.messages import Cut, Merged, Parted
+from server.messaging.messages import PersonMerge, PersonSplit, ViewCut
 from server.service.decision_state import Board
 from server.service.view_selection.decider import GopDecision, ObjectChoice
 from server.service.view_selection.explanation import Explanation, Why
@@ -29,9 +29,9 @@ def test_a_decision_is_told_with_its_cuts_and_corrections() -> None:
     turned_out = (Merge(kept=1, lost=5), Split(kept=2, parted=3, camera="c1"))
     told = Board(25.0).put(GopDecision(20, 10, choices, {"c0": [], "c1": []}, {5: 1}, turned_out, _UNTOLD))
     assert told.choices == {1: "c1", 2: "c0"}
-    assert told.cuts == [Cut(object=1, pulse=20, from_camera="c0", to_camera="c1")]
-    assert told.merged == [Merged(kept=1, lost=5)]
-    assert told.split == [Parted(kept=2, parted=3, camera="c1")]
+    assert told.cuts == [ViewCut(object=1, pulse=20, from_camera="c0", to_camera="c1")]
+    assert told.merged == [PersonMerge(kept=1, lost=5)]
+    assert told.split == [PersonSplit(kept=2, parted=3, camera="c1")]
 
 
 def decided(board: Board, first: int, numbers: tuple[int, ...] = (1, 2)) -> Counted:

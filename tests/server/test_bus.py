@@ -14,16 +14,16 @@ from patience import PATIENCE
 from pydantic import ValidationError
 
 from server.cli.generated_config import free_port
-from server.config.sections import Zenoh
+from server.config.sections import ZenohSettings
 from server.messaging.bus import Bus
 from server.messaging.inbox import Inbox, Message
 from server.system.errors import UserError
 
 
 @pytest.fixture
-def settings() -> Zenoh:
+def settings() -> ZenohSettings:
     address = f"tcp/127.0.0.1:{free_port()}"
-    return Zenoh(connect=address, listen=address)
+    return ZenohSettings(connect=address, listen=address)
 
 
 class Heard:
@@ -55,7 +55,7 @@ class Presence:
                 self._changed.clear()
 
 
-async def test_a_message_comes_with_its_key_and_attachment(settings: Zenoh) -> None:
+async def test_a_message_comes_with_its_key_and_attachment(settings: ZenohSettings) -> None:
     router, client = Bus.router(settings), Bus.client(settings)
     heard, there = Heard(), Presence()
     router.subscribe("myview/hall/*/video", heard.queue.put_nowait)
@@ -70,7 +70,7 @@ async def test_a_message_comes_with_its_key_and_attachment(settings: Zenoh) -> N
     router.close()
 
 
-async def test_a_message_larger_than_any_is_dropped_and_all_others_come(settings: Zenoh) -> None:
+async def test_a_message_larger_than_any_is_dropped_and_all_others_come(settings: ZenohSettings) -> None:
     router, client = Bus.router(settings), Bus.client(settings)
     heard, there = Heard(), Presence()
     router.subscribe("myview/hall/camera/*/video", heard.queue.put_nowait)
@@ -85,7 +85,7 @@ async def test_a_message_larger_than_any_is_dropped_and_all_others_come(settings
     router.close()
 
 
-async def test_messages_of_one_session_stay_in_order(settings: Zenoh) -> None:
+async def test_messages_of_one_session_stay_in_order(settings: ZenohSettings) -> None:
     router, client = Bus.router(settings), Bus.client(settings)
     heard, there = Heard(), Presence()
     router.subscribe("a/**", heard.queue.put_nowait)
@@ -101,7 +101,9 @@ async def test_messages_of_one_session_stay_in_order(settings: Zenoh) -> None:
     router.close()
 
 
-async def test_however_many_keys_there_were_few_are_kept_and_all_messages_come(settings: Zenoh) -> None:
+async def test_however_many_keys_there_were_few_are_kept_and_all_messages_come(
+    settings: ZenohSettings,
+) -> None:
     router, client = Bus.router(settings), Bus.client(settings)
     heard, there = Heard(), Presence()
     router.subscribe("thumbs/**", heard.queue.put_nowait)
@@ -121,7 +123,7 @@ async def test_however_many_keys_there_were_few_are_kept_and_all_messages_come(s
     router.close()
 
 
-async def test_a_client_may_come_before_the_router_and_survives_its_restart(settings: Zenoh) -> None:
+async def test_a_client_may_come_before_the_router_and_survives_its_restart(settings: ZenohSettings) -> None:
     client = Bus.client(settings)
     there = Presence()
     client.watch_alive("router", there.note)
@@ -142,7 +144,7 @@ async def test_a_client_may_come_before_the_router_and_survives_its_restart(sett
 
 
 async def test_two_that_hear_each_other_do_so_through_the_router_until_one_listens_no_more(
-    settings: Zenoh,
+    settings: ZenohSettings,
 ) -> None:
     router = Bus.router(settings)
     one, two = Bus.hearing(settings), Bus.hearing(settings)
@@ -164,7 +166,7 @@ async def test_two_that_hear_each_other_do_so_through_the_router_until_one_liste
 
 
 async def test_who_wants_to_hear_the_others_needs_the_router(
-    settings: Zenoh, monkeypatch: pytest.MonkeyPatch
+    settings: ZenohSettings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("server.messaging.bus._OPEN_WITHIN_MS", 100)
     with pytest.raises(UserError, match=r"zenoh\.connect: nobody is at tcp/127"):
@@ -172,7 +174,7 @@ async def test_who_wants_to_hear_the_others_needs_the_router(
 
 
 async def test_who_closes_is_seen_to_be_gone_and_who_was_there_before_is_seen_to_be_there(
-    settings: Zenoh,
+    settings: ZenohSettings,
 ) -> None:
     router, client = Bus.router(settings), Bus.client(settings)
     client.declare_alive("camera/c0")
@@ -187,7 +189,7 @@ async def test_who_closes_is_seen_to_be_gone_and_who_was_there_before_is_seen_to
     router.close()
 
 
-async def test_two_routers_of_one_address_cannot_be(settings: Zenoh) -> None:
+async def test_two_routers_of_one_address_cannot_be(settings: ZenohSettings) -> None:
     router = Bus.router(settings)
     with pytest.raises(UserError, match=r"zenoh\.listen: cannot listen on tcp/127") as caught:
         Bus.router(settings)
@@ -198,9 +200,9 @@ async def test_two_routers_of_one_address_cannot_be(settings: Zenoh) -> None:
 async def test_an_address_that_is_none_is_refused() -> None:
     for address in ("nonsense", "tcp/127.0.0.1", "127.0.0.1:7447", "tcp/a b:1", "tcp/a:65536", "tcp/a:0"):
         with pytest.raises(ValidationError, match="is not an address such as tcp"):
-            Zenoh(connect=address)
+            ZenohSettings(connect=address)
     with pytest.raises(UserError, match=r"zenoh\.connect: cannot use smoke/signal:1") as caught:
-        Bus.client(Zenoh(connect="smoke/signal:1"))
+        Bus.client(ZenohSettings(connect="smoke/signal:1"))
     assert "\n" not in str(caught.value)
 
 

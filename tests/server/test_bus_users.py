@@ -16,16 +16,16 @@ from programs import needs_openssl
 
 from server.cli.generated_config import free_port
 from server.config.password_file import password_of, read_users
-from server.config.sections import Zenoh, ZenohTls
+from server.config.sections import ZenohSettings, ZenohTlsSettings
 from server.messaging.bus import Bus
-from server.messaging.bus_access import SETTING, access_rules
+from server.messaging.bus_access import SETTING, build_access_control
 from server.messaging.inbox import Message
-from server.messaging.messages import Keys
+from server.messaging.messages import ZenohKeys
 from server.system.errors import UserError
 
 pytestmark = needs_openssl
 
-SITE = Keys("hall")
+SITE = ZenohKeys("hall")
 SECURITY = (Path(__file__).parents[2] / "docs" / "how-to" / "secure.md").read_text(encoding="utf-8")
 
 
@@ -42,12 +42,12 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def settings(folder: Path) -> Zenoh:
+def settings(folder: Path) -> ZenohSettings:
     address = f"tls/127.0.0.1:{free_port()}"
-    tls = ZenohTls(
+    tls = ZenohTlsSettings(
         authority=folder / "authority.pem", certificate=folder / "router.pem", key=folder / "router.key"
     )
-    return Zenoh(connect=address, listen=address, users=folder / "zenoh.users", tls=tls)
+    return ZenohSettings(connect=address, listen=address, users=folder / "zenoh.users", tls=tls)
 
 
 class Heard:
@@ -86,14 +86,14 @@ def opened(*openings: Callable[[], Bus]) -> Iterator[list[Bus]]:
         yield buses
 
 
-def router(settings: Zenoh) -> Bus:
+def router(settings: ZenohSettings) -> Bus:
     assert settings.users is not None
     return Bus.router(
-        settings, access_rules("hall", ["c0", "c1"], "c1", list(read_users(settings.users, SETTING)))
+        settings, build_access_control("hall", ["c0", "c1"], "c1", list(read_users(settings.users, SETTING)))
     )
 
 
-async def test_a_camera_speaks_for_itself_alone(settings: Zenoh) -> None:
+async def test_a_camera_speaks_for_itself_alone(settings: ZenohSettings) -> None:
     heard = Heard()
     with opened(
         lambda: router(settings), lambda: Bus.client(settings, "c0"), lambda: Bus.client(settings, "c1")
@@ -109,7 +109,7 @@ async def test_a_camera_speaks_for_itself_alone(settings: Zenoh) -> None:
         assert "c0/video false" not in heard.texts, "one session keeps its order: it would have come before"
 
 
-async def test_sound_is_sent_by_whose_it_is(settings: Zenoh) -> None:
+async def test_sound_is_sent_by_whose_it_is(settings: ZenohSettings) -> None:
     heard = Heard()
     with opened(
         lambda: router(settings), lambda: Bus.client(settings, "c0"), lambda: Bus.client(settings, "c1")
@@ -127,14 +127,14 @@ async def test_sound_is_sent_by_whose_it_is(settings: Zenoh) -> None:
 
 
 async def test_strangers_fail_to_publish_and_to_listen(
-    settings: Zenoh, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    settings: ZenohSettings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("server.messaging.bus._OPEN_WITHIN_MS", 300)
     strangers = [
         settings.model_copy(update={"users": None}),
         settings.model_copy(update={"users": _users(tmp_path, "c0:guessed\n")}),
         settings.model_copy(update={"connect": settings.connect.replace("tls/", "tcp/")}),
-        settings.model_copy(update={"tls": ZenohTls()}),
+        settings.model_copy(update={"tls": ZenohTlsSettings()}),
     ]
     heard, overheard = Heard(), Heard()
     with opened(
@@ -168,7 +168,7 @@ def _all(buses: Sequence[Bus], number: int) -> None:
 
 @pytest.mark.parametrize("what", ["pointing", "remember"])
 async def test_what_a_camera_is_told_is_said_by_the_best_view_and_heard_by_that_camera(
-    settings: Zenoh, what: str
+    settings: ZenohSettings, what: str
 ) -> None:
     heard, overheard = Heard(), Heard()
     with opened(
@@ -200,7 +200,7 @@ def _tell(bestview: Bus, other: Bus, what: str, number: int) -> None:
     bestview.publish(SITE.camera("c0", what), str(number).encode())
 
 
-async def test_cameras_hear_what_others_found_and_not_what_they_see(settings: Zenoh) -> None:
+async def test_cameras_hear_what_others_found_and_not_what_they_see(settings: ZenohSettings) -> None:
     heard = Heard()
     with opened(
         lambda: router(settings),
@@ -225,7 +225,7 @@ async def test_cameras_hear_what_others_found_and_not_what_they_see(settings: Ze
         assert set(everything.texts) == {"c0/video seen", "c0/found found"}, "who listens sends nothing"
 
 
-async def test_another_best_view_service_hears_and_says_all(settings: Zenoh) -> None:
+async def test_another_best_view_service_hears_and_says_all(settings: ZenohSettings) -> None:
     heard, told = Heard(), Heard()
     with opened(
         lambda: router(settings),

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from server.config.camera_password import with_password
+from server.config.camera_password import fill_in_password
 from server.config.loader import build_config
 from server.config.site_config import Config
 from server.system.errors import UserError
@@ -29,7 +29,7 @@ def config_of(folder: Path, source: str = SOURCE) -> Config:
 def test_any_password_arrives_as_it_is(tmp_path_factory: pytest.TempPathFactory, password: str) -> None:
     folder = tmp_path_factory.mktemp("site")
     (folder / "door.password").write_text(password + "\n", encoding="utf-8")
-    filled = with_password(config_of(folder), "door").camera("door")
+    filled = fill_in_password(config_of(folder), "door").camera("door")
     address = urlsplit(filled.source)
     assert unquote(address.password or "") == password
     assert (address.username, address.hostname, address.path) == ("viewer", "192.0.2.11", "/stream1")
@@ -38,7 +38,7 @@ def test_any_password_arrives_as_it_is(tmp_path_factory: pytest.TempPathFactory,
 def test_other_processes_need_no_file(tmp_path: Path) -> None:
     config = config_of(tmp_path)
     assert config.camera("door").source == SOURCE
-    assert with_password(config, "stairs") == config
+    assert fill_in_password(config, "stairs") == config
 
 
 @pytest.mark.parametrize("content", [b"", b"\n", b"two\nlines\n", b"\xff\xfe", None])
@@ -46,7 +46,7 @@ def test_what_is_no_password_is_refused_in_one_line(tmp_path: Path, content: byt
     if content is not None:
         (tmp_path / "door.password").write_bytes(content)
     with pytest.raises(UserError, match=r"^cameras\.door\.password: the file that it names ") as refused:
-        with_password(config_of(tmp_path), "door")
+        fill_in_password(config_of(tmp_path), "door")
     assert "\n" not in str(refused.value)
 
 

@@ -15,9 +15,9 @@ from free_port import free
 from patience import PATIENCE
 from videos_by_hand import write_video
 
-from server.config.running_config import Running
+from server.config.running_config import ActiveConfig
 from server.supervisor.camera_process import camera_process
-from server.system.errors import AwayError
+from server.system.errors import UnavailableError
 
 
 class Lines(logging.Handler):
@@ -73,7 +73,7 @@ async def begin(tmp_path: Path) -> AsyncIterator[Callable[..., Site]]:
             "cameras": [{"id": "c0", "source": f"http://127.0.0.1:{port}/c0.mp4", "h264": h264}],
         }
         path.write_text(yaml.safe_dump(content))
-        begun.append(asyncio.create_task(camera_process(Running(path), "c0")))
+        begun.append(asyncio.create_task(camera_process(ActiveConfig(path), "c0")))
 
         async def answer() -> None:
             await runner.setup()
@@ -110,5 +110,5 @@ async def test_what_is_wrong_with_a_camera_that_was_waited_for_ends_no_others(
     site = begin(128, "pass")
     await site.told.until(lambda line: "Connection refused; it is tried again" in line)
     await site.answer()
-    with pytest.raises(AwayError, match=r"^camera c0: h264: pass: its pictures are 64x48"):
+    with pytest.raises(UnavailableError, match=r"^camera c0: h264: pass: its pictures are 64x48"):
         await asyncio.wait_for(site.process, PATIENCE)

@@ -20,7 +20,7 @@ from free_port import free
 from patience import PATIENCE
 from videos_by_hand import write_video
 
-from server.system.errors import AwayError
+from server.system.errors import UnavailableError
 from synthetic import scene_names
 
 
@@ -268,7 +268,7 @@ def test_seconds_that_are_none_are_refused(run: Run, command: list[str], seconds
 
 def test_watch_says_in_one_line_that_nobody_is_there_now(run: Run) -> None:
     done = run("watch", f"http://127.0.0.1:{free()}")
-    assert (done.code, done.out) == (AwayError.code, "")
+    assert (done.code, done.out) == (UnavailableError.code, "")
     (line,) = done.err.splitlines()
     assert line.startswith("myview: watch: ")
 

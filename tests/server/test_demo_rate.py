@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 import yaml
 
-from server.cli.demo import rate_for
+from server.cli.demo import demo_fps
 from server.cli.generated_config import demo_config
-from server.system.processors import processors
+from server.system.processors import available_processors
 
 THERE = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
@@ -19,7 +19,7 @@ THERE = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os
     ("there", "fps"), [(0.5, 6.25), (1, 6.25), (2, 12.5), (3.9, 12.5), (4, 25), (64, 25)]
 )
 def test_the_rate_follows_from_the_processors(there: float, fps: float) -> None:
-    assert rate_for(there) == fps
+    assert demo_fps(there) == fps
 
 
 def test_the_environment_goes_before_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -53,15 +53,15 @@ def test_a_container_has_the_least_of_its_groups_limits(
     put(tmp_path / "groups" / "a" / "b", cpu_max=own)
     put(tmp_path / "groups" / "a", cpu_max=above)
     (tmp_path / "cgroup").write_text("0::/a/b\n")
-    assert processors(tmp_path / "groups", tmp_path / "cgroup") == limit
+    assert available_processors(tmp_path / "groups", tmp_path / "cgroup") == limit
 
 
 @pytest.mark.parametrize(("quota", "limit"), [("20000", 0.2), ("-1", THERE)])
 def test_groups_of_the_first_version_count_as_well(tmp_path: Path, quota: str, limit: float) -> None:
     put(tmp_path / "groups" / "cpu" / "a", cpu_cfs_quota_us=quota, cpu_cfs_period_us="100000")
     (tmp_path / "cgroup").write_text("4:memory:/z\n2:cpu,cpuacct:/a\n")
-    assert processors(tmp_path / "groups", tmp_path / "cgroup") == limit
+    assert available_processors(tmp_path / "groups", tmp_path / "cgroup") == limit
 
 
 def test_where_there_are_no_groups_all_processors_count(tmp_path: Path) -> None:
-    assert processors(tmp_path, tmp_path / "none") == THERE
+    assert available_processors(tmp_path, tmp_path / "none") == THERE

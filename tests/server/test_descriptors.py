@@ -20,7 +20,12 @@ from patience import PATIENCE
 
 from server.cli.doctor.findings import Level
 from server.cli.doctor.machine import descriptor_findings
-from server.system.descriptors import FOR_OPERATORS, limit, places, raise_limit
+from server.system.descriptors import (
+    FOR_OPERATORS,
+    connection_limit,
+    descriptor_limit,
+    raise_descriptor_limit,
+)
 
 
 @pytest.fixture
@@ -33,16 +38,16 @@ def low() -> Iterator[int]:
 
 
 def test_the_soft_limit_is_raised_to_the_hard_one(low: int) -> None:
-    assert limit() == 512
-    raise_limit()
-    assert limit() == min(low, 1 << 20) > 512
+    assert descriptor_limit() == 512
+    raise_descriptor_limit()
+    assert descriptor_limit() == min(low, 1 << 20) > 512
 
 
 def test_every_command_raises_it_and_what_it_starts_has_it_too(low: int, myview: Run) -> None:
     assert myview("--version").code == 0
     child = [sys.executable, "-c", "import resource; print(resource.getrlimit(resource.RLIMIT_NOFILE)[0])"]
     shown = subprocess.run(child, check=True, capture_output=True, text=True)
-    assert int(shown.stdout) == limit() == min(low, 1 << 20)
+    assert int(shown.stdout) == descriptor_limit() == min(low, 1 << 20)
 
 
 @pytest.mark.parametrize("descriptors", [256, 512, 1024, 4096, 1 << 20])
@@ -51,7 +56,7 @@ def test_what_viewers_cannot_take_is_left_for_everything_else(
     descriptors: int, record: dict[str, Any]
 ) -> None:
     config = small_config(record=record, http={"viewers_max": 300, "connections_max": 2000})
-    taken = places(config, descriptors)
+    taken = connection_limit(config, descriptors)
     files = min(config.http.viewers_max, taken) if record else 0  # of the past: one for each who watches
     assert 0 < taken <= 2000
     assert taken == 2000 or taken + files + FOR_OPERATORS + 128 <= descriptors
@@ -82,7 +87,7 @@ def test_the_doctor_tells_of_it(myview: Run, tmp_path: Path) -> None:
     path = written(tmp_path, free())
     said = json.loads(myview("doctor", path, "--json", "--seconds", 1).out)
     (found,) = [it for it in said["findings"] if it["check"] == "open files"]
-    assert str(limit()) in found["text"]
+    assert str(descriptor_limit()) in found["text"]
 
 
 def test_a_process_that_can_accept_nobody_says_so_once_and_takes_them_when_it_can(tmp_path: Path) -> None:

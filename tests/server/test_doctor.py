@@ -22,16 +22,16 @@ from videos_by_hand import write_video
 
 from camsync import Login, PulseClient, PulseServer
 from server.cli.doctor import machine
-from server.cli.doctor.camera_probe import Probe
-from server.cli.doctor.cameras import camera_findings, probe_all, sound_findings
+from server.cli.doctor.camera_probe import CameraProbe
+from server.cli.doctor.cameras import camera_findings, probe_cameras, sound_findings
 from server.cli.doctor.certificates import certificate_finding
-from server.cli.doctor.command import checked
+from server.cli.doctor.command import run_checks
 from server.cli.doctor.disk import disk_findings, needed_mb
 from server.cli.doctor.files import file_findings
 from server.cli.doctor.findings import Finding, Level
 from server.cli.doctor.machine import clock_findings, machine_findings
 from server.cli.doctor.ports import port_findings
-from server.cli.doctor.stream_probe import Sent
+from server.cli.doctor.stream_probe import StreamStats
 from server.config.loader import load_config
 from server.config.site_config import Config
 
@@ -87,7 +87,7 @@ def test_a_site_that_is_well_is_said_to_be_so_and_nothing_is_left_behind(myview:
 
 async def test_a_scene_that_there_is_not_is_its_cameras_fault_alone(tmp_path: Path) -> None:
     there = config(tmp_path, cameras=[{"id": "c0", "source": "scene:nowhere"}])
-    found = [it async for it in checked(there, 1.0)]
+    found = [it async for it in run_checks(there, 1.0)]
     assert only(found, "camera c0").level is Level.BAD
     assert "there is no scene 'nowhere'" in only(found, "camera c0").text
     assert {it.check for it in found if it.level is Level.BAD} == {"camera c0"}
@@ -185,7 +185,7 @@ def test_a_network_camera_is_measured_against_the_site(tmp_path: Path) -> None:
     site_of = config(tmp_path, cameras=cameras, site={"name": "hall", "width": 128, "height": 96})
     try:
         camera.let = 1000
-        found = camera_findings(site_of, probe_all(site_of, 4.0), runs=False)
+        found = camera_findings(site_of, probe_cameras(site_of, 4.0), runs=False)
     finally:
         camera.close()
     first, *doubts = of(found, "camera door")
@@ -199,7 +199,7 @@ def test_cameras_are_tried_at_once_and_a_dead_one_holds_nobody_up(tmp_path: Path
     write_video(tmp_path / "c0.mp4", 12)
     silent = {"id": "gate", "source": f"rtsp://127.0.0.1:{taken}/live"}
     both = config(tmp_path, cameras=[silent, {"id": "c0", "source": "c0.mp4"}])
-    probes = probe_all(both, 1.5)
+    probes = probe_cameras(both, 1.5)
     assert probes["gate"].problem
     found = camera_findings(both, probes, runs=False)
     assert only(found, "camera gate").level is Level.BAD
@@ -209,16 +209,22 @@ def test_cameras_are_tried_at_once_and_a_dead_one_holds_nobody_up(tmp_path: Path
 @pytest.mark.parametrize(
     ("found", "words"),
     [
-        (Probe(size=(640, 360), sent=Sent((640, 360), 12.5, 25, 0, 0.0)), "it sends 12.5 pictures a second"),
-        (Probe(size=(640, 360), sent=Sent((640, 360), 25.0, 25, 3, 0.0)), "3 packets could not be decoded"),
-        (Probe(size=(640, 360), why_encoded="it has B pictures"), "is encoded anew: it has B pictures"),
-        (Probe(size=(640, 360), recorded_fps=30.0), "was recorded at 30 pictures a second"),
-        (Probe(size=(320, 180)), "are smaller than the site's"),
+        (
+            CameraProbe(size=(640, 360), sent=StreamStats((640, 360), 12.5, 25, 0, 0.0)),
+            "it sends 12.5 pictures a second",
+        ),
+        (
+            CameraProbe(size=(640, 360), sent=StreamStats((640, 360), 25.0, 25, 3, 0.0)),
+            "3 packets could not be decoded",
+        ),
+        (CameraProbe(size=(640, 360), why_encoded="it has B pictures"), "is encoded anew: it has B pictures"),
+        (CameraProbe(size=(640, 360), recorded_fps=30.0), "was recorded at 30 pictures a second"),
+        (CameraProbe(size=(320, 180)), "are smaller than the site's"),
     ],
 )
-def test_a_camera_that_does_not_fit_is_doubted(tmp_path: Path, found: Probe, words: str) -> None:
+def test_a_camera_that_does_not_fit_is_doubted(tmp_path: Path, found: CameraProbe, words: str) -> None:
     small = config(tmp_path, site={"width": 640, "height": 360})
-    assert len(of(camera_findings(small, {"c0": Probe(size=(640, 360))}, runs=False), "camera c0")) == 1
+    assert len(of(camera_findings(small, {"c0": CameraProbe(size=(640, 360))}, runs=False), "camera c0")) == 1
     fine, doubt = of(camera_findings(small, {"c0": found}, runs=False), "camera c0")
     assert (fine.level, doubt.level) == (Level.OK, Level.WARNING)
     assert words in doubt.text
@@ -229,12 +235,12 @@ def test_a_password_from_a_file_is_used_and_others_should_not_read_it(tmp_path: 
         {"id": "gate", "source": f"rtsp://me:{{password}}@127.0.0.1:{taken}/live", "password": "secret"}
     ]
     there = config(tmp_path, cameras=cameras)
-    missing = only(camera_findings(there, probe_all(there, 1.0), runs=False), "camera gate").text
+    missing = only(camera_findings(there, probe_cameras(there, 1.0), runs=False), "camera gate").text
     assert "the file that it names cannot be read: No such file or directory" in missing
     (tmp_path / "secret").write_text("open sesame\n")
     (tmp_path / "secret").chmod(0o644)
     assert "others may read" in only(file_findings(there), "camera gate").text
-    shown = only(camera_findings(there, probe_all(there, 1.0), runs=False), "camera gate").text
+    shown = only(camera_findings(there, probe_cameras(there, 1.0), runs=False), "camera gate").text
     assert f"rtsp://127.0.0.1:{taken}/..." in shown
 
 
@@ -257,18 +263,18 @@ def test_a_sounds_password_is_not_shown(tmp_path: Path) -> None:
 def test_a_cameras_password_is_not_shown(tmp_path: Path, taken: int) -> None:
     source = f"rtsp://me:pa@ss:w@127.0.0.1:{taken}/live?x=a:b@c"
     there = config(tmp_path, cameras=[{"id": "gate", "source": source}])
-    shown = only(camera_findings(there, probe_all(there, 1.0), runs=False), "camera gate").text
+    shown = only(camera_findings(there, probe_cameras(there, 1.0), runs=False), "camera gate").text
     assert "rtsp://...: cannot open" in shown
 
 
 def test_what_a_recording_takes_is_held_against_the_disk(tmp_path: Path) -> None:
     record: dict[str, Any] = {"folder": "kept", "keep_s": 3600.0, "most_mb": 1e6}
-    probes = {"c0": Probe(size=(WIDTH, HEIGHT), kbps=1000.0)}
+    probes = {"c0": CameraProbe(size=(WIDTH, HEIGHT), kbps=1000.0)}
     small = config(tmp_path, record=record)
     assert needed_mb(small, probes) == pytest.approx((1000 + 8 * 100 * 25 / 1000) * 3600 / 8000)
     assert only(disk_findings(small, probes), "disk").level is Level.OK
     assert not (tmp_path / "kept").exists()
-    huge = {"c0": Probe(size=(WIDTH, HEIGHT), kbps=1e12)}
+    huge = {"c0": CameraProbe(size=(WIDTH, HEIGHT), kbps=1e12)}
     assert (
         only(disk_findings(config(tmp_path, record={**record, "most_mb": 1e12}), huge), "disk").level
         is Level.BAD
@@ -346,13 +352,13 @@ def test_the_processors_are_those_that_this_process_may_use(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(machine, "processors", lambda: 0.5)
-    said = only(machine_findings(config(tmp_path), {"c0": Probe(cores=0.2)}), "processor")
+    said = only(machine_findings(config(tmp_path), {"c0": CameraProbe(cores=0.2)}), "processor")
     assert (said.level, said.text.endswith("of 0.5 cores")) == (Level.WARNING, True)
 
 
 def test_a_machine_that_is_too_small_is_told_of(tmp_path: Path) -> None:
     small = config(tmp_path)
-    fine, busy = ({"c0": Probe(size=(WIDTH, HEIGHT), cores=cores)} for cores in (0.0, 1000.0))
+    fine, busy = ({"c0": CameraProbe(size=(WIDTH, HEIGHT), cores=cores)} for cores in (0.0, 1000.0))
     assert only(machine_findings(small, fine), "processor").level is Level.OK
     assert only(machine_findings(small, busy), "processor").level is Level.WARNING
     large = config(tmp_path, track={"backlog_s": 1e7})

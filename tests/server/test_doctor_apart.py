@@ -14,12 +14,12 @@ from programs import needs_openssl
 from test_doctor import config, site
 
 from server.cli.doctor import command, files, ports
-from server.cli.doctor.camera_probe import Probe
+from server.cli.doctor.camera_probe import CameraProbe
 from server.cli.doctor.cameras import camera_findings
 from server.cli.doctor.files import file_findings
 from server.cli.doctor.findings import Finding, Level
 from server.cli.doctor.ports import port_findings
-from server.cli.doctor.reachability import way_findings
+from server.cli.doctor.reachability import reachability_findings
 
 
 def of(findings: list[Finding], check: str) -> list[tuple[Level, str]]:
@@ -37,7 +37,7 @@ BROKEN = [(Level.BAD, "/closed/door: Permission denied")]
     ("check", "lost"),
     [
         ("port_findings", {"http.port", "sync.port", "zenoh.listen"}),
-        ("way_findings", {"sync.host", "zenoh.connect"}),
+        ("reachability_findings", {"sync.host", "zenoh.connect"}),
         ("clock_findings", {"clock", "pulse server"}),
         ("probe_all", set[str]()),
         ("camera_findings", {"camera c0"}),
@@ -50,10 +50,10 @@ async def test_a_check_that_fails_loses_no_other_s_findings(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, check: str, lost: set[str]
 ) -> None:
     there = config(tmp_path)
-    before = {it.check async for it in command.checked(there, 1.0)}
+    before = {it.check async for it in command.run_checks(there, 1.0)}
     assert before >= {"http.port", "sync.host", "ground", "clock", "camera c0", "record", "memory"}
     monkeypatch.setattr(command, check, broken)
-    found = [it async for it in command.checked(there, 1.0)]
+    found = [it async for it in command.run_checks(there, 1.0)]
     (said,) = [it for it in found if (it.level, it.text) == BROKEN[0]]
     assert {it.check for it in found if it is not said} == before - lost
 
@@ -77,7 +77,7 @@ async def test_a_mistake_is_told_without_a_password(tmp_path: Path, monkeypatch:
         raise RuntimeError("cannot be: rtsp://me:hunter2@door/live")
 
     monkeypatch.setattr(command, "sound_findings", wrong)
-    found = [it async for it in command.checked(config(tmp_path), 1.0)]
+    found = [it async for it in command.run_checks(config(tmp_path), 1.0)]
     text = "a mistake in MyView: RuntimeError: cannot be: ..."
     assert of(found, "sound") == [(Level.BAD, text)]
     assert of(found, "memory")
@@ -88,9 +88,9 @@ async def test_findings_are_told_as_they_are_found(
 ) -> None:
     told = []
 
-    def probe_all(*_: object) -> dict[str, Probe]:
+    def probe_all(*_: object) -> dict[str, CameraProbe]:
         told.append(capsys.readouterr().out)
-        return {"c0": Probe("away")}
+        return {"c0": CameraProbe("away")}
 
     monkeypatch.setattr(command, "probe_all", probe_all)
     await command._told(site(tmp_path), 1.0, as_json=False)
@@ -111,7 +111,7 @@ async def test_a_server_that_nobody_knows_is_bad(tmp_path: Path, monkeypatch: py
         raise socket.gaierror(socket.EAI_NONAME, "Name or service not known")
 
     monkeypatch.setattr(socket, "getaddrinfo", unknown)
-    found = await way_findings(there)
+    found = await reachability_findings(there)
     assert of(found, "sync.host") == [(Level.BAD, "pulses:7400 cannot be found: Name or service not known")]
     assert of(found, "zenoh.connect")[0][0] is Level.BAD
 
@@ -119,15 +119,15 @@ async def test_a_server_that_nobody_knows_is_bad(tmp_path: Path, monkeypatch: py
 async def test_a_way_on_this_machine_leads_to_who_listens(tmp_path: Path) -> None:
     port, other = free(), free()
     fine = config(tmp_path, zenoh={"connect": f"tcp/127.0.0.1:{port}", "listen": f"tcp/0.0.0.0:{port}"})
-    assert {it.level for it in await way_findings(fine)} == {Level.OK}
+    assert {it.level for it in await reachability_findings(fine)} == {Level.OK}
     astray = config(tmp_path, zenoh={"connect": f"tcp/127.0.0.1:{other}", "listen": f"tcp/127.0.0.1:{port}"})
     text = f"nobody is at 127.0.0.1:{other}, where cameras look, and zenoh.listen is 127.0.0.1:{port}"
-    assert of(await way_findings(astray), "zenoh.connect") == [(Level.BAD, text)]
+    assert of(await reachability_findings(astray), "zenoh.connect") == [(Level.BAD, text)]
     with socket.create_server(("127.0.0.1", other)):
         answered = [(Level.OK, f"127.0.0.1:{other} answers")]  # something may pass it on
-        assert of(await way_findings(astray), "zenoh.connect") == answered
+        assert of(await reachability_findings(astray), "zenoh.connect") == answered
     narrow = config(tmp_path, sync={"host": "127.0.0.2", "port": other})
-    assert of(await way_findings(narrow), "sync.host")[0][0] is Level.BAD
+    assert of(await reachability_findings(narrow), "sync.host")[0][0] is Level.BAD
 
 
 async def test_two_ports_that_are_one_are_bad(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 import yaml
 
-from server.cli.doctor.camera_probe import Probe
+from server.cli.doctor.camera_probe import CameraProbe
 from server.cli.doctor.disk import disk_findings, needed_mb
 from server.cli.doctor.findings import Finding, Level
 from server.config.loader import load_config
@@ -22,8 +22,8 @@ from server.config.site_config import Config
 FREE_MB = 1000
 HOUR_S = 3600.0
 INDEX_KBPS = 8 * 100 * 25 / 1000
-GOOD = Probe(size=(64, 48), kbps=1000.0)
-AWAY = Probe("Connection refused")
+GOOD = CameraProbe(size=(64, 48), kbps=1000.0)
+AWAY = CameraProbe("Connection refused")
 
 
 def site(folder: Path, cameras: tuple[str, ...] = ("c0",), h264: str = "encode", **changes: Any) -> Config:
@@ -66,7 +66,7 @@ def test_the_size_is_that_of_the_cameras_that_were_tried_and_says_so(tmp_path: P
 
 
 def test_what_is_known_not_to_fit_is_bad_whatever_else_comes(tmp_path: Path) -> None:
-    large = Probe(size=(64, 48), kbps=10_000.0)
+    large = CameraProbe(size=(64, 48), kbps=10_000.0)
     findings = disk_findings(site(tmp_path, ("c0", "c1")), {"c0": AWAY, "c1": large})
     assert of(findings, "disk").level is Level.BAD
     small = site(tmp_path, ("c0", "c1"), record={"folder": "kept", "keep_s": HOUR_S, "most_mb": 46.0})
@@ -84,7 +84,7 @@ def test_a_cap_of_the_encoder_is_what_a_camera_takes_that_was_not_tried(tmp_path
 
 def test_the_cap_is_not_that_of_a_camera_which_encodes_itself(tmp_path: Path) -> None:
     own = site(tmp_path, h264="auto", encode={"max_kbps": 500})
-    passing = Probe(size=(64, 48), kbps=4000.0, passes=True)
+    passing = CameraProbe(size=(64, 48), kbps=4000.0, passes=True)
     assert needed_mb(own, {"c0": passing}) == pytest.approx((4000 + INDEX_KBPS) * HOUR_S / 8000)
     assert needed_mb(own, {"c0": GOOD}) == pytest.approx((500 + INDEX_KBPS) * HOUR_S / 8000)
     assert of(disk_findings(own, {"c0": AWAY}), "disk").level is Level.WARNING

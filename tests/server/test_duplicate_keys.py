@@ -39,7 +39,7 @@ def refusal(folder: Path, text: str) -> str:
 def test_two_sections_of_one_name_do_not_drop_the_tokens_in_silence(tmp_path: Path) -> None:
     path = tmp_path / "site.yaml"
     path.write_text(f"{SITE}http:\n  host: 0.0.0.0\naccess:\n  open_to_all: true\n")
-    with pytest.raises(UserError, match=r"site\.yaml: 'access' is there twice, in lines 3 and 7") as refused:
+    with pytest.raises(UserError, match=r"site\.yaml: 'access' occurs twice, in lines 3 and 7") as refused:
         load_config(path)
     assert "\n" not in str(refused.value)
 
@@ -47,19 +47,19 @@ def test_two_sections_of_one_name_do_not_drop_the_tokens_in_silence(tmp_path: Pa
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("a:\n  b: 1\n  c: 2\n  b: 3\n", "'b' is there twice, in lines 2 and 4"),
-        ("a: [{b: 1, b: 2}]\n", "'b' is there twice, in line 1"),
-        ("- {a: {b: {c: 1,\n  d: 2,\n  c: 3}}}\n", "'c' is there twice, in lines 1 and 3"),
-        ('1: a\n"1": b\n', "'1' is there twice, in lines 1 and 2"),
-        ("16: a\n0x10: b\n", "'0x10' is there twice, in lines 1 and 2"),
-        ("yes: a\ntrue: b\n", "'true' is there twice, in lines 1 and 2"),
-        ("1: a\n1.0: b\n", "'1.0' is there twice, in lines 1 and 2"),
-        ("~: a\nnull: b\n", "'null' is there twice, in lines 1 and 2"),
-        ("a: 1\n'a': 2\n", "'a' is there twice, in lines 1 and 2"),
-        ("a: 1\n? a\n: 2\n", "'a' is there twice, in lines 1 and 2"),
-        ("x: &x {a: 1}\ny: &y {a: 2}\nz:\n  <<: *x\n  <<: *y\n", "'<<' is there twice, in lines 4 and 5"),
-        ("x: &x {a: 1, a: 2}\ny: {<<: *x}\n", "'a' is there twice, in line 1"),
-        ("!!set {a, b, a}\n", "'a' is there twice, in line 1"),
+        ("a:\n  b: 1\n  c: 2\n  b: 3\n", "'b' occurs twice, in lines 2 and 4"),
+        ("a: [{b: 1, b: 2}]\n", "'b' occurs twice, in line 1"),
+        ("- {a: {b: {c: 1,\n  d: 2,\n  c: 3}}}\n", "'c' occurs twice, in lines 1 and 3"),
+        ('1: a\n"1": b\n', "'1' occurs twice, in lines 1 and 2"),
+        ("16: a\n0x10: b\n", "'0x10' occurs twice, in lines 1 and 2"),
+        ("yes: a\ntrue: b\n", "'true' occurs twice, in lines 1 and 2"),
+        ("1: a\n1.0: b\n", "'1.0' occurs twice, in lines 1 and 2"),
+        ("~: a\nnull: b\n", "'null' occurs twice, in lines 1 and 2"),
+        ("a: 1\n'a': 2\n", "'a' occurs twice, in lines 1 and 2"),
+        ("a: 1\n? a\n: 2\n", "'a' occurs twice, in lines 1 and 2"),
+        ("x: &x {a: 1}\ny: &y {a: 2}\nz:\n  <<: *x\n  <<: *y\n", "'<<' occurs twice, in lines 4 and 5"),
+        ("x: &x {a: 1, a: 2}\ny: {<<: *x}\n", "'a' occurs twice, in line 1"),
+        ("!!set {a, b, a}\n", "'a' occurs twice, in line 1"),
     ],
 )
 def test_a_key_that_is_there_twice_is_refused_with_its_lines(tmp_path: Path, text: str, said: str) -> None:
@@ -99,7 +99,7 @@ def test_a_key_twice_in_json_is_found_wherever_it_is(content: Any, inner: Any, d
     twice = json.dumps(inner)[:-1] + f", {json.dumps(key)}: 0}}"
     text = '{\n"around": ' + json.dumps([content]) + ',\n"here":\n' + twice + "\n}"
     assert json.loads(text)["here"] == {**inner, key: 0}
-    with pytest.raises(DuplicateKeyError, match="is there twice, in line 4"):
+    with pytest.raises(DuplicateKeyError, match="occurs twice, in line 4"):
         parse_json(text)
 
 
@@ -108,14 +108,14 @@ def test_a_camera_twice_in_a_ground_file_is_refused_with_both_lines(tmp_path: Pa
     text = f'{{"homography": {{\n"c0": {matrix},\n"c1": {matrix},\n"c\\u0030": {matrix}}}}}'
     (tmp_path / "ground.json").write_text(text)
     content = {"cameras": [{"id": "c0", "source": "c0.mp4"}], "ground": "ground.json"}
-    with pytest.raises(UserError, match=r"ground: .*ground\.json: 'c0' is there twice, in lines 2 and 4"):
+    with pytest.raises(UserError, match=r"ground: .*ground\.json: 'c0' occurs twice, in lines 2 and 4"):
         build_config(content, where="site.yaml", folder=tmp_path)
 
 
 def test_a_camera_twice_in_a_file_of_points_is_refused_with_both_lines(tmp_path: Path) -> None:
     path = tmp_path / "points.json"
     path.write_text('{"cameras": {\n"c0": [{"image": [1, 2], "floor": [3, 4]}],\n"c0": []}}')
-    with pytest.raises(UserError, match=r"points\.json: 'c0' is there twice, in lines 2 and 3"):
+    with pytest.raises(UserError, match=r"points\.json: 'c0' occurs twice, in lines 2 and 3"):
         read_points(path)
 
 
@@ -129,14 +129,14 @@ def test_a_column_twice_in_a_file_of_points_is_refused(tmp_path: Path) -> None:
 def test_a_setting_twice_in_a_token_is_refused_with_both_lines(tmp_path: Path) -> None:
     path = tmp_path / "tokens.yaml"
     path.write_text(f"tokens:\n- name: a\n  sha256: '{SUM}'\n  role: watch\n  role: operate\n")
-    with pytest.raises(UserError, match=r"tokens\.yaml: 'role' is there twice, in lines 4 and 5"):
+    with pytest.raises(UserError, match=r"tokens\.yaml: 'role' occurs twice, in lines 4 and 5"):
         read_tokens(path)
 
 
 def test_two_lists_of_tokens_are_refused_with_both_lines(tmp_path: Path) -> None:
     path = tmp_path / "tokens.yaml"
     path.write_text(f"tokens:\n- {{name: a, sha256: '{SUM}', role: watch}}\ntokens: []\n")
-    with pytest.raises(UserError, match=r"tokens\.yaml: 'tokens' is there twice, in lines 1 and 3"):
+    with pytest.raises(UserError, match=r"tokens\.yaml: 'tokens' occurs twice, in lines 1 and 3"):
         read_tokens(path)
 
 
@@ -160,7 +160,7 @@ def test_two_lists_of_tokens_are_refused_with_both_lines(tmp_path: Path) -> None
             "MYVIEW_VIEW and MYVIEW_VIEW__FLAGS__RISK both say view.flags.risk",
         ),
         ({"MYVIEW_GROUND": "a", "MYVIEW_ground": "b"}, "MYVIEW_GROUND and MYVIEW_ground both say ground"),
-        ({"MYVIEW_ACCESS": '{"tokens": "a", "tokens": null}'}, "MYVIEW_ACCESS: 'tokens' is there twice"),
+        ({"MYVIEW_ACCESS": '{"tokens": "a", "tokens": null}'}, "MYVIEW_ACCESS: 'tokens' occurs twice"),
         ({"myview_htp__port": "1"}, "myview_htp__port: there is no section 'htp'"),
     ],
 )

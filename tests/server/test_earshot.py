@@ -6,13 +6,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from server.camera.peers.detection_buffer import Earshot
-from server.messaging.messages import Found
+from server.messaging.messages import FrameDetections
 
 PATIENCE, MOST = 0.2, 50
 
 
-def word(pulse: int, camera: str = "c1", boot: int = 1, *, ended: bool = False) -> Found:
-    return Found(camera=camera, boot=boot, size=(640, 480), pulse=pulse, boxes=[], ended=ended)
+def word(pulse: int, camera: str = "c1", boot: int = 1, *, ended: bool = False) -> FrameDetections:
+    return FrameDetections(camera=camera, boot=boot, size=(640, 480), pulse=pulse, boxes=[], ended=ended)
 
 
 def earshot(*others: str, near: bool = True) -> Earshot:

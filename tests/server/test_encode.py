@@ -10,10 +10,10 @@ import pytest
 from numpy.typing import NDArray
 
 from server.camera.encoding.encoder import AccessUnit, Encoder
-from server.config.sections import Encode, Site
+from server.config.sections import EncodeSettings, SiteSettings
 from server.media.h264.annexb import nal_units, parameter_sets
 
-SITE = Site(width=160, height=96, fps=25)
+SITE = SiteSettings(width=160, height=96, fps=25)
 FRAMES = 100
 SECOND = 25
 CAP = 400
@@ -28,7 +28,7 @@ def picture(pulse: int) -> NDArray[np.uint8]:
     return np.random.default_rng(pulse).integers(0, 256, (SITE.height, SITE.width, 3), dtype=np.uint8)
 
 
-def encoded(settings: Encode) -> list[AccessUnit]:
+def encoded(settings: EncodeSettings) -> list[AccessUnit]:
     encoder = Encoder(SITE, settings)
     return [encoder.encode(pulse, picture(pulse)) for pulse in range(FRAMES)]
 
@@ -42,14 +42,16 @@ def most_kbps(units: list[AccessUnit]) -> float:
 @pytest.mark.parametrize("preset", ["ultrafast", "medium"])
 @pytest.mark.parametrize("gop", [1, 10, 50])
 def test_no_second_of_a_noisy_scene_takes_more_than_the_cap(gop: int, preset: str) -> None:
-    settings = Encode.model_validate({"gop": gop, "preset": preset, "max_kbps": CAP})
+    settings = EncodeSettings.model_validate({"gop": gop, "preset": preset, "max_kbps": CAP})
     assert CAP / 2 < most_kbps(encoded(settings)) <= CAP
-    free = Encode.model_validate({"gop": gop, "preset": preset})
+    free = EncodeSettings.model_validate({"gop": gop, "preset": preset})
     assert most_kbps(encoded(free)) > 2 * CAP, "or the cap would not be what holds it"
 
 
-@pytest.mark.parametrize("settings", [Encode(gop=10, max_kbps=CAP), Encode(gop=10, codec="vp8")])
-def test_keys_are_where_gops_begin_and_the_bytes_the_same_each_time(settings: Encode) -> None:
+@pytest.mark.parametrize(
+    "settings", [EncodeSettings(gop=10, max_kbps=CAP), EncodeSettings(gop=10, codec="vp8")]
+)
+def test_keys_are_where_gops_begin_and_the_bytes_the_same_each_time(settings: EncodeSettings) -> None:
     units = encoded(settings)
     codec = "h264" if settings.codec == "h264" else "vp8"
     parser = av.CodecContext.create(codec, "r")
@@ -61,14 +63,17 @@ def test_keys_are_where_gops_begin_and_the_bytes_the_same_each_time(settings: En
 
 
 def test_of_vp8_too_a_pulse_is_a_frame_and_less_is_better() -> None:
-    fine, coarse = encoded(Encode(codec="vp8", quantizer=8)), encoded(Encode(codec="vp8", quantizer=40))
+    fine, coarse = (
+        encoded(EncodeSettings(codec="vp8", quantizer=8)),
+        encoded(EncodeSettings(codec="vp8", quantizer=40)),
+    )
     assert [unit.pulse for unit in fine] == [unit.pulse for unit in coarse] == list(range(FRAMES))
     assert all(unit.data for unit in [*fine, *coarse])
     assert most_kbps(fine) > 1.5 * most_kbps(coarse)
 
 
 def test_what_a_capped_camera_sees_does_not_shape_its_parameter_sets() -> None:
-    settings = Encode(gop=10, max_kbps=CAP)
+    settings = EncodeSettings(gop=10, max_kbps=CAP)
     sets = {parameter_sets(nal_units(unit.data)) for unit in encoded(settings) if unit.key}
     assert len(sets) == 1
     assert None not in sets

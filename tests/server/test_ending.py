@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 from patience import PATIENCE
 
-from server.supervisor.shutdown import ending_later
+from server.supervisor.shutdown import defer_termination
 
 
 @pytest.fixture(params=[signal.SIGTERM, signal.SIGINT])
@@ -49,7 +49,7 @@ def test_a_signal_waits_even_when_another_thread_takes_it(
     handled: tuple[signal.Signals, list[int]], other_thread: int
 ) -> None:
     number, seen = handled
-    with ending_later():
+    with defer_termination():
         for _ in range(5):
             signal.pthread_kill(other_thread, number)
         while number in signal.sigpending():
@@ -64,7 +64,7 @@ def test_a_signal_waits_even_when_another_thread_takes_it(
 
 
 def test_nothing_came_nothing_happens(handled: tuple[signal.Signals, list[int]]) -> None:
-    with ending_later():
+    with defer_termination():
         pass
     assert handled[1] == []
 
@@ -75,7 +75,7 @@ def test_a_child_inherits_the_mask_and_can_lift_it() -> None:
         "def blocked(): return {2, 15} & set(signal.pthread_sigmask(signal.SIG_BLOCK, ()))\n"
         "before = blocked(); again(); print(len(before), len(blocked()))"
     )
-    with ending_later():
+    with defer_termination():
         done = subprocess.run(
             [sys.executable, "-c", code], capture_output=True, text=True, timeout=PATIENCE, check=True
         )

@@ -20,12 +20,12 @@ from server.camera.peers.cross_view_scorer import Heard, Witness
 from server.camera.peers.detection_exchange import Exchange
 from server.camera.pipeline import CameraPipeline
 from server.cli.generated_config import free_port
-from server.cli.render.camera_workers import Batch, CameraWorkers, run_cameras
+from server.cli.render.camera_workers import CameraWorkers, EpochBatch, run_cameras
 from server.cli.render.renderer import Renderer
 from server.config.loader import build_config
 from server.config.site_config import Config
 from server.messaging.bus import Bus
-from server.messaging.messages import FOUND_MOST, Found, Keys
+from server.messaging.messages import FRAME_DETECTIONS_MAX, FrameDetections, ZenohKeys
 from synthetic import Scene, write_recording
 from tracking import Detections
 
@@ -121,12 +121,12 @@ def test_what_others_see_counts_and_workers_that_are_in_step_by_pipes_say_the_sa
     assert sorted(piped, key=_order) != here_in_step(config_of(recording, 2, use=False, c1=7))
 
 
-def here_in_step(config: Config) -> list[Batch]:
+def here_in_step(config: Config) -> list[EpochBatch]:
     batches = run_cameras({camera: CameraPipeline(config, camera) for camera in config.camera_ids})
     return sorted(batches, key=_order)
 
 
-def _order(batch: Batch) -> tuple[str, int]:
+def _order(batch: EpochBatch) -> tuple[str, int]:
     return batch.camera, batch.tracks.epoch if batch.tracks else -1
 
 
@@ -172,8 +172,10 @@ def now() -> float:
     return asyncio.get_running_loop().time()
 
 
-def word(camera: str, pulse: int) -> Found:
-    return Found(camera=camera, boot=1, size=(192, 108), pulse=pulse, boxes=[(1.5, 2.0, 20.25, 60.0, 0.5)])
+def word(camera: str, pulse: int) -> FrameDetections:
+    return FrameDetections(
+        camera=camera, boot=1, size=(192, 108), pulse=pulse, boxes=[(1.5, 2.0, 20.25, 60.0, 0.5)]
+    )
 
 
 async def both(one: Exchange, two: Exchange, pulse: int = 0, *, needed: bool = True) -> list[Heard]:
@@ -218,7 +220,7 @@ async def test_a_camera_that_is_gone_is_waited_for_once(pair: tuple[Bus, Exchang
 async def test_what_is_no_word_is_counted_and_left(pair: tuple[Bus, Exchange, Exchange]) -> None:
     _, one, two = pair
     await both(one, two, needed=False)
-    key = Keys("hall").camera("c1", "found")
+    key = ZenohKeys("hall").camera("c1", "found")
     assert two._bus is not None
     far = msgspec.json.encode(word("c0", 1))
     for nonsense in (b"", b"{", b"[1]", b'{"camera": "c1"}', far, b"\xff\xfe"):
@@ -237,7 +239,7 @@ ROWS = st.lists(st.lists(NUMBER, min_size=4, max_size=6), max_size=4) | NUMBER
     st.fixed_dictionaries(
         {"camera": st.just("c1"), "boot": NUMBER, "size": ROWS, "pulse": NUMBER, "boxes": ROWS}
     ),
-    st.lists(st.tuples(*[st.floats(-1e6, 1e6)] * 4, st.floats(0, 1)), max_size=FOUND_MOST),
+    st.lists(st.tuples(*[st.floats(-1e6, 1e6)] * 4, st.floats(0, 1)), max_size=FRAME_DETECTIONS_MAX),
 )
 def test_whatever_is_read_as_a_word_can_be_gone_by(message: dict[str, Any], boxes: list[Any]) -> None:
     config = _room()
@@ -246,7 +248,7 @@ def test_whatever_is_read_as_a_word_can_be_gone_by(message: dict[str, Any], boxe
     good = {"camera": "c1", "boot": 1, "size": [640, 360], "pulse": 3, "boxes": boxes}
     for it in (message, {**good, "boxes": message["boxes"]}, {**good, "size": message["size"]}, good):
         try:
-            read = msgspec.json.decode(msgspec.json.encode(it), type=Found)
+            read = msgspec.json.decode(msgspec.json.encode(it), type=FrameDetections)
         except (msgspec.ValidationError, msgspec.DecodeError, OverflowError):
             assert it is not good
             continue
@@ -271,9 +273,9 @@ def test_only_the_surest_boxes_are_told_and_in_their_order() -> None:
     scores = np.arange(150) % 101 / 100
     said = Witness(config, "c0", (640, 360), 1).word(5, Detections(boxes, scores, np.empty((150, 0))))
     assert said.boxes is not None
-    assert len(said.boxes) == FOUND_MOST
+    assert len(said.boxes) == FRAME_DETECTIONS_MAX
     assert [row[0] for row in said.boxes] == sorted(row[0] for row in said.boxes)
-    left_out = sorted(scores)[: 150 - FOUND_MOST]
+    left_out = sorted(scores)[: 150 - FRAME_DETECTIONS_MAX]
     assert sorted(scores) == sorted([*(row[4] for row in said.boxes), *left_out])
 
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from bestview import TrackKey
-from server.media.letterbox import Fit
+from server.media.letterbox import Letterbox
 from server.service.identity.camera_window import CameraWindow
 from server.service.identity.id_switches import Exchange, exchanged
 from server.service.ingest.window_history import Stretch
@@ -24,7 +24,7 @@ def window(boxes: NDArray[np.float64], first: int) -> CameraWindow:
     last = first + boxes.shape[1] - 1
     message = word("c0", 0, dict.fromkeys(tracks, (1.0, 1.0, 2.0, 2.0)), first=first, last=last)
     keys = tuple(TrackKey("c0", it) for it in tracks)
-    fit = Fit((WIDTH, HEIGHT), (WIDTH, HEIGHT))
+    fit = Letterbox((WIDTH, HEIGHT), (WIDTH, HEIGHT))
     return CameraWindow(message, keys, np.array(list(tracks)), fit, boxes, first)
 
 

@@ -13,7 +13,7 @@ from tokens_by_hand import line_of, write_tokens
 
 from server.cli.generated_config import DEMO
 from server.config.loader import load_config
-from server.config.sections import Access
+from server.config.sections import AccessSettings
 from server.supervisor.exposure_checks import check_bus, check_pulses, check_viewers, is_loopback
 from server.system.errors import UserError
 
@@ -117,6 +117,6 @@ def test_the_secure_example_is_open_to_nobody_without_a_token_or_a_password() ->
     assert config.zenoh.connect.startswith("tls/")
     assert config.zenoh.tls.authority == CONFIGS / "secret" / "authority.pem"
     check_pulses(config)
-    check_bus(config.model_copy(update={"access": Access()}))
+    check_bus(config.model_copy(update={"access": AccessSettings()}))
     with pytest.raises(UserError, match="cannot read the tokens"):
         check_viewers(config)

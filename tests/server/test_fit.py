@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from server.media.letterbox import Fit
+from server.media.letterbox import Letterbox
 
 sides = st.integers(16, 4000)
 sizes = st.tuples(sides, sides)
@@ -18,7 +18,7 @@ places = st.lists(st.tuples(*[st.floats(-5000, 5000)] * 4), min_size=1, max_size
 def test_boxes_come_back_from_the_site_as_they_went(
     own: tuple[int, int], site: tuple[int, int], boxes: list[tuple[float, float, float, float]]
 ) -> None:
-    fit, given_boxes = Fit(own, site), np.array(boxes)
+    fit, given_boxes = Letterbox(own, site), np.array(boxes)
     np.testing.assert_allclose(fit.boxes_to_own(fit.boxes_to_site(given_boxes)), given_boxes, atol=1e-6)
 
 
@@ -26,7 +26,7 @@ def test_boxes_come_back_from_the_site_as_they_went(
 def test_the_whole_picture_is_in_the_sites_undistorted_and_touches_two_sides(
     own: tuple[int, int], site: tuple[int, int]
 ) -> None:
-    left, top, right, bottom = Fit(own, site).boxes_to_site(np.array([[0.0, 0.0, *own]]))[0]
+    left, top, right, bottom = Letterbox(own, site).boxes_to_site(np.array([[0.0, 0.0, *own]]))[0]
     assert (right - left) / own[0] == pytest.approx((bottom - top) / own[1])
     assert min(left, top) >= 0
     assert right <= site[0] + 1e-6
@@ -36,7 +36,7 @@ def test_the_whole_picture_is_in_the_sites_undistorted_and_touches_two_sides(
 
 def test_a_picture_of_the_sites_size_passes_untouched() -> None:
     picture = np.random.default_rng(0).integers(0, 255, (48, 64, 3), dtype=np.uint8)
-    assert Fit((64, 48), (64, 48)).image(picture) is picture
+    assert Letterbox((64, 48), (64, 48)).image(picture) is picture
 
 
 @pytest.mark.parametrize(
@@ -47,7 +47,7 @@ def test_what_is_left_over_is_black_and_the_rest_is_the_picture(
     own: tuple[int, int], bars: tuple[slice, slice]
 ) -> None:
     white = np.full((own[1], own[0], 3), 255, dtype=np.uint8)
-    fitted = Fit(own, (64, 48)).image(white)
+    fitted = Letterbox(own, (64, 48)).image(white)
     assert fitted.shape == (48, 64, 3)
     assert (fitted[bars] == 0).all()
     assert (fitted[24, 32] == 255).all()
@@ -57,7 +57,7 @@ def test_what_is_left_over_is_black_and_the_rest_is_the_picture(
 def test_what_is_at_a_place_of_the_picture_is_at_that_place_in_the_sites() -> None:
     picture = np.zeros((100, 50, 3), dtype=np.uint8)
     picture[60:80, 10:30] = 255
-    fit = Fit((50, 100), (200, 200))
+    fit = Letterbox((50, 100), (200, 200))
     left, top, right, bottom = fit.boxes_to_site(np.array([[10.0, 60.0, 30.0, 80.0]]))[0]
     fitted = fit.image(picture)
     rows, columns = np.nonzero(fitted[:, :, 0] > 127)
@@ -66,5 +66,5 @@ def test_what_is_at_a_place_of_the_picture_is_at_that_place_in_the_sites() -> No
 
 
 def test_a_picture_that_changes_its_size_on_the_way_still_fits() -> None:
-    fit = Fit((64, 48), (64, 48))
+    fit = Letterbox((64, 48), (64, 48))
     assert fit.image(np.zeros((100, 100, 3), np.uint8)).shape == (48, 64, 3)

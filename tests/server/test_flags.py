@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from server.config.sections import Flags as FlagSettings
+from server.config.sections import FlagSettings
 from server.service.operator_assist.flags import Flag, Flags, Foreseen
 
 FPS = 25.0

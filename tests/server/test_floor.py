@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from bestview.geometry.ground_plane import from_ground, to_ground
-from server.media.letterbox import Fit
+from server.media.letterbox import Letterbox
 from server.service.calibration.floor_map import FARTHEST, covered
 
 SITE = (640, 360)
@@ -40,13 +40,15 @@ def test_a_place_is_covered_where_the_picture_shows_it_and_it_is_not_too_far(
     own = camera(tilt, height) * sign
     part = covered(own, OWN, SITE)
     there = to_ground(own, np.array([x, y]))
-    site = np.append(Fit(OWN, SITE).to_site(np.array([x, y])), 1.0)
+    site = np.append(Letterbox(OWN, SITE).to_site(np.array([x, y])), 1.0)
     mapped = part.homography @ site
     assert (mapped[2] > 0) == bool(np.isfinite(there).all())
     if mapped[2] <= 0:
         return
     np.testing.assert_allclose(mapped[:2] / mapped[2], there, rtol=1e-6, atol=1e-9)
-    nearest = max((part.homography @ np.append(Fit(OWN, SITE).to_site(np.array(it)), 1.0))[2] for it in EDGES)
+    nearest = max(
+        (part.homography @ np.append(Letterbox(OWN, SITE).to_site(np.array(it)), 1.0))[2] for it in EDGES
+    )
     reach = mapped[2] / nearest * FARTHEST
     if abs(reach - 1) > 1e-3 and 1 < x < 319 and 1 < y < 239:
         assert inside(part.outline, there) == (reach > 1)

@@ -8,12 +8,12 @@ from cameras_by_hand import SMALL, word
 from hypothesis import given
 from hypothesis import strategies as st
 
-from server.messaging.messages import FrameHead, Solve
+from server.messaging.messages import FrameHeader, SolverReport
 from server.service.metrics.camera_metrics import Gauge, Spread
 
 
-def head(pulse: int, late: float, due: float = 100.0) -> FrameHead:
-    return FrameHead(pulse=pulse, key=False, boot=1, due=due, taken=due + late, encoded=due + late)
+def head(pulse: int, late: float, due: float = 100.0) -> FrameHeader:
+    return FrameHeader(pulse=pulse, key=False, boot=1, due=due, taken=due + late, encoded=due + late)
 
 
 @given(st.lists(st.floats(-1.0, 1.0), min_size=1, max_size=600))
@@ -44,7 +44,7 @@ def test_a_windows_delay_is_from_when_its_last_frame_was_due() -> None:
 def test_a_window_is_certified_where_nothing_can_be_better(gaps: list[float], share: float | None) -> None:
     gauge = Gauge()
     for gap in gaps:
-        solve = Solve(objective=-4.0, bound=-4.0, gap=gap, integral=False, rounds=1)
+        solve = SolverReport(objective=-4.0, bound=-4.0, gap=gap, integral=False, rounds=1)
         gauge.window(msgspec.structs.replace(word("c0", 0, {}), solve=solve))
     gauge.window(word("c0", 1, {}))  # nobody there, nothing solved
     assert (gauge.certified, gauge.windows) == (share, len(gaps))

@@ -17,7 +17,7 @@ from test_own_parameters import MAKES, sent
 from test_skip import PRESETS, decoded, encoded, how
 
 from server.camera.encoding.encoder import Encoder
-from server.config.sections import Encode, Site
+from server.config.sections import EncodeSettings, SiteSettings
 from server.media.containers.fmp4 import init_segment
 from server.media.h264.annexb import ParameterSets, nal_units, parameter_sets, sample
 from server.media.h264.bitstream import BitWriter, unit_of
@@ -58,7 +58,7 @@ def test_it_is_grey_and_what_is_before_and_behind_it_is_as_it_was(
 @given(Sizes)
 def test_so_it_is_in_vp8(blocks: tuple[int, int]) -> None:
     width, height = 16 * blocks[0], 16 * blocks[1] + 2
-    encoder = Encoder(Site(width=width, height=height, fps=FPS), Encode(gop=GOP, codec="vp8"))
+    encoder = Encoder(SiteSettings(width=width, height=height, fps=FPS), EncodeSettings(gop=GOP, codec="vp8"))
     noise = np.random.default_rng(0).integers(0, 255, (3, height, width, 3), dtype=np.uint8)
     units = [encoder.encode(pulse, picture).data for pulse, picture in enumerate(noise)]
 

@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from server.camera.encoding.encoder import AccessUnit, Encoder
-from server.config.sections import Encode, Site
+from server.config.sections import EncodeSettings, SiteSettings
 from server.media.containers.fmp4 import Sample, fragment, init_segment, rebased, ticks
 from server.media.h264.annexb import NAL_AUD, nal_type, nal_units, parameter_sets, sample, units_of
 
-SITE = Site(width=64, height=48, fps=25)
+SITE = SiteSettings(width=64, height=48, fps=25)
 GOP = 4
 
 
@@ -28,7 +28,7 @@ def picture(seed: int) -> NDArray[np.uint8]:
 
 
 def encoded(first: int, frames: int, seed: int = 0, crf: int = 23) -> list[AccessUnit]:
-    encoder = Encoder(SITE, Encode(gop=GOP, crf=crf))
+    encoder = Encoder(SITE, EncodeSettings(gop=GOP, crf=crf))
     return [encoder.encode(pulse, picture(1000 * seed + pulse)) for pulse in range(first, first + frames)]
 
 

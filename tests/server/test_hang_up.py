@@ -16,7 +16,7 @@ from patience import PATIENCE
 
 from server.cli import site_commands
 from server.cli.generated_config import free_port
-from server.supervisor.sighup import hang_ups, mind_hang_ups
+from server.supervisor.sighup import record_early_sighups, sighups
 
 
 @pytest.fixture(autouse=True)
@@ -32,7 +32,7 @@ def hang_up() -> None:
 
 async def turn() -> None:
     """Wait for SIGHUP."""
-    waiting = hang_ups()
+    waiting = sighups()
     async with asyncio.timeout(PATIENCE):
         await anext(waiting)
     await waiting.aclose()
@@ -65,10 +65,10 @@ def test_what_comes_between_reading_and_running_is_not_lost(
 
 
 async def test_those_that_came_early_are_one_and_those_that_come_later_one_each() -> None:
-    mind_hang_ups()
+    record_early_sighups()
     hang_up()
     hang_up()
-    waiting = hang_ups()
+    waiting = sighups()
     async with asyncio.timeout(PATIENCE):
         await anext(waiting)
         again = asyncio.ensure_future(anext(waiting))

@@ -23,7 +23,7 @@ from camsync import PulseServer
 from server.cli.generated_config import free_port
 from server.config.password_file import read_users
 from server.config.pulse_passwords import SHORTEST
-from server.config.tokens_file import digest_of, read_tokens
+from server.config.tokens_file import read_tokens, token_digest
 from server.supervisor.healthcheck import main
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -174,7 +174,7 @@ def test_what_is_made_for_a_secure_site_fits_together(secrets: Path) -> None:
     assert (operator.role, operator.camera) == ("operate", None)
     assert (health.role, health.camera) == ("watch", "c0")
     token = (secrets / "cameras" / "c0" / "token").read_text("ascii").strip()
-    assert health.sha256 == digest_of(token)
+    assert health.sha256 == token_digest(token)
     c0 = secrets / "cameras" / "c0"
     assert users(secrets / "bus") == users(c0 / "bus")
     assert users(secrets / "pulses") == users(secrets / "web" / "pulses") | users(c0 / "pulses")

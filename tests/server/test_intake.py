@@ -29,13 +29,13 @@ from hypothesis import strategies as st
 from bestview import IdentitySettings
 from server.media.stream_format import Agreement
 from server.messaging.inbox import Message
-from server.messaging.messages import Keys
+from server.messaging.messages import ZenohKeys
 from server.service.identity.people import People
 from server.service.ingest.epoch_aligner import Aligner
 from server.service.ingest.ingest import Intake
 from server.service.streaming.frame_buffer import Shelf, Shelved
 
-KEYS = Keys("hall")
+KEYS = ZenohKeys("hall")
 
 
 class Hall:

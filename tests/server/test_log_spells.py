@@ -23,10 +23,10 @@ from server.camera.process import CameraProcess
 from server.camera.sources import recording
 from server.camera.sources.frame_reader import pictures
 from server.camera.sources.recording import Recording
-from server.config.sections import Sound
+from server.config.sections import SoundSettings
 from server.media.rendering_messages import Draw
 from server.messaging.inbox import Message
-from server.messaging.messages import CameraStatus, Found, Keys
+from server.messaging.messages import CameraStatus, FrameDetections, ZenohKeys
 from server.service.rendering import stream_source
 from server.service.rendering.decided_boxes import NOTHING
 from server.service.rendering.worker import stream_renderer
@@ -34,12 +34,12 @@ from server.service.rendering.worker_process import ProcessDiedError
 from server.service.streaming.broadcaster import Channel
 from server.supervisor.site import _keep
 
-KEYS = Keys("hall")
+KEYS = ZenohKeys("hall")
 
 
 def found(camera: str, pulse: int) -> bytes:
     """Give what a camera says of a frame."""
-    return msgspec.json.encode(Found(camera=camera, boot=1, size=(192, 108), pulse=pulse, boxes=[]))
+    return msgspec.json.encode(FrameDetections(camera=camera, boot=1, size=(192, 108), pulse=pulse, boxes=[]))
 
 
 async def test_words_that_come_too_late_again_and_again_are_told_of_seldom_and_when_that_is_over(
@@ -106,7 +106,7 @@ def test_a_camera_without_sound_is_told_of_once_however_often_it_is_opened(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     caplog.set_level("INFO")
-    sound = LiveSound(Sound(source="c0"), 25.0)
+    sound = LiveSound(SoundSettings(source="c0"), 25.0)
     for _ in range(10):
         sound.opened(None)
     assert caplog.messages == ["there is no sound in what the camera sends; the site is silent"]

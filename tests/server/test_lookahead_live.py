@@ -22,7 +22,7 @@ from halls import A, B, Hall
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from server.config.sections import View
+from server.config.sections import ViewSettings
 from server.http.access.csrf import CHANGES
 from server.service.streaming.broadcaster import Piece
 from server.service.view_selection.decider import Decider, GopDecision
@@ -35,7 +35,7 @@ Changes = Mapping[int, int]
 CHANGED = st.dictionaries(st.integers(0, 29), st.integers(GOP, 40), max_size=6)
 
 
-def looking(view: View, frames: int) -> View:
+def looking(view: ViewSettings, frames: int) -> ViewSettings:
     return view.model_copy(update={"lookahead": frames})
 
 

@@ -34,18 +34,18 @@ from server.media.audio.audio_format import SoundFormat
 from server.messaging.epochs import end_of_epoch
 from server.messaging.inbox import Message
 from server.messaging.messages import (
-    SOUND_MOST,
-    TRACKS_MOST,
+    AUDIO_FRAMES_MAX,
+    TRACKS_MAX,
+    AudioHeader,
     CameraTracks,
     GopChoices,
-    Keys,
-    SoundHead,
-    Track,
+    TrackMessage,
+    ZenohKeys,
 )
 from server.service.streaming.audio_buffer import SoundShelf
 from server.service.streaming.media_chunk import Footage
 
-KEYS = Keys("hall")
+KEYS = ZenohKeys("hall")
 LIAR, OTHER = CAMERAS
 EPOCHS = 8
 FAR = 500_000_000_000
@@ -76,7 +76,7 @@ def of_one(epoch: int, /, **changes: Any) -> list[Message]:
 
 def very_many(epoch: int) -> list[Message]:
     boxes = [SMALL] * STRIDE
-    many = [Track(id=it, boxes=[*boxes], confidence=1.0) for it in range(TRACKS_MOST + 1)]
+    many = [TrackMessage(id=it, boxes=[*boxes], confidence=1.0) for it in range(TRACKS_MAX + 1)]
     return said(epoch, tracks=msgspec.to_builtins(many))
 
 
@@ -232,12 +232,12 @@ def test_when_all_recordings_are_over_nothing_is_decided_of_pulses_that_nobody_h
 
 
 def test_sound_of_more_frames_than_any_is_none_and_takes_no_time() -> None:
-    head = {"first": 2**62, "sizes": [1] * (SOUND_MOST + 1)}
+    head = {"first": 2**62, "sizes": [1] * (AUDIO_FRAMES_MAX + 1)}
     with pytest.raises(msgspec.ValidationError):
-        msgspec.json.decode(json.dumps(head).encode(), type=SoundHead)
+        msgspec.json.decode(json.dumps(head).encode(), type=AudioHeader)
     shelf = SoundShelf(SoundFormat(48_000, 2), 25.0, 10.0)
-    for first in range(0, 20 * SOUND_MOST, SOUND_MOST):
-        shelf.put(SoundHead(first=first, sizes=[1] * SOUND_MOST), bytes(SOUND_MOST))
+    for first in range(0, 20 * AUDIO_FRAMES_MAX, AUDIO_FRAMES_MAX):
+        shelf.put(AudioHeader(first=first, sizes=[1] * AUDIO_FRAMES_MAX), bytes(AUDIO_FRAMES_MAX))
     assert len(shelf._frames) == 469
 
 

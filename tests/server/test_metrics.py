@@ -18,7 +18,7 @@ from promql_series import selectors
 from server.http.event_loop_lag import Lag
 from server.http.traffic import Sent
 from server.messaging.inbox import Message
-from server.messaging.messages import FrameHead, Keys, Solve
+from server.messaging.messages import FrameHeader, SolverReport, ZenohKeys
 from server.service.metrics.histogram import Histogram
 from server.service.readiness import most_behind
 from server.service.streaming.broadcaster import Chunk, Viewer
@@ -49,9 +49,11 @@ def test_a_histogram_counts_what_does_not_pass_each_bound(values: list[float], b
 async def test_a_cameras_stages_are_measured_by_its_own_times(hall: Hall) -> None:
     see(hall)
     unit = encoded(0)[15]
-    head = FrameHead(pulse=unit.pulse, key=unit.key, boot=1, due=100.0, taken=100.03, encoded=100.04)
-    hall.service.intake.video(Message(Keys("hall").camera(A, "video"), unit.data, msgspec.json.encode(head)))
-    solve = Solve(objective=-4.0, bound=-4.2, gap=0.2, integral=False, rounds=3)
+    head = FrameHeader(pulse=unit.pulse, key=unit.key, boot=1, due=100.0, taken=100.03, encoded=100.04)
+    hall.service.intake.video(
+        Message(ZenohKeys("hall").camera(A, "video"), unit.data, msgspec.json.encode(head))
+    )
+    solve = SolverReport(objective=-4.0, bound=-4.2, gap=0.2, integral=False, rounds=3)
     said = word(A, 3, {1: SMALL}, solve=solve, search_s=0.02, solve_s=0.2, solved_at=100.5)
     hall.service.intake.tracks(tracks(msgspec.structs.replace(said, first=11, last=15, final_to=15)))
     hall.service.intake.tracks(tracks(said))
@@ -78,7 +80,7 @@ async def test_what_a_camera_says_of_itself_is_there_once_it_has_said_it(busy: H
 
 
 async def test_messages_that_were_not_understood_are_counted_whoever_heard_them(hall: Hall) -> None:
-    hall.service.intake.tracks(Message(Keys("hall").camera(A, "tracks"), b"{", b""))
+    hall.service.intake.tracks(Message(ZenohKeys("hall").camera(A, "tracks"), b"{", b""))
     hall.service.intake.status(status(B, bad_messages=3))
     told = {key[1:]: value for key, value in (await samples(hall)).items() if key[0] == _BAD}
     assert told == {(A, "sent"): 1, (B, "sent"): 0, (B, "heard"): 3}
@@ -196,5 +198,5 @@ async def test_a_site_without_pulses_or_live_cameras_is_not_ready(busy: Hall) ->
     assert await ready(busy) == (503, "no pulse has come for 60 s")
     busy.service._pulsed_at = time.monotonic()
     for camera in CAMERAS:
-        busy.service.intake.alive(Keys("hall").camera(camera, "alive"), there=False)
+        busy.service.intake.alive(ZenohKeys("hall").camera(camera, "alive"), there=False)
     assert await ready(busy) == (503, "no camera delivers frames")

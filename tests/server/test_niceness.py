@@ -14,7 +14,7 @@ from patience import PATIENCE
 
 from server.cli.generated_config import free_port
 from server.system.child_process import start_child
-from server.system.niceness import make_nicer
+from server.system.niceness import lower_priority
 
 NOBODY = 2**22 + 1  # more than a process's number can be (proc(5), pid_max)
 BEFORE = os.getpriority(os.PRIO_PROCESS, 0)
@@ -28,8 +28,8 @@ def niceness(pid: int) -> int:
 
 def nicer_by(*steps: int) -> int:
     """Give how nice a process becomes that is told so many times to be nicer."""
-    calls = "; ".join(f"be_nicer({by})" for by in steps)
-    script = f"import os; from server.system.niceness import be_nicer; {calls}; print(os.nice(0))"
+    calls = "; ".join(f"lower_own_priority({by})" for by in steps)
+    script = f"import os; from server.system.niceness import lower_own_priority; {calls}; print(os.nice(0))"
     return int(subprocess.run([sys.executable, "-c", script], capture_output=True, check=True).stdout)
 
 
@@ -45,7 +45,7 @@ def test_nobody_is_nicer_than_the_system_knows() -> None:
 
 
 def test_who_is_gone_already_is_no_trouble() -> None:
-    make_nicer(NOBODY, 5)
+    lower_priority(NOBODY, 5)
 
 
 async def test_what_the_service_starts_yields_to_it_and_goes_before_the_cameras() -> None:

@@ -23,7 +23,7 @@ from server.camera.passthrough.opening import open_own
 from server.camera.sources import open_source
 from server.config import yaml_file
 from server.config.loader import build_config
-from server.config.sections import Camera, Site
+from server.config.sections import CameraSettings, SiteSettings
 from server.config.site_config import Config
 from server.config.yaml_file import read_yaml
 from server.http.operator.settings import settings_of
@@ -168,7 +168,7 @@ def test_why_a_camera_cannot_be_opened_is_said_without_its_password(source: str,
     address = source.format(password)
     config = built(cameras=[door(address, h264="auto")], sound={"source": address})
     for attempt in (
-        lambda: open_source(Camera(id="door", source=address), Site()),
+        lambda: open_source(CameraSettings(id="door", source=address), SiteSettings()),
         lambda: open_own(config, config.camera("door"), None),
         lambda: open_sound(config, "door"),
     ):

@@ -11,7 +11,7 @@ import pytest
 
 from server.camera.detector_setup import make_detector
 from server.config.loader import build_config
-from server.media.letterbox import Fit
+from server.media.letterbox import Letterbox
 from server.system.errors import UserError
 from tracking.detectors import PAPER_BOXES, BackgroundDetector, HogDetector, MotFileDetector
 
@@ -24,7 +24,7 @@ def observer(folder: Path, detect: dict[str, Any], **camera: Any) -> Any:
     config = build_config(
         {"site": site, "cameras": cameras, "detect": detect}, where="site.yaml", folder=folder
     )
-    return make_detector(config, config.cameras[0], Fit(SIZE, SIZE))
+    return make_detector(config, config.cameras[0], Letterbox(SIZE, SIZE))
 
 
 def test_the_kind_says_which_detector(tmp_path: Path) -> None:

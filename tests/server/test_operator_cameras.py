@@ -10,7 +10,7 @@ from halls import A, B, Hall, opened
 
 from camsync import Login, PulseClient, PulseServer
 from server.messaging.inbox import Message
-from server.messaging.messages import Keys
+from server.messaging.messages import ZenohKeys
 
 
 async def test_every_camera_is_told_with_what_is_measured(busy: Hall) -> None:
@@ -33,13 +33,13 @@ async def test_what_went_wrong_last_is_told_until_something_else_does(busy: Hall
         return str(camera["last_trouble"]["text"])
 
     intake = busy.service.intake
-    intake.status(Message(Keys("hall").camera(A, "status"), b"{}", b""))
+    intake.status(Message(ZenohKeys("hall").camera(A, "status"), b"{}", b""))
     assert "a message that cannot be used: " in await trouble()
     intake.status(status(A, state="away"))
     assert await trouble() == "its source gives no pictures; it is tried again"
     intake.status(status(A, state="live"))
     assert await trouble() == "its source gives no pictures; it is tried again"
-    intake.alive(Keys("hall").camera(A, "alive"), there=False)
+    intake.alive(ZenohKeys("hall").camera(A, "alive"), there=False)
     assert await trouble() == "its process was gone"
 
 

@@ -27,8 +27,8 @@ from walk_by_hand import SITE, curved, errors_on_floor, words
 from benchmarks.browser import chromium
 from bestview import IdentityRegistry
 from server.cli.calibrate.points_file import read_points
-from server.messaging.messages import Keys
-from server.messaging.operator_messages import Trouble
+from server.messaging.messages import ZenohKeys
+from server.messaging.operator_messages import RiskEvent
 
 PAGE = Path(__file__).parents[2] / "client" / "page"
 AXE = PAGE.parents[1] / "node_modules/axe-core/axe.min.js"
@@ -122,7 +122,7 @@ async def test_every_camera_has_a_tile_that_says_how_it_is(browser: Browser) -> 
         )
         hall.service.intake.status(status(A, missed=3, clock_offset=-0.25))
         await expect(tile.get_by_text("-250 ms")).to_be_visible()
-        hall.service.intake.alive(Keys("hall").camera(A, "alive"), there=False)
+        hall.service.intake.alive(ZenohKeys("hall").camera(A, "alive"), there=False)
         await expect(tile.locator(".state")).to_have_text("Gone")
         await expect(tile.locator(".last-trouble")).to_contain_text("its process was gone")
         await expect(page.locator("#pulses")).to_contain_text("there is no pulse server at")
@@ -184,7 +184,7 @@ async def test_flags_are_listed_with_what_has_become_of_them(browser: Browser) -
         await expect(page.locator("#flag-none")).to_have_text("None so far.")
         see(hall)
         hall.service.decider.people.roll.call(1, "Ann")
-        trouble = Trouble(reason="alike", tracks=[2, 1], pulse=29, margin=0.1, risk=0.5)
+        trouble = RiskEvent(reason="alike", tracks=[2, 1], pulse=29, margin=0.1, risk=0.5)
         hall.service.intake.tracks(tracks(word(A, 3, {1: SMALL, 2: SMALL}, troubles=[trouble])))
         hall.service.intake.tracks(tracks(word(B, 3, {1: LARGE})))
         hall.service.pulse = 19

@@ -14,7 +14,7 @@ from halls import A, B, Hall, opened, see
 from server.camera.operator_corrections import Pointed
 from server.http.access.csrf import CHANGES
 from server.messaging.inbox import Message
-from server.messaging.operator_messages import Pointings, Trouble
+from server.messaging.operator_messages import OperatorPoints, RiskEvent
 
 POINTING = "/api/operator/pointing"
 
@@ -28,12 +28,12 @@ async def helped() -> AsyncIterator[Hall]:
         yield hall
 
 
-def sent(hall: Hall) -> list[tuple[str, Pointings]]:
+def sent(hall: Hall) -> list[tuple[str, OperatorPoints]]:
     """Collect what cameras are told from now on."""
-    told: list[tuple[str, Pointings]] = []
+    told: list[tuple[str, OperatorPoints]] = []
 
     def send(camera: str, payload: bytes) -> None:
-        told.append((camera, msgspec.json.decode(payload, type=Pointings)))
+        told.append((camera, msgspec.json.decode(payload, type=OperatorPoints)))
 
     hall.service.assist._send = send
     return told
@@ -117,9 +117,9 @@ async def test_where_no_camera_takes_it_that_is_said(busy: Hall) -> None:
 
 async def test_a_flag_is_raised_followed_answered_and_counted(helped: Hall) -> None:
     expected = 4 * STRIDE
-    trouble = Trouble(reason="alike", tracks=[1, 2], pulse=expected, margin=0.1, risk=0.5)
-    nobody = [Trouble(reason="gap", tracks=[], pulse=17, margin=0.0, risk=0.5)]
-    nobody += [Trouble(reason="fading", tracks=[77], pulse=17, margin=0.0, risk=0.5)]
+    trouble = RiskEvent(reason="alike", tracks=[1, 2], pulse=expected, margin=0.1, risk=0.5)
+    nobody = [RiskEvent(reason="gap", tracks=[], pulse=17, margin=0.0, risk=0.5)]
+    nobody += [RiskEvent(reason="fading", tracks=[77], pulse=17, margin=0.0, risk=0.5)]
     helped.service.intake.tracks(tracks(word(A, 3, {1: SMALL, 2: SMALL}, troubles=[*nobody, trouble])))
     helped.service.intake.tracks(tracks(word(B, 3, {1: LARGE})))
     helped.service.pulse = 4 * STRIDE - 1

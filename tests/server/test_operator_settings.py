@@ -13,7 +13,7 @@ from cameras_by_hand import CAMERAS, LARGE, SMALL, TrackNumbers, epoch_of, small
 from halls import A, B, Hall, opened
 
 from bestview.quality import QualitySettings
-from server.config.sections import View
+from server.config.sections import ViewSettings
 from server.config.site_config import Config
 from server.http.access.csrf import CHANGES
 from server.http.operator.settings import settings_of
@@ -29,7 +29,7 @@ async def put(hall: Hall, json: Any) -> tuple[int, Any]:
         return answer.status, await answer.json()
 
 
-def decided(config: Config, tuned: View | None = None, after: int = 0) -> list[Any]:
+def decided(config: Config, tuned: ViewSettings | None = None, after: int = 0) -> list[Any]:
     """Give what is decided of two people who are now large in one camera, now in the other."""
     decider = Decider(config, dict.fromkeys(CAMERAS), lambda *_: True)
     decider.people._registry = TrackNumbers()  # type: ignore[assignment]

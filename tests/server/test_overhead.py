@@ -15,7 +15,7 @@ from server.camera.tracker_setup import _measured
 from server.cli.track.command import track_one
 from server.config.loader import build_config
 from server.config.site_config import Config
-from server.media.letterbox import Fit
+from server.media.letterbox import Letterbox
 from synthetic import Scene, write_recording
 from tracking.baselines.temporal_consistency import TemporalSettings
 from tracking.boxes import iou
@@ -40,7 +40,7 @@ def _config(kind: str, **camera: object) -> Config:
 def _recall(kind: str) -> float:
     """Give the share of people whom the detector surely finds in the room from above."""
     config, scene = _config(kind), Scene("overhead", 1, 2, 4, *SIZE, 2.0)
-    detector = make_detector(config, config.cameras[0], Fit(SIZE, SIZE))
+    detector = make_detector(config, config.cameras[0], Letterbox(SIZE, SIZE))
     assert isinstance(detector, BackgroundDetector)
     detector.prepare([scene.image(0, frame) for frame in range(0, 80, 8)], 10)
     found = []
@@ -113,7 +113,7 @@ def test_floor_is_measured_across_all_of_the_picture_that_is_looked_at() -> None
     # Six metres across a picture of 4 by 3, which has black columns at its sides in a site of 16 by 9.
     config = _config("overhead", ground=np.diag([0.0125, 0.0125, 1.0]).tolist(), ground_unit="m")
     across = [
-        _measured(TemporalSettings(), config.cameras[0], Fit((480, 360), site)).room_m
+        _measured(TemporalSettings(), config.cameras[0], Letterbox((480, 360), site)).room_m
         for site in ((480, 360), (640, 360), (960, 720))
     ]
     assert across == pytest.approx([6.0, 8.0, 6.0])

@@ -40,7 +40,7 @@ from server.media.containers.mpegts import Counters, pack
 from server.media.h264.annexb import NAL_AUD, nal_type, nal_units
 from server.media.stream_format import Agreement
 from server.service.streaming.frame_buffer import Shelf
-from server.system.errors import AwayError, UserError
+from server.system.errors import UnavailableError, UserError
 
 FRAMES = 20
 
@@ -400,7 +400,7 @@ def test_a_network_camera_that_falls_silent_while_it_is_looked_at_is_away(
     monkeypatch.setattr("server.camera.passthrough.stream_source.READ_S", 0.5)
     network.let = 2
     camera = {"options": {"probesize": "2000", "analyzeduration": "1000"}}
-    with pytest.raises(AwayError, match=r"stopped while it was looked at: no answer within 0\.5 s$"):
+    with pytest.raises(UnavailableError, match=r"stopped while it was looked at: no answer within 0\.5 s$"):
         CameraPipeline(site(network.url, h264, camera=camera), "c0")
 
 

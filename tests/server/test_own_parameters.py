@@ -19,7 +19,7 @@ from played_in_chromium import READ, seen_in_chromium
 from programs import needs_chromium, needs_ffmpeg
 
 from server.camera.encoding.encoder import AccessUnit, Encoder
-from server.config.sections import Encode, Site
+from server.config.sections import EncodeSettings, SiteSettings
 from server.config.site_config import Config
 from server.media.codec import agreement_for
 from server.media.h264.annexb import nal_units, parameter_sets
@@ -40,7 +40,9 @@ MISSING = {(B, 3), (A, 6), (A, 7), (B, 10)}
 
 @cache
 def sent(camera: str) -> tuple[AccessUnit, ...]:
-    encoder = Encoder(Site(width=WIDTH, height=HEIGHT, fps=FPS), Encode(gop=GOP, **MAKES[camera]))
+    encoder = Encoder(
+        SiteSettings(width=WIDTH, height=HEIGHT, fps=FPS), EncodeSettings(gop=GOP, **MAKES[camera])
+    )
     rng = np.random.default_rng(sum(camera.encode()))
     coarse = rng.integers(0, 255, (GOPS * GOP, HEIGHT // 8, WIDTH // 8, 3), dtype=np.uint8)
     return tuple(

@@ -35,8 +35,8 @@ from server.media.containers.mpegts import Counters
 from server.media.picture import Picture as Shown
 from server.media.stream_format import Agreement
 from server.messaging.inbox import Message
-from server.messaging.messages import Box, Keys
-from server.messaging.retained_state import Remembered
+from server.messaging.messages import Box, ZenohKeys
+from server.messaging.retained_state import IdentitySnapshot
 from server.service.recording import time_shift_stream as past_stream
 from server.service.recording.available_range import kept_from, kept_until, known
 from server.service.recording.media_files import pulse_of
@@ -429,8 +429,8 @@ async def test_somebodys_past_goes_back_beyond_a_restart_if_their_number_does(tm
         hall.service.pulse0 = PULSE0 + 0.01
         hall.service.past.open()
         hall.service.come(*CAMERAS)
-        said = Remembered(pulse=19, boot=1, next=9, since=since, people=[])
-        key = Keys("hall").camera(A, "remembered")
+        said = IdentitySnapshot(pulse=19, boot=1, next=9, since=since, people=[])
+        key = ZenohKeys("hall").camera(A, "remembered")
         hall.service.remembering.heard(Message(key, msgspec.json.encode(said), b""))
         for epoch in range(5, 8):
             hall.service.feed(epoch, IN_A)

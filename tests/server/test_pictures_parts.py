@@ -17,7 +17,7 @@ from test_draw import CANVAS, fragments, shown
 
 from server.media.audio.audio_format import SoundFormat
 from server.media.rendering_messages import Drawn, Jpeg, Unit
-from server.messaging.messages import GopChoices, SoundHead
+from server.messaging.messages import AudioHeader, GopChoices
 from server.service.rendering.decided_boxes import NOTHING, Decided
 from server.service.rendering.jpeg_series import AllSeries, Series
 from server.service.rendering.overlay_film import Film
@@ -91,7 +91,7 @@ def test_a_film_that_goes_on_with_another_process_has_no_hole_and_never_goes_bac
 def test_a_film_is_silent_where_its_pictures_are() -> None:
     form = SoundFormat(48_000, 2)
     shelf = SoundShelf(form, FPS, 60.0)
-    shelf.put(SoundHead(first=0, sizes=[9] * 30), b"not quiet" * 30)
+    shelf.put(AudioHeader(first=0, sizes=[9] * 30), b"not quiet" * 30)
     film = Film(CANVAS, 8, shelf)
     viewer = film.channel.join()
     for gop in range(3):
@@ -105,7 +105,7 @@ def test_a_film_is_silent_where_its_pictures_are() -> None:
 def test_the_holes_of_a_film_are_silent_where_nobody_knows_what_was_in_them(*, silent: bool) -> None:
     form = SoundFormat(48_000, 2)
     shelf = SoundShelf(form, FPS, 60.0)
-    shelf.put(SoundHead(first=0, sizes=[9] * 30), b"not quiet" * 30)
+    shelf.put(AudioHeader(first=0, sizes=[9] * 30), b"not quiet" * 30)
     film = Film(CANVAS, 8, shelf, silent_holes=silent)
     viewer = film.channel.join()
     film.put(units(0, GOP))

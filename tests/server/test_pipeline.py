@@ -15,9 +15,9 @@ from bestview import QualitySettings
 from server.camera.encoding.encoder import AccessUnit
 from server.camera.pipeline import CameraPipeline
 from server.camera.sources import SourceEnded
-from server.cli.render.camera_workers import Batch, run_camera
+from server.cli.render.camera_workers import EpochBatch, run_camera
 from server.config.loader import build_config
-from server.config.sections import Site
+from server.config.sections import SiteSettings
 from server.config.site_config import Config
 from server.messaging.messages import Box, CameraTracks
 from server.system.errors import UserError
@@ -46,7 +46,7 @@ def config_of(recording: Path, *, detect: Mapping[str, Any] = MappingProxyType({
     return build_config(content, where="site", folder=recording)
 
 
-def offline(config: Config) -> list[Batch]:
+def offline(config: Config) -> list[EpochBatch]:
     return list(run_camera(CameraPipeline(config, "c0"), "c0"))
 
 
@@ -100,7 +100,7 @@ def test_an_offset_moves_everything_by_so_many_pulses(recording: Path) -> None:
     assert all(not batch.tracks.shed for batch in moved if batch.tracks), "before it begins nothing is missed"
 
 
-def _boxes(batches: list[Batch]) -> dict[tuple[int, int], Box]:
+def _boxes(batches: list[EpochBatch]) -> dict[tuple[int, int], Box]:
     return {
         (batch.tracks.first + place, track.id): box
         for batch in batches
@@ -172,7 +172,7 @@ def test_pictures_of_another_size_are_fitted_and_boxes_say_whose_size(tmp_path: 
 
 def test_detections_of_a_file_are_followed_in_the_sites_pixels(recording: Path) -> None:
     config = config_of(recording, detections="gt/c0.txt")
-    small = config.model_copy(update={"site": Site(width=96, height=80)})
+    small = config.model_copy(update={"site": SiteSettings(width=96, height=80)})
     boxes = _boxes(offline(small))
     assert boxes, "there are people in it"
     rows = np.loadtxt(recording / "gt" / "c0.txt", delimiter=",", ndmin=2)

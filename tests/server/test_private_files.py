@@ -17,14 +17,14 @@ from test_splice import choice
 
 from server.cli.doctor.disk import disk_findings
 from server.cli.doctor.findings import Level
-from server.media.letterbox import Fit
+from server.media.letterbox import Letterbox
 from server.service.decision_files.live_recorder import LiveRecorder
 from server.service.decision_files.recorder import Recorder
 from server.service.recording.recording_session import Headers
 from server.service.recording.store import Store
 from server.system.private_files import make_private_folder
 
-FITS = dict.fromkeys(CAMERAS, Fit((WIDTH, HEIGHT), (WIDTH, HEIGHT)))
+FITS = dict.fromkeys(CAMERAS, Letterbox((WIDTH, HEIGHT), (WIDTH, HEIGHT)))
 
 
 @contextlib.contextmanager

@@ -26,7 +26,7 @@ from server.cli.render.renderer import Renderer
 from server.config.loader import build_config
 from server.config.pulse_passwords import pulse_users
 from server.config.site_config import Config
-from server.messaging.messages import CameraStatus, CameraTracks, FrameHead, GopChoices, pulse_client
+from server.messaging.messages import CameraStatus, CameraTracks, FrameHeader, GopChoices, pulse_client
 from server.service.service import BestViewService
 from synthetic import Scene, write_recording
 
@@ -179,7 +179,7 @@ async def test_recordings_run_to_their_end_and_every_frame_and_word_is_there(
     assert written["choices.csv"].count(b"\n") > 1, "somebody is shown"
     assert written == rendered(config, tmp_path / "offline"), "live as offline, to the byte"
 
-    frames = [msgspec.json.decode(head, type=FrameHead) for _, head in plain.of("c0/video")]
+    frames = [msgspec.json.decode(head, type=FrameHeader) for _, head in plain.of("c0/video")]
     assert [frame.pulse for frame in frames] == list(range(FRAMES))
     assert all(frame.due <= frame.encoded and frame.taken <= frame.encoded for frame in frames)
     words = [msgspec.json.decode(payload, type=CameraTracks) for payload, _ in plain.of("c0/tracks")]
@@ -322,7 +322,7 @@ async def test_a_camera_on_the_topmost_rung_shows_every_gop_and_ends_every_windo
         await asyncio.gather(over, *(it.camera(camera) for camera in config.camera_ids))
     await asyncio.to_thread(plain.wait_and_close, "bestview/choices", len(gops))
 
-    heads = [msgspec.json.decode(head, type=FrameHead) for _, head in plain.of("c0/video")]
+    heads = [msgspec.json.decode(head, type=FrameHeader) for _, head in plain.of("c0/video")]
     frames = [head.pulse for head in heads]
     assert frames[:6] == [0, 2, 4, 6, 8, 9]
     assert [head.pulse for head in heads if head.key] == list(range(0, FRAMES, config.encode.gop))

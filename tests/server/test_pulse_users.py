@@ -15,7 +15,7 @@ from camsync import Login, PulseClient, clients_of
 from server.cli.generated_config import free_port
 from server.config.loader import load_config
 from server.config.pulse_passwords import pulse_clients, pulse_login, pulse_users
-from server.config.running_config import Running
+from server.config.running_config import ActiveConfig
 from server.config.site_config import Config
 from server.supervisor.sync_process import sync_process
 from server.system.errors import UserError
@@ -86,7 +86,7 @@ def test_a_server_that_could_not_know_who_comes_refuses_with_one_line(
 
 
 async def test_the_process_lets_in_who_knows_a_password(tmp_path: Path) -> None:
-    running = Running(site(tmp_path))
+    running = ActiveConfig(site(tmp_path))
     serving = asyncio.create_task(sync_process(running))
     try:
         async with asyncio.timeout(PATIENCE):

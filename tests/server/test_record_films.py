@@ -14,18 +14,18 @@ from sounds_by_hand import FRAMES as SOUNDING
 from test_splice import choice
 
 from bestview import Merge, Split
-from server.cli.render.films import Films
+from server.cli.render.films import FilmWriter
 from server.cli.render.soundtrack import Soundtrack
-from server.config.sections import Site
+from server.config.sections import SiteSettings
 from server.media.codec import agreement_for
-from server.media.letterbox import Fit
+from server.media.letterbox import Letterbox
 from server.messaging.messages import NumberedBox
 from server.service.decision_files.recorder import Recorder
 from server.service.streaming.frame_buffer import Shelf
 from server.service.view_selection.decider import GopDecision, ObjectChoice
 
 A, B = CAMERAS
-SITE = Site(width=WIDTH, height=HEIGHT, fps=FPS)
+SITE = SiteSettings(width=WIDTH, height=HEIGHT, fps=FPS)
 Codec = Literal["h264", "vp8"]
 
 
@@ -42,7 +42,10 @@ def decision(
 
 
 def test_the_files_are_these_bytes(tmp_path: Path) -> None:
-    fits = {A: Fit((2 * WIDTH, 2 * HEIGHT), (WIDTH, HEIGHT)), B: Fit((WIDTH, HEIGHT), (WIDTH, HEIGHT))}
+    fits = {
+        A: Letterbox((2 * WIDTH, 2 * HEIGHT), (WIDTH, HEIGHT)),
+        B: Letterbox((WIDTH, HEIGHT), (WIDTH, HEIGHT)),
+    }
     recorder = Recorder(tmp_path / "out", CAMERAS, fits)
     boxes: list[list[NumberedBox]] = [[(1, *SMALL)], [(1, *SMALL), (2, *LARGE)]]
     recorder.write(decision(0, choice(1, A), choice(2, None), frames=2, c0=boxes))
@@ -66,13 +69,13 @@ def test_the_files_are_these_bytes(tmp_path: Path) -> None:
     }
 
 
-def films(folder: Path, codec: Codec = "h264") -> tuple[Films, dict[str, Shelf]]:
+def films(folder: Path, codec: Codec = "h264") -> tuple[FilmWriter, dict[str, Shelf]]:
     agreement = agreement_for(small_config(encode={"codec": codec}))
     shelves = {camera: Shelf(FPS, 40, agreement) for camera in CAMERAS}
     for seed, camera in enumerate(CAMERAS):
         for unit in encoded(seed, codec=codec):
             shelves[camera].put(unit.pulse, 1, unit.data, key=unit.key)
-    return Films(folder, shelves, agreement, SITE), shelves
+    return FilmWriter(folder, shelves, agreement, SITE), shelves
 
 
 def own_pictures(seed: int, codec: Codec) -> list[np.ndarray[tuple[int, ...], np.dtype[np.uint8]]]:
@@ -148,7 +151,7 @@ def test_a_film_has_the_sites_sound_in_step(tmp_path: Path, codec: Literal["aac"
     for unit in flashing(recording):
         for shelf in shelves.values():
             shelf.put(unit.pulse, 1, unit.data, key=unit.key)
-    it = Films(tmp_path / "best", shelves, agreement, config.site, track.shelf)
+    it = FilmWriter(tmp_path / "best", shelves, agreement, config.site, track.shelf)
     begin = 3
     for gop in range(begin, SOUNDING // GOP):
         track.read(gop * GOP, (gop + 1) * GOP)

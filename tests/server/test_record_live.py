@@ -12,11 +12,11 @@ from test_record_films import decision
 from test_service_turns import behind, noted
 from test_splice import choice
 
-from server.media.letterbox import Fit
+from server.media.letterbox import Letterbox
 from server.service.decision_files.live_recorder import LiveRecorder
 
 A, B = CAMERAS
-FITS = dict.fromkeys(CAMERAS, Fit((WIDTH, HEIGHT), (WIDTH, HEIGHT)))
+FITS = dict.fromkeys(CAMERAS, Letterbox((WIDTH, HEIGHT), (WIDTH, HEIGHT)))
 
 
 def written(folder: Path) -> dict[str, str]:

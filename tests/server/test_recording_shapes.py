@@ -26,7 +26,7 @@ from server.camera.passthrough.stream_source import OwnStream
 from server.camera.sources import Folder, Recording
 from server.camera.sources.live_stream import Stream
 from server.cli.generated_config import config_for_videos
-from server.cli.render.video_info import look_at
+from server.cli.render.video_info import read_video_info
 from tracking.motchallenge import MotRow, read_rows, write_rows
 
 __all__ = ["myview"]
@@ -78,7 +78,7 @@ def test_a_recording_is_shown_as_its_display_matrix_says(
     path = film(tmp_path / f"phone.{suffix}", turn, flip=flip, frames=3)
     meant = turned(corners(), turn, flip=flip)
     recording = Recording(str(path))
-    assert recording.size == (meant.shape[1], meant.shape[0]) == look_at(path).size
+    assert recording.size == (meant.shape[1], meant.shape[0]) == read_video_info(path).size
     assert same(recording.take(0), meant)
     assert all(same(image, meant) for image in recording.ahead(range(3)))
     recording.close()
@@ -105,7 +105,7 @@ def test_pixels_that_are_not_square_are_made_so(tmp_path: Path, aspect: str) -> 
     path = film(tmp_path / "dv.mp4", frames=2, aspect=aspect)
     width = round(WIDE * Fraction(aspect.replace(":", "/")))
     recording = Recording(str(path))
-    assert recording.size == (width, HIGH) == look_at(path).size
+    assert recording.size == (width, HIGH) == read_video_info(path).size
     assert same(recording.take(0), cv2.resize(corners(), (width, HIGH)))
     recording.close()
 
@@ -237,7 +237,7 @@ def test_an_image_is_upright_as_exif_says(tmp_path: Path, suffix: str, orientati
     folder = Folder(str(tmp_path), 0, "stop")
     assert folder.size == (meant.shape[1], meant.shape[0])
     assert same(folder.take(0), meant)
-    assert look_at(tmp_path).size == folder.size
+    assert read_video_info(tmp_path).size == folder.size
 
 
 def test_images_of_any_depth_and_kind_are_pictures(tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ from server.camera.sources import SourceEnded, open_source
 from server.camera.sources.base import Source
 from server.camera.sources.image_folder import Folder
 from server.camera.sources.recording import Recording
-from server.config.sections import Camera, Site
+from server.config.sections import CameraSettings, SiteSettings
 from server.system.errors import UserError
 
 FRAMES = 25
@@ -133,7 +133,7 @@ def test_a_file_that_was_cut_off_ends_there(tmp_path: Path) -> None:
 
 def refusal(source: str) -> str:
     with pytest.raises(UserError) as caught:
-        open_source(Camera(id="door", source=source), Site())
+        open_source(CameraSettings(id="door", source=source), SiteSettings())
     text = str(caught.value)
     assert text.startswith("camera door: ")
     assert "\n" not in text

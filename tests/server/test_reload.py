@@ -21,13 +21,18 @@ from hypothesis import strategies as st
 from patience import PATIENCE
 
 from server.cli.generated_config import free_port
-from server.config.config_diff import differing
+from server.config.config_diff import changed_keys
 from server.config.loader import build_config
-from server.config.running_config import IN_FORCE, OnDisk, Running, written
-from server.config.sections import Http
+from server.config.running_config import (
+    ACTIVE_CONFIG_VARIABLE,
+    ActiveConfig,
+    ConfigFileState,
+    serialize_config,
+)
+from server.config.sections import HttpSettings
 from server.config.site_config import Config
 from server.http.app import make_app, serving
-from server.supervisor.reload import reloaded
+from server.supervisor.reload import plan_reload
 from server.system.errors import UserError
 
 LIVE, CAMERA, ALL_CAMERAS, BEST_VIEW, SITE = "live", "camera c1", "all cameras", "best view", "site"
@@ -76,7 +81,7 @@ WINDOW = {"window": 5, "stride": 5, "birth_window": 5}
 @given(st.sets(st.sampled_from(sorted(CHANGES))))
 def test_everything_is_in_force_or_waits_and_is_named(keys: set[str]) -> None:
     running, wanted = small_config(), changed(keys)
-    reload = reloaded(running, wanted)
+    reload = plan_reload(running, wanted)
     takes = {key: CHANGES[key][0] for key in keys}
     assert set(reload.live) == {key for key in keys if takes[key] == LIVE}
     assert set(reload.best_view) == {key for key in keys if takes[key] == BEST_VIEW}
@@ -85,19 +90,22 @@ def test_everything_is_in_force_or_waits_and_is_named(keys: set[str]) -> None:
         assert reload.cameras == CAMERAS
     else:
         assert reload.cameras == (("c1",) if CAMERA in takes.values() else ())
-    assert set(differing(reload.now, wanted)) == {*reload.best_view, *reload.site}
-    again = reloaded(reload.now, wanted)
+    assert set(changed_keys(reload.now, wanted)) == {*reload.best_view, *reload.site}
+    again = plan_reload(reload.now, wanted)
     assert (again.now, again.live, again.cameras) == (reload.now, (), ())
     assert all(
         name in reload.line for name in {*reload.live, *reload.cameras, *reload.best_view, *reload.site}
     )
-    assert build_config(yaml.safe_load(written(reload.now, Path())), where="", folder=Path("/")) == reload.now
+    assert (
+        build_config(yaml.safe_load(serialize_config(reload.now, Path())), where="", folder=Path("/"))
+        == reload.now
+    )
 
 
 def test_a_lookahead_that_tracks_do_not_allow_yet_waits_with_what_allows_it() -> None:
     track = {"window": {"window": 15, "stride": 5, "birth_window": 5}}
     running = small_config(track=track, view={"lookahead": 15})
-    reload = reloaded(running, small_config(view={"lookahead": 5, "switch_cost_s": 1.0}))
+    reload = plan_reload(running, small_config(view={"lookahead": 5, "switch_cost_s": 1.0}))
     assert reload.live == ("view.switch_cost_s",)
     assert reload.best_view == ("view.lookahead",)
     assert reload.site == ("track.window.window",)
@@ -108,12 +116,12 @@ def test_a_lookahead_that_tracks_do_not_allow_yet_waits_with_what_allows_it() ->
 def test_other_cameras_wait_and_those_that_run_stay_as_they_are() -> None:
     running = small_config()
     wanted = small_config([{"id": "c0", "source": "scene:room", "offset": 5}, "c1", "c2"])
-    reload = reloaded(running, wanted)
+    reload = plan_reload(running, wanted)
     assert (reload.site, reload.now.cameras) == (("cameras",), running.cameras)
 
 
 def test_cameras_begin_anew_where_sharpness_begins_to_count() -> None:
-    reload = reloaded(small_config(), small_config(view={"quality": {"sharp": 0.5}}))
+    reload = plan_reload(small_config(), small_config(view={"quality": {"sharp": 0.5}}))
     assert (reload.live, reload.cameras) == (("view.quality.sharp",), CAMERAS)
 
 
@@ -124,7 +132,7 @@ def write(path: Path, **changes: Any) -> None:
 def test_what_runs_is_known_to_differ_from_a_file_that_is_wrong_changed_or_mended(tmp_path: Path) -> None:
     path = tmp_path / "site.yaml"
     write(path)
-    running = Running(path)
+    running = ActiveConfig(path)
     assert not running.on_disk().differs
     write(path, view={"lookahead": "many"})
     found = running.on_disk()
@@ -134,7 +142,7 @@ def test_what_runs_is_known_to_differ_from_a_file_that_is_wrong_changed_or_mende
         running.wanted()
     write(path, view={"lookahead": 40}, site={"fps": 12.5})
     assert running.on_disk().waiting == ("site.fps", "view.lookahead")
-    running.now = reloaded(running.now, running.wanted()).now
+    running.now = plan_reload(running.now, running.wanted()).now
     assert running.on_disk().waiting == ("site.fps",)
     write(path, view={"lookahead": 40})
     assert not running.on_disk().differs
@@ -144,7 +152,7 @@ def test_a_ground_file_that_has_changed_is_no_longer_what_runs(tmp_path: Path) -
     path, ground = tmp_path / "site.yaml", tmp_path / "ground.json"
     write(path, ground="ground.json")
     ground.write_text('{"homography": {"c0": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}}')
-    running = Running(path)
+    running = ActiveConfig(path)
     assert not running.on_disk().differs
     ground.write_text('{"homography": {"c0": [[2, 0, 0], [0, 1, 0], [0, 0, 1]], "c1": [[1]]}}')
     assert "ground.json" in running.on_disk().error
@@ -157,12 +165,12 @@ def test_what_a_supervisor_keeps_is_what_its_processes_run_by(
 ) -> None:
     path, kept = tmp_path / "site.yaml", tmp_path / "elsewhere" / "kept.yaml"
     write(path, record={"folder": "recorded"}, access={"tokens": "tokens.yaml"})
-    before = Running(path).now
+    before = ActiveConfig(path).now
     kept.parent.mkdir()
-    kept.write_text(written(before, path.parent))
+    kept.write_text(serialize_config(before, path.parent))
     write(path, site={"fps": "banana"})
-    monkeypatch.setenv(IN_FORCE, str(kept))
-    running = Running(path)
+    monkeypatch.setenv(ACTIVE_CONFIG_VARIABLE, str(kept))
+    running = ActiveConfig(path)
     assert running.now == before
     assert "site.fps" in running.on_disk().error
 
@@ -183,13 +191,14 @@ def test_a_service_goes_by_it_and_what_was_tried_out_stays_where_nothing_else_is
 
 
 @pytest.mark.parametrize(
-    "found", [OnDisk("", ()), OnDisk("site.yaml: is wrong", ()), OnDisk("", ("site.fps",))]
+    "found",
+    [ConfigFileState("", ()), ConfigFileState("site.yaml: is wrong", ()), ConfigFileState("", ("site.fps",))],
 )
-async def test_the_operator_and_prometheus_are_told(found: OnDisk) -> None:
+async def test_the_operator_and_prometheus_are_told(found: ConfigFileState) -> None:
     service = FedService(small_config())
     async with (
         asyncio.timeout(PATIENCE),
-        serving(make_app(service, lambda: found), Http(port=0)) as port,
+        serving(make_app(service, lambda: found), HttpSettings(port=0)) as port,
         aiohttp.ClientSession(f"http://127.0.0.1:{port}") as session,
     ):
         told = await (await session.get("/api/operator/config")).json()
@@ -241,8 +250,8 @@ async def test_a_process_says_what_waits_and_what_is_wrong_and_ends_with_its_ter
 def test_a_tracker_by_which_frames_are_final_later_waits_for_a_restart() -> None:
     running = small_config(view={"lookahead": 200})
     for track in ({"tracker": "temporal"}, {"tracker": "temporal", "temporal": {"stages": 2}}):
-        reload = reloaded(running, small_config(view={"lookahead": 200}, track=track))
+        reload = plan_reload(running, small_config(view={"lookahead": 200}, track=track))
         assert reload.now.track == running.track
         assert "track.tracker" in reload.site
-    quicker = reloaded(running, small_config(view={"lookahead": 200}, track={"tracker": "kalman"}))
+    quicker = plan_reload(running, small_config(view={"lookahead": 200}, track={"tracker": "kalman"}))
     assert quicker.now.track.tracker == "kalman"

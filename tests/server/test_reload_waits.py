@@ -9,17 +9,17 @@ import pytest
 import yaml
 from cameras_by_hand import small_config
 
-from server.config.running_config import IN_FORCE, Running
-from server.supervisor.reload import reloaded
+from server.config.running_config import ACTIVE_CONFIG_VARIABLE, ActiveConfig
+from server.supervisor.reload import plan_reload
 
 
 def test_whose_h264_passes_waits_for_a_codec_that_can() -> None:
     passing = [{"id": "c0", "source": "scene:room", "h264": "pass"}, "c1"]
     running = small_config(encode={"codec": "vp8"})
-    reload = reloaded(running, small_config(passing))
+    reload = plan_reload(running, small_config(passing))
     assert (reload.cameras, reload.now) == ((), running)
     assert reload.site == ("encode.codec", "cameras.c0.h264")
-    reload = reloaded(small_config(), small_config(passing))
+    reload = plan_reload(small_config(), small_config(passing))
     assert (reload.cameras, reload.site) == (("c0",), ())
 
 
@@ -30,7 +30,7 @@ def test_a_wrong_ground_file_is_wrong_until_it_is_mended(
     path.write_text(yaml.safe_dump({"cameras": [{"id": "c0", "source": "x"}], "ground": "ground.json"}))
     right = '{"homography": {"c0": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}}'
     ground.write_text(right)
-    running = Running(path)
+    running = ActiveConfig(path)
     ground.write_text('{"homography": {"c0": [[1]]}}')
     assert all("ground.json" in running.on_disk().error for _ in range(3))
     ground.write_text(right)
@@ -44,9 +44,9 @@ def test_what_somebody_else_put_where_the_supervisor_kept_it_is_not_gone_by(
     path.write_text("cameras: [{id: c0, source: x}]\n")
     theirs.write_text("cameras: [{id: c9, source: x}]\n")
     link.symlink_to(theirs)
-    monkeypatch.setenv(IN_FORCE, str(link))
-    assert Running(path).now.camera_ids == ("c0",)
-    monkeypatch.setenv(IN_FORCE, str(theirs))
-    assert Running(path).now.camera_ids == ("c9",), "the supervisor's own"
+    monkeypatch.setenv(ACTIVE_CONFIG_VARIABLE, str(link))
+    assert ActiveConfig(path).now.camera_ids == ("c0",)
+    monkeypatch.setenv(ACTIVE_CONFIG_VARIABLE, str(theirs))
+    assert ActiveConfig(path).now.camera_ids == ("c9",), "the supervisor's own"
     monkeypatch.setattr(os, "geteuid", lambda: os.getuid() + 1)
-    assert Running(path).now.camera_ids == ("c0",)
+    assert ActiveConfig(path).now.camera_ids == ("c0",)

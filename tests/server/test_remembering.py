@@ -17,13 +17,18 @@ from server.camera.retained_state import Keeping
 from server.http.app import make_app
 from server.messaging.epochs import end_of_epoch
 from server.messaging.inbox import Message
-from server.messaging.messages import Box, Keys
-from server.messaging.retained_state import NUMBER_MOST, REMEMBERED_MOST, Known, Remembered
+from server.messaging.messages import Box, ZenohKeys
+from server.messaging.retained_state import (
+    PERSON_NUMBER_MAX,
+    SNAPSHOT_BYTES_MAX,
+    IdentitySnapshot,
+    PersonSnapshot,
+)
 from server.service.identity.state_recovery import ALONE_MOST, LONGEST_S, Returning, believed
 from server.service.identity.state_replication import PATIENCE_S, Remembering
 
 A, B = CAMERAS
-KEYS = Keys("hall")
+KEYS = ZenohKeys("hall")
 Seen = Mapping[str, Mapping[int, Box]]
 ALL: Seen = {A: {1: SMALL, 2: LARGE}, B: {3: LARGE}}
 """By camera the tracks that are there."""
@@ -141,7 +146,7 @@ def test_tracks_of_a_camera_that_was_started_anew_are_not_taken_for_those_of_bef
 def test_a_number_too_large_to_remember_keeps_nobody_else_from_being_remembered() -> None:
     site = told()
     ann = site.whose(A, 2, 5)
-    site.service.decider.people.roll.known_as(ann, [NUMBER_MOST + 1])
+    site.service.decider.people.roll.known_as(ann, [PERSON_NUMBER_MAX + 1])
     site.tell(range(6, 7))
     site.start()
     site.tell(range(7, 9))
@@ -336,7 +341,7 @@ def test_a_camera_keeps_no_more_than_it_can() -> None:
     said: list[bytes] = []
     it = Keeping(said.append)
     it.put(Message("", b"one", b""))
-    it.put(Message("", b"2" * (REMEMBERED_MOST + 1), b""))
+    it.put(Message("", b"2" * (SNAPSHOT_BYTES_MAX + 1), b""))
     it.service(there=False)
     it.service(there=True)
     assert said == [b"one"]
@@ -344,7 +349,7 @@ def test_a_camera_keeps_no_more_than_it_can() -> None:
 
 numbers = st.integers(1, 8)
 known = st.builds(
-    Known,
+    PersonSnapshot,
     number=numbers,
     tracks=st.lists(st.integers(0, 4), max_size=3),
     also=st.lists(numbers, max_size=3),
@@ -352,7 +357,7 @@ known = st.builds(
     by_hand=st.booleans(),
 )
 remembered = st.builds(
-    Remembered,
+    IdentitySnapshot,
     pulse=st.integers(0, 60),
     boot=st.integers(1, 2),
     next=st.integers(1, 12),
@@ -364,7 +369,7 @@ remembered = st.builds(
 @settings(max_examples=40)
 @given(remembered, remembered)
 def test_whatever_cameras_remember_two_tracks_seen_at_once_in_a_camera_are_two(
-    one: Remembered, other: Remembered
+    one: IdentitySnapshot, other: IdentitySnapshot
 ) -> None:
     site = Site()
     for camera, it in zip(CAMERAS, (one, other), strict=True):
@@ -378,7 +383,9 @@ def test_whatever_cameras_remember_two_tracks_seen_at_once_in_a_camera_are_two(
 
 @settings(max_examples=40)
 @given(remembered, remembered)
-def test_whatever_cameras_remember_the_service_goes_on(one: Remembered, other: Remembered) -> None:
+def test_whatever_cameras_remember_the_service_goes_on(
+    one: IdentitySnapshot, other: IdentitySnapshot
+) -> None:
     site = Site()
     for camera, it in zip(CAMERAS, (one, other), strict=True):
         site.cameras[camera].put(Message("", msgspec.json.encode(it), b""))
@@ -391,16 +398,16 @@ def test_whatever_cameras_remember_the_service_goes_on(one: Remembered, other: R
 
 def lying(site: Site, camera: str, **changes: object) -> None:
     """Let a camera remember something else than what it was told."""
-    said = msgspec.json.decode(site.cameras[camera]._kept, type=Remembered)
+    said = msgspec.json.decode(site.cameras[camera]._kept, type=IdentitySnapshot)
     site.cameras[camera].put(Message("", msgspec.json.encode(msgspec.structs.replace(said, **changes)), b""))
 
 
 @pytest.mark.parametrize(
     "lie",
     [
-        {"next": NUMBER_MOST + 1},
-        {"people": [Known(number=NUMBER_MOST, tracks=[3])]},
-        {"people": [Known(number=5, tracks=[3], also=[NUMBER_MOST])]},
+        {"next": PERSON_NUMBER_MAX + 1},
+        {"people": [PersonSnapshot(number=PERSON_NUMBER_MAX, tracks=[3])]},
+        {"people": [PersonSnapshot(number=5, tracks=[3], also=[PERSON_NUMBER_MAX])]},
     ],
 )
 @pytest.mark.parametrize("again", [False, True])
@@ -430,14 +437,14 @@ def test_large_numbers_that_two_cameras_remember_go_on() -> None:
     assert site.service.decider.people.next_number >= 50_000_000
 
 
-@given(st.lists(st.integers(1, NUMBER_MOST), max_size=6), st.integers(1, NUMBER_MOST))
+@given(st.lists(st.integers(1, PERSON_NUMBER_MAX), max_size=6), st.integers(1, PERSON_NUMBER_MAX))
 def test_whatever_one_camera_says_the_others_say_how_far_it_is_believed(others: list[int], lie: int) -> None:
     most = max([believed(others), ALONE_MOST])
     assert believed([*others, lie]) <= max(most, max(others, default=0) + 10_000)
 
 
-def remembers(since: float, pulse: int = 90) -> Remembered:
-    return Remembered(pulse=pulse, boot=1, next=5, since=since, people=[])
+def remembers(since: float, pulse: int = 90) -> IdentitySnapshot:
+    return IdentitySnapshot(pulse=pulse, boot=1, next=5, since=since, people=[])
 
 
 @pytest.mark.parametrize("lie", [0.0, 1e12])

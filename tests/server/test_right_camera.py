@@ -7,7 +7,7 @@ from itertools import pairwise
 import pytest
 
 from benchmarks.stream.right import Right, judge, schedule
-from server.config.sections import Encode
+from server.config.sections import EncodeSettings
 from server.service.streaming.media_chunk import Footage
 from server.service.streaming.streams import Gop
 
@@ -17,7 +17,7 @@ async def test_every_frame_is_the_chosen_cameras_to_the_pixel() -> None:
 
 
 async def test_every_frame_of_vp8_is_the_chosen_cameras_too() -> None:
-    vp8 = Encode(codec="vp8")
+    vp8 = EncodeSettings(codec="vp8")
     assert await judge(300, 15, seed=1, encode=vp8) == Right(300, 15, contained=300, ts=None, alike=0)
 
 
@@ -30,7 +30,7 @@ async def test_another_cameras_gop_is_noticed(monkeypatch: pytest.MonkeyPatch) -
 
     monkeypatch.setattr(Gop, "whole", mistaken)
     assert await judge(100, 5, seed=1) == Right(100, 5, contained=90, ts=90, alike=0)
-    vp8 = Encode(codec="vp8")
+    vp8 = EncodeSettings(codec="vp8")
     assert await judge(100, 5, seed=1, encode=vp8) == Right(100, 5, contained=90, ts=None, alike=0)
 
 

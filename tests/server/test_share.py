@@ -28,10 +28,10 @@ from patience import PATIENCE
 
 from bestview import EpisodeKey, IdentityUpdate, LocalTrack, Merge
 from server.cli.generated_config import free_port
-from server.config.sections import Http, Share
+from server.config.sections import HttpSettings, ShareSettings
 from server.http.app import make_app, serving
 from server.messaging.bus import Bus
-from server.messaging.messages import Box, Keys
+from server.messaging.messages import Box, ZenohKeys
 from server.service.identity.sharding import index_of, served, server_of
 from server.service.service import BestViewService
 from server.service.view_selection.decider import Decider
@@ -71,7 +71,7 @@ def test_together_they_decide_what_one_alone_would(of: int, seed: int) -> None:
 
 
 def test_whoever_watches_an_old_number_stays_where_they_are() -> None:
-    share = Share(of=3, index=2)
+    share = ShareSettings(of=3, index=2)
     assert served([1, 2, 4, 5], {}, share) == [2, 5]
     assert served([1, 4], {5: 4}, share) == [4]
     assert served([1, 2], {8: 7}, share) == [2]
@@ -125,9 +125,9 @@ def test_a_share_that_cannot_be_is_refused_in_one_line(share: dict[str, Any], wh
 
 
 def test_addresses_are_bases_however_they_are_written() -> None:
-    share = Share(of=2, servers=["http://a:1", "https://b/myview/"])
+    share = ShareSettings(of=2, servers=["http://a:1", "https://b/myview/"])
     assert (server_of(2, share), server_of(3, share)) == ("http://a:1/", "https://b/myview/")
-    assert server_of(3, Share(of=2)) is None
+    assert server_of(3, ShareSettings(of=2)) is None
 
 
 @pytest.fixture(params=[["http://one:1/", "http://two/x"], []])
@@ -138,7 +138,7 @@ async def second(request: pytest.FixtureRequest) -> AsyncIterator[str]:
     service.come(*CAMERAS)
     for epoch in range(4):
         service.feed(epoch, {"c0": {1: SMALL, 2: LARGE, 3: SMALL}, "c1": {1: LARGE}})
-    async with serving(make_app(service), Http(port=0)) as port:
+    async with serving(make_app(service), HttpSettings(port=0)) as port:
         yield f"http://127.0.0.1:{port}"
     service.close()
 
@@ -184,7 +184,7 @@ def pair() -> Iterator[list[BestViewService]]:
 async def test_both_hear_every_camera_and_tell_under_keys_of_their_own(pair: list[BestViewService]) -> None:
     for service in pair:
         service.open()
-    keys, camera = Keys("hall"), Bus.client(pair[0].config.zenoh)
+    keys, camera = ZenohKeys("hall"), Bus.client(pair[0].config.zenoh)
     alive, heard = Heard(), Heard()
     try:
         camera.watch_alive(keys.bestview("**/alive"), lambda key, _: alive.add(key))

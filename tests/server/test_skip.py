@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from server.camera.encoding.encoder import AccessUnit, Encoder
-from server.config.sections import Encode, Site
+from server.config.sections import EncodeSettings, SiteSettings
 from server.media.h264.annexb import ParameterSets, nal_units, parameter_sets, sample
 from server.media.h264.bitstream import BitReader, BitWriter, payload_of, unit_of
 from server.media.h264.repeat_picture import Continuing, UnfitError, continuing
@@ -22,7 +22,9 @@ PRESETS = ("ultrafast", "superfast", "medium")
 
 
 def encoded(size: tuple[int, int], preset: str, frames: int, gop: int = 6) -> list[AccessUnit]:
-    encoder = Encoder(Site(width=size[0], height=size[1], fps=25), Encode(gop=gop, preset=preset))  # type: ignore[arg-type]
+    encoder = Encoder(
+        SiteSettings(width=size[0], height=size[1], fps=25), EncodeSettings(gop=gop, preset=preset)
+    )  # type: ignore[arg-type]
     noise = np.random.default_rng(0).integers(0, 255, (frames, size[1], size[0], 3), dtype=np.uint8)
     return [encoder.encode(pulse, np.asarray(picture // 4 * 2)) for pulse, picture in enumerate(noise)]
 

@@ -19,7 +19,7 @@ from sounds_by_hand import EVERY, FPS, beeps, write_flashes
 
 from server.camera.audio import Frame, LiveSound
 from server.camera.sources.live_stream import Stream
-from server.config.sections import Sound
+from server.config.sections import SoundSettings
 from server.media.audio.aac import SAMPLES as FRAME
 from server.media.audio.audio_format import Coding, SoundFormat
 from server.media.containers.mp4_audio import sound_fragment, sound_init_segment
@@ -69,7 +69,7 @@ def camera(tmp_path: Path) -> Iterator[str]:
 
 
 def test_a_camera_is_heard_beside_its_pictures(camera: str) -> None:
-    sound = LiveSound(Sound(source="c0"), FPS)
+    sound = LiveSound(SoundSettings(source="c0"), FPS)
     source = Stream(camera, {"probesize": "20000", "analyzeduration": "200000"}, sound)
     frames: list[Frame] = []
     begin = time.monotonic()
@@ -115,7 +115,7 @@ def test_a_beep_is_where_the_flash_is_shown_also_after_the_camera_has_begun_anew
     tmp_path: Path, codec: Coding, sends: str
 ) -> None:
     path = write_flashes(tmp_path / "own.mp4", FRAMES, codec=sends)
-    settings = Sound(source="c0", codec=codec)
+    settings = SoundSettings(source="c0", codec=codec)
     sound = LiveSound(settings, FPS)
     one, two = handed_over(path, sound, 50), handed_over(path, sound, 50 + 2 * FRAMES)
     numbers = [frame.number for frame in one + two]
@@ -135,7 +135,7 @@ def test_a_camera_is_heard_on_when_its_sound_changes_while_it_sends(
     after = write_flashes(tmp_path / "after.aac", FRAMES, pictures=False)
     both = tmp_path / "both.aac"
     both.write_bytes(before.read_bytes() + after.read_bytes())
-    sound, frames = LiveSound(Sound(source="c0"), FPS), []
+    sound, frames = LiveSound(SoundSettings(source="c0"), FPS), []
     with av.open(str(both)) as container:
         sound.opened(container.streams.audio[0])
         for packet in container.demux(audio=0):
@@ -160,7 +160,7 @@ def test_when_a_cameras_time_steps_back_it_is_heard_on_and_so_it_is_when_it_is_c
 ) -> None:
     """As that of MPEG-TS does once in 26.5 hours; the sound's steps ``lag`` after the pictures'."""
     path = write_flashes(tmp_path / "own.mp4", FRAMES, codec=sends)
-    sound, wrap, step = LiveSound(Sound(source="c0"), FPS), 95_443, FRAMES / FPS / 2
+    sound, wrap, step = LiveSound(SoundSettings(source="c0"), FPS), 95_443, FRAMES / FPS / 2
     frames: list[Frame] = []
     for again in (0, 1):
         with av.open(str(path)) as container:
@@ -191,7 +191,7 @@ def test_when_a_cameras_time_steps_back_it_is_heard_on_and_so_it_is_when_it_is_c
 
 def test_a_camera_without_sound_is_no_mistake(tmp_path: Path) -> None:
     path = write_flashes(tmp_path / "own.mp4", 10)
-    sound = LiveSound(Sound(source="c0"), FPS)
+    sound = LiveSound(SoundSettings(source="c0"), FPS)
     sound.opened(None)
     with av.open(str(path)) as container:
         for packet in container.demux(audio=0):

@@ -38,14 +38,14 @@ from server.camera.audio import Frame, RecordedSound
 from server.camera.audio.encoder import Encoding
 from server.camera.audio.passthrough import Passing
 from server.config.loader import build_config
-from server.config.sections import Sound
+from server.config.sections import SoundSettings
 from server.media.audio.audio_format import SoundFormat
 from server.media.audio.opus import samples_in
 from server.media.containers.mp4_audio import sound_fragment, sound_init_segment
 from server.service.view_selection.decider import GopDecision, ObjectChoice
 from server.system.errors import UserError
 
-STEREO = Sound(source="here", codec="opus")
+STEREO = SoundSettings(source="here", codec="opus")
 FORM = SoundFormat(48_000, 2, "opus")
 
 
@@ -94,7 +94,7 @@ def test_all_else_is_encoded_to_opus(
 
 def test_a_site_of_aac_encodes_opus(tmp_path: Path) -> None:
     path = write_flashes(tmp_path / "own.mkv", 2 * EVERY, codec="libopus")
-    sound = RecordedSound(str(path), Sound(source="here"), FPS, 0, "stop")
+    sound = RecordedSound(str(path), SoundSettings(source="here"), FPS, 0, "stop")
     assert isinstance(sound._way, Encoding)
     assert not isinstance(RecordedSound(str(path), STEREO, FPS, 0, "stop")._way, Encoding | Passing)
 

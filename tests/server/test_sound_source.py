@@ -23,12 +23,12 @@ from server.camera.audio.encoder import Encoding
 from server.camera.audio.passthrough import Passing
 from server.camera.audio.recorded_source import _in_order
 from server.config.loader import build_config
-from server.config.sections import Sound
+from server.config.sections import SoundSettings
 from server.media.audio.audio_format import SoundFormat
 from server.system.errors import UserError
 
 FRAMES = 70
-STEREO = Sound(source="here")
+STEREO = SoundSettings(source="here")
 FORM = SoundFormat(48_000, 2)
 
 

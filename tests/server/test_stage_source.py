@@ -12,14 +12,14 @@ import pytest
 from server.camera.sources import Recording
 from server.camera.sources.opening import open_video
 from server.camera.sources.synthetic import Stage
-from server.config.sections import Site
+from server.config.sections import SiteSettings
 from server.config.site_config import Config
-from server.config.source_address import SourceKind, kind_of
-from server.supervisor.scene_ground import with_scene_ground
+from server.config.source_address import SourceKind, source_kind
+from server.supervisor.scene_ground import add_scene_ground
 from server.system.errors import UserError
 from synthetic import Scene
 
-SITE = Site(width=128, height=72)
+SITE = SiteSettings(width=128, height=72)
 
 
 def test_the_address_says_which_camera_of_which_scene() -> None:
@@ -74,7 +74,7 @@ def test_a_wrong_address_is_refused_with_the_reason(source: str, why: str) -> No
     ],
 )
 def test_the_kind_of_a_source_shows_in_how_it_is_written(source: str, kind: SourceKind) -> None:
-    assert kind_of(source) is kind
+    assert source_kind(source) is kind
 
 
 @pytest.mark.skipif(not os.access("/dev/shm", os.W_OK), reason="needs a folder in memory")  # noqa: S108
@@ -82,8 +82,8 @@ def test_a_recording_in_memory_is_one_though_it_is_below_dev() -> None:
     with tempfile.TemporaryDirectory(dir="/dev/shm") as folder:
         recording = Path(folder) / "c0.mp4"
         recording.touch()
-        assert kind_of(str(recording)) is SourceKind.FILE
-        assert kind_of(folder) is SourceKind.FOLDER
+        assert source_kind(str(recording)) is SourceKind.FILE
+        assert source_kind(folder) is SourceKind.FOLDER
         with pytest.raises(UserError, match="cannot open this video"):
             open_video(str(recording))
 
@@ -98,7 +98,7 @@ def test_a_scene_without_a_floor_gives_its_cameras_none() -> None:
         {"id": f"c{number}", "source": f"scene:{name}"} for number, name in enumerate(("fish", "court"))
     ]
     site = Config.model_validate({"site": {"width": 128, "height": 72}, "cameras": cameras})
-    tank, court = with_scene_ground(site).cameras
+    tank, court = add_scene_ground(site).cameras
     assert tank.ground is None
     assert court.ground is not None
     assert Stage("scene:fish?camera=1&cameras=2", SITE).take(3) is not None

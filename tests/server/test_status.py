@@ -22,12 +22,12 @@ import client
 from client.status.prometheus_text import Metrics, service_of
 from server.cli.status import command
 from server.cli.status.command import status_live, status_once
-from server.cli.status.display import Rates, picture
-from server.config.sections import Http
+from server.cli.status.display import Rates, render_status
+from server.config.sections import HttpSettings
 from server.http.app import make_app, serving
-from server.messaging.messages import Solve
+from server.messaging.messages import SolverReport
 from server.service.service import BestViewService
-from server.system.errors import AwayError, UserError
+from server.system.errors import UnavailableError, UserError
 
 
 def url(hall: Hall) -> str:
@@ -37,12 +37,12 @@ def url(hall: Hall) -> str:
 def printed(now: client.SiteNow, rates: Rates = Rates(), notice: str = "") -> str:  # noqa: B008 — frozen
     console = Console(width=200, record=True, file=None)
     with console.capture() as said:
-        console.print(picture(now, rates, notice))
+        console.print(render_status(now, rates, notice))
     return said.get()
 
 
 async def test_a_site_is_shown_as_it_is(busy: Hall) -> None:
-    solve = Solve(objective=-4.0, bound=-4.0, gap=0.0, integral=True, rounds=1)
+    solve = SolverReport(objective=-4.0, bound=-4.0, gap=0.0, integral=True, rounds=1)
     busy.service.intake.status(status(A, fps=24.5, missed=3, shed=2, waiting=7, in_step=False))
     busy.service.intake.tracks(tracks(word(A, 2, {}, solve=solve, solved_at=0.25)))
     busy.service.decider.people.roll.names[1] = "Ann"
@@ -140,12 +140,12 @@ async def test_a_server_that_goes_and_comes_back_is_waited_for(
             said.extend(map(json.loads, capsys.readouterr().out.splitlines()))
 
     async with asyncio.timeout(PATIENCE):
-        async with serving(make_app(BestViewService(small_config())), Http(port=0)) as port:
+        async with serving(make_app(BestViewService(small_config())), HttpSettings(port=0)) as port:
             live = asyncio.create_task(status_live(f"http://127.0.0.1:{port}", None, as_json=True))
             await until(lambda it: it.get("name") == "hall")
         await until(lambda it: "away" in it)
         said.clear()
-        async with serving(make_app(BestViewService(small_config())), Http(port=port)):
+        async with serving(make_app(BestViewService(small_config())), HttpSettings(port=port)):
             await until(lambda it: it.get("name") == "hall")
             live.cancel()
             with pytest.raises(asyncio.CancelledError):
@@ -181,7 +181,7 @@ async def test_the_picture_says_that_the_server_is_away_and_that_it_was_restarte
 async def test_what_is_no_myview_or_not_there_is_one_line(hall: Hall) -> None:
     with pytest.raises(UserError, match="is not an address"):
         await status_once("ftp://hall", None, as_json=False)
-    with pytest.raises(AwayError, match="status: http"):
+    with pytest.raises(UnavailableError, match="status: http"):
         await status_once("http://127.0.0.1:9", None, as_json=False)
     with pytest.raises(UserError):
         await status_once(f"{url(hall)}/api", None, as_json=False)

@@ -26,8 +26,8 @@ from server.camera.audio import LiveSound
 from server.camera.sources import live_stream, open_source
 from server.camera.sources.live_stream import Stream
 from server.camera.sources.opening import Opened, open_video
-from server.config.sections import Camera, Site, Sound
-from server.system.errors import AwayError, UserError
+from server.config.sections import CameraSettings, SiteSettings, SoundSettings
+from server.system.errors import UnavailableError, UserError
 
 
 class MotionJpeg:
@@ -232,7 +232,7 @@ def test_pictures_of_another_size_are_no_pictures_of_this_camera(
         camera.width = 2 * WIDTH
         if not connected:
             camera.plug_in(port)
-        with pytest.raises(AwayError, match=r"its pictures are 128x48 now, they were 64x48$"):
+        with pytest.raises(UnavailableError, match=r"its pictures are 128x48 now, they were 64x48$"):
             take_them_all()
     finally:
         source.close()
@@ -288,7 +288,7 @@ def test_a_mistake_while_reading_ends_the_connection_and_not_the_camera(
                 raise ValueError("nobody has thought of this")
             super().opened(stream)
 
-    listener = Stumbling(Sound(source="c0"), 25)
+    listener = Stumbling(SoundSettings(source="c0"), 25)
     source = Stream(f"http://127.0.0.1:{camera.plug_in()}/", {}, listener)
     try:
         until(lambda: shown(source) == 0)
@@ -308,7 +308,7 @@ def test_closing_ends_the_thread(camera: MotionJpeg) -> None:
 @pytest.mark.parametrize("url", ["http://127.0.0.1:1/", "rtsp://127.0.0.1:1/", "nonsense://door"])
 def test_a_camera_that_is_not_there_is_refused_in_one_line(url: str) -> None:
     with pytest.raises(UserError, match="camera door: ") as caught:
-        open_source(Camera(id="door", source=url), Site())
+        open_source(CameraSettings(id="door", source=url), SiteSettings())
     assert "\n" not in str(caught.value)
     assert url in str(caught.value)
 

@@ -13,8 +13,8 @@ from cameras_by_hand import CAMERAS, small_config
 from patience import PATIENCE
 
 from server.supervisor import supervisor
-from server.supervisor.shutdown import OVER
-from server.supervisor.startup_signal import STARTED
+from server.supervisor.shutdown import EXIT_FINISHED
+from server.supervisor.startup_signal import STARTED_FD_VARIABLE
 from server.supervisor.supervisor import Supervisor
 from server.system.errors import UserError
 
@@ -62,7 +62,7 @@ class Machine:
         self.task: asyncio.Task[None] | None = None
 
     async def start(self, *words: str, env: dict[str, str], pass_fds: tuple[int], **_: Any) -> Process:
-        assert env[STARTED] == str(pass_fds[0])
+        assert env[STARTED_FD_VARIABLE] == str(pass_fds[0])
         process = Process(words[3:], os.dup(pass_fds[0]))
         if self.loads_at_once:
             process.loaded()
@@ -197,8 +197,8 @@ async def test_a_camera_whose_recording_is_over_stays_so_and_the_best_views_end_
 ) -> None:
     task = machine.run()
     processes = await machine.processes(4)
-    processes["c0"].end(OVER)
-    processes["bestview"].end(OVER)
+    processes["c0"].end(EXIT_FINISHED)
+    processes["bestview"].end(EXIT_FINISHED)
     await task
     assert machine.started.empty()
     assert processes["c1"].returncode == processes["sync"].returncode == -15

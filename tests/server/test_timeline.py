@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from patience import PATIENCE
 
 from server.camera.encoding.encoder import AccessUnit, Encoder
-from server.config.sections import Encode, Site
+from server.config.sections import EncodeSettings, SiteSettings
 from server.media.containers.fmp4 import init_segment
 from server.media.stream_format import Agreement
 from server.service.streaming.broadcaster import Viewer
@@ -40,7 +40,8 @@ class Shown:
 def taken(seed: int, missed: frozenset[int], preset: str) -> tuple[AccessUnit, ...]:
     """Encode a camera's pictures, but for those pulses that it misses."""
     encoder = Encoder(
-        Site(width=WIDTH, height=HEIGHT, fps=FPS), Encode.model_validate({"gop": GOP, "preset": preset})
+        SiteSettings(width=WIDTH, height=HEIGHT, fps=FPS),
+        EncodeSettings.model_validate({"gop": GOP, "preset": preset}),
     )
     noise = np.random.default_rng(seed).integers(0, 255, (FRAMES, HEIGHT, WIDTH, 3), dtype=np.uint8)
     return tuple(encoder.encode(pulse, noise[pulse]) for pulse in range(FRAMES) if pulse not in missed)

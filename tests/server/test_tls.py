@@ -20,7 +20,7 @@ from pydantic import ValidationError
 from tokens_by_hand import line_of, token_of, write_tokens
 
 from server.config.loader import build_config
-from server.config.sections import Tls
+from server.config.sections import TlsSettings
 from server.http.access.csrf import CHANGES
 from server.http.tls import Certificate
 from server.system.errors import UserError
@@ -28,10 +28,10 @@ from server.system.errors import UserError
 pytestmark = needs_openssl
 
 
-def make_certificate(folder: Path, name: str) -> Tls:
+def make_certificate(folder: Path, name: str) -> TlsSettings:
     """Make a certificate of this machine's own name, and its key."""
     folder.mkdir(exist_ok=True)
-    tls = Tls(certificate=folder / "certificate.pem", key=folder / "key.pem")
+    tls = TlsSettings(certificate=folder / "certificate.pem", key=folder / "key.pem")
     request = ["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes"]
     request += ["-days", "2", "-subj", f"/CN={name}", "-addext", "subjectAltName=IP:127.0.0.1"]
     request += ["-out", str(tls.certificate), "-keyout", str(tls.key)]
@@ -40,18 +40,18 @@ def make_certificate(folder: Path, name: str) -> Tls:
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Tls, Tls]:
+def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[TlsSettings, TlsSettings]:
     folder = tmp_path_factory.mktemp("certificates")
     return make_certificate(folder / "first", "first"), make_certificate(folder / "second", "second")
 
 
 @pytest.fixture
-def tls(made: tuple[Tls, Tls], tmp_path: Path) -> Tls:
+def tls(made: tuple[TlsSettings, TlsSettings], tmp_path: Path) -> TlsSettings:
     """Give the first certificate, in files that the test may change."""
-    return copied(made[0], Tls(certificate=tmp_path / "c.pem", key=tmp_path / "k.pem"))
+    return copied(made[0], TlsSettings(certificate=tmp_path / "c.pem", key=tmp_path / "k.pem"))
 
 
-def copied(source: Tls, to: Tls) -> Tls:
+def copied(source: TlsSettings, to: TlsSettings) -> TlsSettings:
     for one, other in ((source.certificate, to.certificate), (source.key, to.key)):
         assert one is not None
         assert other is not None
@@ -59,11 +59,11 @@ def copied(source: Tls, to: Tls) -> Tls:
     return to
 
 
-def trusting(tls: Tls) -> ssl.SSLContext:
+def trusting(tls: TlsSettings) -> ssl.SSLContext:
     return ssl.create_default_context(cafile=str(tls.certificate))
 
 
-async def test_it_is_spoken_and_plain_http_is_not(tls: Tls, tmp_path: Path) -> None:
+async def test_it_is_spoken_and_plain_http_is_not(tls: TlsSettings, tmp_path: Path) -> None:
     tokens = write_tokens(tmp_path / "tokens.yaml", line_of("desk"))
     settings = {"http": {"tls": tls.model_dump()}, "access": {"tokens": str(tokens)}}
     async with aclosing(opened(**settings)) as halls, aiohttp.ClientSession() as session:
@@ -84,7 +84,7 @@ async def test_it_is_spoken_and_plain_http_is_not(tls: Tls, tmp_path: Path) -> N
 
 
 async def test_watching_trusts_what_the_usual_variable_names_and_sends_its_token(
-    tls: Tls, tmp_path: Path
+    tls: TlsSettings, tmp_path: Path
 ) -> None:
     tokens = write_tokens(tmp_path / "tokens.yaml", line_of("family"))
     settings = {"http": {"tls": tls.model_dump()}, "access": {"tokens": str(tokens)}}
@@ -109,7 +109,7 @@ async def test_watching_trusts_what_the_usual_variable_names_and_sends_its_token
             assert (process.returncode == 0) == ("yes" in said)
 
 
-async def is_proven(port: int, trusted: Tls) -> bool:
+async def is_proven(port: int, trusted: TlsSettings) -> bool:
     """Tell whether a new connection is proven by a certificate."""
     try:
         _, writer = await asyncio.open_connection("127.0.0.1", port, ssl=trusting(trusted))
@@ -120,7 +120,7 @@ async def is_proven(port: int, trusted: Tls) -> bool:
 
 
 async def test_a_new_certificate_is_taken_for_new_connections(
-    made: tuple[Tls, Tls], tls: Tls, caplog: pytest.LogCaptureFixture
+    made: tuple[TlsSettings, TlsSettings], tls: TlsSettings, caplog: pytest.LogCaptureFixture
 ) -> None:
     caplog.set_level(logging.INFO, "server.http.tls")
     certificate = Certificate.of(tls)
@@ -148,16 +148,18 @@ async def test_a_new_certificate_is_taken_for_new_connections(
     await server.wait_closed()
 
 
-def test_what_is_no_certificate_is_said_in_one_line(made: tuple[Tls, Tls], tmp_path: Path) -> None:
-    none = Tls(certificate=tmp_path / "none.pem", key=made[0].key)
+def test_what_is_no_certificate_is_said_in_one_line(
+    made: tuple[TlsSettings, TlsSettings], tmp_path: Path
+) -> None:
+    none = TlsSettings(certificate=tmp_path / "none.pem", key=made[0].key)
     bad = tmp_path / "bad.pem"
     bad.write_text("no certificate", encoding="utf-8")
     for settings in (
         none,
-        Tls(certificate=bad, key=made[0].key),
-        Tls(certificate=made[0].certificate, key=bad),
-        Tls(certificate=made[0].certificate, key=made[1].key),
-        Tls(certificate=tmp_path, key=made[0].key),
+        TlsSettings(certificate=bad, key=made[0].key),
+        TlsSettings(certificate=made[0].certificate, key=bad),
+        TlsSettings(certificate=made[0].certificate, key=made[1].key),
+        TlsSettings(certificate=tmp_path, key=made[0].key),
     ):
         with pytest.raises(UserError) as raised:
             Certificate.of(settings)
@@ -165,7 +167,9 @@ def test_what_is_no_certificate_is_said_in_one_line(made: tuple[Tls, Tls], tmp_p
         assert "\n" not in str(raised.value)
 
 
-def test_a_key_with_a_password_is_refused_and_not_waited_for(made: tuple[Tls, Tls], tmp_path: Path) -> None:
+def test_a_key_with_a_password_is_refused_and_not_waited_for(
+    made: tuple[TlsSettings, TlsSettings], tmp_path: Path
+) -> None:
     locked = tmp_path / "locked.pem"
     command = [
         "openssl",
@@ -180,12 +184,12 @@ def test_a_key_with_a_password_is_refused_and_not_waited_for(made: tuple[Tls, Tl
     ]
     subprocess.run(command, check=True, capture_output=True)
     with pytest.raises(UserError, match=r"http\.tls: .*: the key has a password; write it without one"):
-        Certificate.of(Tls(certificate=made[0].certificate, key=locked))
+        Certificate.of(TlsSettings(certificate=made[0].certificate, key=locked))
 
 
 def test_one_file_without_the_other_is_refused() -> None:
     with pytest.raises(ValidationError, match="HTTPS takes both files"):
-        Tls(certificate=Path("a.pem"))
+        TlsSettings(certificate=Path("a.pem"))
 
 
 def test_the_files_lie_beside_the_configuration() -> None:
@@ -195,5 +199,5 @@ def test_the_files_lie_beside_the_configuration() -> None:
         "access": {"tokens": "tokens.yaml"},
     }
     config = build_config(content, where="site.yaml", folder=Path("/sites"))
-    assert config.http.tls == Tls(certificate=Path("/sites/a.pem"), key=Path("/sites/b.pem"))
+    assert config.http.tls == TlsSettings(certificate=Path("/sites/a.pem"), key=Path("/sites/b.pem"))
     assert config.access.tokens == Path("/sites/tokens.yaml")

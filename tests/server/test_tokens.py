@@ -9,10 +9,10 @@ import pytest
 from command_line import Run, refusal
 from tokens_by_hand import LATER, line_of, write_tokens
 
-from server.config.tokens_file import digest_of, read_tokens
+from server.config.tokens_file import read_tokens, token_digest
 from server.system.errors import UserError
 
-SUM = digest_of("x")
+SUM = token_digest("x")
 
 
 def test_tokens_are_read_in_the_order_of_the_file(tmp_path: Path) -> None:
@@ -123,7 +123,7 @@ def test_a_new_token_comes_with_the_line_that_lets_it_in(
     path = tmp_path / "tokens.yaml"
     path.write_text(f"tokens:\n{line}\n", encoding="utf-8")
     [read] = read_tokens(path)
-    assert (read.name, read.sha256) == ("Ann's parents", digest_of(token))
+    assert (read.name, read.sha256) == ("Ann's parents", token_digest(token))
     assert (read.role, read.object, read.camera) == limits
     assert myview("token", "a").out.splitlines()[1].strip() != token
 

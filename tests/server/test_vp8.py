@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from programs import needs_ffprobe
 
 from server.camera.encoding.encoder import AccessUnit, Encoder
-from server.config.sections import Encode, Site
+from server.config.sections import EncodeSettings, SiteSettings
 from server.media.containers.webm import cluster, header, rebased
 from server.media.picture import Picture
 from server.media.stream_format import ParameterMismatchError
@@ -35,7 +35,7 @@ sides = st.integers(8, 60).map(lambda half: 2 * half)
 @cache
 def encoded(width: int, height: int, missed: frozenset[int] = frozenset()) -> tuple[AccessUnit, ...]:
     """Encode pictures that move, so that frames build on the ones before them, but for those missed."""
-    encoder = Encoder(Site(width=width, height=height, fps=FPS), Encode(codec="vp8", gop=GOP))
+    encoder = Encoder(SiteSettings(width=width, height=height, fps=FPS), EncodeSettings(codec="vp8", gop=GOP))
     noise = np.random.default_rng(0).integers(0, 255, (height, width, 3), dtype=np.uint8)
     taken = (pulse for pulse in range(FRAMES) if pulse not in missed)
     return tuple(encoder.encode(pulse, np.roll(noise, 3 * pulse, axis=1)) for pulse in taken)
@@ -82,7 +82,9 @@ def test_a_camera_of_another_size_or_codec_is_refused() -> None:
     other = encoded(96, 48)[0]
     with pytest.raises(ParameterMismatchError, match="not VP8 of the site's size"):
         shelf().put(0, 1, other.data, key=True)
-    h264 = Encoder(Site(width=64, height=48), Encode()).encode(0, np.zeros((48, 64, 3), dtype=np.uint8))
+    h264 = Encoder(SiteSettings(width=64, height=48), EncodeSettings()).encode(
+        0, np.zeros((48, 64, 3), dtype=np.uint8)
+    )
     with pytest.raises(ParameterMismatchError):
         shelf().put(0, 1, h264.data, key=True)
 

@@ -10,7 +10,7 @@ from typing import Any
 import yaml
 from halls import Hall, opened
 
-from server.config.tokens_file import digest_of
+from server.config.tokens_file import token_digest
 
 LATER = "2100-01-01T00:00:00Z"
 """When a token may have been made that is younger than any service of a test."""
@@ -33,7 +33,7 @@ def bearer(name: str) -> dict[str, str]:
 
 def line_of(name: str, **what: Any) -> dict[str, Any]:
     """Give a line of the file."""
-    return {"name": name, "sha256": digest_of(token_of(name)), **(what or EVERYBODY[name])}
+    return {"name": name, "sha256": token_digest(token_of(name)), **(what or EVERYBODY[name])}
 
 
 def write_tokens(path: Path, *lines: dict[str, Any]) -> Path:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from bestview import to_ground
 from server.config.site_config import Config
-from server.messaging.messages import Box, CameraTracks, Track
+from server.messaging.messages import Box, CameraTracks, TrackMessage
 from server.service.ingest.epoch_aligner import Epoch
 from synthetic import Scene
 from synthetic.cameras.pinhole import Perspective
@@ -57,7 +57,7 @@ def words(config: Config, places: Floats, epoch: int = 0, boot: int = 1) -> Iter
 
 def _word(camera: str, boxes: list[Box | None], epoch: int, boot: int) -> CameraTracks:
     first, last = epoch * STRIDE, (epoch + 1) * STRIDE - 1
-    track = Track(id=1, boxes=boxes, confidence=1.0)
+    track = TrackMessage(id=1, boxes=boxes, confidence=1.0)
     return CameraTracks(
         camera=camera,
         boot=boot,

@@ -6,8 +6,8 @@ from server.camera.audio.frames import Frame, runs
 from server.camera.audio.live_source import LiveSound
 from server.camera.audio.recorded_source import RecordedSound
 from server.config.site_config import Config
-from server.config.source_address import SourceKind, kind_of
-from server.system.address_redaction import shown
+from server.config.source_address import SourceKind, source_kind
+from server.system.address_redaction import redact_address
 from server.system.errors import UserError
 
 __all__ = ["Frame", "LiveSound", "RecordedSound", "open_sound", "runs"]
@@ -26,10 +26,12 @@ def open_sound(config: Config, camera_id: str) -> RecordedSound | LiveSound | No
     if settings.source in config.camera_ids:
         camera = config.camera(camera_id)
         path, offset, at_end = camera.source, camera.offset, camera.at_end
-        if kind_of(path) is SourceKind.STREAM:
+        if source_kind(path) is SourceKind.STREAM:
             return LiveSound(settings, fps, config.encode.gop / fps)
-        if kind_of(path) is not SourceKind.FILE:
-            raise UserError(f"sound: camera {camera_id} has none: {shown(path)}; name another, or a file")
+        if source_kind(path) is not SourceKind.FILE:
+            raise UserError(
+                f"sound: camera {camera_id} has none: {redact_address(path)}; name another, or a file"
+            )
     try:
         return RecordedSound(path, settings, fps, offset, at_end)
     except UserError as error:

@@ -12,7 +12,7 @@ from av.audio.stream import AudioStream
 from camsync import Spell
 from server.camera.audio.frames import Frame, Packet, Way
 from server.camera.audio.selection import way_for
-from server.config.sections import Sound
+from server.config.sections import SoundSettings
 
 log = logging.getLogger(__name__)
 
@@ -33,7 +33,7 @@ class LiveSound:
     ``waiting_s`` until they are shown, and sound with them.
     """
 
-    def __init__(self, settings: Sound, fps: float, waiting_s: float = 0.0) -> None:
+    def __init__(self, settings: SoundSettings, fps: float, waiting_s: float = 0.0) -> None:
         form = settings.format
         if form is None:
             raise ValueError("a site without sound")

@@ -16,9 +16,9 @@ from av.video.stream import VideoStream
 from server.camera.audio.frames import Frame, Packet, Way
 from server.camera.audio.selection import way_for
 from server.camera.sources.frame_timing import length_of, rate_of
-from server.config.sections import Sound
-from server.config.source_address import is_missing
-from server.system.address_redaction import ffmpeg_reason, shown
+from server.config.sections import SoundSettings
+from server.config.source_address import path_is_missing
+from server.system.address_redaction import ffmpeg_reason, redact_address
 from server.system.errors import UserError
 
 log = logging.getLogger(__name__)
@@ -39,7 +39,7 @@ class RecordedSound:
     """
 
     def __init__(
-        self, path: str, settings: Sound, fps: float, offset: int, at_end: Literal["stop", "loop"]
+        self, path: str, settings: SoundSettings, fps: float, offset: int, at_end: Literal["stop", "loop"]
     ) -> None:
         form = settings.format
         if form is None:
@@ -107,7 +107,9 @@ class RecordedSound:
                 yield time - self._start, packet
         except av.error.FFmpegError as error:
             if not self._told:  # it may be read over and over
-                log.warning("%s: its sound cannot be read any further: %s", shown(self._path), error.strerror)
+                log.warning(
+                    "%s: its sound cannot be read any further: %s", redact_address(self._path), error.strerror
+                )
             self._told = True
         finally:
             container.close()
@@ -171,8 +173,8 @@ def _pictures(container: InputContainer) -> VideoStream | None:
 
 
 def _open(path: str) -> tuple[InputContainer, AudioStream]:
-    name = shown(path)
-    if is_missing(path):
+    name = redact_address(path)
+    if path_is_missing(path):
         raise UserError(f"{name}: is neither a camera of this site nor a file")
     try:
         container = av.open(path)

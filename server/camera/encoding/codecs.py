@@ -11,7 +11,7 @@ from av.video.codeccontext import VideoCodecContext
 from server.media.rendering_messages import Canvas
 
 if TYPE_CHECKING:  # a drawing process encodes too, and has no second to load the configuration's libraries
-    from server.config.sections import Encode, Site
+    from server.config.sections import EncodeSettings, SiteSettings
 
 CLOCK = Fraction(1, 90_000)
 _FAR = 1_000_000
@@ -21,7 +21,7 @@ _BITS_TO_SPARE = 1_000_000_000
 """A rate that VP8 never reaches: the quantizer alone says how many bits there are."""
 
 
-def x264(site: Site | Canvas, settings: Encode | Canvas) -> VideoCodecContext:
+def x264(site: SiteSettings | Canvas, settings: EncodeSettings | Canvas) -> VideoCodecContext:
     """Give an encoder of H.264."""
     context = _opened_by("libx264", site)
     context.max_b_frames = 0
@@ -36,7 +36,7 @@ def x264(site: Site | Canvas, settings: Encode | Canvas) -> VideoCodecContext:
     return context
 
 
-def libvpx(site: Site, settings: Encode) -> VideoCodecContext:
+def libvpx(site: SiteSettings, settings: EncodeSettings) -> VideoCodecContext:
     """Give an encoder of VP8."""
     context = _opened_by("libvpx", site)
     context.bit_rate = _BITS_TO_SPARE
@@ -54,7 +54,7 @@ def libvpx(site: Site, settings: Encode) -> VideoCodecContext:
     return context
 
 
-def _opened_by(name: str, site: Site | Canvas) -> VideoCodecContext:
+def _opened_by(name: str, site: SiteSettings | Canvas) -> VideoCodecContext:
     context = av.CodecContext.create(name, "w")
     assert isinstance(context, VideoCodecContext)  # noqa: S101 — tells mypy what an encoder is
     context.width, context.height, context.pix_fmt = site.width, site.height, "yuv420p"
@@ -66,7 +66,7 @@ def _opened_by(name: str, site: Site | Canvas) -> VideoCodecContext:
     return context
 
 
-def _cap(site: Site | Canvas, settings: Encode | Canvas) -> str:
+def _cap(site: SiteSettings | Canvas, settings: EncodeSettings | Canvas) -> str:
     """Give x264 a leaky bucket (H.264, annex C) that lets no more than the cap through in any second.
 
     A bucket that fills at a rate and holds so many seconds of it lets both through at once. It holds a GOP,

@@ -14,7 +14,7 @@ from server.media.color_conversion import yuv
 from server.media.rendering_messages import Canvas
 
 if TYPE_CHECKING:  # a drawing process encodes too, and has no second to load the configuration's libraries
-    from server.config.sections import Encode, Site
+    from server.config.sections import EncodeSettings, SiteSettings
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +35,7 @@ class Encoder:
     decoder takes a cut between cameras for an ordinary GOP boundary. What is drawn on a canvas is H.264.
     """
 
-    def __init__(self, site: Site | Canvas, settings: Encode | Canvas) -> None:
+    def __init__(self, site: SiteSettings | Canvas, settings: EncodeSettings | Canvas) -> None:
         self._gop = settings.gop
         self._fps = site.fps
         self._last: int | None = None

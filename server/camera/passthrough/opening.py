@@ -9,10 +9,10 @@ from server.camera.passthrough.compatibility import MisfitError, wanted_by
 from server.camera.passthrough.encoder import OwnSource
 from server.camera.passthrough.recording_source import OwnRecording
 from server.camera.passthrough.stream_source import OwnStream
-from server.config.sections import Camera
+from server.config.sections import CameraSettings
 from server.config.site_config import Config
-from server.config.source_address import SourceKind, kind_of
-from server.system.errors import AwayError, UserError
+from server.config.source_address import SourceKind, source_kind
+from server.system.errors import UnavailableError, UserError
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,12 +25,12 @@ class Own:
     """Why so; empty where nothing was asked for."""
 
 
-def open_own(config: Config, camera: Camera, listener: LiveSound | None) -> Own:
+def open_own(config: Config, camera: CameraSettings, listener: LiveSound | None) -> Own:
     """Open a camera's own H.264, if that is wished.
 
     Raises:
         UserError: it cannot be opened, or must fit and does not; the text says which camera and why.
-        AwayError: the same, of a network camera that may yet come.
+        UnavailableError: the same, of a network camera that may yet come.
     """
     if camera.h264 == "encode":
         return Own(None, "")
@@ -42,12 +42,12 @@ def open_own(config: Config, camera: Camera, listener: LiveSound | None) -> Own:
             raise UserError(f"camera {camera.id}: h264: pass: {misfit}; {hint}") from misfit
         return Own(None, str(misfit))
     except UserError as error:
-        away = kind_of(camera.source) is SourceKind.STREAM
-        raise (AwayError if away else UserError)(f"camera {camera.id}: {error}") from error
+        away = source_kind(camera.source) is SourceKind.STREAM
+        raise (UnavailableError if away else UserError)(f"camera {camera.id}: {error}") from error
 
 
-def _opened(config: Config, camera: Camera, listener: LiveSound | None) -> OwnSource:
-    match kind_of(camera.source):
+def _opened(config: Config, camera: CameraSettings, listener: LiveSound | None) -> OwnSource:
+    match source_kind(camera.source):
         case SourceKind.STREAM:
             return OwnStream(camera.source, camera.options, listener, wanted_by(config))
         case SourceKind.FILE:

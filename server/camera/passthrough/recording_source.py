@@ -16,9 +16,9 @@ from server.camera.sources.base import Image, SourceEnded
 from server.camera.sources.opening import Opened, open_video
 from server.camera.sources.orientation import Orientation, orientation_of
 from server.camera.sources.recording import Recording, frames_at
-from server.config.source_address import is_missing
+from server.config.source_address import path_is_missing
 from server.media.color_conversion import bgr
-from server.system.address_redaction import ffmpeg_reason, shown
+from server.system.address_redaction import ffmpeg_reason, redact_address
 from server.system.errors import UserError
 
 
@@ -33,8 +33,8 @@ class OwnRecording:
     recorded = True
 
     def __init__(self, path: str, offset: int, at_end: Literal["stop", "loop"], wanted: Wanted) -> None:
-        if is_missing(path):
-            raise UserError(f"{shown(path)}: no such file or folder")
+        if path_is_missing(path):
+            raise UserError(f"{redact_address(path)}: no such file or folder")
         self._path, self._offset, self._loop = path, offset, at_end == "loop"
         self._fps = wanted.fps
         self._length = _checked(path, offset, wanted)
@@ -138,5 +138,5 @@ def _checked(path: str, offset: int, wanted: Wanted) -> int:
     finally:
         opened.container.close()
     if frame < 0:
-        raise UserError(f"{shown(path)}: there is not one picture in this video; is the file whole?")
+        raise UserError(f"{redact_address(path)}: there is not one picture in this video; is the file whole?")
     return frame + 1

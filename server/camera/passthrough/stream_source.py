@@ -19,7 +19,7 @@ from server.camera.sources.base import Image
 from server.camera.sources.live_stream import OPEN_S, READ_S, Stream
 from server.camera.sources.opening import Opened, no_answer, open_video
 from server.camera.sources.orientation import orientation_of, pixel_aspect_of
-from server.system.address_redaction import ffmpeg_reason, shown
+from server.system.address_redaction import ffmpeg_reason, redact_address
 from server.system.errors import UserError
 
 _LOOKED_AT_GOPS = 2
@@ -63,7 +63,7 @@ class OwnStream(Stream):
             Fitting(self._wanted).opened(opened)
         except MisfitError as misfit:
             opened.container.close()
-            self._lost(f"{shown(self._url)}: what it sends does not fit any more: {misfit}")
+            self._lost(f"{redact_address(self._url)}: what it sends does not fit any more: {misfit}")
             return False
         at_once(opened)
         self._unbroken = False
@@ -120,6 +120,6 @@ def _check(url: str, options: Mapping[str, str], wanted: Wanted) -> None:
         raise MisfitError(f"it cannot be read: {why}") from None
     except av.error.FFmpegError as error:  # it has gone, which says nothing of what it sends
         why = no_answer(error, READ_S) or ffmpeg_reason(error)
-        raise UserError(f"{shown(url)}: it stopped while it was looked at: {why}") from None
+        raise UserError(f"{redact_address(url)}: it stopped while it was looked at: {why}") from None
     finally:
         opened.container.close()

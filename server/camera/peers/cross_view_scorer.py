@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from bestview import Findings, Vantage, overlook, witnessed
 from server.config.site_config import Config
-from server.media.letterbox import Fit
-from server.messaging.messages import FOUND_MOST, Found
-from server.messaging.number_types import FARTHEST
+from server.media.letterbox import Letterbox
+from server.messaging.messages import FRAME_DETECTIONS_MAX, FrameDetections
+from server.messaging.number_types import COORDINATE_MAX
 from tracking import Detections
 
 Floats = NDArray[np.float64]
@@ -24,7 +24,7 @@ _PIXEL_DIGITS, _SCORE_DIGITS = 1, 3
 class Heard:
     """What the other cameras found in a frame; ``alone``: somebody's word was needed and not there."""
 
-    words: tuple[Found, ...] = ()
+    words: tuple[FrameDetections, ...] = ()
     alone: bool = False
 
 
@@ -34,30 +34,30 @@ class Witness:
     def __init__(self, config: Config, camera_id: str, size: tuple[int, int], boot: int) -> None:
         self._config, self._camera, self._size, self._boot = config, camera_id, size, boot
         site = config.site
-        self._fit = Fit(size, (site.width, site.height))
+        self._fit = Letterbox(size, (site.width, site.height))
         self._own = _vantage(config, camera_id, size)
         self._others: dict[str, tuple[tuple[int, int], Vantage | None]] = {}
         """The others' sizes of picture, and where they look from; None: at none of this camera's ground."""
 
-    def word(self, pulse: int, detections: Detections | None, *, ended: bool = False) -> Found:
+    def word(self, pulse: int, detections: Detections | None, *, ended: bool = False) -> FrameDetections:
         """Say what was found in a frame; None: nobody was looked for."""
         boxes = None
         if detections is not None:
             # The surest, in the detector's order.
-            most = np.sort(np.argsort(-detections.scores, kind="stable")[:FOUND_MOST])
+            most = np.sort(np.argsort(-detections.scores, kind="stable")[:FRAME_DETECTIONS_MAX])
             places = self._fit.boxes_to_own(detections.boxes[most]).round(_PIXEL_DIGITS)
             scores = detections.scores[most].round(_SCORE_DIGITS)
-            rows = np.clip(np.column_stack([places, scores]), -FARTHEST, FARTHEST)
+            rows = np.clip(np.column_stack([places, scores]), -COORDINATE_MAX, COORDINATE_MAX)
             boxes = [(row[0], row[1], row[2], row[3], row[4]) for row in rows.tolist()]
-        return Found(
+        return FrameDetections(
             camera=self._camera, boot=self._boot, size=self._size, pulse=pulse, boxes=boxes, ended=ended
         )
 
-    def looks_here(self, word: Found) -> bool:
+    def looks_here(self, word: FrameDetections) -> bool:
         """Tell whether the camera whose word this is looks at ground that this one sees."""
         return self._vantage_of(word) is not None
 
-    def scored(self, detections: Detections, words: Sequence[Found]) -> Detections:
+    def scored(self, detections: Detections, words: Sequence[FrameDetections]) -> Detections:
         """Give the detections with the scores that they have by what the others found in the same frame."""
         others = [
             (vantage, _findings(word.boxes))
@@ -67,7 +67,7 @@ class Witness:
         found = Findings(self._fit.boxes_to_own(detections.boxes), detections.scores)
         return replace(detections, scores=witnessed(self._own, found, others, self._config.track.witness))
 
-    def _vantage_of(self, word: Found) -> Vantage | None:
+    def _vantage_of(self, word: FrameDetections) -> Vantage | None:
         known = self._others.get(word.camera)
         if known is None or known[0] != word.size:
             vantage = _vantage(self._config, word.camera, word.size)
@@ -77,7 +77,7 @@ class Witness:
 
 def _vantage(config: Config, camera_id: str, size: tuple[int, int]) -> Vantage:
     camera, site = config.camera(camera_id), config.site
-    fit = Fit(size, (site.width, site.height))
+    fit = Letterbox(size, (site.width, site.height))
     own = [np.array(polygon, dtype=np.float64) for polygon in camera.ignore]
     shared = [fit.to_own(np.array(polygon, dtype=np.float64)) for polygon in config.detect.ignore]
     return Vantage(np.array(camera.ground, dtype=np.float64), size, (*own, *shared))

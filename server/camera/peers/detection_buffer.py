@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from server.camera.peers.cross_view_scorer import Heard
-from server.messaging.messages import Found
+from server.messaging.messages import FrameDetections
 
 _ASKED = 256
 """Pulses for which it is remembered until when their words counted."""
@@ -25,7 +25,7 @@ class _Other:
     """False after it was late: it is not waited for until it would have been in time again."""
     near: bool | None = None
     """Whether it looks at ground that this camera sees; None: that is not known yet."""
-    words: dict[int, Found] = field(default_factory=dict)
+    words: dict[int, FrameDetections] = field(default_factory=dict)
 
 
 class Earshot:
@@ -40,12 +40,14 @@ class Earshot:
         looks_here: tells by a camera's first word whether it sees the same ground.
     """
 
-    def __init__(self, others: Sequence[str], most: int, looks_here: Callable[[Found], bool]) -> None:
+    def __init__(
+        self, others: Sequence[str], most: int, looks_here: Callable[[FrameDetections], bool]
+    ) -> None:
         self._others = {camera: _Other() for camera in others}
         self._most, self._looks_here = most, looks_here
         self._asked: deque[tuple[int, float]] = deque(maxlen=_ASKED)
 
-    def put(self, word: Found, now: float) -> bool:
+    def put(self, word: FrameDetections, now: float) -> bool:
         """Take a word; give whether its camera sees the same ground: if not, no more of it is needed."""
         other = self._others[word.camera]
         if other.boot != word.boot:

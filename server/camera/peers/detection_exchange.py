@@ -15,7 +15,7 @@ from server.camera.peers.detection_buffer import Earshot
 from server.config.site_config import Config
 from server.messaging.bus import Bus
 from server.messaging.inbox import Message
-from server.messaging.messages import UNREADABLE, Found, Keys, camera_of
+from server.messaging.messages import DECODE_ERRORS, FrameDetections, ZenohKeys, camera_of_key
 from server.system.errors import UserError
 
 log = logging.getLogger(__name__)
@@ -24,7 +24,7 @@ _JOINED_S = 2.0
 _AGAIN_S = 1.0
 _LISTENERS_S = 1.0
 """How long the first word waits until all the others can hear it: all have come when pulses begin."""
-_DECODER = msgspec.json.Decoder(Found)
+_DECODER = msgspec.json.Decoder(FrameDetections)
 
 
 class Exchange:
@@ -35,7 +35,7 @@ class Exchange:
 
     def __init__(self, config: Config, camera_id: str, witness: Witness | None, most: int) -> None:
         self._config, self._camera = config, camera_id
-        self._keys = Keys(config.site.name)
+        self._keys = ZenohKeys(config.site.name)
         self._others = config.witnesses(camera_id) if witness else ()
         self._patience = config.track.witness_wait_s
         looks_here = witness.looks_here if witness else lambda _: False
@@ -95,7 +95,7 @@ class Exchange:
         bus.declare_alive(self._keys.camera(self._camera, "hears"))
         self._bus = bus
 
-    async def of(self, pulse: int, word: Found | None, taken: float, *, needed: bool) -> Heard:
+    async def of(self, pulse: int, word: FrameDetections | None, taken: float, *, needed: bool) -> Heard:
         """Tell the others what was found in a frame; give what they found in it, waited for where needed.
 
         ``taken`` is when the frame was taken, by the loop's clock. From then on patience is counted, and not
@@ -129,12 +129,12 @@ class Exchange:
         if self._late[camera].over():
             log.info("camera %s: what %s finds comes in time again", self._camera, camera)
 
-    async def end(self, word: Found | None) -> None:
+    async def end(self, word: FrameDetections | None) -> None:
         """Tell the others that nothing follows."""
         if word is not None:
             await self._tell(word)
 
-    async def _tell(self, word: Found) -> None:
+    async def _tell(self, word: FrameDetections) -> None:
         if self._bus is None:
             return
         if not self._told:
@@ -162,13 +162,13 @@ class Exchange:
 
         end = bus.listen(self._keys.camera(other, "found"), take)
 
-    def _read(self, message: Message) -> Found | None:
-        other = camera_of(message.key)
+    def _read(self, message: Message) -> FrameDetections | None:
+        other = camera_of_key(message.key)
         try:
             word = _DECODER.decode(message.payload)
             if word.camera != other:
                 raise msgspec.ValidationError("it is another camera's")
-        except UNREADABLE as problem:
+        except DECODE_ERRORS as problem:
             self.bad_messages += 1
             if (more := self._bad[other].happened(str(problem))) is not None:
                 told = "camera %s: a message on %s is none: %s%s"
@@ -180,5 +180,5 @@ class Exchange:
         return word
 
     def _alive(self, key: str, there: bool) -> None:
-        (self._listening.add if there else self._listening.discard)(camera_of(key))
+        (self._listening.add if there else self._listening.discard)(camera_of_key(key))
         self._came.set()

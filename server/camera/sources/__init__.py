@@ -8,15 +8,15 @@ from server.camera.sources.image_folder import Folder
 from server.camera.sources.live_stream import Stream
 from server.camera.sources.recording import Recording
 from server.camera.sources.synthetic import Stage
-from server.config.sections import Camera, Site
-from server.config.source_address import SourceKind, kind_of
-from server.system.errors import AwayError, UserError
+from server.config.sections import CameraSettings, SiteSettings
+from server.config.source_address import SourceKind, source_kind
+from server.system.errors import UnavailableError, UserError
 
 __all__ = ["Folder", "Image", "Recording", "Source", "SourceEnded", "open_source"]
 
 
 def open_source(
-    camera: Camera, site: Site, listener: LiveSound | None = None, *, ready: bool = True
+    camera: CameraSettings, site: SiteSettings, listener: LiveSound | None = None, *, ready: bool = True
 ) -> Source:
     """Open a camera's source; a network camera's sound is handed to ``listener``, if there is one.
 
@@ -24,10 +24,10 @@ def open_source(
 
     Raises:
         UserError: it cannot be opened; the text says which camera and why.
-        AwayError: the same, of a network camera or device that may yet come.
+        UnavailableError: the same, of a network camera or device that may yet come.
     """
     try:
-        match kind_of(camera.source):
+        match source_kind(camera.source):
             case SourceKind.SCENE:
                 stage = Stage(camera.source, site)
                 return stage.warm_up() if ready else stage
@@ -39,5 +39,5 @@ def open_source(
                 return Recording(camera.source, camera.offset, camera.at_end, site.fps)
     except UserError as error:
         # A network camera may only be switched off; a file that is not there will not come by itself.
-        away = kind_of(camera.source) is SourceKind.STREAM
-        raise (AwayError if away else UserError)(f"camera {camera.id}: {error}") from error
+        away = source_kind(camera.source) is SourceKind.STREAM
+        raise (UnavailableError if away else UserError)(f"camera {camera.id}: {error}") from error

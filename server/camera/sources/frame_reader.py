@@ -14,7 +14,7 @@ from av.video.stream import VideoStream
 
 from server.camera.sources.opening import Opened
 from server.camera.sources.timestamp_repair import Continuous
-from server.system.address_redaction import shown
+from server.system.address_redaction import redact_address
 
 log = logging.getLogger(__name__)
 
@@ -179,11 +179,15 @@ def _packets(opened: Opened, *, again: bool) -> Iterator[av.Packet[VideoStream]]
     try:
         for packet in opened.container.demux(opened.stream):
             if times.leaps(packet) and not again:
-                log.warning("%s: its times leap: it is taken to go on there", shown(opened.container.name))
+                log.warning(
+                    "%s: its times leap: it is taken to go on there", redact_address(opened.container.name)
+                )
                 again = True  # once is enough
             yield packet
     except av.error.FFmpegError as error:
         if error.errno == errno.EINTR:
             raise  # a signal has cut a read short: the file is not over
         if not again:
-            log.warning("%s: cannot be read any further: %s", shown(opened.container.name), error.strerror)
+            log.warning(
+                "%s: cannot be read any further: %s", redact_address(opened.container.name), error.strerror
+            )

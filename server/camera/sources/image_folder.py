@@ -12,7 +12,7 @@ import numpy as np
 
 from server.camera.sources.base import Image, SourceEnded
 from server.camera.sources.missing_frames import Gaps
-from server.media.letterbox import Fit
+from server.media.letterbox import Letterbox
 from server.system.errors import UserError
 
 log = logging.getLogger(__name__)
@@ -86,7 +86,7 @@ class Folder:
                 "%s: is %dx%d, and the first image %dx%d: all are fitted into that",
                 *(file, *size, *self.size),
             )
-        return Fit(size, self.size).image(image)
+        return Letterbox(size, self.size).image(image)
 
     def _say_gaps(self) -> None:
         self._gaps.say(len(self._files), 1.0)

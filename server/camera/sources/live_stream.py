@@ -19,8 +19,8 @@ from server.camera.audio import LiveSound
 from server.camera.sources.base import Image
 from server.camera.sources.opening import Opened, no_answer, open_video
 from server.camera.sources.orientation import INTERLACED, Orientation, orientation_of, pixel_aspect_of
-from server.system.address_redaction import ffmpeg_reason, shown
-from server.system.errors import AwayError, UserError
+from server.system.address_redaction import ffmpeg_reason, redact_address
+from server.system.errors import UnavailableError, UserError
 
 log = logging.getLogger(__name__)
 
@@ -68,12 +68,12 @@ class Stream:
         """Give the newest picture; None while the camera is away.
 
         Raises:
-            AwayError: its pictures have another size by now, and whoever takes them has to begin anew: the
-                floor, the boxes and the people's looks go by the one that it began with.
+            UnavailableError: the size of its pictures has changed; the caller has to open it again, because
+                homography, boxes and appearance models belong to the old size.
         """
         del pulse
         if self._resized is not None:
-            raise AwayError(f"{shown(self._url)}: {self._other_size(self._resized)}")
+            raise UnavailableError(f"{redact_address(self._url)}: {self._other_size(self._resized)}")
         with self._lock:
             picture = self._newest if time.monotonic() - self._newest_at < _STALE_S else None
         return None if picture is None else self._oriented(picture).image(picture)
@@ -128,7 +128,7 @@ class Stream:
         finally:
             opened.container.close()
         if not self._closing.is_set():
-            self._lost(f"{shown(self._url)}: {why}")
+            self._lost(f"{redact_address(self._url)}: {why}")
         return any_picture
 
     def _other_size(self, size: tuple[int, int]) -> str:
@@ -141,14 +141,14 @@ class Stream:
 
     def _back(self) -> None:
         if ended := self._away.over():
-            log.info("%s: pictures come again, after %.0f s", shown(self._url), ended.seconds)
+            log.info("%s: pictures come again, after %.0f s", redact_address(self._url), ended.seconds)
 
     def _read_alive(self, opened: Opened) -> bool:
         """Do the same, and outlive mistakes: nobody would begin this thread anew."""
         try:
             return self._read(opened)
         except Exception as error:  # noqa: BLE001 — it is said, with its traceback
-            self._lost(f"{shown(self._url)}: a mistake of type {type(error).__name__}", mistake=True)
+            self._lost(f"{redact_address(self._url)}: a mistake of type {type(error).__name__}", mistake=True)
             opened.container.close()
             return False
 
@@ -185,7 +185,7 @@ class Stream:
             self._orientation = self._oriented(first)
             self.size = self._size_of(first)
         if first.interlaced_frame:
-            log.warning("%s: %s", shown(self._url), INTERLACED)
+            log.warning("%s: %s", redact_address(self._url), INTERLACED)
         self._sized.set()
 
     def _oriented(self, picture: VideoFrame) -> Orientation:

@@ -6,7 +6,7 @@ import logging
 from collections.abc import Iterable, Iterator
 from itertools import pairwise
 
-from server.system.address_redaction import shown
+from server.system.address_redaction import redact_address
 
 log = logging.getLogger(__name__)
 
@@ -47,7 +47,7 @@ class Gaps:
         if self._damaged:
             log.warning(
                 "%s: %d damaged frames show as the picture before them: %s",
-                shown(self._path),
+                redact_address(self._path),
                 len(self._damaged),
                 _named(self._damaged),
             )
@@ -55,13 +55,13 @@ class Gaps:
         if len(missing) > _UNEVEN * length:
             log.warning(
                 "%s: its pictures come at uneven times (%.4g a second): each is shown when it was taken",
-                shown(self._path),
+                redact_address(self._path),
                 rate,
             )
         elif missing:
             log.warning(
                 "%s: %d frames are missing from it and show as the picture before them: %s",
-                shown(self._path),
+                redact_address(self._path),
                 len(missing),
                 _named(missing),
             )

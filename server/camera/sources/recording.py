@@ -14,9 +14,9 @@ from server.camera.sources.frame_timing import length_of, place_of
 from server.camera.sources.missing_frames import Gaps
 from server.camera.sources.opening import open_video
 from server.camera.sources.orientation import INTERLACED, orientation_of, pixel_aspect_of
-from server.config.source_address import is_missing
-from server.media.letterbox import Fit
-from server.system.address_redaction import shown
+from server.config.source_address import path_is_missing
+from server.media.letterbox import Letterbox
+from server.system.address_redaction import redact_address
 from server.system.errors import UserError
 
 log = logging.getLogger(__name__)
@@ -59,8 +59,8 @@ class Recording:
         *,
         quiet: bool = False,
     ) -> None:
-        if is_missing(path):
-            raise UserError(f"{shown(path)}: no such file or folder")
+        if path_is_missing(path):
+            raise UserError(f"{redact_address(path)}: no such file or folder")
         self._path, self._offset, self._loop = path, offset, at_end == "loop"
         self._quiet = quiet
         self._opened = open_video(path)
@@ -83,7 +83,7 @@ class Recording:
             self._gaps = None  # all of it is damaged
             self.close()
             raise UserError(
-                f"{shown(path)}: there is not one picture in this video; is the file whole?"
+                f"{redact_address(path)}: there is not one picture in this video; is the file whole?"
             ) from None
         self.orientation = orientation_of(first, self._aspect)
         """How its first picture is turned, mirrored and stretched."""
@@ -194,22 +194,24 @@ class Recording:
             self._resized = True
             log.warning(
                 "%s: its pictures are %dx%d from frame %d on, they were %dx%d: they are fitted into that",
-                *(shown(self._path), *size, self._asked + 1, *self.size),
+                *(redact_address(self._path), *size, self._asked + 1, *self.size),
             )
-        return Fit(size, self.size).image(image)
+        return Letterbox(size, self.size).image(image)
 
     def _say_what_is_odd(self, first: VideoFrame) -> None:
         if self._opened.videos > 1:
             log.warning(
-                "%s: there are %d videos in it: the first is taken", shown(self._path), self._opened.videos
+                "%s: there are %d videos in it: the first is taken",
+                redact_address(self._path),
+                self._opened.videos,
             )
         if first.interlaced_frame:
-            log.warning("%s: %s", shown(self._path), INTERLACED)
+            log.warning("%s: %s", redact_address(self._path), INTERLACED)
         if not self._same_rate:
             some = "left out" if self.fps > self._site_fps else "shown twice"
             log.warning(
                 "%s: it has %.4g pictures a second, %.4g are taken: each is shown at its time, some are %s",
-                *(shown(self._path), self.fps, self._site_fps, some),
+                *(redact_address(self._path), self.fps, self._site_fps, some),
             )
 
     def _say_gaps(self) -> None:

@@ -8,7 +8,7 @@ from typing import Self
 from urllib.parse import parse_qsl
 
 from server.camera.sources.base import Image
-from server.config.sections import Site
+from server.config.sections import SiteSettings
 from server.system.errors import UserError
 from synthetic import Scene
 
@@ -25,7 +25,7 @@ class Stage:
 
     recorded = True
 
-    def __init__(self, source: str, site: Site) -> None:
+    def __init__(self, source: str, site: SiteSettings) -> None:
         name, _, query = source.removeprefix("scene:").partition("?")
         values: dict[str, int | None] = dict(_DEFAULTS)
         for key, value in parse_qsl(query, keep_blank_values=True):

@@ -10,7 +10,7 @@ import numpy as np
 
 from bestview.calibration import CalibrationError, MarkedPoints, PointFit, WalkSettings, fit_cameras
 from server.cli.calibrate.points_file import read_points
-from server.config.ground_unit import checked_unit
+from server.config.ground_unit import check_unit
 from server.service.calibration.floor_plan import PlanView, plan_of, plot_plan
 from server.service.calibration.ground_file import ground_file
 from server.service.calibration.outcome import worked_out
@@ -70,7 +70,7 @@ def refusing(source: Path | str) -> Iterator[None]:
 
 def _checked(where: str, unit: str) -> str:
     try:
-        return checked_unit(unit)
+        return check_unit(unit)
     except ValueError as error:
         raise UserError(f"{where}: {error}") from error
 

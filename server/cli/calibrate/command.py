@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from server.system.address_redaction import shown
-from server.system.atomic_write import whole_file
+from server.system.address_redaction import redact_address
+from server.system.atomic_write import atomic_file
 from server.system.errors import UserError
 
 
@@ -40,24 +40,24 @@ def calibrate(
     """Find each camera's homography to the floor: from marked points, or from people who walk about."""
     from server.cli.calibrate.calibration import calibrate_from_walks, calibrate_points
     from server.cli.calibrate.points_file import ENDINGS
-    from server.cli.calibrate.walk_input import Picture, walks_of
+    from server.cli.calibrate.walk_input import VideoFormat, read_walks
     from server.cli.render.video_info import parse_size
     from server.service.calibration.walk_comparison import walk_settings
 
     for path in given:
         if not path.exists():
-            raise UserError(f"{shown(str(path))}: is not there")
+            raise UserError(f"{redact_address(str(path))}: is not there")
     plan = plan or out.with_suffix(".png")
     if plan.resolve() == out.resolve():
         raise UserError(f"--out: {out}: the floor plan would be written there too; name a .json, or --plan")
-    picture = Picture(parse_size(size) if size else None, fps)
-    with whole_file(out, *given) as ground, whole_file(plan, *given) as drawn:  # both of them, or none
+    picture = VideoFormat(parse_size(size) if size else None, fps)
+    with atomic_file(out, *given) as ground, atomic_file(plan, *given) as drawn:  # both of them, or none
         if any(path.suffix.lower() in ENDINGS for path in given):
             if len(given) > 1:
                 raise UserError("calibrate: marked points are one file, with all cameras in it")
             lines = calibrate_points(given[0], ground, drawn, unit)
         else:
-            walked = walks_of(given, config, picture, lambda name: typer.echo(f"tracking {name}", err=True))
+            walked = read_walks(given, config, picture, lambda name: typer.echo(f"tracking {name}", err=True))
             settings = walk_settings(walked.fps, shift)
             lines = calibrate_from_walks(walked, ground, drawn, settings, person, force=force)
     for line in lines:

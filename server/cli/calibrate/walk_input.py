@@ -12,8 +12,8 @@ import numpy as np
 
 from bestview.calibration import Walk, make_walk
 from server.cli.generated_config import camera_name
-from server.cli.render.video_info import Size, look_at
-from server.cli.track.command import loaded_for, track_one
+from server.cli.render.video_info import Size, read_video_info
+from server.cli.track.command import config_for_video, track_one
 from server.service.calibration.walk_comparison import Walked, moment
 from server.system.errors import UserError
 from tracking.motchallenge import MotRow, read_rows
@@ -25,15 +25,15 @@ _SAME_RATE = 0.01
 
 
 @dataclass(frozen=True, slots=True)
-class Picture:
+class VideoFormat:
     """What is known of the pictures: their size and rate, if the user has said so."""
 
     size: Size | None
     fps: float | None
 
 
-def walks_of(
-    given: Sequence[Path], config: Path | None, picture: Picture, progress: Callable[[str], None]
+def read_walks(
+    given: Sequence[Path], config: Path | None, picture: VideoFormat, progress: Callable[[str], None]
 ) -> Walked:
     """Read tracks, or track people in videos; ``progress`` is told which video is on.
 
@@ -54,7 +54,7 @@ def _is_tracks(path: Path) -> bool:
     return path.name.endswith(ENDINGS) or (path.is_dir() and bool(_files(path)))
 
 
-def walks_from_tracks(given: Sequence[Path], picture: Picture) -> Walked:
+def walks_from_tracks(given: Sequence[Path], picture: VideoFormat) -> Walked:
     """Read files of tracks, MOTChallenge text; each camera is called like its file.
 
     Raises:
@@ -74,7 +74,7 @@ def walks_from_tracks(given: Sequence[Path], picture: Picture) -> Walked:
 
 
 def walks_from_videos(
-    videos: Sequence[Path], config: Path | None, picture: Picture, progress: Callable[[str], None]
+    videos: Sequence[Path], config: Path | None, picture: VideoFormat, progress: Callable[[str], None]
 ) -> Walked:
     """Track people in each video first, as `myview track` does; the configuration's offsets are left out.
 
@@ -84,8 +84,8 @@ def walks_from_videos(
     names = [camera_name(video) for video in videos]
     _check_names(names)
     # All that can be wrong is found out before the first of them is tracked, which takes a while.
-    seen = [look_at(video) for video in videos]
-    loaded = [loaded_for(video, None, config) for video in videos]
+    seen = [read_video_info(video) for video in videos]
+    loaded = [config_for_video(video, None, config) for video in videos]
     # Tracks are counted by the site's rate, which is a video's own where the configuration has none.
     told = {name: one.site.fps for name, one, it in zip(names, loaded, seen, strict=True) if it.fps}
     fps = picture.fps or _rate(told)

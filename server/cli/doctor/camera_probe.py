@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 
 from server.camera.pipeline import CameraPipeline
 from server.camera.sources import SourceEnded
-from server.cli.doctor.stream_probe import Sent, fps_of, watch
-from server.config.camera_password import with_password
+from server.cli.doctor.stream_probe import StreamStats, file_fps, measure_stream
+from server.config.camera_password import fill_in_password
 from server.config.site_config import Config
-from server.config.source_address import SourceKind, kind_of
+from server.config.source_address import SourceKind, source_kind
 from server.system.errors import UserError
 
 _FRAMES_S = 3.0
@@ -18,7 +18,7 @@ _FRAMES_S = 3.0
 
 
 @dataclass(frozen=True, slots=True)
-class Probe:
+class CameraProbe:
     """What became of it.
 
     Attributes:
@@ -34,7 +34,7 @@ class Probe:
     """
 
     problem: str = ""
-    sent: Sent | None = None
+    sent: StreamStats | None = None
     size: tuple[int, int] | None = None
     recorded_fps: float | None = None
     passes: bool = False
@@ -44,26 +44,26 @@ class Probe:
     cores: float = 0.0
 
 
-def probe(config: Config, camera_id: str, seconds: float) -> Probe:
+def probe_camera(config: Config, camera_id: str, seconds: float) -> CameraProbe:
     """Try a camera for so many seconds, after it has answered."""
     sent = None
     try:
-        config = with_password(config, camera_id)
+        config = fill_in_password(config, camera_id)
         camera = config.camera(camera_id)
-        kind = kind_of(camera.source)
+        kind = source_kind(camera.source)
         if kind is SourceKind.STREAM:
-            sent = watch(camera.source, camera.options, seconds / 2, seconds)
+            sent = measure_stream(camera.source, camera.options, seconds / 2, seconds)
         pipeline = CameraPipeline(config, camera_id)
     except UserError as error:
-        return Probe(str(error).removeprefix(f"camera {camera_id}: "), sent)
+        return CameraProbe(str(error).removeprefix(f"camera {camera_id}: "), sent)
     try:
         tried = _tried(config, pipeline, sent, time.monotonic() + seconds / 2)
-        return replace(tried, recorded_fps=fps_of(camera.source) if kind is SourceKind.FILE else None)
+        return replace(tried, recorded_fps=file_fps(camera.source) if kind is SourceKind.FILE else None)
     finally:
         pipeline.close()
 
 
-def _tried(config: Config, pipeline: CameraPipeline, sent: Sent | None, until: float) -> Probe:
+def _tried(config: Config, pipeline: CameraPipeline, sent: StreamStats | None, until: float) -> CameraProbe:
     fps, size = config.site.fps, pipeline.source.size
     live = not pipeline.source.recorded
     frames = units = 0
@@ -83,7 +83,7 @@ def _tried(config: Config, pipeline: CameraPipeline, sent: Sent | None, until: f
     spent = time.thread_time() - began
     decoding = sent.cpu_s if sent is not None else 0.0
     each = 1 / max(1, frames)
-    return Probe(
+    return CameraProbe(
         problem="" if frames else "no picture came in the time that it was given",
         sent=sent,
         size=size,

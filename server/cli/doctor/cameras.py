@@ -8,11 +8,11 @@ import time
 from collections.abc import Mapping
 
 from server.camera.audio import open_sound
-from server.cli.doctor.camera_probe import Probe, probe
-from server.cli.doctor.findings import Finding, bad, mistake, ok, reason_of, warning
+from server.cli.doctor.camera_probe import CameraProbe, probe_camera
+from server.cli.doctor.findings import Finding, bad, describe_bug, ok, reason_of, warning
 from server.config.site_config import Config
-from server.config.source_address import SourceKind, is_device, kind_of
-from server.system.address_redaction import shown
+from server.config.source_address import SourceKind, is_device, source_kind
+from server.system.address_redaction import redact_address
 from server.system.errors import UserError
 
 _GRACE_S = 3.0
@@ -23,17 +23,17 @@ _SAME_RATE = 0.1
 """Part by which a camera's rate may be off the site's without a word."""
 
 
-def probe_all(config: Config, seconds: float) -> dict[str, Probe]:
+def probe_cameras(config: Config, seconds: float) -> dict[str, CameraProbe]:
     """Try all cameras in parallel; one that has not answered in time says so."""
-    found: dict[str, Probe] = {}
+    found: dict[str, CameraProbe] = {}
 
     def run(camera: str) -> None:
         try:
-            found[camera] = probe(config, camera, seconds)
+            found[camera] = probe_camera(config, camera, seconds)
         except OSError as error:
-            found[camera] = Probe(reason_of(error))
+            found[camera] = CameraProbe(reason_of(error))
         except Exception as error:  # noqa: BLE001 — of one camera; the others are still to be told of
-            found[camera] = Probe(mistake(error))
+            found[camera] = CameraProbe(describe_bug(error))
 
     # Daemons: what hangs in a driver must not keep the doctor from ending.
     threads = [threading.Thread(target=run, args=(it,), daemon=True) for it in config.camera_ids]
@@ -42,7 +42,7 @@ def probe_all(config: Config, seconds: float) -> dict[str, Probe]:
     until = time.monotonic() + 2 * seconds + _GRACE_S
     for thread in threads:
         thread.join(max(0.0, until - time.monotonic()))
-    late = Probe(f"no answer within {2 * seconds + _GRACE_S:.0f} s{_while_busy()}")
+    late = CameraProbe(f"no answer within {2 * seconds + _GRACE_S:.0f} s{_while_busy()}")
     return {camera: found.get(camera, late) for camera in config.camera_ids}
 
 
@@ -61,11 +61,14 @@ def sound_findings(config: Config) -> list[Finding]:
     except UserError as error:
         return [bad("sound", str(error).removeprefix("sound: "), "another file, or a camera that has sound")]
     return [
-        ok("sound", f"{shown(str(config.sound.source))}: {config.sound.codec}, {config.sound.kbps} kbit/s")
+        ok(
+            "sound",
+            f"{redact_address(str(config.sound.source))}: {config.sound.codec}, {config.sound.kbps} kbit/s",
+        )
     ]
 
 
-def camera_findings(config: Config, probes: Mapping[str, Probe], *, runs: bool) -> list[Finding]:
+def camera_findings(config: Config, probes: Mapping[str, CameraProbe], *, runs: bool) -> list[Finding]:
     """Say of each camera how it is; ``runs``: the site runs, and may hold a device that only one can have."""
     found = [it for camera, probed in probes.items() for it in _of(config, camera, probed, runs=runs)]
     return found + _shared(config)
@@ -83,7 +86,7 @@ def _shared(config: Config) -> list[Finding]:
     return found
 
 
-def _of(config: Config, camera: str, found: Probe, *, runs: bool) -> list[Finding]:
+def _of(config: Config, camera: str, found: CameraProbe, *, runs: bool) -> list[Finding]:
     check = f"camera {camera}"
     if found.problem or found.size is None:
         if runs:
@@ -102,12 +105,12 @@ def _of(config: Config, camera: str, found: Probe, *, runs: bool) -> list[Findin
 def _remedy(source: str) -> str:
     if is_device(source):
         return "plug it in, let this user have it (group video), and end what else has it"
-    if kind_of(source) is SourceKind.STREAM:
+    if source_kind(source) is SourceKind.STREAM:
         return "try its source in ffplay; address, password, cable"
     return "mend what the configuration says of it, or the file, which this user has to be able to read"
 
 
-def _doubts(config: Config, check: str, found: Probe) -> list[Finding]:
+def _doubts(config: Config, check: str, found: CameraProbe) -> list[Finding]:
     site, doubts = config.site, []
     wide, high = found.size or (site.width, site.height)
     if wide < site.width and high < site.height:

@@ -14,18 +14,27 @@ import msgspec
 import typer
 from rich.console import Console
 
-from server.cli.doctor.camera_probe import Probe
-from server.cli.doctor.cameras import camera_findings, probe_all, sound_findings
+from server.cli.doctor.camera_probe import CameraProbe
+from server.cli.doctor.cameras import camera_findings, probe_cameras, sound_findings
 from server.cli.doctor.disk import disk_findings
 from server.cli.doctor.files import file_findings
-from server.cli.doctor.findings import Finding, Findings, all_of, bad, kept_apart, ok, show, show_counts
+from server.cli.doctor.findings import (
+    Finding,
+    Findings,
+    bad,
+    collect_findings,
+    ok,
+    report_failure,
+    show,
+    show_counts,
+)
 from server.cli.doctor.machine import clock_findings, descriptor_findings, machine_findings
 from server.cli.doctor.ports import port_findings
-from server.cli.doctor.reachability import way_findings
+from server.cli.doctor.reachability import reachability_findings
 from server.config.loader import load_config
 from server.config.site_config import Config
-from server.supervisor.scene_ground import with_scene_ground
-from server.system.descriptors import limit
+from server.supervisor.scene_ground import add_scene_ground
+from server.system.descriptors import descriptor_limit
 from server.system.errors import UserError
 
 T = TypeVar("T")
@@ -53,10 +62,10 @@ async def _told(path: Path, seconds: float, *, as_json: bool) -> Findings:
     for it in found:
         tell(it)
     if config is not None:
-        async for it in checked(config, seconds):
+        async for it in run_checks(config, seconds):
             found.append(it)
             tell(it)
-    findings = all_of(found)
+    findings = collect_findings(found)
     if as_json:
         typer.echo(msgspec.json.format(msgspec.json.encode(findings)).decode())
     else:
@@ -65,7 +74,7 @@ async def _told(path: Path, seconds: float, *, as_json: bool) -> Findings:
 
 
 def _read(path: Path, found: list[Finding]) -> Config | None:
-    with kept_apart("configuration", found):
+    with report_failure("configuration", found):
         try:
             config = load_config(path)
         except UserError as error:
@@ -78,25 +87,25 @@ def _read(path: Path, found: list[Finding]) -> Config | None:
     return None
 
 
-async def checked(config: Config, seconds: float) -> AsyncIterator[Finding]:
+async def run_checks(config: Config, seconds: float) -> AsyncIterator[Finding]:
     """Give all findings about a configuration, as they are found."""
     found: list[Finding] = []
-    runs, probes = False, {it: Probe("it was not tried") for it in config.camera_ids}
-    with kept_apart("ports", found):
+    runs, probes = False, {it: CameraProbe("it was not tried") for it in config.camera_ids}
+    with report_failure("ports", found):
         ports, runs = await port_findings(config)
         found += ports
-    with kept_apart("zenoh.connect", found):
-        found += await way_findings(config)
+    with report_failure("zenoh.connect", found):
+        found += await reachability_findings(config)
     for it in [*found, *file_findings(_placed(config))]:
         yield it
     found = []
-    with kept_apart("clock", found):
+    with report_failure("clock", found):
         found += await clock_findings(config)
     for it in found:
         yield it
     found = []
-    with kept_apart("cameras", found):
-        probes = await _let_go_of(lambda: probe_all(config, seconds))
+    with report_failure("cameras", found):
+        probes = await _let_go_of(lambda: probe_cameras(config, seconds))
     for it in found + _last(config, probes, runs=runs):
         yield it
 
@@ -120,18 +129,18 @@ async def _let_go_of(work: Callable[[], T]) -> T:
     return await result
 
 
-def _last(config: Config, probes: dict[str, Probe], *, runs: bool) -> list[Finding]:
+def _last(config: Config, probes: dict[str, CameraProbe], *, runs: bool) -> list[Finding]:
     """Give what is known once the cameras were tried."""
     checks: Sequence[tuple[str, Callable[[], list[Finding]]]] = (
         ("cameras", lambda: camera_findings(config, probes, runs=runs)),
         ("sound", lambda: sound_findings(config)),
         ("disk", lambda: disk_findings(config, probes)),
         ("machine", lambda: machine_findings(config, probes)),
-        ("open files", lambda: descriptor_findings(config, limit())),
+        ("open files", lambda: descriptor_findings(config, descriptor_limit())),
     )
     found: list[Finding] = []
     for check, find in checks:
-        with kept_apart(check, found):
+        with report_failure(check, found):
             found += find()
     return found
 
@@ -139,6 +148,6 @@ def _last(config: Config, probes: dict[str, Probe], *, runs: bool) -> list[Findi
 def _placed(config: Config) -> Config:
     """Give the configuration with its scenes' floors; where there is no such scene, the camera says so."""
     try:
-        return with_scene_ground(config)
+        return add_scene_ground(config)
     except (UserError, OSError):
         return config

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 
-from server.cli.doctor.camera_probe import Probe
+from server.cli.doctor.camera_probe import CameraProbe
 from server.cli.doctor.findings import Finding, bad, ok, warning
 from server.config.site_config import Config
 from server.system.private_files import rights_of_others
@@ -19,7 +19,7 @@ _INDEX_BYTES = 100
 _TRY_AGAIN = "try again when it answers; where encode.max_kbps is set, that is taken for its rate"
 
 
-def disk_findings(config: Config, probes: Mapping[str, Probe]) -> list[Finding]:
+def disk_findings(config: Config, probes: Mapping[str, CameraProbe]) -> list[Finding]:
     """Compare what `record` will take with what is free."""
     folder = config.record.folder
     if folder is None:
@@ -45,7 +45,7 @@ def _writable(folder: Path) -> Finding:
     return ok("record.folder", text)
 
 
-def _sizes(config: Config, probes: Mapping[str, Probe], free: float, held: float) -> list[Finding]:
+def _sizes(config: Config, probes: Mapping[str, CameraProbe], free: float, held: float) -> list[Finding]:
     record, found = config.record, []
     unknown = [camera for camera, it in probes.items() if _kbps(config, camera, it) is None]
     guessed = [camera for camera, it in probes.items() if it.problem and camera not in unknown]
@@ -72,7 +72,7 @@ def _sizes(config: Config, probes: Mapping[str, Probe], free: float, held: float
     return found
 
 
-def needed_mb(config: Config, probes: Mapping[str, Probe]) -> float:
+def needed_mb(config: Config, probes: Mapping[str, CameraProbe]) -> float:
     """Give the megabytes that `record.keep_s` of the sound and of all cameras take whose rate is known."""
     known = [it for camera, probe in probes.items() if (it := _kbps(config, camera, probe)) is not None]
     kbps = sum(known) + (config.sound.kbps if config.sound.source is not None else 0)
@@ -80,7 +80,7 @@ def needed_mb(config: Config, probes: Mapping[str, Probe]) -> float:
     return (kbps + index) * config.record.keep_s / 8000
 
 
-def _kbps(config: Config, camera: str, probe: Probe) -> float | None:
+def _kbps(config: Config, camera: str, probe: CameraProbe) -> float | None:
     """Give what a camera takes: at most `encode.max_kbps`, or else as much as when it was tried.
 
     None: it was not, and its rate may be its own.

@@ -8,8 +8,8 @@ from functools import partial
 from pathlib import Path
 
 from server.cli.doctor.certificates import authority_finding, certificate_finding, router_finding
-from server.cli.doctor.findings import Finding, bad, kept_apart, ok, warning
-from server.cli.doctor.reachability import place_of
+from server.cli.doctor.findings import Finding, bad, ok, report_failure, warning
+from server.cli.doctor.reachability import host_and_port
 from server.config.password_file import read_users
 from server.config.pulse_passwords import SETTING, SHORTEST, pulse_clients
 from server.config.site_config import Config
@@ -24,7 +24,7 @@ def file_findings(config: Config) -> list[Finding]:
     """Say of each file whether it can be used, and who else may read or write it."""
     found: list[Finding] = []
     for check, find in _checks(config):
-        with kept_apart(check, found):
+        with report_failure(check, found):
             found += find()
     return found
 
@@ -51,7 +51,7 @@ def _pair(check: str, certificate: Path | None, key: Path | None) -> list[Findin
 
 
 def _bus(config: Config) -> list[Finding]:
-    tls, there = config.zenoh.tls, place_of(config.zenoh.connect)
+    tls, there = config.zenoh.tls, host_and_port(config.zenoh.connect)
     found = _pair("zenoh.tls", tls.certificate, tls.key)
     if tls.authority is None:
         return found

@@ -10,7 +10,7 @@ import msgspec
 from rich.console import Console
 from rich.markup import escape
 
-from server.system.address_redaction import shown, without_addresses
+from server.system.address_redaction import redact_address, redact_addresses
 from server.system.errors import UserError
 from server.system.printable import printable
 
@@ -58,32 +58,34 @@ def bad(check: str, text: str, do: str = "") -> Finding:
     return Finding(check, Level.BAD, text, do)
 
 
-def all_of(findings: Sequence[Finding]) -> Findings:
+def collect_findings(findings: Sequence[Finding]) -> Findings:
     """Put findings together."""
     return Findings(all(it.level is not Level.BAD for it in findings), list(findings))
 
 
 @contextmanager
-def kept_apart(check: str, found: list[Finding]) -> Iterator[None]:
+def report_failure(check: str, found: list[Finding]) -> Iterator[None]:
     """Let it be a finding, too, that a check fails itself: those of the others are still told."""
     try:
         yield
     except (OSError, UserError) as error:
         found.append(bad(check, reason_of(error), "mend that, and try again"))
     except Exception as error:  # noqa: BLE001 — a mistake in one check is no reason to say nothing of the others
-        found.append(bad(check, mistake(error), "tell of it"))
+        found.append(bad(check, describe_bug(error), "tell of it"))
 
 
 def reason_of(error: Exception) -> str:
     """Give an error as a part of a line."""
     if isinstance(error, OSError) and error.strerror:
-        return f"{shown(str(error.filename))}: {error.strerror}" if error.filename else error.strerror
+        return (
+            f"{redact_address(str(error.filename))}: {error.strerror}" if error.filename else error.strerror
+        )
     return str(error)
 
 
-def mistake(error: Exception) -> str:
+def describe_bug(error: Exception) -> str:
     """Say that something failed that should not have; an address in what it says is left out."""
-    return f"a mistake in MyView: {type(error).__name__}: {without_addresses(str(error))}"
+    return f"a mistake in MyView: {type(error).__name__}: {redact_addresses(str(error))}"
 
 
 _COLOURS = {Level.OK: "green", Level.WARNING: "yellow", Level.BAD: "red"}

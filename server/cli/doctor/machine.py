@@ -9,12 +9,12 @@ from pathlib import Path
 
 from camsync.messages import Challenge, Greeting
 from camsync.protocol import ProtocolError, parse_server_line
-from server.cli.doctor.camera_probe import Probe
+from server.cli.doctor.camera_probe import CameraProbe
 from server.cli.doctor.findings import Finding, ok, warning
 from server.config.site_config import Config
-from server.system.clock_sync import clock_is_kept
-from server.system.descriptors import places
-from server.system.processors import processors
+from server.system.clock_sync import is_clock_synchronized
+from server.system.descriptors import connection_limit
+from server.system.processors import available_processors
 
 _FAR_S = 1.0
 _ANSWER_S = 2.0
@@ -42,9 +42,9 @@ async def clock_findings(config: Config) -> list[Finding]:
     return found
 
 
-def machine_findings(config: Config, probes: Mapping[str, Probe]) -> list[Finding]:
+def machine_findings(config: Config, probes: Mapping[str, CameraProbe]) -> list[Finding]:
     """Compare what these cameras take with what this machine has, as if all of them ran here."""
-    cores = processors()
+    cores = available_processors()
     untried = [camera for camera, it in probes.items() if it.problem]
     takes = sum(it.cores for it in probes.values()) + _SERVICE_CORES
     who = "all cameras" if not untried else f"without {', '.join(untried)}, the cameras"
@@ -72,7 +72,7 @@ def machine_findings(config: Config, probes: Mapping[str, Probe]) -> list[Findin
 
 def descriptor_findings(config: Config, descriptors: int) -> list[Finding]:
     """Say how many connections and viewers the files let that a process may have open."""
-    wanted, most = config.http.connections, places(config, descriptors)
+    wanted, most = config.http.connections, connection_limit(config, descriptors)
     viewers = min(config.http.viewers_max, most)
     has = f"{descriptors} may be open in a process that is started from here: {most} connections"
     if viewers < config.http.viewers_max:
@@ -96,7 +96,7 @@ def available_mb() -> float | None:
 
 
 def _kept(config: Config) -> Finding:
-    kept = clock_is_kept()
+    kept = is_clock_synchronized()
     if kept is None:
         return ok("clock", "the system does not say whether it is kept by NTP")
     if kept:

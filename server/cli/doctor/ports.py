@@ -7,7 +7,7 @@ import os
 
 import client
 from camsync import Login, SyncError, clients_of
-from server.cli.doctor.findings import Finding, bad, kept_apart, ok
+from server.cli.doctor.findings import Finding, bad, ok, report_failure
 from server.config.pulse_passwords import pulse_clients, pulse_login
 from server.config.site_config import Config
 from server.supervisor.startup_checks import check_port_free
@@ -41,7 +41,7 @@ async def port_findings(config: Config) -> tuple[list[Finding], bool]:
         if twice:
             found.append(bad(check, f"{where} is what {twice[0]} says, too", "a port for each"))
             continue
-        with kept_apart(check, found):
+        with report_failure(check, found):
             taken = _taken(host, port, check)
             if taken is None:
                 found.append(ok(check, f"{where} is free"))

@@ -6,7 +6,7 @@ import asyncio
 import os
 import socket
 
-from server.cli.doctor.findings import Finding, bad, kept_apart, ok, warning
+from server.cli.doctor.findings import Finding, bad, ok, report_failure, warning
 from server.config.site_config import Config
 
 _ANSWER_S = 3.0
@@ -16,20 +16,20 @@ Place = tuple[str, int]
 """Host and port."""
 
 
-async def way_findings(config: Config) -> list[Finding]:
+async def reachability_findings(config: Config) -> list[Finding]:
     """Say of each way whether it leads to who listens here, or to another machine that answers."""
     sync, found = config.sync, list[Finding]()
     ways = [("sync.host", (sync.host, sync.port), "sync.bind", (sync.bind, sync.port))]
-    connect, listen = place_of(config.zenoh.connect), place_of(config.zenoh.listen)
+    connect, listen = host_and_port(config.zenoh.connect), host_and_port(config.zenoh.listen)
     if connect is not None and listen is not None:
         ways.append(("zenoh.connect", connect, "zenoh.listen", listen))
     for check, there, setting, listens in ways:
-        with kept_apart(check, found):
+        with report_failure(check, found):
             found.append(await _way(check, there, setting, listens))
     return found
 
 
-def place_of(endpoint: str) -> Place | None:
+def host_and_port(endpoint: str) -> Place | None:
     """Give host and port of a zenoh endpoint; None: it is of another kind."""
     protocol, _, address = endpoint.partition("/")
     host, _, port = address.rpartition(":")

@@ -16,7 +16,7 @@ _LEAST = 5
 
 
 @dataclass(frozen=True, slots=True)
-class Sent:
+class StreamStats:
     """What came.
 
     Attributes:
@@ -34,7 +34,7 @@ class Sent:
     cpu_s: float
 
 
-def watch(url: str, options: Mapping[str, str], seconds: float, open_s: float) -> Sent:
+def measure_stream(url: str, options: Mapping[str, str], seconds: float, open_s: float) -> StreamStats:
     """Decode what comes for so many seconds.
 
     Raises:
@@ -47,7 +47,7 @@ def watch(url: str, options: Mapping[str, str], seconds: float, open_s: float) -
         opened.container.close()
 
 
-def fps_of(file: str) -> float:
+def file_fps(file: str) -> float:
     """Give the pictures a second of a recording, as it says.
 
     Raises:
@@ -58,7 +58,7 @@ def fps_of(file: str) -> float:
     return opened.fps
 
 
-def _watched(opened: Opened, until: float) -> Sent:
+def _watched(opened: Opened, until: float) -> StreamStats:
     times: list[float] = []
     damaged, began = 0, time.thread_time()
     try:
@@ -75,4 +75,4 @@ def _watched(opened: Opened, until: float) -> Sent:
     spent = time.thread_time() - began
     span = times[-1] - times[0] if times else 0.0
     fps = (len(times) - 1) / span if len(times) >= _LEAST and span > 0 else None
-    return Sent(opened.size, fps, len(times), damaged, spent / max(1, len(times)))
+    return StreamStats(opened.size, fps, len(times), damaged, spent / max(1, len(times)))

@@ -10,9 +10,9 @@ from typing import Any
 
 from server.cli.evaluate.choices_file import read_choices
 from server.cli.evaluate.file_pairing import files_by_camera
-from server.cli.evaluate.ground_truth import people_of_objects, truth_of
+from server.cli.evaluate.ground_truth import build_truth, people_of_objects
 from server.cli.evaluate.plots import plot_views
-from server.cli.evaluate.site_facts import SiteOptions, site_facts, videos_by_camera
+from server.cli.evaluate.site_facts import SiteOptions, collect_site_info, videos_by_camera
 from server.cli.evaluate.track_scores import (
     content_of,
     evaluate_recordings,
@@ -20,14 +20,14 @@ from server.cli.evaluate.track_scores import (
     read_recordings,
     rows_of,
 )
-from server.cli.evaluate.view_scores import Judged, content_of_views, judge, print_views
-from server.system.atomic_write import whole_file, whole_folder
+from server.cli.evaluate.view_scores import ViewEvaluation, content_of_views, evaluate_views, print_views
+from server.system.atomic_write import atomic_file, atomic_folder
 from server.system.errors import UserError
 from tracking.evaluation import Recording
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class EvaluateOptions:
     """The options."""
 
     truth: list[Path]
@@ -41,7 +41,7 @@ class Asked:
     plots: Path | None
 
 
-def evaluate(asked: Asked) -> None:
+def evaluate(asked: EvaluateOptions) -> None:
     """Score tracks, choices of views, or both; print, and write what is asked for.
 
     Raises:
@@ -51,8 +51,8 @@ def evaluate(asked: Asked) -> None:
     read = (*asked.tracks, *asked.truth, asked.views, *asked.videos)
     content: dict[str, Any] = {"iou": asked.least_iou}
     with ExitStack() as outputs:  # all of them, or none
-        numbers = outputs.enter_context(whole_file(asked.json_file, *read)) if asked.json_file else None
-        plots = outputs.enter_context(whole_folder(asked.plots)) if asked.plots else None
+        numbers = outputs.enter_context(atomic_file(asked.json_file, *read)) if asked.json_file else None
+        plots = outputs.enter_context(atomic_folder(asked.plots)) if asked.plots else None
         if asked.tracks:
             recordings = read_recordings(asked.tracks, asked.truth)
             scores = evaluate_recordings(recordings, asked.least_iou)
@@ -71,7 +71,7 @@ def evaluate(asked: Asked) -> None:
         print_views(judged)
 
 
-def _check(asked: Asked) -> None:
+def _check(asked: EvaluateOptions) -> None:
     if not asked.tracks and asked.views is None:
         raise UserError("evaluate: name what is to be scored: --tracks, or --views, or both")
     if asked.views is None and (asked.plots is not None or asked.videos):
@@ -79,14 +79,14 @@ def _check(asked: Asked) -> None:
 
 
 def _judge(
-    asked: Asked, choices_file: Path, recordings: dict[str, Recording], plots: Path | None
-) -> tuple[Judged, dict[str, Any]]:
+    asked: EvaluateOptions, choices_file: Path, recordings: dict[str, Recording], plots: Path | None
+) -> tuple[ViewEvaluation, dict[str, Any]]:
     cameras = tuple(recordings)
     choices = read_choices(choices_file)
     videos = videos_by_camera(asked.videos, cameras) if asked.videos else {}
-    facts = site_facts(choices_file, cameras, videos, asked.site)
+    facts = collect_site_info(choices_file, cameras, videos, asked.site)
     rows = {camera: it.truth for camera, it in recordings.items()}
-    truth = truth_of(rows, facts.sizes, asked.least_shown)
+    truth = build_truth(rows, facts.sizes, asked.least_shown)
     if not truth.views.counted.any():
         raise UserError("--gt: nobody is ever visible in it")
     if asked.tracks:
@@ -98,7 +98,7 @@ def _judge(
                 f"--views: {choices_file}: none of its objects has the number of a person in the "
                 "ground truth; say who is who with --tracks"
             )
-    judged = judge(truth, choices, person_of, facts)
+    judged = evaluate_views(truth, choices, person_of, facts)
     if plots is not None:
         plot_views(plots, truth, judged, facts, videos)
     return judged, content_of_views(judged, facts)

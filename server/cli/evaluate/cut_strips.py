@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from bestview import cuts_of
 from server.camera.sources import open_source
-from server.cli.evaluate.ground_truth import Truth
-from server.cli.evaluate.view_scores import Judged
+from server.cli.evaluate.ground_truth import SceneTruth
+from server.cli.evaluate.view_scores import ViewEvaluation
 from server.cli.render.plots import new_figure, save_figure
-from server.cli.render.site_file import SiteFacts
-from server.cli.track.command import pictures
-from server.config.sections import Camera, Site
+from server.cli.render.site_file import SiteInfo
+from server.cli.track.command import read_frames
+from server.config.sections import CameraSettings, SiteSettings
 
 MOST_CUTS = 12
 """Cuts shown of one person: the first."""
@@ -31,7 +31,7 @@ Image = NDArray[np.uint8]
 
 
 @dataclass(frozen=True, slots=True, order=True)
-class _Shown:
+class _BestViewFrame:
     """A frame of the best view: what a camera showed."""
 
     camera: int
@@ -44,11 +44,11 @@ class _Strip:
     """The frames around one cut."""
 
     cut: int
-    frames: tuple[_Shown, ...]
+    frames: tuple[_BestViewFrame, ...]
 
 
 def plot_strips(
-    folder: Path, truth: Truth, judged: Judged, facts: SiteFacts, videos: Mapping[str, Path]
+    folder: Path, truth: SceneTruth, judged: ViewEvaluation, facts: SiteInfo, videos: Mapping[str, Path]
 ) -> None:
     """Write `person-K.png` for everybody whose best view is cut; boxes are the ground truth's.
 
@@ -57,11 +57,11 @@ def plot_strips(
     """
     strips = {row: _strips(views, facts.fps) for row, views in enumerate(judged.views)}
     wanted = {shown for found in strips.values() for strip in found for shown in strip.frames}
-    images: dict[_Shown, Image] = {}
+    images: dict[_BestViewFrame, Image] = {}
     for index, camera in enumerate(truth.cameras):
         numbers = sorted(shown.frame for shown in wanted if shown.camera == index)
         read = _read(videos[camera], facts, camera, numbers)
-        images |= {_Shown(index, number): image for number, image in read.items()}
+        images |= {_BestViewFrame(index, number): image for number, image in read.items()}
     for row, found in strips.items():
         if found:
             _plot(folder, row, found, truth, judged, images)
@@ -73,18 +73,18 @@ def _strips(views: NDArray[np.int64], fps: float) -> list[_Strip]:
     for cut in cuts_of(views)[:MOST_CUTS].tolist():
         around = {cut - 1, *(cut + round(seconds * fps) for seconds in _AROUND_S)}
         inside = [frame for frame in sorted(around) if 0 <= frame < len(views) and views[frame] >= 0]
-        strips.append(_Strip(cut, tuple(_Shown(int(views[frame]), frame) for frame in inside)))
+        strips.append(_Strip(cut, tuple(_BestViewFrame(int(views[frame]), frame) for frame in inside)))
     return strips
 
 
-def _read(video: Path, facts: SiteFacts, camera: str, numbers: Sequence[int]) -> dict[int, Image]:
+def _read(video: Path, facts: SiteInfo, camera: str, numbers: Sequence[int]) -> dict[int, Image]:
     """Give frames of a camera's recording by number, in its own size."""
     found: dict[int, Image] = {}
     if not numbers:
         return found
-    source = open_source(Camera(id=camera, source=str(video.absolute())), Site(fps=facts.fps))
+    source = open_source(CameraSettings(id=camera, source=str(video.absolute())), SiteSettings(fps=facts.fps))
     wanted = set(numbers)
-    for number, image in pictures(source):
+    for number, image in read_frames(source):
         if number in wanted and image is not None:
             found[number] = np.asarray(cv2.resize(image, facts.sizes[camera]), dtype=np.uint8)
         if number >= numbers[-1]:
@@ -97,9 +97,9 @@ def _plot(
     folder: Path,
     row: int,
     strips: Sequence[_Strip],
-    truth: Truth,
-    judged: Judged,
-    images: Mapping[_Shown, Image],
+    truth: SceneTruth,
+    judged: ViewEvaluation,
+    images: Mapping[_BestViewFrame, Image],
 ) -> None:
     columns = max(len(strip.frames) for strip in strips)
     figure = new_figure((2.2 * columns, 0.6 + 1.9 * len(strips)))

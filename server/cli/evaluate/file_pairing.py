@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from server.system.address_redaction import shown
+from server.system.address_redaction import redact_address
 from server.system.errors import UserError
 
 _ENDINGS = (".txt", ".txt.gz")
@@ -15,7 +15,7 @@ _FEW = 3
 
 
 @dataclass(frozen=True, slots=True)
-class Pair:
+class FilePair:
     """The two files of one camera."""
 
     camera: str
@@ -24,7 +24,7 @@ class Pair:
 
 
 @dataclass(frozen=True, slots=True)
-class _Given:
+class _OptionFiles:
     """What one of the two options names."""
 
     option: str
@@ -43,7 +43,7 @@ class _Given:
         return ", ".join(some) + (", …" if len(self.files) > _FEW else "")
 
 
-def pair_up(tracks: Sequence[Path], truth: Sequence[Path]) -> list[Pair]:
+def pair_files(tracks: Sequence[Path], truth: Sequence[Path]) -> list[FilePair]:
     """Give the pairs, by the files' names where any agree, else in the order in which they are named.
 
     Each of the two is some files, or a folder of one file per camera: the folder may be one that `myview
@@ -68,7 +68,7 @@ def pair_up(tracks: Sequence[Path], truth: Sequence[Path]) -> list[Pair]:
             f"--tracks and --gt: cannot tell the cameras apart: several files of each are called "
             f"{found.told} and {there.told}"
         )
-    return [Pair(*pair) for pair in zip(names, found.files, there.files, strict=True)]
+    return [FilePair(*pair) for pair in zip(names, found.files, there.files, strict=True)]
 
 
 def files_by_camera(option: str, paths: Sequence[Path], inner: str) -> dict[str, Path]:
@@ -82,7 +82,7 @@ def files_by_camera(option: str, paths: Sequence[Path], inner: str) -> dict[str,
     return dict(zip(given.names, given.files, strict=True))
 
 
-def _by_name(found: _Given, there: _Given) -> list[Pair]:
+def _by_name(found: _OptionFiles, there: _OptionFiles) -> list[FilePair]:
     for given in (found, there):
         _check_names(given)
     tracks, truth = (dict(zip(it.names, it.files, strict=True)) for it in (found, there))
@@ -97,19 +97,19 @@ def _by_name(found: _Given, there: _Given) -> list[Pair]:
         if alone and not given.folder:
             missing = "is no ground truth" if given is found else "are no tracks"
             raise UserError(f"{given.option}: {alone[0]}: there {missing} of that name beside it")
-    return [Pair(camera, tracks[camera], truth[camera]) for camera in common]
+    return [FilePair(camera, tracks[camera], truth[camera]) for camera in common]
 
 
-def _given(option: str, paths: Sequence[Path], inner: str) -> _Given:
+def _given(option: str, paths: Sequence[Path], inner: str) -> _OptionFiles:
     files: list[Path] = []
     for path in paths:
         if not path.exists():
-            raise UserError(f"{shown(str(path))}: is not there")
+            raise UserError(f"{redact_address(str(path))}: is not there")
         files += _files(path, inner) if path.is_dir() else [path]
-    return _Given(option, tuple(files), any(path.is_dir() for path in paths))
+    return _OptionFiles(option, tuple(files), any(path.is_dir() for path in paths))
 
 
-def _check_names(given: _Given) -> None:
+def _check_names(given: _OptionFiles) -> None:
     seen: dict[str, Path] = {}
     for path, camera in zip(given.files, given.names, strict=True):
         if camera in seen:

@@ -20,7 +20,7 @@ LEAST_SHOWN = 0.25
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Truth:
+class SceneTruth:
     """Everybody in every camera.
 
     Attributes:
@@ -37,9 +37,9 @@ class Truth:
     views: ViewTruth
 
 
-def truth_of(
+def build_truth(
     rows: Mapping[str, Sequence[MotRow]], sizes: Mapping[str, Size], least_shown: float = LEAST_SHOWN
-) -> Truth:
+) -> SceneTruth:
     """Lay out the ground truth of several cameras that share their people's numbers.
 
     Rows of confidence 0 do not count, as in `tracking.evaluation`.
@@ -61,7 +61,7 @@ def truth_of(
             shown[place[row.id], row.frame - 1, camera] = row.visible
     pictures = np.array([sizes[camera] for camera in counted], dtype=np.float64).reshape(-1, 2)
     views = true_views(boxes, shown, pictures, least_shown)
-    return Truth(tuple(people), tuple(counted), boxes, views)
+    return SceneTruth(tuple(people), tuple(counted), boxes, views)
 
 
 def people_of_objects(

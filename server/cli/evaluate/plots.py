@@ -11,10 +11,10 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from server.cli.evaluate.cut_strips import plot_strips
-from server.cli.evaluate.ground_truth import Truth
-from server.cli.evaluate.view_scores import Judged
+from server.cli.evaluate.ground_truth import SceneTruth
+from server.cli.evaluate.view_scores import ViewEvaluation
 from server.cli.render.plots import new_figure, save_figure
-from server.cli.render.site_file import SiteFacts
+from server.cli.render.site_file import SiteInfo
 
 _ROW_INCHES, _WIDTH_INCHES = 1.1, 11.0
 _SEEN, _BEST, _CHOSEN = "#d9d9d9", "#d9822b", "#2a7f3f"
@@ -23,7 +23,7 @@ _ABOVE = 0.16
 
 
 def plot_views(
-    folder: Path, truth: Truth, judged: Judged, facts: SiteFacts, videos: Mapping[str, Path]
+    folder: Path, truth: SceneTruth, judged: ViewEvaluation, facts: SiteInfo, videos: Mapping[str, Path]
 ) -> None:
     """Write `choices.png`, and with videos `person-K.png` with the frames around each cut.
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from server.cli.generated_config import camera_name
-from server.cli.render.site_file import SITE_FILE, SiteFacts, read_site
-from server.cli.render.video_info import Size, look_at, parse_size
-from server.config.sections import View
+from server.cli.render.site_file import SITE_FILE, SiteInfo, read_site
+from server.cli.render.video_info import Size, parse_size, read_video_info
+from server.config.sections import ViewSettings
 from server.system.errors import UserError
 
 
@@ -40,9 +40,9 @@ def videos_by_camera(videos: Sequence[Path], cameras: Sequence[str]) -> dict[str
     return dict(zip(cameras, videos, strict=True))
 
 
-def site_facts(
+def collect_site_info(
     choices: Path, cameras: Sequence[str], videos: Mapping[str, Path], options: SiteOptions
-) -> SiteFacts:
+) -> SiteInfo:
     """Give the facts; options go before videos, and these before the file that a rendering has of itself.
 
     The rate is the rendering's before it is the videos': that is what its frames are counted by.
@@ -55,7 +55,7 @@ def site_facts(
     sizes: dict[str, Size] = dict(told.sizes) if told else {}
     fps = told.fps if told else None
     for camera, path in videos.items():
-        seen = look_at(path)
+        seen = read_video_info(path)
         sizes[camera], fps = seen.size, fps or seen.fps
     if options.size is not None:
         sizes = dict.fromkeys(cameras, parse_size(options.size))
@@ -70,5 +70,5 @@ def site_facts(
     if options.switch_cost_s is not None:
         switch_cost_s = options.switch_cost_s
     else:
-        switch_cost_s = told.switch_cost_s if told else View().switch_cost_s
-    return SiteFacts(fps, switch_cost_s, {camera: sizes[camera] for camera in cameras})
+        switch_cost_s = told.switch_cost_s if told else ViewSettings().switch_cost_s
+    return SiteInfo(fps, switch_cost_s, {camera: sizes[camera] for camera in cameras})

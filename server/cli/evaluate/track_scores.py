@@ -10,20 +10,20 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from server.cli.evaluate.file_pairing import pair_up
+from server.cli.evaluate.file_pairing import pair_files
 from server.system.errors import UserError
 from tracking.evaluation import HEADINGS, CameraScores, Recording, cells, evaluate_cameras
 from tracking.motchallenge import MotRow, read_rows
 
 
 def read_recordings(tracks: Sequence[Path], truth: Sequence[Path]) -> dict[str, Recording]:
-    """Read files, or those of folders, in the pairs that :func:`pair_up` makes of them; by camera.
+    """Read files, or those of folders, in the pairs that :func:`pair_files` makes of them; by camera.
 
     Raises:
         UserError: there is nothing to compare, or a file is missing or malformed.
     """
     recordings = {}
-    for pair in pair_up(tracks, truth):
+    for pair in pair_files(tracks, truth):
         recording = Recording(truth=rows_of(pair.truth), tracks=rows_of(pair.tracks))
         _check(recording, pair.tracks, pair.truth)
         recordings[pair.camera] = recording

@@ -13,12 +13,12 @@ from rich.table import Table
 
 from bestview import ViewScore, best_views, score_views
 from server.cli.evaluate.choices_file import Choice, views_of
-from server.cli.evaluate.ground_truth import Truth
-from server.cli.render.site_file import SiteFacts
+from server.cli.evaluate.ground_truth import SceneTruth
+from server.cli.render.site_file import SiteInfo
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Judged:
+class ViewEvaluation:
     """Choices beside the optimum.
 
     Attributes:
@@ -38,7 +38,9 @@ class Judged:
     strangers: int
 
 
-def judge(truth: Truth, choices: Sequence[Choice], person_of: Mapping[int, int], facts: SiteFacts) -> Judged:
+def evaluate_views(
+    truth: SceneTruth, choices: Sequence[Choice], person_of: Mapping[int, int], facts: SiteInfo
+) -> ViewEvaluation:
     """Judge choices; ``person_of`` says who an object stands for.
 
     Raises:
@@ -51,7 +53,7 @@ def judge(truth: Truth, choices: Sequence[Choice], person_of: Mapping[int, int],
     def score(rows: slice) -> ViewScore:
         return score_views(cost[rows], visible[rows], views[rows], facts.switch_cost, facts.fps)
 
-    return Judged(
+    return ViewEvaluation(
         objects={person: number for number, person in person_of.items()},
         views=views,
         best=best_views(truth.views, facts.switch_cost),
@@ -79,7 +81,7 @@ HEADINGS = (
 )
 
 
-def print_views(judged: Judged) -> None:
+def print_views(judged: ViewEvaluation) -> None:
     """Print a row for each person and one for all."""
     table = Table(box=None, padding=(0, 1, 0, 0))
     for place, heading in enumerate(HEADINGS):
@@ -102,7 +104,7 @@ def _shares(score: ViewScore) -> tuple[float, ...]:
     return score.agreement, score.regret, score.visible, score.chosen
 
 
-def content_of_views(judged: Judged, facts: SiteFacts) -> dict[str, Any]:
+def content_of_views(judged: ViewEvaluation, facts: SiteInfo) -> dict[str, Any]:
     """Give it all for a file; shares are parts of 1, and null where they are infinite."""
 
     def content(score: ViewScore) -> dict[str, Any]:

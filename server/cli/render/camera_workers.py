@@ -16,10 +16,10 @@ from server.camera.encoding.encoder import AccessUnit
 from server.camera.peers.cross_view_scorer import Heard
 from server.camera.pipeline import CameraPipeline, Searched
 from server.camera.sources import SourceEnded
-from server.cli.render.peer_pipes import Others, Pipes, Piping
+from server.cli.render.peer_pipes import PeerLink, PeerPipeFactory, PeerPipes
 from server.config.site_config import Config
-from server.messaging.messages import CameraTracks, Found
-from server.supervisor.shutdown import end_at_once_again, end_with_parent, ending_later
+from server.messaging.messages import CameraTracks, FrameDetections
+from server.supervisor.shutdown import defer_termination, restore_termination, terminate_with_parent
 from server.system.errors import UserError
 
 log = logging.getLogger(__name__)
@@ -30,7 +30,7 @@ _POLL_S = 1.0
 
 
 @dataclass(frozen=True, slots=True)
-class Batch:
+class EpochBatch:
     """What one camera did up to the end of one epoch."""
 
     camera: str
@@ -40,14 +40,14 @@ class Batch:
 
 
 @dataclass(frozen=True, slots=True)
-class Failure:
+class WorkerFailure:
     """Why a camera's worker ended before its recording."""
 
     text: str
     bad_input: bool
 
 
-Outbox: TypeAlias = "Queue[Batch | Failure]"
+Outbox: TypeAlias = "Queue[EpochBatch | WorkerFailure]"
 
 
 class CameraWorkers:
@@ -65,8 +65,10 @@ class CameraWorkers:
     def start(self) -> None:
         """Start all workers; a signal waits until each is known, so that :meth:`close` ends every one."""
         context = multiprocessing.get_context("spawn")
-        piping = Piping({camera: self._config.witnesses(camera) for camera in self._config.camera_ids})
-        with ending_later():
+        piping = PeerPipeFactory(
+            {camera: self._config.witnesses(camera) for camera in self._config.camera_ids}
+        )
+        with defer_termination():
             for camera in self._config.camera_ids:
                 outbox: Outbox = context.Queue(_AHEAD)
                 with piping.of(camera) as pipes:
@@ -76,7 +78,7 @@ class CameraWorkers:
                     process.start()
                 self._outboxes[camera], self._processes[camera] = outbox, process
 
-    def __iter__(self) -> Iterator[Batch]:
+    def __iter__(self) -> Iterator[EpochBatch]:
         running = dict(self._outboxes)
         while running:
             for camera in list(running):
@@ -91,7 +93,7 @@ class CameraWorkers:
             process.terminate()
             process.join()
 
-    def _next(self, camera: str) -> Batch:
+    def _next(self, camera: str) -> EpochBatch:
         while True:
             alive = self._processes[
                 camera
@@ -102,17 +104,17 @@ class CameraWorkers:
                 if alive:
                     continue
                 raise UserError(f"camera {camera}: its worker died") from None
-            if isinstance(item, Failure):
+            if isinstance(item, WorkerFailure):
                 if item.bad_input:
                     raise UserError(item.text)
                 raise RuntimeError(item.text)  # noqa: TRY004 — what failed was not an argument
             return item
 
 
-def _work(config: Config, camera: str, outbox: Outbox, others: Pipes) -> None:
-    end_with_parent()
+def _work(config: Config, camera: str, outbox: Outbox, others: PeerPipes) -> None:
+    terminate_with_parent()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent, which ends its workers
-    end_at_once_again()
+    restore_termination()
     try:
         pipeline = CameraPipeline(config, camera)
         if pipeline.why_encoded:
@@ -120,12 +122,12 @@ def _work(config: Config, camera: str, outbox: Outbox, others: Pipes) -> None:
         for batch in run_camera(pipeline, camera, others):
             outbox.put(batch)
     except UserError as error:
-        outbox.put(Failure(str(error), bad_input=True))
+        outbox.put(WorkerFailure(str(error), bad_input=True))
     except Exception as error:  # noqa: BLE001 — goes to the parent, which raises it
-        outbox.put(Failure(f"camera {camera}: {type(error).__name__}: {error}", bad_input=False))
+        outbox.put(WorkerFailure(f"camera {camera}: {type(error).__name__}: {error}", bad_input=False))
 
 
-def run_camera(pipeline: CameraPipeline, camera: str, others: Others | None = None) -> Iterator[Batch]:
+def run_camera(pipeline: CameraPipeline, camera: str, others: PeerLink | None = None) -> Iterator[EpochBatch]:
     """Run a recording through a camera's pipeline, epoch by epoch, in step with the others."""
     run = CameraRun(pipeline, camera)
     while not run.ended:
@@ -135,7 +137,7 @@ def run_camera(pipeline: CameraPipeline, camera: str, others: Others | None = No
             yield batch
 
 
-def run_cameras(pipelines: Mapping[str, CameraPipeline]) -> Iterator[Batch]:
+def run_cameras(pipelines: Mapping[str, CameraPipeline]) -> Iterator[EpochBatch]:
     """Run all cameras' recordings in this process, in step."""
     runs = {camera: CameraRun(pipeline, camera) for camera, pipeline in pipelines.items()}
     while runs:
@@ -159,7 +161,7 @@ class CameraRun:
         self._searched: Searched | None = None
         self.ended = False
 
-    def search(self) -> Found | None:
+    def search(self) -> FrameDetections | None:
         """Take, encode and search the next frame; give what the other cameras are told, if they are."""
         try:
             image = self._pipeline.take(self._pulse)
@@ -171,7 +173,7 @@ class CameraRun:
         self._searched = self._pipeline.search(self._pulse, image)
         return self._searched.word
 
-    def follow(self, words: Sequence[Found]) -> Batch | None:
+    def follow(self, words: Sequence[FrameDetections]) -> EpochBatch | None:
         """Follow everybody into it, by what the others found, too; give what an epoch's end brings.
 
         Raises:
@@ -184,12 +186,12 @@ class CameraRun:
         if tracks is None:
             return None
         units, self._units = self._units, []
-        return Batch(self._camera, units, tracks, ended=False)
+        return EpochBatch(self._camera, units, tracks, ended=False)
 
-    def _finish(self) -> Batch:
+    def _finish(self) -> EpochBatch:
         self.ended = True
         tracks = self._pipeline.finish(self._pulse)
         self._pipeline.close()
         if self._pulse <= max(0, self._pipeline.begins):
             raise UserError(f"camera {self._camera}: there is not one picture in its recording")
-        return Batch(self._camera, self._units, tracks, ended=True)
+        return EpochBatch(self._camera, self._units, tracks, ended=True)

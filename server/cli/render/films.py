@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
-from server.config.sections import Site
+from server.config.sections import SiteSettings
 from server.media.audio.audio_chunk import Heard
 from server.media.containers.mp4_audio import sound_fragment
 from server.media.stream_format import Agreement
@@ -31,7 +31,7 @@ class _Film:
     """The pulse after it."""
 
 
-class Films:
+class FilmWriter:
     """Writes ``object-1.mp4`` (or ``.webm``) and so on; the fragments of the streams, begun at time 0.
 
     ``sound`` is None where there is none.
@@ -42,7 +42,7 @@ class Films:
         folder: Path,
         shelves: Mapping[str, Shelf],
         agreement: Agreement,
-        site: Site,
+        site: SiteSettings,
         sound: SoundShelf | None = None,
     ) -> None:
         folder.mkdir()

@@ -11,21 +11,21 @@ from typing import Protocol
 
 import msgspec
 
-from server.messaging.messages import Found
+from server.messaging.messages import FrameDetections
 
-_DECODER = msgspec.json.Decoder(Found)
+_DECODER = msgspec.json.Decoder(FrameDetections)
 
 
-class Others(Protocol):
+class PeerLink(Protocol):
     """The other cameras of one, as it is in step with them."""
 
-    def exchange(self, word: Found) -> Sequence[Found]:
+    def exchange(self, word: FrameDetections) -> Sequence[FrameDetections]:
         """Tell them what was found in a frame; give what they found in it."""
         ...
 
 
 @dataclass(slots=True)
-class Pipes:
+class PeerPipes:
     """One camera's ends of the pipes, in the order of the configuration.
 
     Nobody gets ahead of another by more than one frame, and two words fit into a pipe: telling never
@@ -35,7 +35,7 @@ class Pipes:
     tell: dict[str, Connection] = field(default_factory=dict)
     hear: dict[str, Connection] = field(default_factory=dict)
 
-    def exchange(self, word: Found) -> Sequence[Found]:
+    def exchange(self, word: FrameDetections) -> Sequence[FrameDetections]:
         """Tell the others what was found in a frame; give what those who have not ended found in it."""
         data = msgspec.json.encode(word)
         for camera, connection in list(self.tell.items()):
@@ -47,7 +47,7 @@ class Pipes:
             return ()
         return [said for camera in list(self.hear) if (said := self._hear(camera)) is not None]
 
-    def _hear(self, camera: str) -> Found | None:
+    def _hear(self, camera: str) -> FrameDetections | None:
         try:
             word = _DECODER.decode(self.hear[camera].recv_bytes())
         except EOFError:  # it failed: whoever started it will say so
@@ -58,7 +58,7 @@ class Pipes:
         return word
 
 
-class Piping:
+class PeerPipeFactory:
     """Lays the pipes between cameras that are started one after the other.
 
     Open are only those that somebody still has to be given: of very many cameras all would be too many.
@@ -66,11 +66,11 @@ class Piping:
 
     def __init__(self, others: Mapping[str, Sequence[str]]) -> None:
         self._others = others
-        self._laid: dict[str, Pipes] = {camera: Pipes() for camera in others}
+        self._laid: dict[str, PeerPipes] = {camera: PeerPipes() for camera in others}
         self._given: set[str] = set()
 
     @contextmanager
-    def of(self, camera: str) -> Iterator[Pipes]:
+    def of(self, camera: str) -> Iterator[PeerPipes]:
         """Give the ends of a camera's pipes, while its process starts; they are its own from then on."""
         own = self._laid[camera]
         for other in self._others[camera]:

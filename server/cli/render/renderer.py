@@ -6,8 +6,8 @@ import logging
 from collections.abc import Callable
 from pathlib import Path
 
-from server.cli.render.camera_workers import Batch, CameraWorkers
-from server.cli.render.films import Films
+from server.cli.render.camera_workers import CameraWorkers, EpochBatch
+from server.cli.render.films import FilmWriter
 from server.cli.render.plots import plot_choices, plot_tracks
 from server.cli.render.site_file import write_site
 from server.cli.render.soundtrack import Soundtrack
@@ -43,13 +43,13 @@ class Renderer:
         self._recorder = Recorder(folder, cameras, self._decider.people.fits)
         self._soundtrack = Soundtrack(config)
         shelf = self._soundtrack.shelf
-        self._films = Films(folder / "best", self._shelves, agreement, config.site, shelf)
+        self._films = FilmWriter(folder / "best", self._shelves, agreement, config.site, shelf)
         self._sizes: dict[str, Size] = {}
         self.ended: dict[str, int] = {}
         """The last pulse of each camera whose recording is over."""
         self.frames = 0
 
-    def take(self, batch: Batch) -> None:
+    def take(self, batch: EpochBatch) -> None:
         """Take in what a camera did, and decide what can be decided."""
         for unit in batch.units:
             self._shelves[batch.camera].put(unit.pulse, _BOOT, unit.data, key=unit.key)

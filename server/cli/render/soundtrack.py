@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from server.camera.audio import RecordedSound, open_sound, runs
 from server.config.site_config import Config
-from server.messaging.messages import SoundHead
+from server.messaging.messages import AudioHeader
 from server.service.streaming.audio_buffer import SoundShelf
 
 _KEPT_S = 20.0
@@ -37,5 +37,5 @@ class Soundtrack:
         self._begun = True
         frames += self._sound.until(until + round(_AHEAD_S * self._fps))
         for run in runs(frames):
-            head = SoundHead(first=run[0].number, sizes=[len(frame.data) for frame in run])
+            head = AudioHeader(first=run[0].number, sizes=[len(frame.data) for frame in run])
             self.shelf.put(head, b"".join(frame.data for frame in run))

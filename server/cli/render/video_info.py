@@ -13,7 +13,7 @@ Size = tuple[int, int]
 
 
 @dataclass(frozen=True, slots=True)
-class Recorded:
+class VideoInfo:
     """A recorded view's pictures.
 
     Attributes:
@@ -25,17 +25,17 @@ class Recorded:
     fps: float | None
 
 
-def look_at(view: Path) -> Recorded:
+def read_video_info(view: Path) -> VideoInfo:
     """Look at a video or a folder of images.
 
     Raises:
         UserError: it cannot be opened, or there is not one picture in it.
     """
     if view.is_dir():
-        return Recorded(Folder(str(view), 0, "stop").size, None)
+        return VideoInfo(Folder(str(view), 0, "stop").size, None)
     recording = Recording(str(view), quiet=True)
     recording.close()
-    return Recorded(recording.size, recording.fps)
+    return VideoInfo(recording.size, recording.fps)
 
 
 def parse_size(text: str) -> Size:

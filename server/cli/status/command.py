@@ -14,15 +14,15 @@ from rich.text import Text
 
 from client import AwayError as ServerAway
 from client import ClientError, HttpSettings, RefusedError, SiteNow, status
-from server.cli.status.display import Rates, picture
-from server.system.errors import AwayError, UserError
+from server.cli.status.display import Rates, render_status
+from server.system.errors import UnavailableError, UserError
 from server.system.printable import printable
 
 _EVERY_S = 1.0
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class SiteReport:
     """One look at a site: how it is, or why nobody can tell."""
 
     now: SiteNow | None
@@ -34,15 +34,15 @@ async def status_once(url: str, token: str | None, *, as_json: bool) -> bool:
 
     Raises:
         UserError: the server refuses, or is none.
-        AwayError: it cannot be reached.
+        UnavailableError: it cannot be reached.
     """
     look = await _look(url, HttpSettings(token=token))
     if look.now is None:
-        raise AwayError(f"status: {look.away}")
+        raise UnavailableError(f"status: {look.away}")
     if as_json:
         typer.echo(msgspec.json.encode(look.now))
     else:
-        Console().print(picture(look.now, Rates()))
+        Console().print(render_status(look.now, Rates()))
     return look.now.ready
 
 
@@ -66,27 +66,27 @@ async def status_live(url: str, token: str | None, *, as_json: bool) -> None:
                 shown = (
                     Text(printable(notice), style="red")
                     if before is None
-                    else picture(before, Rates(), notice)
+                    else render_status(before, Rates(), notice)
                 )
             else:
                 if before is not None and _is_another_run(before, look.now):
                     restarted = "the service was restarted"
-                shown = picture(look.now, Rates.between(before, look.now), restarted)
+                shown = render_status(look.now, Rates.between(before, look.now), restarted)
                 before = look.now
             live.update(shown, refresh=True)
 
 
-async def _looks(url: str, settings: HttpSettings) -> AsyncIterator[Look]:
+async def _looks(url: str, settings: HttpSettings) -> AsyncIterator[SiteReport]:
     while True:
         yield await _look(url, settings)
         await asyncio.sleep(_EVERY_S)
 
 
-async def _look(url: str, settings: HttpSettings) -> Look:
+async def _look(url: str, settings: HttpSettings) -> SiteReport:
     try:
-        return Look(await status(url, settings))
+        return SiteReport(await status(url, settings))
     except ServerAway as error:
-        return Look(None, str(error))
+        return SiteReport(None, str(error))
     except RefusedError as error:
         raise UserError(f"status: {error}; --token, or MYVIEW_TOKEN") from error
     except (ClientError, ValueError) as error:

@@ -36,7 +36,7 @@ class Rates:
         return cls((other.cpu_s - one.cpu_s) / seconds, (other.sent_bytes - one.sent_bytes) / seconds)
 
 
-def picture(now: SiteNow, rates: Rates, notice: str = "") -> RenderableType:
+def render_status(now: SiteNow, rates: Rates, notice: str = "") -> RenderableType:
     """Show a site: a head, its cameras, its people; ``notice`` says what has happened to the connection."""
     parts: list[RenderableType] = [_head(now)]
     if now.service is not None:

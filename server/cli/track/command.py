@@ -16,8 +16,8 @@ from server.camera.tracker_setup import ready_tracker
 from server.cli.generated_config import config_for_videos
 from server.config.loader import build_config, read_content
 from server.config.site_config import Config
-from server.media.letterbox import Fit
-from server.system.atomic_write import whole_file
+from server.media.letterbox import Letterbox
+from server.system.atomic_write import atomic_file
 from server.system.errors import UserError
 from tracking import Detections, Solver, WindowResult, create_solver, solver_names
 from tracking.baselines import Tracker, needs_pictures, tracker_names
@@ -28,7 +28,7 @@ _NO_PICTURE = np.empty((0, 0, 3), dtype=np.uint8)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Frame:
+class DetectedFrame:
     """A frame of a recording, counted from 0; there is no picture where only detections are known."""
 
     number: int
@@ -53,11 +53,11 @@ def track_one(
     """
     if video is None and det is None:
         raise UserError("track: name a video, or its detections with --det, or both")
-    loaded = loaded_for(video, det, config)
-    frames = _from_detections(det) if video is None and det is not None else searched(loaded)
+    loaded = config_for_video(video, det, config)
+    frames = _from_detections(det) if video is None and det is not None else detect_frames(loaded)
     follower = _follower(loaded, _tracker_for(loaded, tracker, video), lambda: solver_for(loaded, solver))
     rows: list[MotRow] = []
-    with whole_file(out, video, det) as draft:
+    with atomic_file(out, video, det) as draft:
         for frame in frames:
             rows += final_rows(follower.push(frame.number, frame.detections, frame.image))
             progress(frame.number + 1)
@@ -100,7 +100,7 @@ def solver_for(config: Config, name: str | None) -> Solver:
     return create_solver(name or config.track.solver)
 
 
-def loaded_for(video: Path | None, det: Path | None, config: Path | None) -> Config:
+def config_for_video(video: Path | None, det: Path | None, config: Path | None) -> Config:
     """Give the configuration, with the video as its only camera."""
     base = read_content(config) if config else {}
     base.pop("ground", None)  # one camera needs no floor; the file may be what `myview calibrate` is to make
@@ -113,20 +113,20 @@ def loaded_for(video: Path | None, det: Path | None, config: Path | None) -> Con
     return build_config({**base, "cameras": [nothing]}, where=where, folder=folder)
 
 
-def searched(config: Config) -> Iterator[Frame]:
+def detect_frames(config: Config) -> Iterator[DetectedFrame]:
     """Give every frame of the video, and what is found in it, in its own pixels."""
     camera = config.cameras[0]
     source = open_source(camera, config.site)
-    fit = Fit(source.size, (config.site.width, config.site.height))
+    fit = Letterbox(source.size, (config.site.width, config.site.height))
     detector = ready_detector(config, camera, source, fit)
-    for number, image in pictures(source):
+    for number, image in read_frames(source):
         if image is not None:
             found = detector.detect(fit.image(image), number)
-            yield Frame(number, replace(found, boxes=fit.boxes_to_own(found.boxes)), image)
+            yield DetectedFrame(number, replace(found, boxes=fit.boxes_to_own(found.boxes)), image)
     source.close()
 
 
-def pictures(source: Source, first: int = 0) -> Iterator[tuple[int, Image | None]]:
+def read_frames(source: Source, first: int = 0) -> Iterator[tuple[int, Image | None]]:
     """Give the frames of a recording from `first` to its end; `None` where one has no picture."""
     for number in count(first):
         try:
@@ -136,7 +136,7 @@ def pictures(source: Source, first: int = 0) -> Iterator[tuple[int, Image | None
         yield number, image
 
 
-def _from_detections(path: Path) -> Iterator[Frame]:
+def _from_detections(path: Path) -> Iterator[DetectedFrame]:
     try:
         detector = MotFileDetector(path)
     except OSError as error:
@@ -144,7 +144,7 @@ def _from_detections(path: Path) -> Iterator[Frame]:
     except ValueError as error:
         raise UserError(f"--det: {error}") from error
     for number in range(detector.last + 1):
-        yield Frame(number, detector.detect(_NO_PICTURE, number), None)
+        yield DetectedFrame(number, detector.detect(_NO_PICTURE, number), None)
 
 
 def final_rows(result: WindowResult | None) -> Iterator[MotRow]:

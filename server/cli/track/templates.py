@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from server.camera.sources import SourceEnded, open_source
-from server.cli.track.command import final_rows, loaded_for, pictures, solver_for
-from server.system.atomic_write import whole_file
+from server.cli.track.command import config_for_video, final_rows, read_frames, solver_for
+from server.system.atomic_write import atomic_file
 from server.system.errors import UserError
 from tracking import TemplateTracker
 from tracking.detectors import TemplateSettings
@@ -51,7 +51,7 @@ def track_templates(
     Raises:
         UserError: a box is not in the picture, or something cannot be read or written.
     """
-    loaded = loaded_for(video, None, config)
+    loaded = config_for_video(video, None, config)
     settings = loaded.track
     source = open_source(loaded.cameras[0], loaded.site)
     try:
@@ -66,8 +66,8 @@ def track_templates(
             MotRow(1, number, left, top, right - left, bottom - top)
             for number, (left, top, right, bottom) in enumerate(boxes.tolist(), 1)
         ]
-        with whole_file(out, video) as draft:
-            for number, picture in pictures(source, 1):
+        with atomic_file(out, video) as draft:
+            for number, picture in read_frames(source, 1):
                 if picture is not None:
                     rows += final_rows(tracker.push(picture))
                 progress(number + 1)

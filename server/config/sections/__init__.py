@@ -1,35 +1,35 @@
 """The sections of the configuration, one idea per file."""
 
-from server.config.sections.access import Access
-from server.config.sections.audio import Sound
-from server.config.sections.base import Endpoint, Name, Polygon, Port, Section, Side
-from server.config.sections.camera import Camera, Track
-from server.config.sections.encode import Encode
-from server.config.sections.output import Http, Record, Tls
-from server.config.sections.site import Site, Sync, Zenoh, ZenohTls
-from server.config.sections.view import TUNED, Flags, Share, View
+from server.config.sections.access import AccessSettings
+from server.config.sections.audio import SoundSettings
+from server.config.sections.base import Endpoint, Identifier, PictureSide, Polygon, Port, Section
+from server.config.sections.camera import CameraSettings, TrackSettings
+from server.config.sections.encode import EncodeSettings
+from server.config.sections.output import HttpSettings, RecordSettings, TlsSettings
+from server.config.sections.site import SiteSettings, SyncSettings, ZenohSettings, ZenohTlsSettings
+from server.config.sections.view import LIVE_VIEW_SETTINGS, FlagSettings, ShareSettings, ViewSettings
 
 __all__ = [
-    "TUNED",
-    "Access",
-    "Camera",
-    "Encode",
+    "LIVE_VIEW_SETTINGS",
+    "AccessSettings",
+    "CameraSettings",
+    "EncodeSettings",
     "Endpoint",
-    "Flags",
-    "Http",
-    "Name",
+    "FlagSettings",
+    "HttpSettings",
+    "Identifier",
+    "PictureSide",
     "Polygon",
     "Port",
-    "Record",
+    "RecordSettings",
     "Section",
-    "Share",
-    "Side",
-    "Site",
-    "Sound",
-    "Sync",
-    "Tls",
-    "Track",
-    "View",
-    "Zenoh",
-    "ZenohTls",
+    "ShareSettings",
+    "SiteSettings",
+    "SoundSettings",
+    "SyncSettings",
+    "TlsSettings",
+    "TrackSettings",
+    "ViewSettings",
+    "ZenohSettings",
+    "ZenohTlsSettings",
 ]

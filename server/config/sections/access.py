@@ -10,7 +10,7 @@ from pydantic import Field
 from server.config.sections.base import Section
 
 
-class Access(Section):
+class AccessSettings(Section):
     """Who may what."""
 
     tokens: Path | None = None

@@ -10,7 +10,7 @@ from server.config.sections.base import Section
 from server.media.audio.audio_format import OPUS_RATE, Coding, SoundFormat
 
 
-class Sound(Section):
+class SoundSettings(Section):
     """One sound for the whole site, under every picture."""
 
     source: str | None = None

@@ -10,7 +10,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 Polygon = Annotated[list[tuple[float, float]], Field(min_length=3)]
 """Corners in pixels of the camera's own picture."""
 
-Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,31}$")]
+Identifier = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,31}$")]
 """A name that fits into a zenoh key, a URL and a file name."""
 
 
@@ -33,7 +33,7 @@ _PORT_MOST = 65535
 Endpoint = Annotated[str, AfterValidator(_endpoint)]
 """Where zenoh connects to or listens: protocol/host:port."""
 
-Side = Annotated[int, Field(ge=16, le=8192), AfterValidator(_even)]
+PictureSide = Annotated[int, Field(ge=16, le=8192), AfterValidator(_even)]
 """Width or height of a picture in pixels; x264 cannot encode much smaller or larger ones."""
 
 Port = Annotated[int, Field(ge=1, le=_PORT_MOST)]

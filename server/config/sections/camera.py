@@ -9,18 +9,18 @@ from pydantic import AfterValidator, NonNegativeFloat, PositiveFloat, Validation
 
 from bestview import WitnessSettings, checked_homography
 from server.config.dataclass_section import validated
-from server.config.ground_unit import checked_unit
-from server.config.sections.base import Name, Polygon, Section
+from server.config.ground_unit import check_unit
+from server.config.sections.base import Identifier, Polygon, Section
 from tracking import DEFAULT_SOLVER, CostSettings, WindowSettings, create_solver
 from tracking.baselines import DEFAULT_TRACKER, TEMPORAL, tracker_names
 from tracking.baselines.temporal_consistency import TemporalSettings
 from tracking.interactive import AssistSettings
 
 
-class Camera(Section):
+class CameraSettings(Section):
     """One camera."""
 
-    id: Name
+    id: Identifier
     source: str
     """A file, a folder of images, a URL that FFmpeg opens, /dev/video0, or scene:NAME?camera=0&…"""
     password: Path | None = None
@@ -39,7 +39,7 @@ class Camera(Section):
     """Parts of the picture where nobody is looked for, in pixels of the camera's own picture."""
     ground: list[list[float]] | None = None
     """3x3 homography from the camera's own picture (pixels) to the ground plane."""
-    ground_unit: Annotated[str, AfterValidator(checked_unit)] | None = None
+    ground_unit: Annotated[str, AfterValidator(check_unit)] | None = None
     """The ground plane's unit: by m, cm or mm it is known how tall people are in the picture."""
     detections: Path | None = None
     """A MOTChallenge detection file to use instead of looking for people in the picture."""
@@ -61,7 +61,7 @@ class Camera(Section):
         return ground
 
 
-class Track(Section):
+class TrackSettings(Section):
     """Following people in one camera: the network LP over a moving window (paper, II)."""
 
     tracker: str = DEFAULT_TRACKER

@@ -9,7 +9,7 @@ from pydantic import Field, PositiveInt, model_validator
 from server.config.sections.base import Section
 
 
-class Encode(Section):
+class EncodeSettings(Section):
     """Identical in all cameras that encode: that is what makes cutting without re-encoding possible."""
 
     codec: Literal["h264", "vp8"] = "h264"

@@ -10,7 +10,7 @@ from pydantic import Field, PositiveFloat, PositiveInt, model_validator
 from server.config.sections.base import Section
 
 
-class Tls(Section):
+class TlsSettings(Section):
     """HTTPS: both files or none."""
 
     certificate: Path | None = None
@@ -30,7 +30,7 @@ _CONNECTIONS_PER_VIEWER = 4
 _CONNECTIONS_LEAST = 1000
 
 
-class Http(Section):
+class HttpSettings(Section):
     """The page, the streams and the API."""
 
     host: str = "127.0.0.1"
@@ -56,7 +56,7 @@ class Http(Section):
     pictures_max: PositiveInt = 8
     """People and cameras whose pictures are decoded at once: JPEG, and boxes burnt in. One more gets 503."""
     jpeg_quality: Annotated[int, Field(ge=1, le=100)] = 80
-    tls: Tls = Tls()
+    tls: TlsSettings = TlsSettings()
 
     @property
     def connections(self) -> int:
@@ -64,7 +64,7 @@ class Http(Section):
         return self.connections_max or max(_CONNECTIONS_LEAST, _CONNECTIONS_PER_VIEWER * self.viewers_max)
 
 
-class Record(Section):
+class RecordSettings(Section):
     """What was streamed, kept on the disk."""
 
     folder: Path | None = None

@@ -7,21 +7,21 @@ from typing import Annotated
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
-from server.config.sections.base import Endpoint, Name, Port, Section, Side
+from server.config.sections.base import Endpoint, Identifier, PictureSide, Port, Section
 
 
-class Site(Section):
+class SiteSettings(Section):
     """What all cameras share. Every camera's picture is scaled to one size, so that any can follow any."""
 
-    name: Name = "site"
+    name: Identifier = "site"
     fps: Annotated[float, Field(ge=0.001, le=1000, allow_inf_nan=False)] = 25.0
-    width: Side = 640
-    height: Side = 360
+    width: PictureSide = 640
+    height: PictureSide = 360
     niceness: Annotated[int, Field(ge=0, le=19)] = 10
     """How much nicer a camera's process is than who starts it, as in nice(1): a busy machine serves first."""
 
 
-class Sync(Section):
+class SyncSettings(Section):
     """The pulse server."""
 
     host: str = "127.0.0.1"
@@ -38,7 +38,7 @@ class Sync(Section):
     """How long pulse 0 waits for all cameras to be there, so that recordings start at their first frame."""
 
 
-class ZenohTls(Section):
+class ZenohTlsSettings(Section):
     """Encryption of the bus, where its addresses begin with tls/."""
 
     authority: Path | None = None
@@ -49,7 +49,7 @@ class ZenohTls(Section):
     """PEM: its private key."""
 
 
-class Zenoh(Section):
+class ZenohSettings(Section):
     """The message bus. The best-view service is its router: no separate daemon is needed."""
 
     connect: Endpoint = "tcp/127.0.0.1:7447"
@@ -63,4 +63,4 @@ class Zenoh(Section):
 
     A camera comes as its id, and sends under its own key alone. The router needs all lines, others their own.
     """
-    tls: ZenohTls = ZenohTls()
+    tls: ZenohTlsSettings = ZenohTlsSettings()

@@ -10,15 +10,23 @@ from pydantic import Field, NonNegativeInt, PositiveFloat, PositiveInt, model_va
 from bestview import IdentitySettings, QualitySettings
 from server.config.dataclass_section import validated
 from server.config.sections.base import Section
-from server.messaging.operator_messages import TroubleReason
+from server.messaging.operator_messages import RiskReason
 
-TUNED = ("lookahead", "switch_cost_s", "goes_on_s", "missed_s", "unfound", "min_shot_s", "quality")
+LIVE_VIEW_SETTINGS = (
+    "lookahead",
+    "switch_cost_s",
+    "goes_on_s",
+    "missed_s",
+    "unfound",
+    "min_shot_s",
+    "quality",
+)
 """Settings of the choice that can be changed while it runs."""
 
 Seconds = Annotated[float, Field(ge=0, le=3600)]
 
 
-class Share(Section):
+class ShareSettings(Section):
     """Several best-view services of one site: each decides for the objects whose number leaves its index."""
 
     of: PositiveInt = 1
@@ -40,20 +48,20 @@ class Share(Section):
         return self
 
 
-class Flags(Section):
+class FlagSettings(Section):
     """What an operator is asked to look at."""
 
     per_minute: Annotated[int, Field(ge=0, le=600)] = 2
     """Flags raised a minute at most, where identities are likeliest to fail; those of 3 minutes are saved."""
     risk: Annotated[float, Field(ge=0, le=1)] = 0.1
     """How likely a failure is at least for which one is raised, as far as the trackers can tell."""
-    reasons: list[TroubleReason] = ["alike", "exchange", "fading", "gap"]
+    reasons: list[RiskReason] = ["alike", "exchange", "fading", "gap"]
     """For which of the troubles that are foreseen one is raised."""
     answer_s: Annotated[float, Field(gt=0, le=600)] = 8.0
     """Seconds after what was expected in which a flag can be answered; cameras keep `track.assist.memory`."""
 
 
-class View(Section):
+class ViewSettings(Section):
     """The best-view service."""
 
     lookahead: PositiveInt = 25
@@ -77,7 +85,7 @@ class View(Section):
     quality: Annotated[QualitySettings, validated(QualitySettings)] = QualitySettings()
     """What makes a view good."""
     identity: Annotated[IdentitySettings, validated(IdentitySettings)] = IdentitySettings()
-    flags: Flags = Flags()
+    flags: FlagSettings = FlagSettings()
     """Where a camera's tracker may go wrong, of what `track.assist` foresees."""
-    share: Share = Share()
+    share: ShareSettings = ShareSettings()
     """With other best-view services of the site."""

@@ -18,7 +18,7 @@ from pathlib import Path
 
 from aiohttp import web
 
-from server.config.tokens_file import Token, digest_of
+from server.config.tokens_file import Token, token_digest
 from server.http.access.csrf import path_of, refused_to_other_sites
 from server.http.access.grants import Grant, Need, ShareHolder, need_of
 from server.http.access.local_requests import is_from_here
@@ -146,7 +146,7 @@ class Access:
 
     def known(self, request: web.Request, given: str) -> Holder | web.Response:
         """Look a token up that somebody gives; where it is none, say so, and after some have them wait."""
-        digest, address = digest_of(given), request.remote or "?"
+        digest, address = token_digest(given), request.remote or "?"
         wait = 0.0 if (address, digest) in self._right else self._failures.wait(address)
         if wait > 0:
             seconds = math.ceil(wait)  # not too soon by a fraction
@@ -166,7 +166,7 @@ class Access:
 
     def session_of(self, request: web.Request) -> str:
         """Give the SHA-256 of the identifier in a request's cookie."""
-        return digest_of(request.cookies.get(self.cookie, ""))
+        return token_digest(request.cookies.get(self.cookie, ""))
 
     async def run(self) -> None:
         """Look at the file again and again, and end what nobody may have any more."""

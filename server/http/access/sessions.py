@@ -6,7 +6,7 @@ import secrets
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from server.config.tokens_file import digest_of
+from server.config.tokens_file import token_digest
 
 SESSION_S = 12 * 3600
 """Seconds that a sign-in lasts."""
@@ -36,7 +36,7 @@ class Sessions:
         if len(others) >= _EACH:
             del self._sessions[others[0]]  # the oldest
         identifier = secrets.token_urlsafe(32)
-        self._sessions[digest_of(identifier)] = _Session(token, now + SESSION_S)
+        self._sessions[token_digest(identifier)] = _Session(token, now + SESSION_S)
         return identifier
 
     def token(self, key: str) -> str | None:

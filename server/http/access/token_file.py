@@ -8,7 +8,7 @@ from pathlib import Path
 
 from server.config.tokens_file import Token, read_tokens
 from server.system.errors import UserError
-from server.system.file_state import state_of
+from server.system.file_state import file_state
 
 log = logging.getLogger(__name__)
 
@@ -23,12 +23,12 @@ class TokenFile:
             UserError: it cannot be read, or something in it is wrong.
         """
         self._path = path
-        self._read = self._seen = state_of(path)
+        self._read = self._seen = file_state(path)
         self._tokens = _by_digest(path)
 
     def look(self) -> None:
         """Read the file again if it has changed, once it is still: it may be half-written."""
-        before, self._seen = self._seen, state_of(self._path)
+        before, self._seen = self._seen, file_state(self._path)
         if self._seen == self._read or self._seen != before:
             return
         self._read = self._seen

@@ -12,7 +12,7 @@ from server.http.api.responses import choice_info, thumbnail_of
 from server.http.api.schema import Problem
 from server.http.app_keys import METRICS, SERVICE
 from server.http.connections.listener import still_coming
-from server.messaging.messages import UNREADABLE
+from server.messaging.messages import DECODE_ERRORS
 from server.service.readiness import why_not_ready
 from server.service.recording.moments import MomentError, pulse_at
 from server.service.service import BestViewService
@@ -68,7 +68,7 @@ async def asked_for(request: web.Request, kind: type[Asked]) -> Asked:
         with still_coming(request):
             asked = await request.read()
         return msgspec.json.decode(asked, type=kind)
-    except UNREADABLE as error:
+    except DECODE_ERRORS as error:
         raise web.HTTPBadRequest(reason=f"the request's JSON: {' '.join(str(error).split())}") from error
 
 

@@ -8,7 +8,7 @@ from datetime import UTC, datetime
 
 from aiohttp import web
 
-from server.config.sections import Site
+from server.config.sections import SiteSettings
 from server.service.streaming.hls_segmenter import Plan
 
 TYPE = "application/vnd.apple.mpegurl"
@@ -77,7 +77,7 @@ def head_lines(plan: Plan, first: int, extra: Iterable[str] = ()) -> list[str]:
     ]
 
 
-def master(address: str, bandwidth: int, codecs: str, site: Site) -> str:
+def master(address: str, bandwidth: int, codecs: str, site: SiteSettings) -> str:
     """Write a playlist of playlists that names one; ``bandwidth`` is bits a second at the most."""
     told = (
         f'BANDWIDTH={max(1, bandwidth)},CODECS="{codecs}",RESOLUTION={site.width}x{site.height},'

@@ -8,7 +8,7 @@ from prometheus_client import CollectorRegistry, Metric, ProcessCollector
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily
 from prometheus_client.registry import Collector
 
-from server.config.running_config import OnDisk
+from server.config.running_config import ConfigFileState
 from server.http.access.access_control import Access
 from server.http.hls.sessions import Readers
 from server.service.rendering.renderer import Pictures
@@ -19,7 +19,11 @@ class ServiceCollector(Collector):
     """Gives the service's numbers."""
 
     def __init__(
-        self, service: BestViewService, readers: Readers, access: Access, on_disk: Callable[[], OnDisk]
+        self,
+        service: BestViewService,
+        readers: Readers,
+        access: Access,
+        on_disk: Callable[[], ConfigFileState],
     ) -> None:
         self._service, self._readers, self._access = service, readers, access
         self._on_disk = on_disk
@@ -146,7 +150,7 @@ def registry(
     pictures: Pictures,
     readers: Readers,
     access: Access,
-    on_disk: Callable[[], OnDisk],
+    on_disk: Callable[[], ConfigFileState],
 ) -> CollectorRegistry:
     """Give the metrics of a service and its process."""
     metrics = CollectorRegistry()

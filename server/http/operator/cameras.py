@@ -21,7 +21,7 @@ from server.http.operator.schema import (
     PulseListener,
     Pulses,
 )
-from server.media.letterbox import Fit
+from server.media.letterbox import Letterbox
 from server.service.calibration.floor_map import covered
 from server.service.ingest.ingest import CameraState
 from server.service.service import BestViewService
@@ -82,6 +82,6 @@ def _camera(service: BestViewService, camera: str, state: CameraState) -> Operat
 
 def _picture(service: BestViewService, own: tuple[int, int]) -> OwnPicture:
     site = service.config.site
-    fit = Fit(own, (site.width, site.height))
+    fit = Letterbox(own, (site.width, site.height))
     left, top = fit.to_site(np.zeros(2)).tolist()
     return OwnPicture(width=own[0], height=own[1], scale=fit.scale, left=left, top=top)

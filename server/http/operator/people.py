@@ -9,7 +9,7 @@ from server.http.access.grants import OPERATING
 from server.http.api.handlers import answer, asked_for, no_camera, no_object, problem
 from server.http.app_keys import SERVICE
 from server.http.operator.schema import PeopleByHand
-from server.messaging.retained_state import NAME_MOST
+from server.messaging.retained_state import NAME_LENGTH_MAX
 from server.service.identity.people import People
 from server.service.service import BestViewService
 
@@ -56,8 +56,8 @@ async def post_people(request: web.Request) -> web.Response:
 
 def _call(service: BestViewService, number: int, name: str) -> web.Response:
     name = " ".join(name.split())
-    if len(name) > NAME_MOST or not name.isprintable():
-        return problem(400, f"name: at most {NAME_MOST} letters that can be read")
+    if len(name) > NAME_LENGTH_MAX or not name.isprintable():
+        return problem(400, f"name: at most {NAME_LENGTH_MAX} letters that can be read")
     service.decider.people.roll.call(number, name)
     return answer(_told(service))
 

@@ -12,7 +12,7 @@ from server.http.api.handlers import answer, asked_for, no_camera, no_object, pr
 from server.http.app_keys import SERVICE
 from server.http.operator.schema import Pointing
 from server.messaging.number_types import Pulse
-from server.messaging.operator_messages import POINTS_MOST, REACH_LEAST
+from server.messaging.operator_messages import OPERATOR_POINTS_MAX, TOLERANCE_MIN
 from server.service.operator_assist.corrections import Place
 from server.service.service import BestViewService
 
@@ -38,7 +38,7 @@ class Said(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     object: int
     camera: str
-    points: Annotated[list[Point], msgspec.Meta(min_length=1, max_length=POINTS_MOST)]
+    points: Annotated[list[Point], msgspec.Meta(min_length=1, max_length=OPERATOR_POINTS_MAX)]
 
 
 @routes.get(f"{OPERATING}/pointing")
@@ -79,7 +79,7 @@ def _wrong(service: BestViewService, point: Point) -> str:
 
 def _place(point: Point, width: int) -> Place:
     reach = _REACH * width if point.reach is None else min(point.reach, _REACH_MOST * width)
-    return Place(point.pulse, point.x, point.y, max(reach, REACH_LEAST))
+    return Place(point.pulse, point.x, point.y, max(reach, TOLERANCE_MIN))
 
 
 def _cannot(service: BestViewService) -> str:
@@ -92,4 +92,4 @@ def _cannot(service: BestViewService) -> str:
 
 def _told(service: BestViewService, taken: int, left_out: int, flags: list[int]) -> Pointing:
     memory = service.config.track.assist.memory
-    return Pointing(memory, POINTS_MOST, _cannot(service), taken, left_out, flags)
+    return Pointing(memory, OPERATOR_POINTS_MAX, _cannot(service), taken, left_out, flags)

@@ -11,16 +11,16 @@ from aiohttp import web
 from pydantic import BaseModel
 from pydantic_core import PydanticUndefined
 
-from server.config.loader import changed_view
-from server.config.sections import TUNED, View
+from server.config.loader import change_view_settings
+from server.config.sections import LIVE_VIEW_SETTINGS, ViewSettings
 from server.config.site_config import Config
-from server.config.yaml_file import as_lines, one_line
+from server.config.yaml_file import dump_yaml, dump_yaml_inline
 from server.http.access.grants import OPERATING
 from server.http.api.handlers import answer, asked_for, problem
 from server.http.app_keys import ON_DISK, SERVICE
 from server.http.operator.schema import Choosing, Setting, Settings
 from server.service.service import BestViewService
-from server.system.address_redaction import HIDDEN, shown, shown_endpoint
+from server.system.address_redaction import HIDDEN, redact_address, redact_endpoint
 from server.system.errors import UserError
 
 routes = web.RouteTableDef()
@@ -54,7 +54,7 @@ async def put_choosing(request: web.Request) -> web.Response:
         if key not in known:
             return problem(400, f"view.{key}: cannot be changed here; what can is {', '.join(known)}")
     try:
-        service.choose_by(changed_view(service.decider.view, _nested(asked), "to try out"))
+        service.choose_by(change_view_settings(service.decider.view, _nested(asked), "to try out"))
     except UserError as error:
         return problem(400, str(error))
     return answer(_choosing(service))
@@ -105,36 +105,36 @@ def _names(section: Any) -> list[str]:
 def _written(key: str, value: Any) -> str:
     """Write a value as a configuration does, without what may be secret."""
     if key in _ENDPOINTS:
-        return one_line(shown_endpoint(value))
+        return dump_yaml_inline(redact_endpoint(value))
     if value is not None and _PASSWORD.fullmatch(key):
-        return one_line(HIDDEN)
-    return one_line(_shown(value))
+        return dump_yaml_inline(HIDDEN)
+    return dump_yaml_inline(_shown(value))
 
 
 def _shown(value: Any) -> Any:
     """Give a value as YAML has it: of addresses their hosts, and of options for FFmpeg their names alone."""
     match value:
         case Mapping():
-            return {shown(it): HIDDEN for it in value}
+            return {redact_address(it): HIDDEN for it in value}
         case list() | tuple():
             return [_shown(it) for it in value]
         case bool() | int() | float() | None:
             return value
         case _:
-            return shown(str(value))
+            return redact_address(str(value))
 
 
 def _choosing(service: BestViewService) -> Choosing:
-    now, file, usual = _flat(service.decider.view), _flat(service.config.view), _flat(View())
+    now, file, usual = _flat(service.decider.view), _flat(service.config.view), _flat(ViewSettings())
     lines = {key: value for key, value in now.items() if value != usual[key] or value != file[key]}
-    written = "" if not lines else as_lines({"view": _nested(lines)})
+    written = "" if not lines else dump_yaml({"view": _nested(lines)})
     least, most = service.config.least_lookahead, service.most_lookahead
     return Choosing(values=now, file=file, lines=written, least_lookahead=least, most_lookahead=most)
 
 
-def _flat(view: View) -> dict[str, float | bool]:
+def _flat(view: ViewSettings) -> dict[str, float | bool]:
     flat: dict[str, float | bool] = {}
-    for name in TUNED:
+    for name in LIVE_VIEW_SETTINGS:
         value = getattr(view, name)
         if dataclasses.is_dataclass(value):
             flat |= {f"{name}.{it.name}": getattr(value, it.name) for it in dataclasses.fields(value)}

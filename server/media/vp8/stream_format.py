@@ -6,7 +6,7 @@ import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from server.config.sections import Site
+from server.config.sections import SiteSettings
 from server.media.audio.audio_format import SoundFormat
 from server.media.containers.webm import cluster, header, rebased, ticks
 from server.media.gap_filler import NO_CAMERAS, Bridge, Span
@@ -48,7 +48,9 @@ class Vp8Agreement(Agreement):
         """Give a frame as a cluster, which fits into any stream of the site."""
         return cluster(access_unit, pulse, fps, key=key)
 
-    def head(self, site: Site, sound: SoundFormat | None = None, *, pulses: int | None = None) -> bytes:
+    def head(
+        self, site: SiteSettings, sound: SoundFormat | None = None, *, pulses: int | None = None
+    ) -> bytes:
         """Give what a player needs before the first cluster; there is no sound in it."""
         del sound
         return header(site.width, site.height, site.fps, pulses)

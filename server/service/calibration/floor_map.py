@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from server.media.letterbox import Fit
+from server.media.letterbox import Letterbox
 
 Floats = NDArray[np.float64]
 
@@ -37,7 +37,7 @@ def covered(own: Floats, size: tuple[int, int], site: tuple[int, int]) -> Covere
         size: width and height of that picture.
         site: width and height of the site's.
     """
-    fit = Fit(size, site)
+    fit = Letterbox(size, site)
     left, top = fit.to_site(np.zeros(2)).tolist()
     to_own = np.array([[1.0, 0.0, -left], [0.0, 1.0, -top], [0.0, 0.0, fit.scale]]) / fit.scale
     width, height = (float(side) for side in size)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from bestview import feet
 from bestview.calibration import Floats, cut_off
-from server.media.letterbox import Fit
+from server.media.letterbox import Letterbox
 from server.messaging.messages import CameraTracks
 from server.service.calibration.worker_messages import Seen
 from server.service.ingest.box_arrays import boxes_array
@@ -63,7 +63,7 @@ class Trail:
         boxes = boxes[:, first - message.first : last + 1 - message.first]
         track, frame = np.nonzero(~np.isnan(boxes[:, :, 0]))
         names = [self._names.setdefault((message.boot, it.id), len(self._names)) for it in message.tracks]
-        own = Fit(message.size, self._site).boxes_to_own(boxes[track, frame])
+        own = Letterbox(message.size, self._site).boxes_to_own(boxes[track, frame])
         self._frames.append(frame + first - start)
         self._who.append(np.array(names, dtype=np.int64)[track])
         self._boxes.append(own)

@@ -8,7 +8,7 @@ from enum import Enum
 from typing import Any
 
 from server.config.site_config import Config
-from server.config.source_address import SourceKind, kind_of
+from server.config.source_address import SourceKind, source_kind
 from server.service.calibration.coverage import Covered, covered
 from server.service.calibration.walk_comparison import moment
 from server.service.calibration.walk_samples import Trail
@@ -86,7 +86,7 @@ class Walking:
         offsets = {
             it.id: it.offset
             for it in self._config.cameras
-            if kind_of(it.source) in (SourceKind.FILE, SourceKind.FOLDER)
+            if source_kind(it.source) in (SourceKind.FILE, SourceKind.FOLDER)
         }
         task = Task([it for it in seen if it is not None], self._fps, _SHIFT_S, person, offsets)
         self.done, self.state = None, State.WORKING

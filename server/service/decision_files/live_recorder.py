@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from server.media.letterbox import Fit
+from server.media.letterbox import Letterbox
 from server.service.decision_files.recorder import Recorder
 from server.service.view_selection.decider import GopDecision
 
@@ -34,7 +34,7 @@ class LiveRecorder:
     there is room again ``late.csv`` says of which frames.
     """
 
-    def __init__(self, folder: Path, cameras: Sequence[str], fits: Mapping[str, Fit]) -> None:
+    def __init__(self, folder: Path, cameras: Sequence[str], fits: Mapping[str, Letterbox]) -> None:
         """Begin new files, for this user alone, in a folder, which may exist.
 
         Raises:

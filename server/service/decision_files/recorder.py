@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from bestview import Merge, Split
-from server.media.letterbox import Fit
+from server.media.letterbox import Letterbox
 from server.messaging.messages import NumberedBox
 from server.service.decision_files.row_files import WholeFiles
 from server.service.view_selection.decider import GopDecision
@@ -33,7 +33,7 @@ class Recorder:
     """
 
     def __init__(
-        self, folder: Path, cameras: Sequence[str], fits: Mapping[str, Fit], *, private: bool = False
+        self, folder: Path, cameras: Sequence[str], fits: Mapping[str, Letterbox], *, private: bool = False
     ) -> None:
         """Begin new files in a folder, which may exist; ``private``: for this user alone.
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bestview import Glimpse, LocalTrack, TrackKey
-from server.media.letterbox import Fit
+from server.media.letterbox import Letterbox
 from server.messaging import messages
 from server.messaging.messages import CameraTracks
 from server.service.identity.local_numbers import LocalNumbers
@@ -35,7 +35,7 @@ class CameraWindow:
     message: CameraTracks
     keys: tuple[TrackKey, ...]
     locals: NDArray[np.int64]
-    fit: Fit
+    fit: Letterbox
     boxes: Floats
     fresh: int
 
@@ -74,7 +74,7 @@ class CameraWindow:
         return list(zip(begins.tolist(), ends.tolist(), strict=True))
 
 
-def _glimpses(looks: Sequence[messages.Glimpse], first: int) -> tuple[Glimpse, ...]:
+def _glimpses(looks: Sequence[messages.AppearanceHistogram], first: int) -> tuple[Glimpse, ...]:
     """Give the looks in the frames from `first` on."""
     return tuple(
         Glimpse(max(it.first, first), it.last, np.array(it.histogram, dtype=np.float64))
@@ -89,7 +89,7 @@ class Reader:
     def __init__(self, site_size: tuple[int, int]) -> None:
         self._site_size = site_size
         self.locals = LocalNumbers()
-        self.fits: dict[str, Fit] = {}
+        self.fits: dict[str, Letterbox] = {}
         """Of each camera, known from its first word on; its picture has another size after another source."""
         self._final: dict[str, int] = {}
         """By camera, the last frame that was final."""
@@ -111,7 +111,7 @@ class Reader:
     def _window(self, message: CameraTracks) -> CameraWindow:
         fit = self.fits.get(message.camera)
         if fit is None or fit.own != message.size:
-            fit = self.fits[message.camera] = Fit(message.size, self._site_size)
+            fit = self.fits[message.camera] = Letterbox(message.size, self._site_size)
         keys = self.locals.of(message)
         frames = max(0, message.last - message.first + 1)
         boxes = boxes_array(track.boxes for track in message.tracks)

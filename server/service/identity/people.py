@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bestview import IdentityRegistry, IdentitySettings, Merge, Split, TrackKey
-from server.config.sections import Share
-from server.media.letterbox import Fit
+from server.config.sections import ShareSettings
+from server.media.letterbox import Letterbox
 from server.messaging.messages import NumberedBox
 from server.service.identity.camera_window import CameraWindow, Reader
 from server.service.identity.id_switch_repair import Mending
@@ -32,7 +32,7 @@ from server.service.identity.undetected_frames import Unsearched
 from server.service.ingest.epoch_aligner import Epoch
 from server.service.ingest.window_history import History
 
-ALL = Share()
+ALL = ShareSettings()
 """One service for everybody."""
 _LATELY = 100
 """Frames that tell whether a camera looks; at least those of an epoch."""
@@ -54,7 +54,7 @@ class People:
         homographies: Mapping[str, NDArray[np.float64] | None],
         site_size: tuple[int, int],
         lag: int,
-        share: Share = ALL,
+        share: ShareSettings = ALL,
         overhead: Collection[str] = (),
         fps: float = 25.0,
     ) -> None:
@@ -108,7 +108,7 @@ class People:
         return [*late, *windows]
 
     @property
-    def fits(self) -> Mapping[str, Fit]:
+    def fits(self) -> Mapping[str, Letterbox]:
         """How each camera's own picture lies in the site's; known from its first word on."""
         return self._reader.fits
 

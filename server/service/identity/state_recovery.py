@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import chain
 from math import inf
 
-from server.messaging.retained_state import ALSO_MOST, NUMBER_MOST, Known, Remembered
+from server.messaging.retained_state import ALIASES_MAX, PERSON_NUMBER_MAX, IdentitySnapshot, PersonSnapshot
 from server.service.identity.local_numbers import Followed
 from server.service.identity.people import People
 
@@ -21,7 +21,7 @@ LONGEST_S = 30.0
 
 def remembered_by(
     people: People, cameras: Iterable[str], pulse: int, lately: int, since: float
-) -> dict[str, Remembered]:
+) -> dict[str, IdentitySnapshot]:
     """Put down for each camera whom it has followed lately, and since when numbers are not given twice."""
     followed = people.followed(people.roll.everybody, pulse - lately)
     boots: dict[str, int] = {}
@@ -29,12 +29,12 @@ def remembered_by(
         boots[it.camera] = max(it.boot, boots.get(it.camera, 0))
     also: dict[int, list[int]] = {}
     for old, number in people.roll.merged.items():
-        if old <= NUMBER_MOST:
+        if old <= PERSON_NUMBER_MAX:
             also.setdefault(number, []).append(old)
     by_hand = set(people.merged_by_hand.values())
-    known: dict[str, list[Known]] = {camera: [] for camera in cameras}
+    known: dict[str, list[PersonSnapshot]] = {camera: [] for camera in cameras}
     for number, tracks in followed.items():
-        if number > NUMBER_MOST:
+        if number > PERSON_NUMBER_MAX:
             continue
         mine: dict[str, list[int]] = {}
         for it in tracks:
@@ -42,17 +42,19 @@ def remembered_by(
                 mine.setdefault(it.camera, []).append(it.track)
         for camera, theirs in mine.items():
             known[camera].append(
-                Known(
+                PersonSnapshot(
                     number=number,
                     tracks=theirs,
-                    also=also.get(number, [])[-ALSO_MOST:],
+                    also=also.get(number, [])[-ALIASES_MAX:],
                     name=people.roll.names.get(number, ""),
                     by_hand=number in by_hand,
                 )
             )
-    following = min(people.next_number, NUMBER_MOST + 1)
+    following = min(people.next_number, PERSON_NUMBER_MAX + 1)
     return {
-        camera: Remembered(pulse=pulse, boot=boots.get(camera, 0), next=following, since=since, people=them)
+        camera: IdentitySnapshot(
+            pulse=pulse, boot=boots.get(camera, 0), next=following, since=since, people=them
+        )
         for camera, them in known.items()
     }
 
@@ -77,7 +79,7 @@ class Returning:
         longest: frames that it may have been away.
     """
 
-    def __init__(self, said: dict[str, Remembered], pulse: int, longest: int) -> None:
+    def __init__(self, said: dict[str, IdentitySnapshot], pulse: int, longest: int) -> None:
         self._until = -1
         self._over = False
         self._tracks: dict[Followed, int] = {}
@@ -141,7 +143,7 @@ class Returning:
         return None if first is None else people.whose(track.camera, track.boot, track.track, first)
 
 
-def first_free(said: Remembered) -> int:
+def first_free(said: IdentitySnapshot) -> int:
     """Give the first number that nobody has or had; what a camera says may contradict itself."""
     return max([said.next, *(number + 1 for it in said.people for number in (it.number, *it.also))])
 
@@ -156,9 +158,9 @@ def believed(firsts: Iterable[int]) -> int:
     return max(other + _SLACK, ALONE_MOST)
 
 
-def _awaited(said: dict[str, Remembered]) -> list[_Awaited]:
+def _awaited(said: dict[str, IdentitySnapshot]) -> list[_Awaited]:
     """Put together what the cameras remember: the newest word on somebody counts."""
-    newest: dict[int, Known] = {}
+    newest: dict[int, PersonSnapshot] = {}
     tracks: dict[int, set[Followed]] = {}
     whose: dict[int, int] = {}
     """By an old number: who had it."""

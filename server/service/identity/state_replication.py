@@ -10,8 +10,8 @@ from collections.abc import Callable, Sequence
 import msgspec
 
 from server.messaging.inbox import Message
-from server.messaging.messages import camera_of
-from server.messaging.retained_state import REMEMBERED_MOST, Remembered
+from server.messaging.messages import camera_of_key
+from server.messaging.retained_state import SNAPSHOT_BYTES_MAX, IdentitySnapshot
 from server.service.identity.people import People
 from server.service.identity.state_recovery import LONGEST_S, Returning, believed, first_free, remembered_by
 
@@ -54,7 +54,7 @@ class Remembering:
         self._came: dict[str, float] = {}
         """When each camera came first that has not said yet what it remembers; it may come again."""
         self._there: set[str] = set()
-        self._said: dict[str, Remembered] = {}
+        self._said: dict[str, IdentitySnapshot] = {}
         self._firsts: dict[str, int] = {}
         """The first free number by what each camera said last."""
         self._returning: list[Returning] = []
@@ -65,12 +65,12 @@ class Remembering:
         """From this number on this run gives them anew, by what it began with; before that it gives none."""
         self._heard: set[str] = set()
         """Cameras that have said what they remember: told sooner, they would have forgotten it."""
-        self._sent: dict[str, Remembered] = {}
+        self._sent: dict[str, IdentitySnapshot] = {}
         self._since = time.time()
 
     def alive(self, key: str, there: bool) -> None:
         """A camera's liveliness token came or went."""
-        camera = camera_of(key)
+        camera = camera_of_key(key)
         if camera in self._cameras and there:
             self._anybody = True
             self._there.add(camera)
@@ -88,7 +88,7 @@ class Remembering:
         Raises:
             DecodeError or another of `UNREADABLE`: it is none.
         """
-        camera = camera_of(message.key)
+        camera = camera_of_key(message.key)
         if camera not in self._cameras:
             return
         again = self._began_at is not None and camera in self._heard
@@ -96,7 +96,7 @@ class Remembering:
         self._heard.add(camera)
         if not message.payload:
             return
-        said = msgspec.json.decode(message.payload, type=Remembered)
+        said = msgspec.json.decode(message.payload, type=IdentitySnapshot)
         self._firsts[camera] = first_free(said)
         if again:
             self._people.begin_at(min(said.next, believed(self._firsts.values())))
@@ -162,16 +162,16 @@ class Remembering:
             if before is not None and pulse - before.pulse < _EVERY_S * self._fps and _same(before, now):
                 continue
             payload = msgspec.json.encode(now)
-            if len(payload) <= REMEMBERED_MOST:
+            if len(payload) <= SNAPSHOT_BYTES_MAX:
                 self._sent[camera] = now
                 self._send(camera, payload)
 
 
-def _below(free: float, said: Remembered) -> Remembered:
+def _below(free: float, said: IdentitySnapshot) -> IdentitySnapshot:
     """Leave out whom this run does not know by the number, since it may have given it to somebody else."""
     known = [it for it in said.people if max([it.number, *it.also]) < free]
     return msgspec.structs.replace(said, people=known)
 
 
-def _same(one: Remembered, other: Remembered) -> bool:
+def _same(one: IdentitySnapshot, other: IdentitySnapshot) -> bool:
     return msgspec.structs.replace(one, pulse=other.pulse) == other

@@ -16,13 +16,13 @@ from server.media.stream_format import ParameterMismatchError
 from server.messaging.epochs import end_of_epoch
 from server.messaging.inbox import Message
 from server.messaging.messages import (
-    UNREADABLE,
+    DECODE_ERRORS,
+    AudioHeader,
     CameraStatus,
     CameraTracks,
-    FrameHead,
-    SoundHead,
-    ThumbHead,
-    camera_of,
+    FrameHeader,
+    ThumbnailHeader,
+    camera_of_key,
 )
 from server.service.ingest.epoch_aligner import Aligner
 from server.service.ingest.validation import makes_sense
@@ -123,15 +123,15 @@ class Intake:
             camera: OrderedDict() for camera in shelves
         }
         """By camera, boot and track; the newest is the last."""
-        self._frame_head = msgspec.json.Decoder(FrameHead)
+        self._frame_head = msgspec.json.Decoder(FrameHeader)
         self._tracks = msgspec.json.Decoder(CameraTracks)
         self._status = msgspec.json.Decoder(CameraStatus)
-        self._sound_head = msgspec.json.Decoder(SoundHead)
-        self._thumb_head = msgspec.json.Decoder(ThumbHead)
+        self._sound_head = msgspec.json.Decoder(AudioHeader)
+        self._thumb_head = msgspec.json.Decoder(ThumbnailHeader)
 
     def alive(self, key: str, there: bool) -> None:
         """A camera's liveliness token came or went."""
-        camera = camera_of(key)
+        camera = camera_of_key(key)
         state = self.states.get(camera)
         if state is None:
             if (more := self._unknown.happened(camera)) is not None:
@@ -161,7 +161,7 @@ class Intake:
                 return
             shelf = self._shelves[camera]
             frame = shelf.put(head.pulse, head.boot, message.payload, key=head.key, after=head.after)
-        except (*UNREADABLE, NoPictureError) as error:
+        except (*DECODE_ERRORS, NoPictureError) as error:
             state.bad(error)
         except ParameterMismatchError as error:
             state.refused = f"{error}; are all cameras of this site run with the same configuration?"
@@ -179,7 +179,7 @@ class Intake:
             return
         try:
             self._sound.put(self._sound_head.decode(message.attachment), message.payload)
-        except (*UNREADABLE, ValueError) as error:
+        except (*DECODE_ERRORS, ValueError) as error:
             self.states[self._sounding].bad(f"sound: {error}")
 
     def tracks(self, message: Message) -> None:
@@ -189,7 +189,7 @@ class Intake:
             return
         try:
             tracks = self._tracks.decode(message.payload)
-        except UNREADABLE as error:
+        except DECODE_ERRORS as error:
             state.bad(error)
             return
         if tracks.camera != camera or not makes_sense(tracks, self._aligner.stride):
@@ -208,7 +208,7 @@ class Intake:
             return
         try:
             heard(message)
-        except UNREADABLE as error:
+        except DECODE_ERRORS as error:
             state.bad(error)
 
     def status(self, message: Message) -> None:
@@ -218,7 +218,7 @@ class Intake:
             return
         try:
             status = self._status.decode(message.payload)
-        except UNREADABLE as error:
+        except DECODE_ERRORS as error:
             state.bad(error)
         else:
             was_away, state.status = state.away, status
@@ -232,7 +232,7 @@ class Intake:
             return
         try:
             head = self._thumb_head.decode(message.attachment)
-        except UNREADABLE as error:
+        except DECODE_ERRORS as error:
             state.bad(error)
             return
         if len(message.payload) > _THUMBNAIL_BYTES:
@@ -266,5 +266,5 @@ class Intake:
         return True
 
     def _state_of(self, message: Message) -> tuple[CameraState | None, str]:
-        camera = camera_of(message.key)
+        camera = camera_of_key(message.key)
         return self.states.get(camera), camera

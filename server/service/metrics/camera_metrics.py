@@ -8,7 +8,7 @@ from collections import OrderedDict, deque
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
-from server.messaging.messages import CameraTracks, FrameHead
+from server.messaging.messages import CameraTracks, FrameHeader
 from server.service.metrics.stage_totals import Totals
 
 _FRAMES = 250
@@ -59,7 +59,7 @@ class Gauge:
         for measured in (self._errors, self._due, self._delays, self._proven):
             measured.clear()
 
-    def frame(self, head: FrameHead) -> None:
+    def frame(self, head: FrameHeader) -> None:
         """Take in a frame that came."""
         self.totals.frame(head)
         self._errors.append(head.taken - head.due)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from server.messaging.messages import CameraTracks, FrameHead
+from server.messaging.messages import CameraTracks, FrameHeader
 from server.service.metrics.histogram import Histogram
 
 
@@ -34,7 +34,7 @@ class Totals:
         """Give the stages by name, in the order of a frame's way."""
         return {name: getattr(self, name) for name in ("take", "encode", "search", "solve", "track")}
 
-    def frame(self, head: FrameHead) -> None:
+    def frame(self, head: FrameHeader) -> None:
         """Count a frame."""
         self.take.observe(head.taken - head.due)
         self.encode.observe(head.encoded - head.taken)

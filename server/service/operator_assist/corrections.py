@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from server.messaging.operator_messages import Pointed, Pointings
+from server.messaging.operator_messages import OperatorPoint, OperatorPoints
 from server.service.identity.people import People
 
 
@@ -26,7 +26,7 @@ class Place:
     reach: float
 
 
-def pointings(people: People, camera: str, number: int, places: Sequence[Place]) -> Pointings | None:
+def pointings(people: People, camera: str, number: int, places: Sequence[Place]) -> OperatorPoints | None:
     """Say in the camera's own terms where somebody is: by the track that it showed them by.
 
     Frames that are forgotten are left out, and so are those of an earlier run of the camera.
@@ -41,8 +41,8 @@ def pointings(people: People, camera: str, number: int, places: Sequence[Place])
     if not boots:
         return None
     points = [
-        Pointed(pulse=it.pulse, track=track.track, x=it.x, y=it.y, reach=it.reach)
+        OperatorPoint(pulse=it.pulse, track=track.track, x=it.x, y=it.y, reach=it.reach)
         for it, track in tracks
         if track is not None and track.boot == max(boots)
     ]
-    return Pointings(boot=max(boots), points=points)
+    return OperatorPoints(boot=max(boots), points=points)

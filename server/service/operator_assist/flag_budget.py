@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 
-from server.config.sections import Flags
+from server.config.sections import FlagSettings
 
 _MINUTE_S = 60.0
 _LOOKS_BACK_S = 600.0
@@ -36,7 +36,7 @@ class Budget:
     several names, since who is lost is alike to everybody near: for some seconds nobody has two flags.
     """
 
-    def __init__(self, settings: Flags, fps: float) -> None:
+    def __init__(self, settings: FlagSettings, fps: float) -> None:
         self._per_minute, self._least, self._fps = settings.per_minute, settings.risk, fps
         self._first: int | None = None
         self._told: dict[frozenset[int], _Told] = {}

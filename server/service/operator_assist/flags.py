@@ -9,8 +9,8 @@ from typing import Literal
 
 import msgspec
 
-from server.config.sections import Flags as FlagSettings
-from server.messaging.operator_messages import TroubleReason
+from server.config.sections import FlagSettings
+from server.messaging.operator_messages import RiskReason
 from server.service.operator_assist.flag_budget import Budget
 
 State = Literal["raised", "followed", "answered", "expired"]
@@ -32,7 +32,7 @@ class Flag(msgspec.Struct, frozen=True, kw_only=True):
     """Whom it is about: point at the first of them."""
     cameras: list[str]
     """Where it is foreseen; the first foresaw it first."""
-    reason: TroubleReason
+    reason: RiskReason
     pulse: int
     """When it is expected."""
     raised: int
@@ -57,7 +57,7 @@ class Foreseen:
     camera: str
     objects: tuple[int, ...]
     """Whom it is about; first whom to point at."""
-    reason: TroubleReason
+    reason: RiskReason
     pulse: int
     margin: float
     risk: float

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import msgspec
 
-from server.messaging.messages import UNREADABLE, GopChoices
+from server.messaging.messages import DECODE_ERRORS, GopChoices
 from server.service.recording.disk_reads import from_disk
 from server.service.recording.recorder import Past
 
@@ -60,7 +60,7 @@ def _lines(path: Path, start: int, end: int) -> list[tuple[bytes, GopChoices]]:
     for line in data.splitlines(keepends=True):
         try:
             choices = msgspec.json.decode(line, type=GopChoices)
-        except UNREADABLE:
+        except DECODE_ERRORS:
             continue
         if choices.first + choices.frames > start and choices.first < end:
             found.append((line, choices))

@@ -19,7 +19,7 @@ from server.service.recording.segment_index import Stretch, Tape
 from server.system.private_files import write_private
 
 CAMERA = "[A-Za-z0-9][A-Za-z0-9_-]{0,31}"
-"""What a camera is called (:data:`server.config.sections.base.Name`); the folder of the sound is, too."""
+"""A camera id (:data:`server.config.sections.base.Identifier`), or the folder of the sound."""
 _END = "#EXT-X-ENDLIST\n"
 _ENTRY = re.compile(
     r"#EXTINF:[0-9.]+,p([0-9]{1,15})\+([0-9]{1,15})\n"

@@ -28,8 +28,8 @@ from typing import Annotated
 
 import msgspec
 
-from server.messaging.messages import UNREADABLE
-from server.system.clock_sync import clock_is_kept
+from server.messaging.messages import DECODE_ERRORS
+from server.system.clock_sync import is_clock_synchronized
 from server.system.private_files import write_private
 
 log = logging.getLogger(__name__)
@@ -69,7 +69,7 @@ class MachineClocks:
     """Seconds since the machine's boot: never jump."""
     boot: Callable[[], str] = _boot
     """While it is the same, the steady clock goes on."""
-    is_kept: Callable[[], bool] = lambda: clock_is_kept() is True
+    is_kept: Callable[[], bool] = lambda: is_clock_synchronized() is True
     """Whether somebody keeps the first one right."""
 
 
@@ -110,7 +110,7 @@ class AgeClock:
         machine, steady = self._machine, self._machine.steady()
         try:
             ledger = msgspec.json.decode(self._path.read_bytes(), type=Ledger)
-        except (OSError, *UNREADABLE):
+        except (OSError, *DECODE_ERRORS):
             self.id = uuid.uuid4().hex
             self._seconds, self._at, self._origin, self.anchored = 0.0, steady, None, 0.0
             return

@@ -8,7 +8,7 @@ import re
 from collections.abc import Collection
 from pathlib import Path
 
-from server.messaging.messages import UNREADABLE
+from server.messaging.messages import DECODE_ERRORS
 from server.service.recording.recording_age import AgeClock
 from server.service.recording.recording_session import HEAD, Run
 from server.service.recording.session_files import MISSING, clear, has_media
@@ -35,7 +35,7 @@ def find_runs(folder: Path, known: Collection[Path], longest_s: float) -> list[R
         except MISSING:
             _tidy(inside)
             continue
-        except UNREADABLE:
+        except DECODE_ERRORS:
             continue  # not written by us, or not to its end: nothing that could be played
         except OSError as error:
             if _RUN_NAME.fullmatch(inside.name):

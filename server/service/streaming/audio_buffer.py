@@ -6,7 +6,7 @@ from collections import OrderedDict
 
 from server.media.audio.audio_chunk import Heard
 from server.media.audio.audio_format import SoundFormat
-from server.messaging.messages import SoundHead
+from server.messaging.messages import AudioHeader
 from server.service.streaming.timeline import LONGEST_S
 
 _PATIENCE_S = 0.5
@@ -25,7 +25,7 @@ class SoundShelf:
         self._frames: OrderedDict[int, bytes] = OrderedDict()
         self._silence = form.silence
 
-    def put(self, head: SoundHead, payload: bytes) -> None:
+    def put(self, head: AudioHeader, payload: bytes) -> None:
         """Shelve consecutive frames.
 
         Raises:

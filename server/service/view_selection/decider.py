@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bestview import NO_CAMERA, Merge, Split, choose_by_gops
-from server.config.sections import TUNED, View
+from server.config.sections import LIVE_VIEW_SETTINGS, ViewSettings
 from server.config.site_config import Config
 from server.messaging.messages import NumberedBox
 from server.service.identity.people import People
@@ -101,26 +101,26 @@ class Decider:
         self._next_gop: int | None = None
 
     @property
-    def view(self) -> View:
+    def view(self) -> ViewSettings:
         """What the choices are made by now."""
         return self._config.view
 
-    def choose_by(self, view: View) -> None:
-        """Choose by other settings from the next GOP on; those that `TUNED` does not name stay as they are.
+    def choose_by(self, view: ViewSettings) -> None:
+        """Apply other settings from the next GOP on, as far as `LIVE_VIEW_SETTINGS` names them.
 
         A longer look-ahead is waited for first; with a shorter one there is more to decide, which is done
         little by little: who watches is not to be overrun. Either way every GOP is decided once, in order.
 
         What is decided then cannot be had again from the recordings and the configuration alone.
         """
-        kept = self._config.view.model_copy(update={name: getattr(view, name) for name in TUNED})
+        kept = self._config.view.model_copy(update={name: getattr(view, name) for name in LIVE_VIEW_SETTINGS})
         anew = kept.quality != self._config.view.quality
         self._config = self._config.model_copy(update={"view": kept})
         self._take(kept)
         if anew:
             self._sight.weigh_anew(kept.quality)
 
-    def _take(self, view: View) -> None:
+    def _take(self, view: ViewSettings) -> None:
         fps = self._config.site.fps
         self.switch_cost = view.switch_cost_s * fps
         self.least_shot = -(-round(view.min_shot_s * fps) // self._config.encode.gop)

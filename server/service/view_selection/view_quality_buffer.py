@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from bestview.quality import Looks, Quality, QualitySettings, Seen, view_quality
 from server.config.site_config import Config
-from server.media.letterbox import Fit
+from server.media.letterbox import Letterbox
 from server.service.identity.camera_window import CameraWindow
 from server.service.ingest.window_history import History, Stretch
 
@@ -42,7 +42,7 @@ class Sight:
     """
 
     def __init__(
-        self, config: Config, homographies: Mapping[str, Floats | None], fits: Mapping[str, Fit]
+        self, config: Config, homographies: Mapping[str, Floats | None], fits: Mapping[str, Letterbox]
     ) -> None:
         self.settings: QualitySettings = config.view.quality
         self._size = (float(config.site.width), float(config.site.height))

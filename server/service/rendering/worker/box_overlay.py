@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from server.messaging.number_types import FARTHEST
+from server.messaging.number_types import COORDINATE_MAX
 
 CHOSEN = (80, 220, 80)
 """Blue, green, red."""
@@ -33,7 +33,7 @@ def draw_boxes(
     line = max(1, round(image.shape[0] / _LINE_AT))
     for number, *box in sorted(boxes, key=lambda it: (it[0] == chosen, it[0])):
         width, colour = (2 * line, CHOSEN) if number == chosen else (line, OTHER)
-        left, top, right, bottom = (round(edge) for edge in np.clip(box, -FARTHEST, FARTHEST))
+        left, top, right, bottom = (round(edge) for edge in np.clip(box, -COORDINATE_MAX, COORDINATE_MAX))
         cv2.rectangle(image, (left, top), (right - 1, bottom - 1), colour, width)
         _number(image, (left, top), str(number), colour)
 

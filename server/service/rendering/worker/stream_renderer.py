@@ -16,7 +16,7 @@ from av.video.frame import VideoFrame
 from server.camera.encoding.encoder import Encoder
 from server.media.color_conversion import bgr
 from server.media.rendering_messages import Canvas, Draw, Drawn, Jpeg, Unit, belongs
-from server.messaging.number_types import LAST_PULSE
+from server.messaging.number_types import PULSE_MAX
 from server.service.rendering.worker.box_overlay import Image, draw_boxes
 from server.service.rendering.worker.mp4_demuxer import frames
 from server.service.rendering.worker.webm_demuxer import webm_frames
@@ -87,7 +87,7 @@ class Studio:
     def _paintings(self, request: Draw) -> Iterator[Painting]:
         unpack = webm_frames if self._canvas.codec == "vp8" else frames
         for unit in unpack(request.fragments, self._canvas.fps):
-            good = bool(unit.data) and unit.pulse <= LAST_PULSE  # no data would mean the end
+            good = bool(unit.data) and unit.pulse <= PULSE_MAX  # no data would mean the end
             self._whole = (self._whole or unit.key) and good
             if not self._whole:
                 continue
