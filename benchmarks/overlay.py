@@ -22,10 +22,10 @@ from server.config.sections import EncodeSettings, SiteSettings
 from server.media.containers.fmp4 import Sample, fragment
 from server.media.h264.annexb import nal_units, sample
 from server.media.rendering_messages import Canvas
-from server.service.rendering.decided_boxes import Told, first_pulse
-from server.service.rendering.jpeg_series import Series
-from server.service.rendering.stream_source import Source
-from server.service.streaming.broadcaster import Channel, Chunk, Viewer
+from server.service.rendering.decided_boxes import GopOverlay, first_pulse
+from server.service.rendering.mjpeg_streams import MjpegVariant
+from server.service.rendering.rendered_stream import RenderedStream
+from server.service.streaming.broadcaster import Broadcaster, BytesChunk, Subscriber
 from synthetic import Scene
 
 _MS = 1e3
@@ -44,7 +44,7 @@ class Wish:
 
     name: str
     films: int = 0
-    series: Sequence[Series] = ()
+    series: Sequence[MjpegVariant] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,25 +87,25 @@ class Stage:
             jpeg_quality=80,
         )
 
-    def next_gop(self) -> Chunk:
+    def next_gop(self) -> BytesChunk:
         """Encode the next GOP."""
         data = b""
         for pulse in range(self._pulse, self._pulse + self.gop):
             unit = self._encoder.encode(pulse, self._images[pulse % _DRAWN])
             data += fragment([Sample(sample(nal_units(unit.data)), unit.key)], pulse, self.site.fps)
         self._pulse += self.gop
-        return Chunk(data, start=True)
+        return BytesChunk(data, start=True)
 
-    def told(self, fragments: bytes) -> Told:
+    def told(self, fragments: bytes) -> GopOverlay:
         """Give the boxes of a GOP."""
         first = first_pulse(fragments, self.site.fps)
-        return Told(first, [self._boxes[pulse % _DRAWN] for pulse in range(first, first + self.gop)], 1)
+        return GopOverlay(first, [self._boxes[pulse % _DRAWN] for pulse in range(first, first + self.gop)], 1)
 
 
 async def measure(stage: Stage, wish: Wish, gops: int) -> Cost:
     """Let a process draw; every GOP is given when the one before is done."""
-    stream = Channel()
-    source = Source("the room", stream, stage.told, stage.canvas, live=True, queue_gops=8)
+    stream = Broadcaster()
+    source = RenderedStream("the room", stream, stage.told, stage.canvas, live=True, queue_gops=8)
     source.use()
     source.film.wanted = wish.films
     viewers = [source.film.channel.join() for _ in range(wish.films)]
@@ -135,12 +135,12 @@ async def measure(stage: Stage, wish: Wish, gops: int) -> Cost:
     return cost
 
 
-async def _read(viewer: Viewer) -> None:
+async def _read(viewer: Subscriber) -> None:
     async for data in viewer:
         del data
 
 
-def _last(stage: Stage, chunk: Chunk) -> int:
+def _last(stage: Stage, chunk: BytesChunk) -> int:
     return first_pulse(chunk.data, stage.site.fps) + stage.gop - 1
 
 
@@ -157,7 +157,7 @@ def _resident_megabytes(pid: int) -> float:
 
 def wishes(fps: float) -> list[Wish]:
     """List what is measured."""
-    plain, boxed = Series(fps, boxed=False), Series(fps, boxed=True)
+    plain, boxed = MjpegVariant(fps, boxed=False), MjpegVariant(fps, boxed=True)
     return [
         Wish("decoded only, for stills"),
         Wish("boxes burnt in, one viewer", 1),
@@ -165,7 +165,7 @@ def wishes(fps: float) -> list[Wish]:
         Wish("JPEG, one viewer", 0, [plain]),
         Wish(f"JPEG, {_MANY} viewers", 0, [plain] * _MANY),
         Wish("JPEG with boxes, one viewer", 0, [boxed]),
-        Wish("JPEG, 5 a second", 0, [Series(5.0, boxed=False)]),
+        Wish("JPEG, 5 a second", 0, [MjpegVariant(5.0, boxed=False)]),
         Wish("all of these at once", _MANY, [plain] * _MANY + [boxed] * _MANY),
     ]
 

@@ -30,7 +30,7 @@ from server.camera.encoding.encoder import AccessUnit
 from server.media.containers.fmp4 import Sample, fragment, ticks
 from server.media.containers.mpegts import Counters
 from server.media.picture import Picture
-from server.service.streaming.media_chunk import Footage
+from server.service.streaming.media_chunk import MediaChunk
 
 GOP = 10
 Films = Sequence[Sequence[AccessUnit]]
@@ -74,7 +74,7 @@ def test_the_delay_is_the_same_to_the_end_and_the_times_are_the_pulses(films: Fi
 def test_the_times_of_a_piece_are_read_from_both_forms(pulse: int) -> None:
     made = fragment([Sample(b"\x00\x00\x17\x70" + b"\x65" * 6000, key=True)], pulse, 25)
     at = ticks(pulse, 25)
-    piece = Footage([Picture(pulse, key=True, fragment=made, boot=1)], 25, Counters())
+    piece = MediaChunk([Picture(pulse, key=True, fragment=made, boot=1)], 25, Counters())
     assert times(piece) == (at, at % 2**33)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from server.config.sections import FlagSettings
-from server.service.operator_assist.flag_budget import Budget
+from server.service.operator_assist.flag_budget import FlagBudget
 from tracking.interactive import RiskEvent
 
 _MOST = 1000
@@ -16,7 +16,7 @@ class Desk:
     """Raises flags. The clips follow each other as if they were one recording."""
 
     def __init__(self, settings: FlagSettings, fps: float) -> None:
-        self._budget = Budget(settings, fps)
+        self._budget = FlagBudget(settings, fps)
         self._same = settings.answer_s * fps
         self._began = self._last = 0
         self._raised: dict[frozenset[int], int] = {}

@@ -17,7 +17,7 @@ from server.cli.evaluate.choices_file import Choice, read_choices
 from server.config.site_config import Config
 from server.messaging.epochs import closing_epoch
 from server.messaging.messages import Box, CameraTracks, TrackMessage
-from server.service.decision_files.recorder import Recorder
+from server.service.decision_files.decision_writer import DecisionWriter
 from server.service.ingest.epoch_aligner import Aligner
 from server.service.view_selection.decider import Decider, homographies
 from tracking.boxes import Floats
@@ -63,7 +63,7 @@ def decide(config: Config, messages: Messages, people: Sequence[int] | None = No
         aligner.frame(camera, messages[camera][0].boot, 0)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        recorder = Recorder(folder, config.camera_ids, decider.people.fits)
+        recorder = DecisionWriter(folder, config.camera_ids, decider.people.fits)
         for message in chain.from_iterable(zip_longest(*messages.values())):
             if message is not None:
                 aligner.tracks(message)

@@ -28,9 +28,8 @@ from server.cli.evaluate.track_scores import evaluate_recordings, read_recording
 from server.cli.generated_config import config_for_videos
 from server.cli.render.renderer import render
 from server.cli.track.command import track_one
-from server.service.calibration.floor_plan import plan_of, plot_plan
-from server.service.calibration.ground_file import ground_file
-from server.service.calibration.walk_comparison import walk_settings
+from server.service.calibration.calibration_report import ground_file_text, walk_settings
+from server.service.calibration.floor_plan import floor_plan_cameras, plot_floor_plan
 from synthetic import Scene, write_recording
 from tracking.motchallenge import write_rows
 
@@ -115,7 +114,7 @@ def terrace_rows(report: Report, data: Path, folder: Path, out: Path) -> None:
     found = calibrate_walks(walked.walks, walk_settings(walked.fps, _SHIFT_S), _PERSON)
     _plot(found, out / "calibration_terrace.png")
     ours = folder / "terrace.json"
-    ours.write_text(ground_file("m", {it.camera: it.homography for it in found.cameras}))
+    ours.write_text(ground_file_text("m", {it.camera: it.homography for it in found.cameras}))
     assert views.ground is not None  # noqa: S101 — the recording has one
     rows: list[list[str]] = []
     for name, ground in (("published", views.ground), ("from its own tracks", ours)):
@@ -157,7 +156,7 @@ def auditorium_rows(report: Report, data: Path, folder: Path, out: Path) -> None
     found = calibrate_walks(walked.walks, walk_settings(walked.fps, 0.0), _PERSON)
     _plot(found, out / "calibration_auditorium.png")
     ground = folder / "auditorium.json"
-    ground.write_text(ground_file("m", {it.camera: it.homography for it in found.cameras}))
+    ground.write_text(ground_file_text("m", {it.camera: it.homography for it in found.cameras}))
     rows = [
         [f"{one}, {other}", *_cells(seen)]
         for (one, other), seen in agreement(ground, source / "gt", size).items()
@@ -177,7 +176,7 @@ def _cells(seen: Agreement) -> Sequence[str]:
 
 def _plot(found: WalkCalibration, path: Path) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
-    plot_plan(plan_of(found), "m", path)
+    plot_floor_plan(floor_plan_cameras(found), "m", path)
 
 
 def main() -> None:

@@ -21,8 +21,8 @@ from server.cli.calibrate import calibration
 from server.cli.calibrate.points_file import COLUMNS, read_points
 from server.config.loader import build_config, resolve_paths
 from server.service.calibration import floor_plan
-from server.service.calibration.floor_map import covered
-from server.service.calibration.floor_plan import PlanView
+from server.service.calibration.floor_map import floor_coverage
+from server.service.calibration.floor_plan import FloorPlanCamera
 from server.system.errors import UserError
 
 WORDS = (
@@ -79,7 +79,7 @@ class _Files(Target):
         """Read ground.json as a site does, and lay its floor out."""
         for camera in resolve_paths(self._site, where="site", folder=self._path).cameras:
             if camera.ground is not None:
-                covered(np.array(camera.ground, dtype=np.float64), (640, 360), (640, 360))
+                floor_coverage(np.array(camera.ground, dtype=np.float64), (640, 360), (640, 360))
 
     def written(self, data: bytes) -> Path:
         """Write a file of points, named by what it looks like."""
@@ -149,7 +149,7 @@ class Plans(_Files):
         return True
 
 
-def _laid_out(views: Sequence[PlanView], unit: str, _: object) -> None:
+def _laid_out(views: Sequence[FloorPlanCamera], unit: str, _: object) -> None:
     """Lay out what is to be drawn, and see that no word of it would be read as a formula."""
     for view in views:
         floor_plan._area(view)

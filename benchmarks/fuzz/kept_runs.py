@@ -14,12 +14,24 @@ from benchmarks.fuzz.media_made import WORDS as MEDIA
 from benchmarks.fuzz.mutate import as_json, damaged, otherwise
 from benchmarks.fuzz.site import CAMERAS, Fed, feed_epoch, site
 from benchmarks.fuzz.target import Scripts, folder
-from server.service.recording.available_range import kept_from, kept_until, known, shown
-from server.service.recording.decision_log import told
-from server.service.recording.playback import CameraPast, ObjectPast, Source, last_before, play, sounds
-from server.service.recording.recorder import Past
-from server.service.recording.recording_session import HEAD
-from server.service.recording.retention import Bounds, Retention
+from server.service.recording.recorder import Recorder
+from server.service.recording.recording_session import INFO_FILE
+from server.service.recording.retention import RetentionLimits, RetentionPolicy
+from server.service.time_shift.availability import (
+    available_camera_ranges,
+    available_ranges,
+    end_of_available,
+    first_available,
+)
+from server.service.time_shift.decision_log import read_decision_lines
+from server.service.time_shift.playback import (
+    CameraPlayback,
+    PersonPlayback,
+    PlaybackSource,
+    last_gop_before,
+    play_gops,
+    recorded_audio,
+)
 
 WORDS = (
     b"\n", b"\x00", b"\xff", b"..", b"../../../precious", b"/", b"9" * 15, b"99999999999", b"-1", b"0",
@@ -57,7 +69,7 @@ class Runs(Scripts):
             "clock": "",
             "clock0": 1.0,
         }  # inputs are the same in every run
-        self._right[HEAD] = as_json({**msgspec.json.decode(self._right[HEAD]), **when})
+        self._right[INFO_FILE] = as_json({**msgspec.json.decode(self._right[INFO_FILE]), **when})
         self._kinds = {it.suffix: [name for name in self._right if name.endswith(it.suffix)] for it in files}
         self._restore()
 
@@ -97,7 +109,7 @@ class Runs(Scripts):
             self.messages += 1
             (self._run / name).write_bytes(content)
         service = self._service
-        past = Past(self._config, service.shelves, service.agreement, 10, service.sound)
+        past = Recorder(self._config, service.shelves, service.agreement, 10, service.sound)
         past.pulse0 = _PULSE0
         store = past.store
         assert store is not None
@@ -111,8 +123,11 @@ class Runs(Scripts):
                 asked = bool(self._loop.run_until_complete(self._asked(past, lot // _DROPS_EVERY)))
             if drops:
                 size = sum(run.size for run in (*store.earlier, *([store.run] if store.run else [])))
-                for bounds in (Bounds(_LONG_S, (size - 1) * 8 / 7 / 1e6, 60.0), Bounds(-_LONG_S, 1e6, 60.0)):
-                    store._retention = Retention(
+                for bounds in (
+                    RetentionLimits(_LONG_S, (size - 1) * 8 / 7 / 1e6, 60.0),
+                    RetentionLimits(-_LONG_S, 1e6, 60.0),
+                ):
+                    store._retention = RetentionPolicy(
                         bounds, lambda: store._clock.now
                     )  # the oldest segment goes, then all
                     store._retain()
@@ -127,26 +142,26 @@ class Runs(Scripts):
         return found and asked
 
     @staticmethod
-    async def _asked(past: Past, lot: int) -> int:
+    async def _asked(past: Recorder, lot: int) -> int:
         """Ask what is told of all; play one camera and one person: to play everybody takes twice as long."""
         assert past.run is not None
-        lines = [it async for it in told(past, 0, _FAR)]
-        sources: tuple[Source, ...] = (
-            CameraPast(past, CAMERAS[lot % 2]),
-            ObjectPast(past, (1 + lot // 2 % 2,)),
+        lines = [it async for it in read_decision_lines(past, 0, _FAR)]
+        sources: tuple[PlaybackSource, ...] = (
+            CameraPlayback(past, CAMERAS[lot % 2]),
+            PersonPlayback(past, (1 + lot // 2 % 2,)),
         )
         for source in sources:
-            known(source, 0, _FAR)
-            shown(source)
-            kept_from(source, 3)
-            kept_until(source)
+            available_ranges(source, 0, _FAR)
+            available_camera_ranges(source)
+            first_available(source, 3)
+            end_of_available(source)
             count = 0
-            async for _ in play(source, 0):
+            async for _ in play_gops(source, 0):
                 count += 1
                 if count == _MOST_GOPS:
                     break
-            await last_before(source, 12)
-        sounds(past)
+            await last_gop_before(source, 12)
+        recorded_audio(past)
         return len(lines)
 
     def close(self) -> None:

@@ -11,10 +11,10 @@ from benchmarks.fuzz.site import FPS, HEIGHT, STRIDE, WIDTH
 from benchmarks.fuzz.target import Target, folder
 from server.media.audio.audio_format import SoundFormat
 from server.media.rendering_messages import Canvas, Draw
-from server.service.recording.audio_file import frames_in
-from server.service.recording.media_files import gops
-from server.service.recording.playlist_file import Playlist
-from server.service.rendering.worker.stream_renderer import Studio
+from server.service.recording.audio_file import read_audio_frames
+from server.service.recording.media_files import read_gops
+from server.service.recording.playlist_file import RecordingPlaylist
+from server.service.rendering.worker.stream_renderer import StreamRenderer
 
 _DRAWN = STRIDE + 1
 """Frames: a GOP, and the beginning of the next."""
@@ -48,7 +48,9 @@ class Drawing(Target):
         )
         boxes = [[(1, 2.0, 3.0, 20.0, 40.0)]] * _DRAWN
         film = zlib.crc32(data) % _FILMED_EVERY == 0
-        drawn = Studio(canvas).draw(Draw(fragments=data, boxes=boxes, film=film, boxed=[2.0], still="plain"))
+        drawn = StreamRenderer(canvas).draw(
+            Draw(fragments=data, boxes=boxes, film=film, boxed=[2.0], still="plain")
+        )
         return drawn.newest >= 0
 
 
@@ -75,12 +77,12 @@ class Kept(Target):
         """Find pictures and sound in it."""
         path = self._path / "0.mp4"
         path.write_bytes(data)
-        playlist = Playlist(path, "../cameras/", "init.mp4", FPS, 0.0, 60.0)
+        playlist = RecordingPlaylist(path, "../cameras/", "init.mp4", FPS, 0.0, 60.0)
         playlist.read()
         for stretch in playlist.tape.between(0, 100):
-            list(gops(path, stretch.offset, stretch.length, FPS, 5))
-        found = list(gops(path, 0, len(data), FPS, 5))
-        frames_in(path, 0, len(data), 0, 20, self._form)
+            list(read_gops(path, stretch.offset, stretch.length, FPS, 5))
+        found = list(read_gops(path, 0, len(data), FPS, 5))
+        read_audio_frames(path, 0, len(data), 0, 20, self._form)
         return bool(found)
 
     def close(self) -> None:

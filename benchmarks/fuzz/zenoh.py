@@ -43,9 +43,9 @@ from server.messaging.messages import FrameDetections
 from server.messaging.operator_messages import OPERATOR_POINTS_MAX, OperatorPoint, OperatorPoints
 from server.service.ingest.epoch_aligner import Aligner
 from server.service.ingest.ingest import Intake
-from server.service.streaming.audio_buffer import SoundShelf
-from server.service.streaming.frame_buffer import Shelf
-from server.service.streaming.media_chunk import Footage
+from server.service.streaming.audio_buffer import AudioBuffer
+from server.service.streaming.frame_buffer import FrameBuffer
+from server.service.streaming.media_chunk import MediaChunk
 
 _EPOCHS = 3
 """Two GOPs are decided, and one is looked ahead to."""
@@ -83,9 +83,9 @@ class Messages(Target):
     def feed(self, data: bytes) -> bool:
         """Take it in, and the epoch out that it may have made."""
         agreement = Agreement()
-        shelves = {camera: Shelf(FPS, 50, agreement) for camera in CAMERAS}
+        shelves = {camera: FrameBuffer(FPS, 50, agreement) for camera in CAMERAS}
         aligner = Aligner(CAMERAS, STRIDE, grace=5)
-        shelf = SoundShelf(self._form, FPS, 10.0)
+        shelf = AudioBuffer(self._form, FPS, 10.0)
         intake = Intake(shelves, aligner, lambda *_: None, shelf, sounding=CAMERAS[0])
         handlers = (intake.video, intake.tracks, intake.status, intake.thumbnail)
         for key, payload, head in _script.decode(data):
@@ -242,7 +242,7 @@ def ask(service: Fed) -> None:
 def drink(viewer: Any) -> None:
     """Take what waits for a viewer, in every form."""
     for piece in list(viewer._queue):
-        if isinstance(piece, Footage):
+        if isinstance(piece, MediaChunk):
             assert piece.data
             assert piece.ts
             assert piece.with_sound

@@ -18,7 +18,7 @@ from server.camera.encoding.encoder import Encoder
 from server.config.sections import EncodeSettings, SiteSettings
 from server.media.containers.fmp4 import init_segment, rebased, ticks
 from server.media.stream_format import Agreement
-from server.service.streaming.frame_buffer import Shelf
+from server.service.streaming.frame_buffer import FrameBuffer
 
 _PAGE = ROOT / "client" / "page"
 _WIDTH, _HEIGHT = 160, 96
@@ -72,7 +72,7 @@ class FastSite:
 
     def _loop(self, seed: int) -> list[bytes]:
         site, rng = SiteSettings(width=_WIDTH, height=_HEIGHT, fps=_FPS), np.random.default_rng(seed)
-        encoder, shelf = Encoder(site, EncodeSettings(gop=_GOP)), Shelf(_FPS, _LOOP, self._agreement)
+        encoder, shelf = Encoder(site, EncodeSettings(gop=_GOP)), FrameBuffer(_FPS, _LOOP, self._agreement)
         small = rng.integers(0, 255, (_LOOP, _HEIGHT // 16, _WIDTH // 16, 3), dtype=np.uint8)
         for pulse, picture in enumerate(small.repeat(16, axis=1).repeat(16, axis=2)):
             unit = encoder.encode(pulse, picture)

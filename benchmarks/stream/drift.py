@@ -17,8 +17,8 @@ from server.media.containers.fmp4 import ticks
 from server.messaging.inbox import Message
 from server.messaging.messages import FrameHeader, GopChoices, ZenohKeys
 from server.service.service import BestViewService
-from server.service.streaming.broadcaster import Piece
-from server.service.streaming.media_chunk import Footage
+from server.service.streaming.broadcaster import Chunk
+from server.service.streaming.media_chunk import MediaChunk
 
 _PER_CAMERA = 2
 """People in a camera's view, on average: few, so that an hour passes in minutes."""
@@ -104,9 +104,9 @@ async def drift(films: Sequence[Sequence[AccessUnit]], pulses: int) -> Drift:
     return Drift(pulses, len(delays), min(delays), max(delays), off, tuple(costs))
 
 
-def times(piece: Piece) -> tuple[int, int]:
+def times(piece: Chunk) -> tuple[int, int]:
     """Read when a piece is shown, 1/90000 s: as MP4 says it, and as the transport stream does."""
-    assert isinstance(piece, Footage)  # noqa: S101 — streams are made of nothing else
+    assert isinstance(piece, MediaChunk)  # noqa: S101 — streams are made of nothing else
     at = piece.data.index(b"tfdt") + len(b"tfdt") + 4
     stamp = piece.ts.index(_VIDEO) + _PTS_AT
     first, middle, last = piece.ts[stamp], piece.ts[stamp + 1 : stamp + 3], piece.ts[stamp + 3 : stamp + 5]

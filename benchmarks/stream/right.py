@@ -15,8 +15,8 @@ from benchmarks.stream.splice import Cut
 from server.camera.encoding.encoder import AccessUnit, Encoder
 from server.config.sections import CameraSettings, EncodeSettings, SiteSettings
 from server.config.site_config import Config
-from server.service.streaming.broadcaster import Piece
-from server.service.streaming.media_chunk import Footage
+from server.service.streaming.broadcaster import Chunk
+from server.service.streaming.media_chunk import MediaChunk
 
 _SITE = SiteSettings(name="right", width=64, height=48, fps=25)
 _ENCODE = EncodeSettings()
@@ -80,7 +80,7 @@ async def judge(frames: int, cuts: int, *, seed: int = 0, encode: EncodeSettings
     assert head is not None  # noqa: S101 — key pictures have come
     contained = head + b"".join(piece.data for piece in pieces)
     has_ts = cut.agreement.container == "mp4"
-    ts = b"".join(piece.ts for piece in pieces if isinstance(piece, Footage)) if has_ts else b""
+    ts = b"".join(piece.ts for piece in pieces if isinstance(piece, MediaChunk)) if has_ts else b""
     expected = [
         own[camera][gop * encode.gop + n] for gop, camera in enumerate(chosen) for n in range(encode.gop)
     ]
@@ -95,12 +95,12 @@ async def judge(frames: int, cuts: int, *, seed: int = 0, encode: EncodeSettings
 
 async def _watch(
     made: Sequence[Sequence[AccessUnit]], chosen: Sequence[int], encode: EncodeSettings
-) -> tuple[list[Piece], Cut]:
+) -> tuple[list[Chunk], Cut]:
     """Give what one viewer of one object is sent, from the first GOP to the last."""
     names = [f"c{number}" for number in range(_CAMERAS)]
     cameras = [CameraSettings(id=name, source="rtsp://nowhere/") for name in names]
     cut = Cut(made, Config(site=_SITE, encode=encode, cameras=cameras))
-    pieces: list[Piece] = []
+    pieces: list[Chunk] = []
     viewer = None
     for gop, camera in enumerate(chosen):
         cut.shelve(gop)

@@ -17,8 +17,8 @@ from server.camera.encoding.encoder import AccessUnit, Encoder
 from server.config.sections import CameraSettings
 from server.config.site_config import Config
 from server.media.codec import agreement_for
-from server.service.streaming.broadcaster import Piece
-from server.service.streaming.frame_buffer import Shelf
+from server.service.streaming.broadcaster import Chunk
+from server.service.streaming.frame_buffer import FrameBuffer
 from server.service.streaming.splicer import Splicer
 from server.service.view_selection.decider import GopDecision, ObjectChoice
 from server.service.view_selection.explanation import Why
@@ -34,7 +34,9 @@ class Cut:
     def __init__(self, films: Sequence[Sequence[AccessUnit]], config: Config) -> None:
         self._films, self.gop = films, config.encode.gop
         self.agreement = agreement = agreement_for(config)
-        self._shelves = {name: Shelf(config.site.fps, 4 * self.gop, agreement) for name in config.camera_ids}
+        self._shelves = {
+            name: FrameBuffer(config.site.fps, 4 * self.gop, agreement) for name in config.camera_ids
+        }
         self.splicer = Splicer(self._shelves, agreement, config)
 
     def shelve(self, gop: int) -> None:
@@ -77,7 +79,7 @@ async def splice(films: Sequence[Sequence[AccessUnit]], objects: int, gops: int)
     """Splice with a viewer for every object, who takes the bytes as they come."""
     cut, rng = Cut(films, cif_config()), np.random.default_rng(0)
     shelved, decided = [], []
-    viewers: list[AsyncIterator[Piece]] = []
+    viewers: list[AsyncIterator[Chunk]] = []
     for gop in range(gops + 1):
         decision = cut.decide(gop, rng.integers(0, CAMERAS, objects).tolist())
         began = time.process_time()

@@ -40,7 +40,7 @@ from server.http.streams import jpeg, time_shift, video
 from server.http.streams.container_check import refuse_other_containers
 from server.http.streams.sending import break_off
 from server.http.tls import Certificate
-from server.service.rendering.renderer import Pictures
+from server.service.rendering.render_pool import RenderPool
 from server.service.service import BestViewService
 from server.system.descriptors import FOR_OPERATORS, connection_limit, descriptor_limit
 from server.system.errors import UserError
@@ -109,7 +109,7 @@ def make_app(
         ],
         client_max_size=_ASKED_BYTES,
     )
-    app[SERVICE], app[EVENTS], app[PICTURES] = service, Events(service), Pictures(service)
+    app[SERVICE], app[EVENTS], app[PICTURES] = service, Events(service), RenderPool(service)
     app[ON_DISK], app[_MISTAKES] = on_disk, Spell()
     app[openapi.DESCRIBED] = openapi.Described(app)
     app[WATCHING], app[LISTENING] = Shares(), Shares()

@@ -10,12 +10,12 @@ from prometheus_client import CollectorRegistry
 from server.config.running_config import ConfigFileState
 from server.http.api.events import Events
 from server.http.hls.sessions import Readers
-from server.service.rendering.renderer import Pictures
+from server.service.rendering.render_pool import RenderPool
 from server.service.service import BestViewService
 
 SERVICE = web.AppKey("service", BestViewService)
 EVENTS = web.AppKey("events", Events)
 READERS = web.AppKey("readers", Readers)
-PICTURES = web.AppKey("pictures", Pictures)
+PICTURES = web.AppKey("pictures", RenderPool)
 ON_DISK: web.AppKey[Callable[[], ConfigFileState]] = web.AppKey("on disk")
 METRICS = web.AppKey("metrics", CollectorRegistry)

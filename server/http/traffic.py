@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from aiohttp import web
 
-from server.service.streaming.broadcaster import Viewer
+from server.service.streaming.broadcaster import Subscriber
 
 
 class Sent:
@@ -17,15 +17,15 @@ class Sent:
 
     def __init__(self) -> None:
         self.streams = self.answers = 0
-        self._viewers: set[Viewer] = set()
+        self._viewers: set[Subscriber] = set()
         self._lost = 0
         """GOPs of viewers who have gone."""
 
-    def join(self, viewer: Viewer) -> None:
+    def join(self, viewer: Subscriber) -> None:
         """Look at a viewer from now on; call :meth:`leave` in the end."""
         self._viewers.add(viewer)
 
-    def leave(self, viewer: Viewer) -> None:
+    def leave(self, viewer: Subscriber) -> None:
         """Keep what a viewer has lost."""
         self._viewers.discard(viewer)
         self._lost += viewer.lost

@@ -21,8 +21,8 @@ from server.messaging.bus import Bus
 from server.messaging.bus_access import access_control_of
 from server.messaging.inbox import Inbox, Message
 from server.messaging.messages import GopChoices, ZenohKeys, pulse_client
-from server.service.calibration.walk_session import Walking
-from server.service.decision_files.live_recorder import LiveRecorder
+from server.service.calibration.walk_session import WalkSession
+from server.service.decision_files.live_decision_writer import LiveDecisionWriter
 from server.service.decision_state import Board
 from server.service.identity.state_replication import PATIENCE_S, Remembering
 from server.service.ingest.backlog import KeepingUp
@@ -30,10 +30,10 @@ from server.service.ingest.epoch_aligner import Aligner, Epoch
 from server.service.ingest.ingest import Intake
 from server.service.ingest.loss_recorder import Lacking
 from server.service.metrics.stage_timers import Stages
-from server.service.operator_assist.assist import Assist
-from server.service.recording.recorder import Past
-from server.service.streaming.audio_buffer import SoundShelf
-from server.service.streaming.frame_buffer import Shelf
+from server.service.operator_assist.operator_assist import OperatorAssist
+from server.service.recording.recorder import Recorder
+from server.service.streaming.audio_buffer import AudioBuffer
+from server.service.streaming.frame_buffer import FrameBuffer
 from server.service.streaming.splicer import Splicer
 from server.service.view_selection.decider import Decider, GopDecision, homographies
 from server.system.errors import UserError
@@ -62,11 +62,11 @@ class BestViewService:
         self.most_lookahead = (frames - behind) // 2 - grace - stride
         """Frames that can be looked ahead while this runs: half as many as what is kept could do for."""
         self.agreement = agreement_for(config)
-        self.shelves = {camera: Shelf(config.site.fps, frames, self.agreement) for camera in cameras}
+        self.shelves = {camera: FrameBuffer(config.site.fps, frames, self.agreement) for camera in cameras}
         far = round(_FAR_S * fps)
         self.aligner = Aligner(cameras, stride, grace, behind, far + grace + behind)
         form = config.sound.format
-        self.sound = None if form is None else SoundShelf(form, config.site.fps, frames / config.site.fps)
+        self.sound = None if form is None else AudioBuffer(form, config.site.fps, frames / config.site.fps)
         self._keeping_up = KeepingUp(frames - config.view.lookahead - config.encode.gop)
         self.left_out = 0
         """Epochs that were not decided, since there was more to decide than could be."""
@@ -85,7 +85,7 @@ class BestViewService:
             config, homographies(config), lambda camera, pulse: self.shelves[camera].has(pulse)
         )
         self.board = Board(config.site.fps)
-        self.assist = Assist(config, self.decider.people, partial(self._tell_camera, "pointing"))
+        self.assist = OperatorAssist(config, self.decider.people, partial(self._tell_camera, "pointing"))
         self.remembering = Remembering(
             self.decider.people,
             cameras,
@@ -93,8 +93,8 @@ class BestViewService:
             partial(self._tell_camera, "remember"),
             tells=config.view.share.index == 0,
         )
-        self.walking = Walking(config)
-        self.past = Past(config, self.shelves, self.agreement, frames, self.sound)
+        self.walking = WalkSession(config)
+        self.past = Recorder(config, self.shelves, self.agreement, frames, self.sound)
         self.pulse = -1
         self._decided_to = -1
         """The last pulse of the last epoch; a frame that is said to be of a later one shows nobody."""
@@ -109,7 +109,7 @@ class BestViewService:
         """Where the bus's messages wait for the event loop."""
         self.on_decision: list[Callable[[GopChoices], None]] = []
         self._out = out
-        self._recorder: LiveRecorder | None = None
+        self._recorder: LiveDecisionWriter | None = None
         self._bus: Bus | None = None
         self.pulse_login: Login | None = None  # of whom the pulse server asks for none
         self._keys = ZenohKeys(config.site.name)
@@ -216,9 +216,9 @@ class BestViewService:
             self._step(epoch)
         return epoch is not None
 
-    def _record(self, out: Path) -> LiveRecorder:
+    def _record(self, out: Path) -> LiveDecisionWriter:
         try:
-            return LiveRecorder(out, self.config.camera_ids, self.decider.people.fits)
+            return LiveDecisionWriter(out, self.config.camera_ids, self.decider.people.fits)
         except OSError as error:
             raise UserError(f"{out}: cannot write there: {error.strerror}") from error
 

@@ -28,11 +28,11 @@ from server.media.h264.annexb import ParameterSets, nal_units, parameter_sets
 from server.media.h264.repeat_picture import UnfitError, continuing
 from server.media.stream_format import Agreement
 from server.messaging.inbox import Message
-from server.service.recording.audio_file import frames_in
-from server.service.recording.playlist_file import Playlist
-from server.service.recording.recording_session import Headers, Run, RunHead
-from server.service.recording.retention import Bounds
-from server.service.recording.store import Store
+from server.service.recording.audio_file import read_audio_frames
+from server.service.recording.playlist_file import RecordingPlaylist
+from server.service.recording.recording_folder import RecordingFolder
+from server.service.recording.recording_session import InitSegments, RecordingSession, SessionInfo
+from server.service.recording.retention import RetentionLimits
 from server.system.errors import UserError
 
 CAMERA = {"id": "c0", "source": "scene:room"}
@@ -193,7 +193,7 @@ def test_parameter_sets_that_no_file_can_hold_are_none() -> None:
 def test_a_playlist_that_names_no_place_in_a_file_is_passed_over(tmp_path: Path) -> None:
     path = tmp_path / "c0.m3u8"
     path.write_text(f"#EXTINF:1,p0+5\n#EXT-X-BYTERANGE:4@{'9' * 30}\n../cameras/c0/0.mp4\n")
-    playlist = Playlist(path, "", "", 25.0, None, 60.0)
+    playlist = RecordingPlaylist(path, "", "", 25.0, None, 60.0)
     playlist.read()
     assert playlist.tape.all == ()
 
@@ -203,16 +203,16 @@ def test_a_recorded_run_whose_cameras_no_site_has_is_left_alone(tmp_path: Path, 
     precious = tmp_path / "precious" / "000000000000.mp4"
     precious.parent.mkdir()
     precious.write_bytes(b"nobody's")
-    head = RunHead(
+    head = SessionInfo(
         site="hall", fps=25.0, width=64, height=48, codec="avc1", cameras=["c0"], began=0.0, pulse0=0.0
     )
     run = tmp_path / "kept" / "20260101T000000Z"
     run.parent.mkdir()
-    Run.begin(run, head, Headers(b""), 60.0)
+    RecordingSession.begin(run, head, InitSegments(b""), 60.0)
     (run / "index" / "000000000000.jsonl").write_bytes(b"")
     told = json.loads((run / "run.json").read_bytes())
     (run / "run.json").write_text(json.dumps({**told, "cameras": ["c0", camera]}))
-    store = Store(tmp_path / "kept", Bounds(-1e9, 1.0, 60.0))
+    store = RecordingFolder(tmp_path / "kept", RetentionLimits(-1e9, 1.0, 60.0))
     store.open()
     store.close()
     assert store.earlier == []
@@ -223,7 +223,7 @@ def test_a_recorded_run_whose_cameras_no_site_has_is_left_alone(tmp_path: Path, 
 def test_a_playlist_that_leads_to_no_camera_is_passed_over(tmp_path: Path, camera: str) -> None:
     path = tmp_path / "1.m3u8"
     path.write_text(f"#EXTINF:1,p0+5\n#EXT-X-BYTERANGE:4@0\n../cameras/{camera}/000000000000.mp4\n")
-    playlist = Playlist(path, "", "", 25.0, None, 60.0)
+    playlist = RecordingPlaylist(path, "", "", 25.0, None, 60.0)
     playlist.read()
     assert playlist.tape.all == ()
 
@@ -231,7 +231,7 @@ def test_a_playlist_that_leads_to_no_camera_is_passed_over(tmp_path: Path, camer
 def test_a_playlist_of_a_time_that_no_calendar_has_is_written_without_it(tmp_path: Path) -> None:
     path = tmp_path / "1.m3u8"
     path.write_text(f"#EXTINF:1,p{'9' * 15}+5\n#EXT-X-BYTERANGE:4@0\n../cameras/c0/000000000000.mp4\n")
-    playlist = Playlist(path, "../cameras/", "", 0.001, 1.7e9, 60.0)
+    playlist = RecordingPlaylist(path, "../cameras/", "", 0.001, 1.7e9, 60.0)
     playlist.read()
     playlist.tidy()
     assert f"p{'9' * 15}+5" in path.read_text()
@@ -257,10 +257,10 @@ def test_recorded_sound_that_says_it_is_longer_than_its_file_is_passed_over(tmp_
     form, path = SoundFormat(48_000, 2), tmp_path / "0.mp4"
     right = sound_fragment(form, [form.silence] * 3, 0)
     path.write_bytes(right)
-    assert len(frames_in(path, 0, len(right), 0, 9, form)) == 3
+    assert len(read_audio_frames(path, 0, len(right), 0, 9, form)) == 3
     at = right.index(b"trun") + 16
     path.write_bytes(right[:at] + b"\xff" * 4 + right[at + 4 :])
-    assert frames_in(path, 0, len(right), 0, 9, form) == {}
+    assert read_audio_frames(path, 0, len(right), 0, 9, form) == {}
 
 
 def test_a_cluster_whose_time_is_no_number_has_none() -> None:

@@ -15,17 +15,17 @@ from numpy.typing import NDArray
 from server.media.containers.fmp4 import init_segment
 from server.media.stream_format import Agreement
 from server.messaging.messages import GopChoices
-from server.service.recording.media_files import Gop, _fragments
-from server.service.recording.recording_age import MachineClocks
-from server.service.recording.recording_session import Headers, RunHead
-from server.service.recording.retention import Bounds
-from server.service.recording.store import Piece, Store
-from server.service.streaming.frame_buffer import Shelf
+from server.service.recording.age_clock import MachineClocks
+from server.service.recording.media_files import RecordedGop, _fragments
+from server.service.recording.recording_folder import GopRecord, RecordingFolder
+from server.service.recording.recording_session import InitSegments, SessionInfo
+from server.service.recording.retention import RetentionLimits
+from server.service.streaming.frame_buffer import FrameBuffer
 
 A, B = CAMERAS
 FRAMES = 200
 PULSE0 = 1_763_700_000.0
-AMPLE = Bounds(keep_s=1e6, most_mb=1e6, segment_s=1.0)
+AMPLE = RetentionLimits(keep_s=1e6, most_mb=1e6, segment_s=1.0)
 """Nothing is taken away; five GOPs in a segment."""
 
 Picture = NDArray[np.uint8]
@@ -64,10 +64,10 @@ class ClocksByHand:
 
 
 @cache
-def filled() -> tuple[dict[str, Shelf], bytes]:
+def filled() -> tuple[dict[str, FrameBuffer], bytes]:
     """Give a shelf per camera with all its frames, and what every file begins with."""
     agreement = Agreement()
-    shelves = {camera: Shelf(FPS, FRAMES, agreement) for camera in CAMERAS}
+    shelves = {camera: FrameBuffer(FPS, FRAMES, agreement) for camera in CAMERAS}
     for seed, camera in enumerate(CAMERAS):
         for unit in encoded(seed, FRAMES):
             shelves[camera].put(unit.pulse, 1, unit.data, key=unit.key)
@@ -85,8 +85,8 @@ def own_pictures(camera: str) -> list[Picture]:
     ]
 
 
-def head(began: float = PULSE0, numbers_since: float | None = None) -> RunHead:
-    return RunHead(
+def head(began: float = PULSE0, numbers_since: float | None = None) -> SessionInfo:
+    return SessionInfo(
         site="hall",
         fps=FPS,
         width=WIDTH,
@@ -101,22 +101,24 @@ def head(began: float = PULSE0, numbers_since: float | None = None) -> RunHead:
 
 def piece(
     gop: int, choices: Mapping[int, str], cameras: tuple[str, ...] = CAMERAS, frames: int = GOP
-) -> Piece:
+) -> GopRecord:
     """Give a GOP as it was decided; ``frames``: as many of it have come."""
     first = gop * GOP
     delivered = {}
     for camera in cameras:
         taken = [filled()[0][camera].get(pulse) for pulse in range(first, first + frames)]
-        delivered[camera] = Gop(first, tuple(it.fragment for it in taken if it is not None))
+        delivered[camera] = RecordedGop(first, tuple(it.fragment for it in taken if it is not None))
     boxes = {camera: [[(1, 1.0, 2.0, 3.0, 4.0)]] * GOP for camera in cameras}
-    return Piece(GopChoices(first=first, frames=GOP, choices=dict(choices), boxes=boxes, cuts=[]), delivered)
+    return GopRecord(
+        GopChoices(first=first, frames=GOP, choices=dict(choices), boxes=boxes, cuts=[]), delivered
+    )
 
 
-def written(store: Store, pieces: list[Piece], began: float = PULSE0) -> Store:
+def written(store: RecordingFolder, pieces: list[GopRecord], began: float = PULSE0) -> RecordingFolder:
     """Open a store and write the pieces."""
     store.open()
     for it in pieces:
-        store.write(it, head(began), Headers(filled()[1]))
+        store.write(it, head(began), InitSegments(filled()[1]))
     return store
 
 

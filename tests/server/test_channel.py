@@ -8,11 +8,11 @@ from itertools import product
 import pytest
 from patience import PATIENCE
 
-from server.service.streaming.broadcaster import Channel, Chunk, Piece
+from server.service.streaming.broadcaster import Broadcaster, BytesChunk, Chunk
 
 
-def gop(number: int) -> Chunk:
-    return Chunk(b"%d" % number, start=True)
+def gop(number: int) -> BytesChunk:
+    return BytesChunk(b"%d" % number, start=True)
 
 
 async def take(viewer: object, count: int) -> list[bytes]:
@@ -26,26 +26,26 @@ async def take(viewer: object, count: int) -> list[bytes]:
 
 
 async def test_a_viewer_starts_at_once_with_the_newest_gop() -> None:
-    channel = Channel()
+    channel = Broadcaster()
     for number in range(3):
         channel.publish(gop(number))
     assert await take(channel.join(), 1) == [b"2"]
 
 
 async def test_a_viewer_of_single_frames_starts_where_the_gop_begins() -> None:
-    channel = Channel()
+    channel = Broadcaster()
     for data, start in [(b"I1", True), (b"P2", False), (b"I3", True), (b"P4", False)]:
-        channel.publish(Chunk(data, start))
+        channel.publish(BytesChunk(data, start))
     assert await take(channel.join(), 2) == [b"I3", b"P4"]
 
 
 async def test_a_viewer_that_falls_behind_loses_whole_gops_and_others_lose_none() -> None:
-    channel = Channel(queue_starts=3)
+    channel = Broadcaster(queue_starts=3)
     slow, quick = channel.join(), channel.join()
     seen = []
     for number in range(10):
-        channel.publish(Chunk(b"I%d" % number, start=True))
-        channel.publish(Chunk(b"P%d" % number, start=False))
+        channel.publish(BytesChunk(b"I%d" % number, start=True))
+        channel.publish(BytesChunk(b"P%d" % number, start=False))
         seen += await take(quick, 2)
     assert len(seen) == 20
     assert slow.lost > 0
@@ -55,7 +55,7 @@ async def test_a_viewer_that_falls_behind_loses_whole_gops_and_others_lose_none(
 
 
 async def test_memory_is_bounded_however_slow_a_viewer_is() -> None:
-    channel = Channel(queue_starts=3)
+    channel = Broadcaster(queue_starts=3)
     slow = channel.join()
     for number in range(1000):
         channel.publish(gop(number))
@@ -63,7 +63,7 @@ async def test_memory_is_bounded_however_slow_a_viewer_is() -> None:
 
 
 async def test_the_end_comes_after_what_was_queued() -> None:
-    channel = Channel()
+    channel = Broadcaster()
     viewer = channel.join()
     channel.publish(gop(1))
     channel.close()
@@ -75,7 +75,7 @@ async def test_the_end_comes_after_what_was_queued() -> None:
 
 
 async def test_whoever_joins_after_the_end_gets_what_was_last_and_the_end() -> None:
-    channel = Channel()
+    channel = Broadcaster()
     channel.publish(gop(1))
     channel.close()
     async with asyncio.timeout(PATIENCE):
@@ -86,10 +86,10 @@ async def test_whoever_joins_after_the_end_gets_what_was_last_and_the_end() -> N
 async def test_pieces_keep_their_order_whether_they_are_taken_at_once_or_wait(
     taken: tuple[bool, ...],
 ) -> None:
-    channel, sent = Channel(queue_starts=10), list[bytes]()
+    channel, sent = Broadcaster(queue_starts=10), list[bytes]()
     viewer, answers = channel.join(), iter(taken)
 
-    def take_at_once(piece: Piece) -> bool:
+    def take_at_once(piece: Chunk) -> bool:
         ready = next(answers)
         sent.extend([piece.data] * ready)
         return ready
@@ -113,7 +113,7 @@ async def test_pieces_keep_their_order_whether_they_are_taken_at_once_or_wait(
 
 
 async def test_who_refuses_at_once_loses_whole_gops_as_ever() -> None:
-    channel = Channel(queue_starts=3)
+    channel = Broadcaster(queue_starts=3)
     viewer = channel.join()
     viewer.at_once = lambda _: False
     for number in range(10):
@@ -123,11 +123,11 @@ async def test_who_refuses_at_once_loses_whole_gops_as_ever() -> None:
 
 
 def test_who_has_lost_something_is_said_once() -> None:
-    channel = Channel(queue_starts=2)
+    channel = Broadcaster(queue_starts=2)
     viewer = channel.join()
-    channel.publish(Chunk(b"1", start=True))
+    channel.publish(BytesChunk(b"1", start=True))
     assert channel.who_lost() == []
     for number in range(4):
-        channel.publish(Chunk(b"%d" % number, start=True))
+        channel.publish(BytesChunk(b"%d" % number, start=True))
     assert channel.who_lost() == [viewer]
     assert channel.who_lost() == []

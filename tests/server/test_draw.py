@@ -21,9 +21,9 @@ from server.media.h264.annexb import nal_units, sample
 from server.media.rendering_messages import Canvas, Draw, Drawn, belongs, framed
 from server.service.rendering.decided_boxes import first_pulse
 from server.service.rendering.worker.__main__ import serve
-from server.service.rendering.worker.box_overlay import CHOSEN, OTHER, Image, draw_boxes
-from server.service.rendering.worker.mp4_demuxer import frames
-from server.service.rendering.worker.stream_renderer import Studio
+from server.service.rendering.worker.box_overlay import CHOSEN_COLOR, OTHER_COLOR, Image, draw_boxes
+from server.service.rendering.worker.demuxers import demux_mp4
+from server.service.rendering.worker.stream_renderer import StreamRenderer
 
 CANVAS = Canvas(
     width=WIDTH, height=HEIGHT, fps=FPS, gop=GOP, preset="ultrafast", crf=18, max_kbps=None, jpeg_quality=90
@@ -80,7 +80,7 @@ def test_frames_come_out_of_fragments_as_they_went_in(
         )
         for place, units in enumerate(content)
     )
-    found = list(frames(data, FPS))
+    found = list(demux_mp4(data, FPS))
     assert [frame.pulse for frame in found] == list(range(first, first + len(content)))
     assert {frame.lasts for frame in found} == {lasts}
     assert [frame.data for frame in found] == [
@@ -91,12 +91,12 @@ def test_frames_come_out_of_fragments_as_they_went_in(
 
 @given(st.binary(max_size=200))
 def test_any_bytes_are_no_frames_or_frames_but_no_error(data: bytes) -> None:
-    list(frames(data, FPS))
-    list(frames(fragments(0, 1)[:-1] + data, FPS))
+    list(demux_mp4(data, FPS))
+    list(demux_mp4(fragments(0, 1)[:-1] + data, FPS))
 
 
 def test_every_picture_is_its_own_frames() -> None:
-    drawn = Studio(CANVAS).draw(Draw(fragments=fragments(0, 2 * GOP), plain=[FPS], still="plain"))
+    drawn = StreamRenderer(CANVAS).draw(Draw(fragments=fragments(0, 2 * GOP), plain=[FPS], still="plain"))
     assert [picture.pulse for picture in drawn.plain] == list(range(2 * GOP))
     for picture in drawn.plain:
         assert far(picture.data, shown(0)[picture.pulse]) < 15
@@ -106,7 +106,7 @@ def test_every_picture_is_its_own_frames() -> None:
 
 
 def test_what_nobody_wants_is_not_made_and_a_still_is_of_the_frame_before() -> None:
-    studio = Studio(CANVAS)
+    studio = StreamRenderer(CANVAS)
     assert studio.draw(Draw(still="boxed")) == Drawn(newest=-1)
     assert studio.draw(Draw(fragments=fragments(0, GOP))) == Drawn(newest=GOP - 1)
     still = studio.draw(Draw(still="plain")).still
@@ -115,14 +115,14 @@ def test_what_nobody_wants_is_not_made_and_a_still_is_of_the_frame_before() -> N
 
 
 def test_frames_before_a_key_frame_are_left_out() -> None:
-    drawn = Studio(CANVAS).draw(Draw(fragments=fragments(2, 2 * GOP), plain=[FPS]))
+    drawn = StreamRenderer(CANVAS).draw(Draw(fragments=fragments(2, 2 * GOP), plain=[FPS]))
     assert [picture.pulse for picture in drawn.plain] == list(range(GOP, 2 * GOP + 2))
 
 
 @settings(deadline=None, max_examples=25)
 @given(st.binary(max_size=60), st.integers(0, GOP - 1))
 def test_a_damaged_frame_spoils_nothing_after_its_gop(damage: bytes, place: int) -> None:
-    studio = Studio(CANVAS)
+    studio = StreamRenderer(CANVAS)
     broken = fragment([Sample(len(damage).to_bytes(4, "big") + damage, key=False)], place, FPS)
     studio.draw(Draw(fragments=fragments(0, place) + broken + fragments(place + 1, GOP - place - 1)))
     drawn = studio.draw(Draw(fragments=fragments(GOP, GOP), plain=[FPS]))
@@ -135,14 +135,14 @@ def test_a_damaged_frame_spoils_nothing_after_its_gop(damage: bytes, place: int)
 def test_a_time_that_never_comes_is_damage(ticks: int) -> None:
     whole = fragments(0, GOP)
     start = whole.index(b"tfdt") + len(b"tfdt") + 4
-    studio = Studio(CANVAS)
+    studio = StreamRenderer(CANVAS)
     broken = whole[:start] + ticks.to_bytes(8, "big") + whole[start + 8 :]
     assert studio.draw(Draw(fragments=broken, film=True, still="plain")) == Drawn(newest=-1)
     assert len(studio.draw(Draw(fragments=fragments(GOP, GOP), film=True)).film) == GOP
 
 
 def test_the_film_has_the_cameras_gops_and_begins_anew_where_time_goes_back() -> None:
-    studio = Studio(CANVAS)
+    studio = StreamRenderer(CANVAS)
     keys = [
         [unit.key for unit in studio.draw(Draw(fragments=fragments(first, GOP), film=True)).film]
         for first in (0, GOP, GOP)
@@ -153,8 +153,8 @@ def test_the_film_has_the_cameras_gops_and_begins_anew_where_time_goes_back() ->
 def test_the_chosen_persons_box_lies_over_the_others() -> None:
     image = np.zeros((HEIGHT, WIDTH, 3), np.uint8)
     draw_boxes(image, [(7, 10, 20, 40, 40), (3, 10, 20, 40, 40), (5, 30, 5, 60, 45)], 3)
-    assert tuple(image[30, 10]) == CHOSEN
-    assert tuple(image[30, 59]) == OTHER
+    assert tuple(image[30, 10]) == CHOSEN_COLOR
+    assert tuple(image[30, 59]) == OTHER_COLOR
     draw_boxes(
         image,
         [(1, -500.0, -500.0, 9000.0, 9000.0), (2, 3.0, 3.0, 3.0, 3.0), (3, -1e300, 4.0, 3e9, 9.0)],

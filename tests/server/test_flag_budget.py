@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from server.config.sections import FlagSettings
-from server.service.operator_assist.flag_budget import Budget
+from server.service.operator_assist.flag_budget import FlagBudget
 
 FPS = 25.0
 MINUTE = round(60 * FPS)
@@ -16,7 +16,7 @@ SAME, OTHER, LATE = frozenset({1, 2}), frozenset({3, 4}), frozenset({5, 6})
 
 def raised(per_minute: int, told: list[tuple[int, int, float]]) -> list[int]:
     """Give when flags are raised for troubles of (pulse, who, risk)."""
-    budget, found = Budget(FlagSettings(per_minute=per_minute, risk=0.0), FPS), []
+    budget, found = FlagBudget(FlagSettings(per_minute=per_minute, risk=0.0), FPS), []
     for now, who, risk in told:
         people = frozenset({2 * who, 2 * who + 1})
         budget.hear(now, people, risk)
@@ -76,7 +76,7 @@ def test_risks_that_are_all_wrong_by_a_factor_change_nothing() -> None:
 
 def test_what_is_told_again_and_again_counts_once() -> None:
     """Else one long trouble would make everything else look rare."""
-    budget = Budget(FlagSettings(per_minute=1, risk=0.0), FPS)
+    budget = FlagBudget(FlagSettings(per_minute=1, risk=0.0), FPS)
     for now in range(0, 40, 5):
         budget.hear(now, SAME, 0.9)
     budget.hear(45, OTHER, 0.5)
@@ -87,14 +87,14 @@ def test_what_is_told_again_and_again_counts_once() -> None:
 
 
 def test_what_is_not_likely_enough_is_worth_none_however_little_else_there_is() -> None:
-    budget = Budget(FlagSettings(per_minute=5, risk=0.25), FPS)
+    budget = FlagBudget(FlagSettings(per_minute=5, risk=0.25), FPS)
     budget.hear(10, SAME, 0.24)
     assert not budget.worth(10, SAME, 0.24)
     assert budget.worth(10, SAME, 0.25)
 
 
 def test_for_some_seconds_nobody_has_two_flags() -> None:
-    budget = Budget(FlagSettings(per_minute=5, risk=0.0), FPS)
+    budget = FlagBudget(FlagSettings(per_minute=5, risk=0.0), FPS)
     budget.spend(10, frozenset({1, 2}))
     assert not budget.worth(12, frozenset({2, 3}), 0.9)
     assert budget.worth(12, frozenset({3, 4}), 0.9)

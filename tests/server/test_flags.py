@@ -9,26 +9,26 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from server.config.sections import FlagSettings
-from server.service.operator_assist.flags import Flag, Flags, Foreseen
+from server.service.operator_assist.flags import Flag, FlagQueue, RiskEvent
 
 FPS = 25.0
 STRIDE = 5
 
 
-def foreseen(*objects: int, pulse: int, camera: str = "c0", risk: float = 0.5) -> Foreseen:
-    return Foreseen(camera, objects, "alike", pulse, margin=0.5, risk=risk)
+def foreseen(*objects: int, pulse: int, camera: str = "c0", risk: float = 0.5) -> RiskEvent:
+    return RiskEvent(camera, objects, "alike", pulse, margin=0.5, risk=risk)
 
 
 class Asked:
     """Flags, and what was told of them."""
 
     def __init__(self, per_minute: int = 2, answer_s: float = 2.0) -> None:
-        self.flags = Flags(FlagSettings(per_minute=per_minute, answer_s=answer_s), FPS)
+        self.flags = FlagQueue(FlagSettings(per_minute=per_minute, answer_s=answer_s), FPS)
         self.told: list[Flag] = []
         self.flags.on_flag.append(self.told.append)
         self.merged: dict[int, int] = {}
 
-    def step(self, now: int, *troubles: Foreseen) -> None:
+    def step(self, now: int, *troubles: RiskEvent) -> None:
         self.flags.step(now, troubles, lambda number: self.merged.get(number, number))
 
     @property
@@ -60,10 +60,10 @@ def test_of_too_many_the_riskiest_are_raised() -> None:
 
 
 def test_what_nobody_is_to_be_asked_about_is_not_raised() -> None:
-    flags = Flags(FlagSettings(reasons=["exchange"]), FPS)
+    flags = FlagQueue(FlagSettings(reasons=["exchange"]), FPS)
     flags.step(10, [foreseen(7, 9, pulse=40)], int)
     assert flags.open == []
-    flags.step(15, [Foreseen("c0", (7, 9), "exchange", 40, 0.5, 0.5)], int)
+    flags.step(15, [RiskEvent("c0", (7, 9), "exchange", 40, 0.5, 0.5)], int)
     assert [flag.reason for flag in flags.open] == ["exchange"]
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from bestview.geometry.ground_plane import from_ground, to_ground
 from server.media.letterbox import Letterbox
-from server.service.calibration.floor_map import FARTHEST, covered
+from server.service.calibration.floor_map import FARTHEST_RATIO, floor_coverage
 
 SITE = (640, 360)
 OWN = (320, 240)
@@ -38,7 +38,7 @@ def test_a_place_is_covered_where_the_picture_shows_it_and_it_is_not_too_far(
     tilt: float, height: float, sign: float, x: float, y: float
 ) -> None:
     own = camera(tilt, height) * sign
-    part = covered(own, OWN, SITE)
+    part = floor_coverage(own, OWN, SITE)
     there = to_ground(own, np.array([x, y]))
     site = np.append(Letterbox(OWN, SITE).to_site(np.array([x, y])), 1.0)
     mapped = part.homography @ site
@@ -49,7 +49,7 @@ def test_a_place_is_covered_where_the_picture_shows_it_and_it_is_not_too_far(
     nearest = max(
         (part.homography @ np.append(Letterbox(OWN, SITE).to_site(np.array(it)), 1.0))[2] for it in EDGES
     )
-    reach = mapped[2] / nearest * FARTHEST
+    reach = mapped[2] / nearest * FARTHEST_RATIO
     if abs(reach - 1) > 1e-3 and 1 < x < 319 and 1 < y < 239:
         assert inside(part.outline, there) == (reach > 1)
 
@@ -69,7 +69,7 @@ def inside(polygon: Floats, point: Floats) -> bool:
 
 def test_the_outline_lies_in_the_picture() -> None:
     own = camera(0.3, 3.0)
-    outline = covered(own, OWN, SITE).outline
+    outline = floor_coverage(own, OWN, SITE).outline
     assert len(outline) >= 4
     pixels = from_ground(own, outline)
     assert (pixels >= -1e-6).all()
@@ -78,11 +78,11 @@ def test_the_outline_lies_in_the_picture() -> None:
 
 @pytest.mark.parametrize("tilt", [-0.8, -1.2])
 def test_a_camera_that_looks_up_covers_nothing(tilt: float) -> None:
-    assert covered(camera(tilt, 3.0), OWN, SITE).outline.shape == (0, 2)
+    assert floor_coverage(camera(tilt, 3.0), OWN, SITE).outline.shape == (0, 2)
 
 
 def test_a_plan_view_covers_all_of_its_picture() -> None:
     plan = np.array([[0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 1.0]])
     np.testing.assert_allclose(
-        covered(plan, OWN, SITE).outline, [[0.0, 24.0], [32.0, 24.0], [32.0, 0.0], [0.0, 0.0]]
+        floor_coverage(plan, OWN, SITE).outline, [[0.0, 24.0], [32.0, 24.0], [32.0, 0.0], [0.0, 0.0]]
     )

@@ -27,7 +27,7 @@ from server.media.picture import Picture
 from server.media.stream_format import Agreement, OwnParameters
 from server.media.vp8.grey_frame import grey_frame
 from server.media.vp8.stream_format import Vp8Agreement
-from server.service.streaming.frame_buffer import Shelf
+from server.service.streaming.frame_buffer import FrameBuffer
 
 Sizes = st.tuples(st.integers(1, 40), st.integers(1, 24))
 """In macroblocks."""
@@ -78,7 +78,7 @@ def test_so_it_is_in_vp8(blocks: tuple[int, int]) -> None:
 def test_a_grey_gop_has_the_format_of_the_picture_before_it(*, own: bool) -> None:
     agreement = OwnParameters() if own else Agreement()
     cameras = list(MAKES) if own else list(MAKES)[:1] * 2
-    shelves = {camera: Shelf(FPS, 99, agreement) for camera in cameras}
+    shelves = {camera: FrameBuffer(FPS, 99, agreement) for camera in cameras}
     for camera, shelf in shelves.items():
         for unit in sent(camera):
             shelf.put(unit.pulse, 1, unit.data, key=unit.key)

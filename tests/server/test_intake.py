@@ -33,7 +33,7 @@ from server.messaging.messages import ZenohKeys
 from server.service.identity.people import People
 from server.service.ingest.epoch_aligner import Aligner
 from server.service.ingest.ingest import Intake
-from server.service.streaming.frame_buffer import Shelf, Shelved
+from server.service.streaming.frame_buffer import FrameBuffer, Shelved
 
 KEYS = ZenohKeys("hall")
 
@@ -43,7 +43,7 @@ class Hall:
 
     def __init__(self) -> None:
         agreement = Agreement()
-        self.shelves = {camera: Shelf(FPS, 50, agreement) for camera in CAMERAS}
+        self.shelves = {camera: FrameBuffer(FPS, 50, agreement) for camera in CAMERAS}
         self.aligner = Aligner(CAMERAS, STRIDE, grace=5)
         self.frames: list[tuple[str, Shelved]] = []
         self.intake = Intake(self.shelves, self.aligner, lambda *frame: self.frames.append(frame))

@@ -9,7 +9,7 @@ from server.media.stream_format import Agreement
 from server.service.ingest.epoch_aligner import Epoch
 from server.service.ingest.ingest import CameraState
 from server.service.ingest.loss_recorder import Lacking
-from server.service.streaming.frame_buffer import Shelf
+from server.service.streaming.frame_buffer import FrameBuffer
 
 A, B = CAMERAS
 
@@ -19,7 +19,7 @@ class Told:
 
     def __init__(self) -> None:
         self.now = 0.0
-        shelves = {camera: Shelf(FPS, 50, Agreement()) for camera in CAMERAS}
+        shelves = {camera: FrameBuffer(FPS, 50, Agreement()) for camera in CAMERAS}
         states = {camera: CameraState() for camera in CAMERAS}
         self.lacking = Lacking(shelves, states, STRIDE, lambda: self.now)
 

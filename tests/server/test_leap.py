@@ -28,8 +28,8 @@ from test_service_turns import noted
 from server.media.audio.aac import SAMPLES
 from server.media.audio.audio_format import SoundFormat
 from server.messaging.epochs import end_of_epoch
-from server.service.streaming.audio_buffer import Following, SoundShelf
-from server.service.streaming.media_chunk import Footage
+from server.service.streaming.audio_buffer import AudioBuffer, AudioFollower
+from server.service.streaming.media_chunk import MediaChunk
 
 HOUR = 3600 * FPS // STRIDE
 """Epochs."""
@@ -100,7 +100,7 @@ def test_streams_go_on_after_a_leap_with_one_picture_that_bridges_it_or_with_a_h
     until, then = service.board.end, minutes * HOUR // 60 // ENCODED * ENCODED
     lived(service, range(then, then + BEFORE))
     for viewer in viewers:
-        footage = [it for it in viewer._queue if isinstance(it, Footage) and it.until > until]
+        footage = [it for it in viewer._queue if isinstance(it, MediaChunk) and it.until > until]
         first, *more = [(it.first, it.until) for it in footage]
         expected = [(it, it + GOP) for it in range(then * STRIDE, service.board.end, GOP)]
         if minutes < 60:
@@ -181,7 +181,7 @@ async def test_a_site_without_a_pulse_server_is_decided_all_the_same(monkeypatch
 
 
 def test_a_camera_that_slept_is_not_followed_by_hours_of_silence() -> None:
-    following = Following(SoundShelf(SoundFormat(48_000, 2), FPS, 10.0))
+    following = AudioFollower(AudioBuffer(SoundFormat(48_000, 2), FPS, 10.0))
     following.beside(0, FPS)
     hours = 8 * 3600 * FPS
     heard = following.beside(hours, hours + FPS)

@@ -27,11 +27,11 @@ from server.config.sections import SoundSettings
 from server.media.rendering_messages import Draw
 from server.messaging.inbox import Message
 from server.messaging.messages import CameraStatus, FrameDetections, ZenohKeys
-from server.service.rendering import stream_source
-from server.service.rendering.decided_boxes import NOTHING
+from server.service.rendering import rendered_stream as stream_source
+from server.service.rendering.decided_boxes import NO_OVERLAY
 from server.service.rendering.worker import stream_renderer
-from server.service.rendering.worker_process import ProcessDiedError
-from server.service.streaming.broadcaster import Channel
+from server.service.rendering.worker_process import WorkerDiedError
+from server.service.streaming.broadcaster import Broadcaster
 from server.supervisor.site import _keep
 
 KEYS = ZenohKeys("hall")
@@ -162,7 +162,7 @@ def test_frames_that_cannot_be_decoded_are_told_of_once_for_a_stream(
             raise av.error.InvalidDataError(1, "damaged")
 
     monkeypatch.setattr(stream_renderer, "_decoder", lambda _: Damaged())
-    drawing = stream_renderer.Studio(CANVAS)
+    drawing = stream_renderer.StreamRenderer(CANVAS)
     for gop in range(3):
         drawing.draw(Draw(fragments=fragments(gop * GOP, GOP)))
     assert len(caplog.messages) == 1
@@ -174,12 +174,14 @@ async def test_drawing_processes_that_die_again_and_again_are_counted_and_told_o
 ) -> None:
     monkeypatch.setattr(stream_source, "_RETRY_FIRST_S", 0.0)
     monkeypatch.setattr(stream_source, "_RETRY_MAX_S", 0.0)
-    drawing = stream_source.Source("object 1", Channel(), lambda _: NOTHING, CANVAS, live=True, queue_gops=4)
+    drawing = stream_source.RenderedStream(
+        "object 1", Broadcaster(), lambda _: NO_OVERLAY, CANVAS, live=True, queue_gops=4
+    )
 
     async def dies() -> None:
         await asyncio.sleep(0)
         if drawing.restarts < 10:
-            raise ProcessDiedError("died")
+            raise WorkerDiedError("died")
 
     monkeypatch.setattr(drawing, "_run_process", dies)
     await drawing.run()

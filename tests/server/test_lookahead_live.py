@@ -24,7 +24,7 @@ from hypothesis import strategies as st
 
 from server.config.sections import ViewSettings
 from server.http.access.csrf import CHANGES
-from server.service.streaming.broadcaster import Piece
+from server.service.streaming.broadcaster import Chunk
 from server.service.view_selection.decider import Decider, GopDecision
 from server.system.errors import UserError
 
@@ -93,7 +93,7 @@ def test_streams_are_the_chosen_cameras_gops_without_a_hole(changes: Changes) ->
     service.on_decision.append(lambda it: shown.append(it.choices.get(1)))
     got: list[bytes] = []
 
-    def take(piece: Piece) -> bool:
+    def take(piece: Chunk) -> bool:
         got.append(piece.data)
         return True
 

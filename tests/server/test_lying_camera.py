@@ -42,8 +42,8 @@ from server.messaging.messages import (
     TrackMessage,
     ZenohKeys,
 )
-from server.service.streaming.audio_buffer import SoundShelf
-from server.service.streaming.media_chunk import Footage
+from server.service.streaming.audio_buffer import AudioBuffer
+from server.service.streaming.media_chunk import MediaChunk
 
 KEYS = ZenohKeys("hall")
 LIAR, OTHER = CAMERAS
@@ -153,7 +153,7 @@ class Lived:
         service.on_decision.append(self.decided.append)
         service.come(*CAMERAS)
         self._viewer = service.splicer.decided[OTHER].join()
-        self.shown: list[Footage] = []
+        self.shown: list[MediaChunk] = []
         """What those are sent who watch the other camera."""
         service.pulse = 0
         service.intake.video(video(OTHER, encoded(1)[0]))
@@ -179,7 +179,7 @@ class Lived:
         while self.service.pulse < pulse:
             self.service.pulse += 1
             self.service.decide()
-            self.shown += [it for it in self._viewer._queue if isinstance(it, Footage)]
+            self.shown += [it for it in self._viewer._queue if isinstance(it, MediaChunk)]
             self._viewer._queue.clear()
 
 
@@ -235,7 +235,7 @@ def test_sound_of_more_frames_than_any_is_none_and_takes_no_time() -> None:
     head = {"first": 2**62, "sizes": [1] * (AUDIO_FRAMES_MAX + 1)}
     with pytest.raises(msgspec.ValidationError):
         msgspec.json.decode(json.dumps(head).encode(), type=AudioHeader)
-    shelf = SoundShelf(SoundFormat(48_000, 2), 25.0, 10.0)
+    shelf = AudioBuffer(SoundFormat(48_000, 2), 25.0, 10.0)
     for first in range(0, 20 * AUDIO_FRAMES_MAX, AUDIO_FRAMES_MAX):
         shelf.put(AudioHeader(first=first, sizes=[1] * AUDIO_FRAMES_MAX), bytes(AUDIO_FRAMES_MAX))
     assert len(shelf._frames) == 469

@@ -13,7 +13,7 @@ from server.camera.track_messages import Reporter
 from server.messaging.messages import CameraTracks
 from server.service.identity.people import People
 from server.service.ingest.epoch_aligner import Epoch
-from server.service.operator_assist.corrections import Place, pointings
+from server.service.operator_assist.corrections import PointedPosition, corrections_for_tracker
 from tracking import CostSettings, Detections, WindowSettings, create_solver
 from tracking.interactive import AssistedTracker, AssistSettings, Pointing
 
@@ -78,7 +78,9 @@ def played(
         said: list[Pointing] = []
         if frame == said_at:
             [left] = [number for number, where in told[20].items() if where < 300]
-            asked = pointings(people, "c0", left, [Place(it, places(it)[0] + 20, 160, 10) for it in of])
+            asked = corrections_for_tracker(
+                people, "c0", left, [PointedPosition(it, places(it)[0] + 20, 160, 10) for it in of]
+            )
             assert asked is not None
             said = [Pointing(it.pulse, it.track, it.x, it.y, it.reach) for it in asked.points]
         message = camera.take(frame, said)
@@ -140,7 +142,7 @@ def test_who_points_again_after_it_was_mended_still_means_the_same() -> None:
     assert before is not None
     assert after is not None
     assert before.track == after.track, "the tracker's own number stays with the person"
-    assert pointings(people, "c0", left, [Place(-1, 0, 0, 1)]) is None
-    assert pointings(people, "c0", 99, [Place(120, 0, 0, 1)]) is None
-    assert pointings(people, "c1", left, [Place(120, 0, 0, 1)]) is None
+    assert corrections_for_tracker(people, "c0", left, [PointedPosition(-1, 0, 0, 1)]) is None
+    assert corrections_for_tracker(people, "c0", 99, [PointedPosition(120, 0, 0, 1)]) is None
+    assert corrections_for_tracker(people, "c1", left, [PointedPosition(120, 0, 0, 1)]) is None
     assert right != left

@@ -21,7 +21,7 @@ from server.messaging.inbox import Message
 from server.messaging.messages import FrameHeader, SolverReport, ZenohKeys
 from server.service.metrics.histogram import Histogram
 from server.service.readiness import most_behind
-from server.service.streaming.broadcaster import Chunk, Viewer
+from server.service.streaming.broadcaster import BytesChunk, Subscriber
 
 
 async def samples(hall: Hall) -> dict[tuple[str, ...], float]:
@@ -140,10 +140,10 @@ async def test_viewers_are_counted_by_kind_and_what_is_sent_to_them_in_bytes(bus
 
 
 async def test_what_slow_viewers_lose_stays_counted_when_they_have_gone() -> None:
-    sent, slow = Sent(), Viewer([], starts_max=2)
+    sent, slow = Sent(), Subscriber([], starts_max=2)
     sent.join(slow)
     for number in range(4):
-        slow.put(Chunk(b"gop", start=True))
+        slow.put(BytesChunk(b"gop", start=True))
         assert sent.longest == (number % 2) + 1
     assert sent.lost == 2
     sent.leave(slow)

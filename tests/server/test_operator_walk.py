@@ -18,9 +18,8 @@ from walk_by_hand import HEIGHT, SITE, WIDTH, curved, errors_on_floor, walk_conf
 from server.config.loader import build_config
 from server.http.access.csrf import CHANGES
 from server.service.calibration import walk_session as walking_module
-from server.service.calibration.walk_session import State, Walking
-from server.service.calibration.worker_messages import Done, Seen, Task
-from server.service.calibration.worker_process import calibrated
+from server.service.calibration.walk_session import WalkSession, WalkState
+from server.service.calibration.worker import CalibrationResult, CalibrationTask, CameraBoxes, run_calibration
 
 WALK = "/api/operator/walk"
 MINE = {CHANGES: "1"}
@@ -120,17 +119,17 @@ async def test_steps_that_make_no_sense_are_refused(hall: Hall, step: Any, statu
     code, told = await do(hall, **step)
     assert code == status
     assert told["error"].startswith(error)
-    assert hall.service.walking.state is State.NONE
+    assert hall.service.walking.state is WalkState.NONE
 
 
-async def told_to(work: list[Task], config: Any, *parts: Any) -> Task:
+async def told_to(work: list[CalibrationTask], config: Any, *parts: Any) -> CalibrationTask:
     """Walk by hand; give what the process would be told."""
 
-    async def note(task: Task) -> Done:
+    async def note(task: CalibrationTask) -> CalibrationResult:
         work.append(task)
-        return Done()
+        return CalibrationResult()
 
-    walking = Walking(config, note)
+    walking = WalkSession(config, note)
     walking.start()
     for part in parts:
         part(walking)
@@ -144,7 +143,7 @@ async def test_every_final_box_is_told_once_and_counts_from_the_start_of_the_wal
     config = walk_config()
     places = curved(100)
 
-    def before_and_on(walking: Walking) -> None:
+    def before_and_on(walking: WalkSession) -> None:
         walking.stop()
         for said in words(config, places[:50]):  # nobody has started yet
             walking.take(said)
@@ -167,7 +166,7 @@ async def test_every_final_box_is_told_once_and_counts_from_the_start_of_the_wal
 async def test_a_camera_that_comes_again_has_other_tracks() -> None:
     config = walk_config()
 
-    def twice(walking: Walking) -> None:
+    def twice(walking: WalkSession) -> None:
         for boot in (1, 2):
             for said in words(config, curved(50), epoch=10 * (boot - 1), boot=boot):
                 walking.take(said)
@@ -180,7 +179,7 @@ async def test_a_camera_that_comes_again_has_other_tracks() -> None:
 async def test_a_walk_that_is_started_before_any_camera_speaks_counts_from_the_first_word() -> None:
     config = walk_config()
 
-    def late(walking: Walking) -> None:
+    def late(walking: WalkSession) -> None:
         for said in words(config, curved(50), epoch=10_000_000):
             walking.take(said)
 
@@ -196,9 +195,9 @@ async def test_offsets_of_recordings_are_told_and_of_live_cameras_none() -> None
 
 
 async def test_after_the_most_that_is_kept_nothing_more_is(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(walking_module, "MOST_S", 1.0)
+    monkeypatch.setattr(walking_module, "MAX_WALK_S", 1.0)
     config = walk_config()
-    walking = Walking(config)
+    walking = WalkSession(config)
     walking.start()
     for said in words(config, curved(100)):
         walking.take(said)
@@ -206,11 +205,11 @@ async def test_after_the_most_that_is_kept_nothing_more_is(monkeypatch: pytest.M
 
 
 async def test_whose_process_dies_learns_of_it_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    nonsense = Seen("c0", (WIDTH, HEIGHT), b"123", b"", b"")
-    done = await calibrated(Task([nonsense], FPS, 0.0, 1.75, {}))
+    nonsense = CameraBoxes("c0", (WIDTH, HEIGHT), b"123", b"", b"")
+    done = await run_calibration(CalibrationTask([nonsense], FPS, 0.0, 1.75, {}))
     assert done.error == "the calibration went wrong; the server's log says more"
     monkeypatch.setattr("sys.executable", "/nowhere/python")
-    done = await calibrated(Task([], FPS, 0.0, 1.75, {}))
+    done = await run_calibration(CalibrationTask([], FPS, 0.0, 1.75, {}))
     assert done.error.startswith("the calibration cannot be started: ")
 
 

@@ -39,7 +39,7 @@ from server.config.site_config import Config
 from server.media.containers.mpegts import Counters, pack
 from server.media.h264.annexb import NAL_AUD, nal_type, nal_units
 from server.media.stream_format import Agreement
-from server.service.streaming.frame_buffer import Shelf
+from server.service.streaming.frame_buffer import FrameBuffer
 from server.system.errors import UnavailableError, UserError
 
 FRAMES = 20
@@ -58,7 +58,7 @@ def written(folder: Path, form: str, seed: int = 0) -> Path:
         path.write_bytes(b"".join(unit.data for unit in units))
         return path
     if form == "ts":
-        shelf = Shelf(FPS, FRAMES, Agreement())
+        shelf = FrameBuffer(FPS, FRAMES, Agreement())
         pictures = [shelf.put(unit.pulse, 1, unit.data, key=unit.key) for unit in units]
         path.write_bytes(pack(pictures, FPS, Counters()))
         return path
@@ -115,7 +115,7 @@ def test_the_tracker_is_given_the_pictures_that_are_sent(tmp_path: Path) -> None
 def test_it_can_be_cut_with_what_another_camera_encodes(tmp_path: Path) -> None:
     pipeline = CameraPipeline(site(written(tmp_path, "mp4")), "c0")
     agreement = Agreement()
-    shelves = [Shelf(FPS, FRAMES, agreement) for _ in range(2)]
+    shelves = [FrameBuffer(FPS, FRAMES, agreement) for _ in range(2)]
     for shelf, units in zip(shelves, (passed(pipeline, range(FRAMES)), encoded(1)), strict=True):
         for unit in units:
             shelf.put(unit.pulse, 1, unit.data, key=unit.key)
@@ -349,7 +349,7 @@ def rtsp() -> Iterator[RtspCamera]:
 @pytest.fixture
 def network() -> Iterator[NetworkCamera]:
     units = encoded(0, 1000)
-    shelf = Shelf(FPS, 1000, Agreement())
+    shelf = FrameBuffer(FPS, 1000, Agreement())
     pictures = [shelf.put(unit.pulse, 1, unit.data, key=unit.key) for unit in units]
     gops = [pictures[first : first + GOP] for first in range(0, 1000, GOP)]
     camera = NetworkCamera([pack(gop, FPS, Counters()) for gop in gops])

@@ -24,9 +24,9 @@ from server.config.site_config import Config
 from server.media.codec import agreement_for
 from server.media.h264.annexb import nal_units, parameter_sets
 from server.media.stream_format import ParameterMismatchError
-from server.service.streaming.broadcaster import Piece
-from server.service.streaming.frame_buffer import Shelf
-from server.service.streaming.media_chunk import Footage
+from server.service.streaming.broadcaster import Chunk
+from server.service.streaming.frame_buffer import FrameBuffer
+from server.service.streaming.media_chunk import MediaChunk
 from server.service.streaming.splicer import Splicer
 from server.service.view_selection.decider import GopDecision, ObjectChoice
 
@@ -72,7 +72,7 @@ def expected() -> list[NDArray[np.uint8]]:
     return seen
 
 
-def put(shelves: dict[str, Shelf]) -> None:
+def put(shelves: dict[str, FrameBuffer]) -> None:
     for camera, shelf in shelves.items():
         for unit in sent(camera):
             if (camera, unit.pulse // GOP) not in MISSING:
@@ -87,9 +87,9 @@ def decision(gop: int) -> GopDecision:
 async def spliced(config: Config) -> tuple[bytes, bytes]:
     """Give a stream that changes camera at every GOP, as MP4 and as a transport stream."""
     agreement = agreement_for(config)
-    shelves = {camera: Shelf(FPS, GOPS * GOP, agreement) for camera in MAKES}
+    shelves = {camera: FrameBuffer(FPS, GOPS * GOP, agreement) for camera in MAKES}
     put(shelves)
-    splicer, pieces, viewer = Splicer(shelves, agreement, config), list[Piece](), None
+    splicer, pieces, viewer = Splicer(shelves, agreement, config), list[Chunk](), None
     for gop in range(GOPS):
         splicer.decision(decision(gop))
         viewer = viewer or splicer.objects[1].join()
@@ -98,7 +98,7 @@ async def spliced(config: Config) -> tuple[bytes, bytes]:
     pieces = [piece async for piece in viewer.pieces()]
     head = agreement.head(config.site)
     assert head is not None
-    ts = b"".join(piece.ts for piece in pieces if isinstance(piece, Footage))
+    ts = b"".join(piece.ts for piece in pieces if isinstance(piece, MediaChunk))
     return head + b"".join(piece.data for piece in pieces), ts
 
 

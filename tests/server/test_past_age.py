@@ -11,12 +11,12 @@ import pytest
 from cameras_by_hand import CAMERAS, FPS, GOP, FedService, small_config
 from recorded_by_hand import A, ClocksByHand, filled, head, piece
 
-from server.service.recording.recording_session import Headers
-from server.service.recording.retention import Bounds
-from server.service.recording.store import Store
+from server.service.recording.recording_folder import RecordingFolder
+from server.service.recording.recording_session import InitSegments
+from server.service.recording.retention import RetentionLimits
 
 KEEP_S = 20.0
-BOUNDS = Bounds(keep_s=KEEP_S, most_mb=1e6, segment_s=0.2)
+BOUNDS = RetentionLimits(keep_s=KEEP_S, most_mb=1e6, segment_s=0.2)
 """A segment for each GOP."""
 STEP_S = GOP / FPS
 TRIAL_S = 600.0
@@ -30,16 +30,16 @@ def clocks() -> ClocksByHand:
     return ClocksByHand()
 
 
-def opened(folder: Path, clocks: ClocksByHand, bounds: Bounds = BOUNDS) -> Store:
-    store = Store(folder, bounds, clocks.machine)
+def opened(folder: Path, clocks: ClocksByHand, bounds: RetentionLimits = BOUNDS) -> RecordingFolder:
+    store = RecordingFolder(folder, bounds, clocks.machine)
     store.open()
     return store
 
 
-def records(store: Store, clocks: ClocksByHand, gops: range) -> None:
+def records(store: RecordingFolder, clocks: ClocksByHand, gops: range) -> None:
     """Write GOPs in real time."""
     for gop in gops:
-        store.write(piece(gop, {1: A}), head(clocks.wall), Headers(filled()[1]))
+        store.write(piece(gop, {1: A}), head(clocks.wall), InitSegments(filled()[1]))
         clocks.now += STEP_S
 
 
@@ -75,7 +75,7 @@ def test_a_clock_that_is_set_while_it_records_takes_nothing_away_and_keeps_nothi
 def test_a_clock_that_jumps_while_it_records_is_not_believed_later_either(
     tmp_path: Path, clocks: ClocksByHand
 ) -> None:
-    bounds = Bounds(keep_s=3.5 * TRIAL_S, most_mb=1e6, segment_s=0.2)
+    bounds = RetentionLimits(keep_s=3.5 * TRIAL_S, most_mb=1e6, segment_s=0.2)
     store = opened(tmp_path, clocks, bounds)
     records(store, clocks, range(2))
     clocks.wall += YEAR_S  # and whoever keeps it says that it is right
@@ -124,7 +124,7 @@ def test_a_clock_that_somebody_sets_right_in_time_takes_nothing_away(
 ) -> None:
     recorded(tmp_path, clocks)
     clocks.off(5.0, wrong_by=YEAR_S)
-    bounds = Bounds(keep_s=2 * TRIAL_S, most_mb=1e6, segment_s=0.2)
+    bounds = RetentionLimits(keep_s=2 * TRIAL_S, most_mb=1e6, segment_s=0.2)
     store = opened(tmp_path, clocks, bounds)
     clocks.now += TRIAL_S / 2
     records(store, clocks, range(10, 11))
@@ -143,7 +143,7 @@ def test_after_a_week_off_what_is_too_old_goes_soon_after_the_start_if_the_clock
     tmp_path: Path, clocks: ClocksByHand, caplog: pytest.LogCaptureFixture, trusted: bool
 ) -> None:
     caplog.set_level(logging.INFO)
-    bounds = Bounds(keep_s=86_400.0, most_mb=1e6, segment_s=0.2, trust_clock=trusted)
+    bounds = RetentionLimits(keep_s=86_400.0, most_mb=1e6, segment_s=0.2, trust_clock=trusted)
     clocks.is_kept = not trusted
     store = opened(tmp_path, clocks, bounds)
     records(store, clocks, range(30))
@@ -164,7 +164,7 @@ def test_after_a_week_off_what_is_too_old_goes_soon_after_the_start_if_the_clock
 
 
 def test_days_off_add_up(tmp_path: Path, clocks: ClocksByHand) -> None:
-    bounds = Bounds(keep_s=2.5 * 86_400.0, most_mb=1e6, segment_s=0.2)
+    bounds = RetentionLimits(keep_s=2.5 * 86_400.0, most_mb=1e6, segment_s=0.2)
     for day in range(4):
         store = opened(tmp_path, clocks, bounds)
         clocks.now += TRIAL_S
@@ -213,7 +213,7 @@ def test_a_machine_without_a_clock_of_its_own_counts_when_the_network_has_told_i
     assert kept(tmp_path) == list(range(11))
     clocks.jump(7 * 86_400.0)
     clocks.is_kept = True
-    bounds = Bounds(keep_s=2 * TRIAL_S, most_mb=1e6, segment_s=0.2)
+    bounds = RetentionLimits(keep_s=2 * TRIAL_S, most_mb=1e6, segment_s=0.2)
     store.close()
     store = opened(tmp_path, clocks, bounds)
     clocks.now += TRIAL_S
@@ -228,7 +228,7 @@ def test_a_machine_without_a_clock_of_its_own_counts_when_the_network_has_told_i
 def test_what_was_recorded_before_the_clock_was_believed_is_no_older_for_it(
     tmp_path: Path, clocks: ClocksByHand, restarts: bool
 ) -> None:
-    bounds = Bounds(keep_s=2 * TRIAL_S, most_mb=1e6, segment_s=0.2)
+    bounds = RetentionLimits(keep_s=2 * TRIAL_S, most_mb=1e6, segment_s=0.2)
     store = opened(tmp_path, clocks, bounds)
     records(store, clocks, range(8))
     store.close()
@@ -259,7 +259,7 @@ def test_what_takes_too_much_goes_by_age_though_the_clock_went_back(
     early = next(it.name for it in tmp_path.iterdir() if it.is_dir() and it.name != late)
     assert early < late, "names are by the clock"
     size = sum(run.size for run in (*store.earlier, store.run) if run is not None)
-    again = opened(tmp_path, clocks, Bounds(KEEP_S, size / 1e6, 0.2))
+    again = opened(tmp_path, clocks, RetentionLimits(KEEP_S, size / 1e6, 0.2))
     gone = sorted(set(range(20)) - set(kept(tmp_path)))
     assert gone
     assert gone == list(range(len(gone)))
@@ -316,7 +316,7 @@ def test_what_a_pass_takes_away_is_told_seldom_and_says_why(
     tmp_path: Path, clocks: ClocksByHand, caplog: pytest.LogCaptureFixture
 ) -> None:
     caplog.set_level(logging.INFO)
-    store = opened(tmp_path, clocks, Bounds(1.0, 1e6, 0.2))
+    store = opened(tmp_path, clocks, RetentionLimits(1.0, 1e6, 0.2))
     records(store, clocks, range(20))
     clocks.now += 3600
     records(store, clocks, range(20, 21))

@@ -9,12 +9,12 @@ from cameras_by_hand import CAMERAS, FPS, GOP, FedService, small_config
 from recorded_by_hand import AMPLE, PULSE0, A, ClocksByHand, filled, head, pictures, piece
 from small_disk import files_of_at_most
 
-from server.service.recording.recording_session import Headers, Run
-from server.service.recording.retention import Bounds
-from server.service.recording.segment_index import Stretch
-from server.service.recording.store import Store
+from server.service.recording.recording_folder import RecordingFolder
+from server.service.recording.recording_session import InitSegments, RecordingSession
+from server.service.recording.retention import RetentionLimits
+from server.service.recording.segment_index import IndexEntry
 
-BOUNDS = Bounds(keep_s=3.0, most_mb=1e6, segment_s=1.0)
+BOUNDS = RetentionLimits(keep_s=3.0, most_mb=1e6, segment_s=1.0)
 SEGMENT = 25  # pulses
 
 
@@ -23,25 +23,25 @@ def clock() -> ClocksByHand:
     return ClocksByHand()
 
 
-def record(store: Store, clock: ClocksByHand, gops: range) -> None:
+def record(store: RecordingFolder, clock: ClocksByHand, gops: range) -> None:
     """Write GOPs of person 1 in a camera, in real time."""
     for gop in gops:
         clock.now = PULSE0 + gop * GOP / FPS
-        store.write(piece(gop, {1: A}), head(), Headers(filled()[1]))
+        store.write(piece(gop, {1: A}), head(), InitSegments(filled()[1]))
 
 
-def opened(folder: Path, clock: ClocksByHand, bounds: Bounds = BOUNDS) -> Store:
-    store = Store(folder, bounds, clock.machine)
+def opened(folder: Path, clock: ClocksByHand, bounds: RetentionLimits = BOUNDS) -> RecordingFolder:
+    store = RecordingFolder(folder, bounds, clock.machine)
     store.open()
     return store
 
 
-def leave(store: Store) -> None:
+def leave(store: RecordingFolder) -> None:
     """End a service."""
     store.close()
 
 
-def refused(store: Store, clock: ClocksByHand, gop: int) -> None:
+def refused(store: RecordingFolder, clock: ClocksByHand, gop: int) -> None:
     """Try to write a GOP on a disk that takes not a byte; it is given up, as the writer does."""
     with files_of_at_most(0), pytest.raises(OSError, match="large"):
         record(store, clock, range(gop, gop + 1))
@@ -53,13 +53,13 @@ def on_disk(folder: Path) -> list[int]:
     return sorted({int(it.stem) for it in folder.glob("*/cameras/*/*.mp4")})
 
 
-def files_in(run: Run) -> set[int]:
+def files_in(run: RecordingSession) -> set[int]:
     """Give the files that the playlists in memory refer to."""
     tapes = [it.tape for it in (*run.cameras.values(), *run.objects.values())]
     return {stretch.file for tape in tapes for stretch in tape.all}
 
 
-def files_told(run: Run) -> set[int]:
+def files_told(run: RecordingSession) -> set[int]:
     """Give the files that the playlists on the disk refer to."""
     told: set[int] = set()
     for path in run.folder.rglob("*.m3u8"):
@@ -179,7 +179,7 @@ def test_a_playlist_that_could_not_be_written_tells_so_until_it_is(
     with files_of_at_most(0), pytest.raises(OSError, match="large"):
         playlist.tidy()
     assert playlist.stale
-    playlist.append(Stretch(A, 50, 9_999, 10, 100, 5))
+    playlist.append(IndexEntry(A, 50, 9_999, 10, 100, 5))
     assert playlist.stale, "what was added stands behind what is gone"
     playlist.tidy()
     assert not playlist.stale

@@ -15,9 +15,9 @@ from nobody_by_hand import nobodys_folder
 from recorded_by_hand import AMPLE, A, B, filled, head, pictures, piece
 from small_disk import files_of_at_most
 
-from server.service.recording.recording_session import Headers, Run
-from server.service.recording.retention import Bounds
-from server.service.recording.store import Store
+from server.service.recording.recording_folder import RecordingFolder
+from server.service.recording.recording_session import InitSegments, RecordingSession
+from server.service.recording.retention import RetentionLimits
 
 NOTHING = "of object 1 nothing is kept from p0 on; there is nothing"
 Harm = Callable[[Path, Path], None]
@@ -78,10 +78,10 @@ FILES = [
 ]
 
 
-def records(store: Store, gops: range) -> None:
+def records(store: RecordingFolder, gops: range) -> None:
     for gop in gops:
         try:
-            store.write(piece(gop, {1: A, 2: B}), head(), Headers(filled()[1]))
+            store.write(piece(gop, {1: A, 2: B}), head(), InitSegments(filled()[1]))
         except OSError:
             store.abandon()  # as the writer does
 
@@ -89,7 +89,7 @@ def records(store: Store, gops: range) -> None:
 def nothing_is_orphaned(folder: Path) -> None:
     """Check that whatever is on the disk is known to a service that begins, which takes it away some day."""
     before = {it for it in folder.rglob("*") if it.is_file()}
-    store = Store(folder, AMPLE)
+    store = RecordingFolder(folder, AMPLE)
     store.open()
     store.close()
     assert {it for it in folder.rglob("*") if it.is_file()} == before, "nothing had to be tidied up"
@@ -104,7 +104,7 @@ def nothing_is_orphaned(folder: Path) -> None:
 
 def shown(folder: Path) -> list[int]:
     """Play what is on the disk of camera c0: give its pulses."""
-    store = Store(folder, AMPLE)
+    store = RecordingFolder(folder, AMPLE)
     store.open()
     store.close()
     found = [run.cameras[A].path for run in store.earlier if run.cameras[A].path.exists()]
@@ -123,7 +123,7 @@ def shown(folder: Path) -> list[int]:
 )
 def test_it_goes_on_at_once_and_leaves_nothing_that_nobody_knows_of(tmp_path: Path, harm: Harm) -> None:
     folder = tmp_path / "kept"
-    store = Store(folder, AMPLE)
+    store = RecordingFolder(folder, AMPLE)
     store.open()
     records(store, range(3))
     assert store.run is not None
@@ -136,7 +136,7 @@ def test_it_goes_on_at_once_and_leaves_nothing_that_nobody_knows_of(tmp_path: Pa
 
 def test_while_a_file_has_the_folders_place_nothing_is_left_and_then_it_goes_on(tmp_path: Path) -> None:
     folder = tmp_path / "kept"
-    store = Store(folder, AMPLE)
+    store = RecordingFolder(folder, AMPLE)
     store.open()
     records(store, range(3))
     shutil.rmtree(folder)
@@ -152,7 +152,7 @@ def test_while_a_file_has_the_folders_place_nothing_is_left_and_then_it_goes_on(
 
 def test_a_disk_that_comes_back_is_gone_on_with_and_its_runs_are_known(tmp_path: Path) -> None:
     folder, away = tmp_path / "kept", tmp_path / "unmounted"
-    store = Store(folder, AMPLE)
+    store = RecordingFolder(folder, AMPLE)
     store.open()
     records(store, range(3))
     folder.rename(away)
@@ -171,14 +171,14 @@ def test_a_disk_that_comes_back_is_gone_on_with_and_its_runs_are_known(tmp_path:
 
 def test_who_took_the_folder_meanwhile_has_it(tmp_path: Path) -> None:
     folder = tmp_path / "kept"
-    store, other = Store(folder, AMPLE), Store(folder, AMPLE)
+    store, other = RecordingFolder(folder, AMPLE), RecordingFolder(folder, AMPLE)
     store.open()
     records(store, range(3))
     shutil.rmtree(folder)
     other.open()
     records(other, range(3))
     with pytest.raises(BlockingIOError, match="another process records there"):
-        store.write(piece(3, {1: A}), head(), Headers(filled()[1]))
+        store.write(piece(3, {1: A}), head(), InitSegments(filled()[1]))
     store.abandon()
     other.close()
     records(store, range(4, 6))
@@ -190,7 +190,7 @@ def test_who_took_the_folder_meanwhile_has_it(tmp_path: Path) -> None:
 def test_where_it_may_not_write_nothing_is_left_and_when_it_may_it_goes_on(closed: str) -> None:
     with nobodys_folder() as tmp_path:
         folder = tmp_path / "kept"
-        store = Store(folder, Bounds(1e6, 1e6, 2 * GOP / FPS))
+        store = RecordingFolder(folder, RetentionLimits(1e6, 1e6, 2 * GOP / FPS))
         store.open()
         records(store, range(3))
         assert store.run is not None
@@ -211,14 +211,14 @@ def test_old_recordings_that_cannot_be_taken_away_keep_nobody_from_recording(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     with nobodys_folder() as tmp_path:
-        first = Store(tmp_path, AMPLE)
+        first = RecordingFolder(tmp_path, AMPLE)
         first.open()
         records(first, range(12))
         first.close()
         closed = [it for it in tmp_path.rglob("*") if it.is_dir()]
         for it in closed:
             it.chmod(0o500)
-        store = Store(tmp_path, Bounds(1e-9, 1e6, 1.0))
+        store = RecordingFolder(tmp_path, RetentionLimits(1e-9, 1e6, 1.0))
         store.open()
         records(store, range(20, 24))
         for it in closed:
@@ -232,7 +232,7 @@ def test_old_recordings_that_cannot_be_taken_away_keep_nobody_from_recording(
 
 
 def test_a_full_disk_leaves_nothing_at_any_try_and_then_it_goes_on(tmp_path: Path) -> None:
-    store = Store(tmp_path, AMPLE)
+    store = RecordingFolder(tmp_path, AMPLE)
     store.open()
     records(store, range(3))
     before = {it for it in tmp_path.rglob("*") if it.is_file()}
@@ -249,14 +249,14 @@ def test_a_full_disk_leaves_nothing_at_any_try_and_then_it_goes_on(tmp_path: Pat
 def test_what_is_left_of_runs_that_hardly_began_goes_and_media_without_a_head_are_told_of(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    Run.begin(tmp_path / "20260101T000000Z", head(), Headers(b"x"), 1.0)
+    RecordingSession.begin(tmp_path / "20260101T000000Z", head(), InitSegments(b"x"), 1.0)
     (tmp_path / "20260101T000000Z" / "run.json").unlink()
     media = tmp_path / "20260102T000000Z" / "cameras" / "c0" / "000000000000.mp4"
     mine = tmp_path / "holiday" / "notes.txt"
     for it in (media, mine):
         it.parent.mkdir(parents=True)
         it.write_bytes(b"")
-    store = Store(tmp_path, AMPLE)
+    store = RecordingFolder(tmp_path, AMPLE)
     store.open()
     store.close()
     assert not (tmp_path / "20260101T000000Z").exists()
@@ -266,13 +266,13 @@ def test_what_is_left_of_runs_that_hardly_began_goes_and_media_without_a_head_ar
 
 
 def test_what_is_lost_without_the_choices_is_kept_and_gets_old(tmp_path: Path) -> None:
-    store = Store(tmp_path, AMPLE)
+    store = RecordingFolder(tmp_path, AMPLE)
     store.open()
     records(store, range(12))
     store.close()
     assert store.run is not None
     shutil.rmtree(store.run.folder / "index")
-    again = Store(tmp_path, AMPLE)
+    again = RecordingFolder(tmp_path, AMPLE)
     again.open()
     again.close()
     assert [it.first for it in again.earlier[0].segments] == [0, 25, 50]
@@ -280,7 +280,7 @@ def test_what_is_lost_without_the_choices_is_kept_and_gets_old(tmp_path: Path) -
 
 
 def test_that_a_new_folder_is_begun_is_one_line(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    store = Store(tmp_path / "kept", AMPLE)
+    store = RecordingFolder(tmp_path / "kept", AMPLE)
     store.open()
     for gop in range(20):
         records(store, range(gop, gop + 1))

@@ -16,10 +16,10 @@ from test_past_hls import GOPS, HTTP, LENGTH, forget, numbers, shows, text, unti
 import server.http.hls.long_playlist as long_module
 from server.http.hls import time_shift_playlist
 from server.http.hls.long_playlist import MOST_GROWING, long_playlist, newest
-from server.service.recording.time_shift import Listing
-from server.service.streaming.hls_segmenter import plan
+from server.service.streaming.hls_segmenter import segment_layout
+from server.service.time_shift.hls_time_shift import SegmentList
 
-PLAN = plan(FPS, LENGTH, LENGTH / FPS, 1.0)
+PLAN = segment_layout(FPS, LENGTH, LENGTH / FPS, 1.0)
 
 
 @pytest.fixture
@@ -133,7 +133,7 @@ async def test_live_is_an_end_of_hls_alone(hall: Hall) -> None:
 
 
 def test_the_time_of_day_is_told_of_the_first_and_of_some_others() -> None:
-    listing = Listing(range(100, 400), PLAN.frames, 1003, 3996)
+    listing = SegmentList(range(100, 400), PLAN.frames, 1003, 3996)
     listed = long_playlist(listing, PLAN, PULSE0, ended=True)
     assert numbers(listed) == list(range(100, 400))
     told = {number: when.timestamp() for number, when in dated(listed).items()}
@@ -145,7 +145,7 @@ def test_the_time_of_day_is_told_of_the_first_and_of_some_others() -> None:
 
 @pytest.mark.parametrize("stop", range(MOST_GROWING + 100, MOST_GROWING + 300, 7))
 def test_what_is_first_after_others_have_gone_was_dated_before(stop: int) -> None:
-    whole = Listing(range(100, stop), PLAN.frames, 1000, stop * PLAN.frames)
+    whole = SegmentList(range(100, stop), PLAN.frames, 1000, stop * PLAN.frames)
     left = newest(whole)
     assert MOST_GROWING - 64 < len(left.numbers) <= MOST_GROWING
     before, after = (entries(long_playlist(it, PLAN, PULSE0, ended=False)) for it in (whole, left))

@@ -35,10 +35,10 @@ from server.media.audio.audio_chunk import Heard
 from server.media.audio.audio_format import SoundFormat
 from server.media.containers.mp4_audio import sound_fragment
 from server.messaging.messages import GopChoices
-from server.service.recording.audio_file import frames_in
-from server.service.recording.recording_session import Headers
-from server.service.recording.retention import Bounds
-from server.service.recording.store import Piece, Store
+from server.service.recording.audio_file import read_audio_frames
+from server.service.recording.recording_folder import GopRecord, RecordingFolder
+from server.service.recording.recording_session import InitSegments
+from server.service.recording.retention import RetentionLimits
 from server.service.view_selection.decider import GopDecision, ObjectChoice
 
 FORM = SoundFormat(48_000, 2)
@@ -128,7 +128,7 @@ async def test_in_the_past_a_beep_is_with_its_flash_whatever_file_it_is_in(
 async def test_where_the_past_meets_the_present_the_sound_goes_on(
     hall: Hall, recording: Path, path: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("server.service.recording.time_shift_stream._LEAD_S", 60.0)
+    monkeypatch.setattr("server.service.time_shift.time_shift_stream._LEAD_S", 60.0)
     service, half = hall.service, GOPS // 2
     own = sends(service, recording)
     shows(hall, recording, range(half))
@@ -203,14 +203,14 @@ async def test_the_sound_of_an_earlier_run_is_heard_after_a_restart(recording: P
 
 async def test_sound_goes_with_the_segments_it_is_of(tmp_path: Path) -> None:
     clocks = ClocksByHand()
-    store = Store(tmp_path, Bounds(keep_s=2.0, most_mb=1e6, segment_s=0.4), clocks.machine)
+    store = RecordingFolder(tmp_path, RetentionLimits(keep_s=2.0, most_mb=1e6, segment_s=0.4), clocks.machine)
     store.open()
     for gop in range(GOPS):
         clocks.now = PULSE0 + gop * GOP / FPS
         it = piece(gop, {1: A})
         begin, end = (FORM.frame_at(pulse, FPS) for pulse in (gop * GOP, (gop + 1) * GOP))
         heard = Heard(begin, tuple(bytes([number % 251]) * 9 for number in range(begin, end)), FORM)
-        store.write(Piece(it.choices, it.cameras, heard), head(), Headers(b"pictures", b"sound"))
+        store.write(GopRecord(it.choices, it.cameras, heard), head(), InitSegments(b"pictures", b"sound"))
     run = store.run
     assert run is not None
     firsts = [it.first for it in run.segments]
@@ -221,7 +221,7 @@ async def test_sound_goes_with_the_segments_it_is_of(tmp_path: Path) -> None:
         sum(it.stat().st_size for it in run.folder.rglob("*") if it.is_file()), abs=3000
     )
     store.close()
-    again = Store(tmp_path, AMPLE)
+    again = RecordingFolder(tmp_path, AMPLE)
     again.open()
     assert again.earlier[0].sound.tape.all == run.sound.tape.all
 
@@ -262,7 +262,7 @@ def test_a_damaged_file_gives_what_can_be_read_or_nothing(
     for _ in range(data.draw(st.integers(1, 5))):
         content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))
     path.write_bytes(content[: data.draw(st.integers(0, len(content)))])
-    found = frames_in(path, 0, data.draw(st.integers(0, len(content))), 0, 8, FORM)
+    found = read_audio_frames(path, 0, data.draw(st.integers(0, len(content))), 0, 8, FORM)
     assert found.keys() <= set(range(8))
 
 
@@ -283,6 +283,6 @@ def test_frames_are_found_by_their_numbers(
         number += len(frames) + data.draw(st.integers(0, 2))
     path.write_bytes(content + b"junk")
     begin, end = (data.draw(st.integers(0, number + 2)) for _ in range(2))
-    assert frames_in(path, 4, len(content) - 4, begin, end, FORM) == {
+    assert read_audio_frames(path, 4, len(content) - 4, begin, end, FORM) == {
         number: frame for number, frame in all_of_them.items() if begin <= number < end
     }

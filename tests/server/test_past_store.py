@@ -28,10 +28,10 @@ from recorded_by_hand import (
 )
 from small_disk import files_of_at_most
 
-from server.service.recording.media_files import CameraFile, gops
-from server.service.recording.recording_session import Headers
-from server.service.recording.retention import Bounds
-from server.service.recording.store import Store
+from server.service.recording.media_files import MediaFile, read_gops
+from server.service.recording.recording_folder import RecordingFolder
+from server.service.recording.recording_session import InitSegments
+from server.service.recording.retention import RetentionLimits
 
 
 def only_run(folder: Path) -> Path:
@@ -47,7 +47,9 @@ def test_a_persons_playlist_is_the_chosen_cameras_pictures_pixel_for_pixel_acros
     tmp_path: Path,
 ) -> None:
     choices = [A, A, B, B, A, B, A, A, A, B, B, A]
-    store = written(Store(tmp_path, AMPLE), [piece(gop, {1: camera}) for gop, camera in enumerate(choices)])
+    store = written(
+        RecordingFolder(tmp_path, AMPLE), [piece(gop, {1: camera}) for gop, camera in enumerate(choices)]
+    )
     during = list(pictures(only_run(tmp_path) / "objects" / "1.m3u8"))
     store.close()
     after = list(pictures(only_run(tmp_path) / "objects" / "1.m3u8"))
@@ -58,9 +60,10 @@ def test_a_persons_playlist_is_the_chosen_cameras_pictures_pixel_for_pixel_acros
 
 
 def test_a_camera_is_written_once_however_many_people_it_shows(tmp_path: Path) -> None:
-    few = written(Store(tmp_path / "few", AMPLE), [piece(gop, {1: A}) for gop in range(4)])
+    few = written(RecordingFolder(tmp_path / "few", AMPLE), [piece(gop, {1: A}) for gop in range(4)])
     many = written(
-        Store(tmp_path / "many", AMPLE), [piece(gop, dict.fromkeys(range(50), A)) for gop in range(4)]
+        RecordingFolder(tmp_path / "many", AMPLE),
+        [piece(gop, dict.fromkeys(range(50), A)) for gop in range(4)],
     )
     few.close()
     many.close()
@@ -70,7 +73,7 @@ def test_a_camera_is_written_once_however_many_people_it_shows(tmp_path: Path) -
 
 def test_every_file_and_playlist_decodes_without_errors_even_with_holes(tmp_path: Path) -> None:
     pieces = [piece(gop, {1: A, 2: B} if gop % 4 else {1: A}) for gop in range(12) if gop != 7]
-    written(Store(tmp_path, AMPLE), pieces).close()
+    written(RecordingFolder(tmp_path, AMPLE), pieces).close()
     files = everything_that_plays(tmp_path)
     assert len(files) == 2 + 2 + 3 * 2, "two people, two cameras, three files each"
     for path in files:
@@ -78,7 +81,10 @@ def test_every_file_and_playlist_decodes_without_errors_even_with_holes(tmp_path
 
 
 def test_a_playlist_keeps_to_the_rules(tmp_path: Path) -> None:
-    written(Store(tmp_path, AMPLE), [piece(gop, {1: B if gop == 3 else A}) for gop in range(7) if gop != 5])
+    written(
+        RecordingFolder(tmp_path, AMPLE),
+        [piece(gop, {1: B if gop == 3 else A}) for gop in range(7) if gop != 5],
+    )
     text = (only_run(tmp_path) / "objects" / "1.m3u8").read_text()
     lines = text.splitlines()
     assert lines[0] == "#EXTM3U"
@@ -97,7 +103,7 @@ def test_a_playlist_keeps_to_the_rules(tmp_path: Path) -> None:
 
 
 def test_the_index_says_who_was_where(tmp_path: Path) -> None:
-    written(Store(tmp_path, AMPLE), [piece(gop, {1: A}) for gop in range(7)]).close()
+    written(RecordingFolder(tmp_path, AMPLE), [piece(gop, {1: A}) for gop in range(7)]).close()
     first, second = sorted((only_run(tmp_path) / "index").iterdir())
     lines = [json.loads(line) for path in (first, second) for line in path.read_text().splitlines()]
     assert [line["first"] for line in lines] == [gop * GOP for gop in range(7)]
@@ -107,7 +113,7 @@ def test_the_index_says_who_was_where(tmp_path: Path) -> None:
 
 def test_of_a_gop_that_did_not_come_whole_the_beginning_is_kept_and_shown_to_nobody(tmp_path: Path) -> None:
     pieces = [piece(0, {1: A}), piece(1, {1: A}, frames=3), piece(2, {1: A})]
-    run = written(Store(tmp_path, AMPLE), pieces).run
+    run = written(RecordingFolder(tmp_path, AMPLE), pieces).run
     assert run is not None
     assert [pulse for pulse, _ in pictures(run.cameras[A].path)] == [
         0,
@@ -128,8 +134,8 @@ def test_of_a_gop_that_did_not_come_whole_the_beginning_is_kept_and_shown_to_nob
 
 
 def test_a_service_that_begins_again_goes_on_beside_what_is_there(tmp_path: Path) -> None:
-    written(Store(tmp_path, AMPLE), [piece(gop, {1: A}) for gop in range(3)]).close()
-    second = written(Store(tmp_path, AMPLE), [piece(gop, {1: B}) for gop in range(3)])
+    written(RecordingFolder(tmp_path, AMPLE), [piece(gop, {1: A}) for gop in range(3)]).close()
+    second = written(RecordingFolder(tmp_path, AMPLE), [piece(gop, {1: B}) for gop in range(3)])
     assert len([it for it in tmp_path.iterdir() if it.is_dir()]) == 2
     (earlier,) = second.earlier
     assert [(it.first, it.end) for it in earlier.objects[1].tape.all] == [(0, 15)]
@@ -140,27 +146,27 @@ def test_a_service_that_begins_again_goes_on_beside_what_is_there(tmp_path: Path
 
 
 def test_pulses_that_begin_anew_are_another_run(tmp_path: Path) -> None:
-    store = written(Store(tmp_path, AMPLE), [piece(gop, {1: A}) for gop in (5, 6, 0, 1)])
+    store = written(RecordingFolder(tmp_path, AMPLE), [piece(gop, {1: A}) for gop in (5, 6, 0, 1)])
     assert store.run is not None
     assert [(it.first, it.end) for it in store.run.objects[1].tape.all] == [(0, 10)]
     assert [(it.first, it.end) for it in store.earlier[0].objects[1].tape.all] == [(25, 35)]
 
 
 def test_two_processes_do_not_record_into_one_folder(tmp_path: Path) -> None:
-    store = written(Store(tmp_path, AMPLE), [])
+    store = written(RecordingFolder(tmp_path, AMPLE), [])
     with pytest.raises(BlockingIOError):
-        Store(tmp_path, AMPLE).open()
+        RecordingFolder(tmp_path, AMPLE).open()
     store.close()
-    Store(tmp_path, AMPLE).open()
+    RecordingFolder(tmp_path, AMPLE).open()
 
 
 def test_what_is_too_old_goes_in_whole_segments_with_what_refers_to_it(tmp_path: Path) -> None:
     clocks = ClocksByHand()
-    store = Store(tmp_path, Bounds(keep_s=3.0, most_mb=1e6, segment_s=1.0), clocks.machine)
+    store = RecordingFolder(tmp_path, RetentionLimits(keep_s=3.0, most_mb=1e6, segment_s=1.0), clocks.machine)
     store.open()
     for gop in range(40):
         clocks.now = PULSE0 + gop * GOP / FPS
-        store.write(piece(gop, {1: A, 2 if gop < 10 else 3: B}), head(), Headers(filled()[1]))
+        store.write(piece(gop, {1: A, 2 if gop < 10 else 3: B}), head(), InitSegments(filled()[1]))
     store.close()
     run = store.run
     assert run is not None
@@ -181,15 +187,15 @@ def test_the_disk_takes_no_more_than_it_may_and_what_is_found_again_is_what_was_
 ) -> None:
     folder = tmp_path_factory.mktemp("bounded")
     most_mb = data.draw(st.sampled_from([0.05, 0.1, 1.0]))
-    store = Store(folder, Bounds(keep_s=1e6, most_mb=most_mb, segment_s=0.4))
+    store = RecordingFolder(folder, RetentionLimits(keep_s=1e6, most_mb=most_mb, segment_s=0.4))
     store.open()
     slack = 2 * 8_000  # bytes: a GOP of both cameras, its line, its references
     for gop, choices in enumerate(shown):
-        store.write(piece(gop, choices), head(), Headers(filled()[1]))
+        store.write(piece(gop, choices), head(), InitSegments(filled()[1]))
         on_disk = sum(it.stat().st_size for it in folder.rglob("*") if it.is_file())
         assert on_disk <= most_mb * 1e6 + slack
     store.close()
-    again = Store(folder, AMPLE)
+    again = RecordingFolder(folder, AMPLE)
     again.open()
     assert store.run is not None
     found = {number: it.tape.all for run in again.earlier for number, it in run.objects.items()}
@@ -200,25 +206,25 @@ def test_the_disk_takes_no_more_than_it_may_and_what_is_found_again_is_what_was_
         assert kept == expected[len(expected) - len(kept) :], "the newest, without a hole of our own"
         for it in tape:
             path = again.earlier[0].camera_file(it.camera, it.file)
-            assert [gop.first for gop in gops(path, it.offset, it.length, FPS)] == list(
+            assert [gop.first for gop in read_gops(path, it.offset, it.length, FPS)] == list(
                 range(it.first, it.end, GOP)
             )
     again.close()
 
 
 def test_when_the_disk_is_full_what_is_there_plays_and_later_it_goes_on(tmp_path: Path) -> None:
-    store = written(Store(tmp_path, AMPLE), [piece(gop, {1: A}) for gop in range(2)])
+    store = written(RecordingFolder(tmp_path, AMPLE), [piece(gop, {1: A}) for gop in range(2)])
     assert store.run is not None
     size = store.run.camera_file(A, 0).stat().st_size
     with files_of_at_most(size + 300), pytest.raises(OSError, match="large") as refused:
-        store.write(piece(2, {1: A}), head(), Headers(filled()[1]))
+        store.write(piece(2, {1: A}), head(), InitSegments(filled()[1]))
     assert refused.value.errno == errno.EFBIG
     store.abandon()
     assert store.run.camera_file(A, 0).stat().st_size == size
     with files_of_at_most(len(filled()[1]) + 300), pytest.raises(OSError, match="large"):
-        store.write(piece(3, {1: A}), head(), Headers(filled()[1]))
+        store.write(piece(3, {1: A}), head(), InitSegments(filled()[1]))
     store.abandon()
-    store.write(piece(4, {1: A}), head(), Headers(filled()[1]))
+    store.write(piece(4, {1: A}), head(), InitSegments(filled()[1]))
     store.close()
     assert [pulse // GOP for pulse, _ in pictures(store.run.objects[1].path)][::GOP] == [0, 1, 4]
     for path in everything_that_plays(tmp_path):
@@ -231,7 +237,7 @@ def test_a_writer_killed_in_the_middle_of_a_gop_leaves_a_file_that_plays(
 ) -> None:
     gop_of = piece(0, {}).cameras[A], piece(1, {}).cameras[A]
     path = tmp_path / "0.mp4"
-    file = CameraFile(path, filled()[1])
+    file = MediaFile(path, filled()[1])
     file.append(gop_of[0])
 
     class KilledError(BaseException):

@@ -37,18 +37,18 @@ from server.media.stream_format import Agreement
 from server.messaging.inbox import Message
 from server.messaging.messages import Box, ZenohKeys
 from server.messaging.retained_state import IdentitySnapshot
-from server.service.recording import time_shift_stream as past_stream
-from server.service.recording.available_range import kept_from, kept_until, known
 from server.service.recording.media_files import pulse_of
-from server.service.recording.moments import MomentError, pulse_at
-from server.service.recording.playback import CameraPast, ObjectPast, Recorded
-from server.service.recording.recording_session import Headers
-from server.service.recording.segment_index import Span
-from server.service.recording.store import Store
-from server.service.recording.time_shift_stream import PastStream, Wish
-from server.service.streaming.broadcaster import Channel
-from server.service.streaming.media_chunk import Footage
-from server.service.streaming.timeline import Timeline
+from server.service.recording.recording_folder import RecordingFolder
+from server.service.recording.recording_session import InitSegments
+from server.service.recording.segment_index import PulseRange
+from server.service.streaming.broadcaster import Broadcaster
+from server.service.streaming.gapless_timeline import GaplessTimeline
+from server.service.streaming.media_chunk import MediaChunk
+from server.service.time_shift import time_shift_stream as past_stream
+from server.service.time_shift.availability import available_ranges, end_of_available, first_available
+from server.service.time_shift.playback import CameraPlayback, PersonPlayback, SessionEntries
+from server.service.time_shift.time_reference import TimeReferenceError, parse_time_reference
+from server.service.time_shift.time_shift_stream import PlaybackRange, TimeShiftStream
 
 MOMENT = "say seconds back (-60), a pulse (p1250) or a time (2026-11-21T16:13:36Z)"
 IN_A: Mapping[str, Mapping[int, Box | None]] = {A: {1: LARGE}, B: {1: SMALL}}
@@ -152,10 +152,10 @@ async def test_an_end_that_is_yet_to_come_is_waited_for(recorded: Hall) -> None:
 
 
 async def test_without_a_recording_the_memory_is_the_past(busy: Hall) -> None:
-    for source in (ObjectPast(busy.service.past, (1,)), CameraPast(busy.service.past, A)):
-        (span,) = known(source)
-        assert (kept_from(source, 0), kept_until(source)) == (span.first, span.end)
-        assert kept_from(source, span.end) is None
+    for source in (PersonPlayback(busy.service.past, (1,)), CameraPlayback(busy.service.past, A)):
+        (span,) = available_ranges(source)
+        assert (first_available(source, 0), end_of_available(source)) == (span.first, span.end)
+        assert first_available(source, span.end) is None
     assert [pulse for pulse, _ in await read(busy, "/objects/1/best.mp4?from=p0&to=p9")] == list(range(9))
 
 
@@ -275,7 +275,7 @@ class OnDisk:
 
     presence = None
 
-    def __init__(self, *recorded: Recorded, end: int) -> None:
+    def __init__(self, *recorded: SessionEntries, end: int) -> None:
         self.recorded, self.end = recorded, end
 
     def recall(self, pulse: int) -> None:
@@ -285,7 +285,7 @@ class OnDisk:
         del pulse
 
 
-def site_of(store: Store) -> tuple[Agreement, bytes]:
+def site_of(store: RecordingFolder) -> tuple[Agreement, bytes]:
     del store
     shelves, header = filled()
     return shelves[A]._agreement, header
@@ -302,17 +302,19 @@ async def test_any_part_of_any_past_is_played_without_a_hole(
 ) -> None:
     folder = tmp_path_factory.mktemp("part")
     pieces = [piece(gop, {} if camera is None else {1: camera}) for gop, camera in enumerate(shown)]
-    store = written(Store(folder, AMPLE), pieces)
+    store = written(RecordingFolder(folder, AMPLE), pieces)
     assert store.run is not None
-    tapes = [Recorded(store.run, store.run.objects[1].tape)] if 1 in store.run.objects else []
+    tapes = [SessionEntries(store.run, store.run.objects[1].tape)] if 1 in store.run.objects else []
     source = OnDisk(*tapes, end=len(shown) * GOP)
     agreement, header = site_of(store)
-    stream = PastStream(source, Timeline(agreement, FPS, GOP), FPS, lambda: None)
-    data = b"".join([it.data async for it in stream.send(Wish(start, start + frames))])
+    stream = TimeShiftStream(source, GaplessTimeline(agreement, FPS, GOP), FPS, lambda: None)
+    data = b"".join([it.data async for it in stream.send(PlaybackRange(start, start + frames))])
     store.close()
-    there = known(source)
-    assert kept_from(source, start) == next((max(it.first, start) for it in there if it.end > start), None)
-    assert kept_until(source) == (there[-1].end if there else 0)
+    there = available_ranges(source)
+    assert first_available(source, start) == next(
+        (max(it.first, start) for it in there if it.end > start), None
+    )
+    assert end_of_available(source) == (there[-1].end if there else 0)
     kept = [gop for gop, camera in enumerate(shown) if camera is not None]
     wanted = [gop for gop in kept if (gop + 1) * GOP > start and gop * GOP < start + frames]
     if not wanted:
@@ -325,45 +327,49 @@ async def test_any_part_of_any_past_is_played_without_a_hole(
         camera = shown[pulse // GOP]
         if camera is not None:
             np.testing.assert_array_equal(picture, own_pictures(camera)[pulse])
-    assert all(any(it.first <= gop * GOP < it.end for it in known(source)) for gop in wanted)
+    assert all(any(it.first <= gop * GOP < it.end for it in available_ranges(source)) for gop in wanted)
 
 
 async def test_what_retention_takes_away_meanwhile_is_left_out(tmp_path: Path) -> None:
-    store = written(Store(tmp_path, AMPLE), [piece(gop, {1: A}) for gop in range(12)])
+    store = written(RecordingFolder(tmp_path, AMPLE), [piece(gop, {1: A}) for gop in range(12)])
     assert store.run is not None
     store.run.camera_file(A, 25).unlink()
-    source = OnDisk(Recorded(store.run, store.run.objects[1].tape), end=60)
+    source = OnDisk(SessionEntries(store.run, store.run.objects[1].tape), end=60)
     agreement, header = site_of(store)
-    stream = PastStream(source, Timeline(agreement, FPS, GOP), FPS, lambda: None)
-    data = b"".join([it.data async for it in stream.send(Wish(0, 60))])
+    stream = TimeShiftStream(source, GaplessTimeline(agreement, FPS, GOP), FPS, lambda: None)
+    data = b"".join([it.data async for it in stream.send(PlaybackRange(0, 60))])
     assert [pulse for pulse, _ in decoded(header + data)] == list(range(60)), "bridged, as live"
-    assert known(source) == [Span(0, 60)]
+    assert available_ranges(source) == [PulseRange(0, 60)]
 
 
 @pytest.mark.parametrize("end", [2 * GOP + 1, 10 * GOP])
 async def test_who_is_out_of_view_at_the_end_is_not_waited_for(tmp_path: Path, end: int) -> None:
     now = 10 * GOP + FPS
     store = written(
-        Store(tmp_path, AMPLE), [piece(gop, {1: A} if gop < 2 else {}) for gop in range(now // GOP)]
+        RecordingFolder(tmp_path, AMPLE), [piece(gop, {1: A} if gop < 2 else {}) for gop in range(now // GOP)]
     )
     assert store.run is not None
-    source = OnDisk(Recorded(store.run, store.run.objects[1].tape), end=now)
+    source = OnDisk(SessionEntries(store.run, store.run.objects[1].tape), end=now)
     agreement, header = site_of(store)
-    stream = PastStream(source, Timeline(agreement, FPS, GOP), FPS, Channel)  # in which nothing comes
-    data = b"".join([it.data async for it in stream.send(Wish(0, end))])
+    stream = TimeShiftStream(
+        source, GaplessTimeline(agreement, FPS, GOP), FPS, Broadcaster
+    )  # in which nothing comes
+    data = b"".join([it.data async for it in stream.send(PlaybackRange(0, end))])
     assert [pulse for pulse, _ in decoded(header + data)] == list(range(2 * GOP))
 
 
 async def test_who_comes_back_after_the_end_does_not_make_the_past_longer(tmp_path: Path) -> None:
-    store = written(Store(tmp_path, AMPLE), [piece(gop, {1: A} if gop < 2 else {}) for gop in range(4)])
+    store = written(
+        RecordingFolder(tmp_path, AMPLE), [piece(gop, {1: A} if gop < 2 else {}) for gop in range(4)]
+    )
     assert store.run is not None
-    source = OnDisk(Recorded(store.run, store.run.objects[1].tape), end=4 * GOP)
+    source = OnDisk(SessionEntries(store.run, store.run.objects[1].tape), end=4 * GOP)
     agreement, header = site_of(store)
-    channel, back = Channel(), piece(8, {1: A}).cameras[A]
+    channel, back = Broadcaster(), piece(8, {1: A}).cameras[A]
     came = [Shown(back.first + at, not at, it, boot=1) for at, it in enumerate(back.fragments)]
-    channel.publish(Footage(came, FPS, Counters()))
-    stream = PastStream(source, Timeline(agreement, FPS, GOP), FPS, lambda: channel)
-    data = b"".join([it.data async for it in stream.send(Wish(0, 5 * GOP))])
+    channel.publish(MediaChunk(came, FPS, Counters()))
+    stream = TimeShiftStream(source, GaplessTimeline(agreement, FPS, GOP), FPS, lambda: channel)
+    data = b"".join([it.data async for it in stream.send(PlaybackRange(0, 5 * GOP))])
     assert [pulse for pulse, _ in decoded(header + data)] == list(range(2 * GOP))
     assert len(fragments(data)) == 2 * GOP, "and nothing that lasts up to then"
 
@@ -371,7 +377,7 @@ async def test_who_comes_back_after_the_end_does_not_make_the_past_longer(tmp_pa
 async def test_a_few_seconds_come_at_once_and_the_rest_in_real_time(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    store = written(Store(tmp_path, AMPLE), [piece(gop, {1: A}) for gop in range(40)])
+    store = written(RecordingFolder(tmp_path, AMPLE), [piece(gop, {1: A}) for gop in range(40)])
     assert store.run is not None
     now, loop = [100.0], asyncio.get_running_loop()
 
@@ -381,9 +387,9 @@ async def test_a_few_seconds_come_at_once_and_the_rest_in_real_time(
     monkeypatch.setattr(loop, "time", lambda: now[0])
     monkeypatch.setattr(asyncio, "sleep", slept)
     agreement, _ = site_of(store)
-    source = OnDisk(Recorded(store.run, store.run.objects[1].tape), end=200)
-    stream = PastStream(source, Timeline(agreement, FPS, GOP), FPS, lambda: None)
-    arrived = [now[0] - 100.0 async for _ in stream.send(Wish(0))]
+    source = OnDisk(SessionEntries(store.run, store.run.objects[1].tape), end=200)
+    stream = TimeShiftStream(source, GaplessTimeline(agreement, FPS, GOP), FPS, lambda: None)
+    arrived = [now[0] - 100.0 async for _ in stream.send(PlaybackRange(0))]
     lead = 4.0
     for gop, at in enumerate(arrived):
         assert at == pytest.approx(max(0.0, gop * GOP / FPS - lead))
@@ -391,7 +397,7 @@ async def test_a_few_seconds_come_at_once_and_the_rest_in_real_time(
 
 
 async def test_a_cameras_past_goes_back_beyond_a_restart_of_the_service(tmp_path: Path) -> None:
-    written(Store(tmp_path / "kept", AMPLE), [piece(gop, {1: A}) for gop in range(4)]).close()
+    written(RecordingFolder(tmp_path / "kept", AMPLE), [piece(gop, {1: A}) for gop in range(4)]).close()
     async for hall in opened(record={"folder": str(tmp_path / "kept"), "segment_s": 0.4}):
         hall.service.pulse0 = PULSE0 + 0.01
         hall.service.past.open()
@@ -413,17 +419,17 @@ async def test_a_cameras_past_goes_back_beyond_a_restart_of_the_service(tmp_path
         assert [line["first"] for line in lines] == [5, 10, 15, 25, 30]
         (earlier,) = hall.service.past.store.earlier
         assert [line.get("run") for line in lines] == [earlier.folder.name] * 3 + [None] * 2
-    other = Store(tmp_path / "kept", AMPLE)
+    other = RecordingFolder(tmp_path / "kept", AMPLE)
     other.open()
     assert len(other.earlier) == 2
 
 
 async def test_somebodys_past_goes_back_beyond_a_restart_if_their_number_does(tmp_path: Path) -> None:
     folder, since = tmp_path / "kept", PULSE0 - 9.0
-    store = Store(folder, AMPLE)
+    store = RecordingFolder(folder, AMPLE)
     written(store, [piece(gop, {}) for gop in range(1)])
     for gop in range(1, 4):  # numbers began when the first camera came
-        store.write(piece(gop, {1: A}), head(numbers_since=since), Headers(filled()[1]))
+        store.write(piece(gop, {1: A}), head(numbers_since=since), InitSegments(filled()[1]))
     store.close()
     async for hall in opened(record={"folder": str(folder), "segment_s": 0.4}):
         hall.service.pulse0 = PULSE0 + 0.01
@@ -460,14 +466,14 @@ async def test_somebodys_past_goes_back_beyond_a_restart_if_their_number_does(tm
     ],
 )
 def test_moments(text: str, pulse: int) -> None:
-    assert pulse_at(text, now=5000, fps=FPS, pulse0=1_763_700_000.0) == pulse
+    assert parse_time_reference(text, now=5000, fps=FPS, pulse0=1_763_700_000.0) == pulse
 
 
 @settings(max_examples=50, deadline=None)
 @given(st.text(max_size=30))
 def test_any_text_is_a_moment_or_told_in_one_line(text: str) -> None:
     try:
-        pulse = pulse_at(text, now=5000, fps=FPS, pulse0=0.0)
-    except MomentError as error:
+        pulse = parse_time_reference(text, now=5000, fps=FPS, pulse0=0.0)
+    except TimeReferenceError as error:
         pulse = 1 - len(str(error).splitlines())
     assert pulse >= 0

@@ -12,8 +12,8 @@ from cameras_by_hand import CAMERAS, GOP, SMALL, FedService, TrackNumbers, encod
 from patience import PATIENCE
 from recorded_by_hand import A, B, pictures, piece
 
-from server.service.recording.store import Piece
-from server.service.recording.writer_thread import Writer
+from server.service.recording.recording_folder import GopRecord
+from server.service.recording.writer_thread import WriterThread
 from server.system.errors import UserError
 
 
@@ -28,7 +28,7 @@ class Disk:
         self.open.set()
         self.asked = threading.Semaphore(0)
 
-    def write(self, it: Piece) -> None:
+    def write(self, it: GopRecord) -> None:
         self.asked.release()
         assert self.open.wait(PATIENCE)
         if self.refuses:
@@ -42,8 +42,8 @@ class Disk:
         self.taken.append(-1)
 
 
-def writer_on(disk: Disk, most: int = 4, retry_s: float = 0.0) -> Writer:
-    writer = Writer(disk.write, disk.abandon, disk.close, most, retry_s)
+def writer_on(disk: Disk, most: int = 4, retry_s: float = 0.0) -> WriterThread:
+    writer = WriterThread(disk.write, disk.abandon, disk.close, most, retry_s)
     writer.start()
     return writer
 
@@ -133,7 +133,7 @@ def test_a_disk_that_does_not_answer_is_told_of() -> None:
 
 def test_a_mistake_does_not_end_the_recording(caplog: pytest.LogCaptureFixture) -> None:
     class Mistaken(Disk):
-        def write(self, it: Piece) -> None:
+        def write(self, it: GopRecord) -> None:
             if not self.taken:
                 self.taken.append(-2)
                 raise ValueError("a mistake")

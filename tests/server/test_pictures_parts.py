@@ -18,23 +18,22 @@ from test_draw import CANVAS, fragments, shown
 from server.media.audio.audio_format import SoundFormat
 from server.media.rendering_messages import Drawn, Jpeg, Unit
 from server.messaging.messages import AudioHeader, GopChoices
-from server.service.rendering.decided_boxes import NOTHING, Decided
-from server.service.rendering.jpeg_series import AllSeries, Series
-from server.service.rendering.overlay_film import Film
-from server.service.rendering.pacing import Pace
-from server.service.rendering.stills import Stills
-from server.service.streaming.audio_buffer import SoundShelf
-from server.service.streaming.broadcaster import Viewer
-from server.service.streaming.media_chunk import Footage
+from server.service.rendering.decided_boxes import NO_OVERLAY, DecidedBoxes
+from server.service.rendering.mjpeg_streams import MjpegStreams, MjpegVariant, PicturePacer
+from server.service.rendering.overlay_video import OverlayVideo
+from server.service.rendering.rendered_stream import StillRequests
+from server.service.streaming.audio_buffer import AudioBuffer
+from server.service.streaming.broadcaster import Subscriber
+from server.service.streaming.media_chunk import MediaChunk
 
-EVERY = Series(FPS, boxed=False)
+EVERY = MjpegVariant(FPS, boxed=False)
 
 
 @given(st.lists(st.tuples(st.floats(0, 2), st.integers(1, 40)), max_size=30), st.floats(0.2, 2))
 def test_no_picture_is_shown_before_it_is_there_nor_kept_back_too_long(
     steps: list[tuple[float, int]], most: float
 ) -> None:
-    pace, now, pulse, last = Pace(FPS, most), 0.0, 0, 0.0
+    pace, now, pulse, last = PicturePacer(FPS, most), 0.0, 0, 0.0
     for wait, step in steps:
         now, pulse = now + wait, pulse + step
         due = pace.due(pulse, now)
@@ -48,7 +47,7 @@ def test_no_picture_is_shown_before_it_is_there_nor_kept_back_too_long(
 def test_gops_that_come_unevenly_are_shown_evenly_once_the_latest_has_come(
     first: int, late: list[float]
 ) -> None:
-    pace = Pace(FPS, 4 * GOP / FPS)
+    pace = PicturePacer(FPS, 4 * GOP / FPS)
     worst = late.index(max(late))
     shown = [
         (pulse, pace.due(pulse, number * GOP / FPS + delay))
@@ -64,12 +63,12 @@ def units(first: int, count: int) -> list[Unit]:
     return [Unit(it.pulse, it.key, it.data) for it in encoded(0)[first : first + count]]
 
 
-def pulses_sent(viewer: Viewer) -> bytes:
+def pulses_sent(viewer: Subscriber) -> bytes:
     return b"".join(piece.data for piece in viewer._queue)
 
 
 def test_a_film_that_goes_on_with_another_process_has_no_hole_and_never_goes_back() -> None:
-    film = Film(CANVAS, 8)
+    film = OverlayVideo(CANVAS, 8)
     assert film.head is None
     viewer = film.channel.join()
     film.put(units(0, 2 * GOP))
@@ -90,13 +89,13 @@ def test_a_film_that_goes_on_with_another_process_has_no_hole_and_never_goes_bac
 
 def test_a_film_is_silent_where_its_pictures_are() -> None:
     form = SoundFormat(48_000, 2)
-    shelf = SoundShelf(form, FPS, 60.0)
+    shelf = AudioBuffer(form, FPS, 60.0)
     shelf.put(AudioHeader(first=0, sizes=[9] * 30), b"not quiet" * 30)
-    film = Film(CANVAS, 8, shelf)
+    film = OverlayVideo(CANVAS, 8, shelf)
     viewer = film.channel.join()
     for gop in range(3):
         film.put(units(gop * GOP, GOP), silent=gop == 1)
-    pieces = [piece for piece in viewer._queue if isinstance(piece, Footage)]
+    pieces = [piece for piece in viewer._queue if isinstance(piece, MediaChunk)]
     told = [set(it.heard.frames) for it in pieces if it.heard is not None]
     assert told == [{b"not quiet"}, {form.silence}, {b"not quiet"}]
 
@@ -104,27 +103,27 @@ def test_a_film_is_silent_where_its_pictures_are() -> None:
 @pytest.mark.parametrize("silent", [False, True])
 def test_the_holes_of_a_film_are_silent_where_nobody_knows_what_was_in_them(*, silent: bool) -> None:
     form = SoundFormat(48_000, 2)
-    shelf = SoundShelf(form, FPS, 60.0)
+    shelf = AudioBuffer(form, FPS, 60.0)
     shelf.put(AudioHeader(first=0, sizes=[9] * 30), b"not quiet" * 30)
-    film = Film(CANVAS, 8, shelf, silent_holes=silent)
+    film = OverlayVideo(CANVAS, 8, shelf, silent_holes=silent)
     viewer = film.channel.join()
     film.put(units(0, GOP))
     film.put(units(2 * GOP, GOP))
-    pieces = [piece for piece in viewer._queue if isinstance(piece, Footage)]
+    pieces = [piece for piece in viewer._queue if isinstance(piece, MediaChunk)]
     told = [set(it.heard.frames) for it in pieces if it.heard is not None]
     assert told == [{b"not quiet"}, {form.silence if silent else b"not quiet"}, {b"not quiet"}]
 
 
 def test_whoever_comes_to_a_film_begins_with_its_newest_gop() -> None:
-    film = Film(CANVAS, 8)
+    film = OverlayVideo(CANVAS, 8)
     film.put(units(0, 2 * GOP))
     assert pulses_sent(film.channel.join()) == fragments(GOP, GOP)
 
 
 def test_a_viewer_of_pictures_has_the_newest_waiting_and_no_other() -> None:
-    series = AllSeries(CANVAS, live=True)
+    series = MjpegStreams(CANVAS, live=True)
     viewer = series.join(EVERY)
-    slow = series.join(Series(1.0, boxed=False))
+    slow = series.join(MjpegVariant(1.0, boxed=False))
     for pulse in range(30):
         series.put(Drawn(newest=pulse, plain=[Jpeg(pulse, b"picture %d." % pulse)]), now=0.0)
         assert series.show(0.0) is None
@@ -137,7 +136,7 @@ def test_a_viewer_of_pictures_has_the_newest_waiting_and_no_other() -> None:
 
 
 def test_pictures_that_come_together_are_passed_on_each_at_its_moment() -> None:
-    series = AllSeries(CANVAS, live=False)
+    series = MjpegStreams(CANVAS, live=False)
     series.join(EVERY)
     series.put(Drawn(newest=4, plain=[Jpeg(pulse, b"") for pulse in range(5)]), now=10.0)
     moments = [10.0]
@@ -151,12 +150,12 @@ def choices(first: int, camera: str = "c0", number: int = 1) -> GopChoices:
     return GopChoices(first=first, frames=GOP, choices={number: camera}, boxes={camera: boxes}, cuts=[])
 
 
-def decided(resolve: Callable[[int], int] = lambda number: number, gops: int = 3) -> Decided:
-    return Decided(resolve, FPS, gops)
+def decided(resolve: Callable[[int], int] = lambda number: number, gops: int = 3) -> DecidedBoxes:
+    return DecidedBoxes(resolve, FPS, gops)
 
 
 async def test_who_asks_for_a_newer_picture_than_others_is_given_no_older_one() -> None:
-    stills = Stills()
+    stills = StillRequests()
     early, late = (asyncio.create_task(stills.get("plain", pulse)) for pulse in (100, 125))
     await asyncio.sleep(0)
     assert stills.possible(101) == ["plain"]
@@ -179,8 +178,8 @@ def test_boxes_are_found_by_the_pulse_of_the_frames() -> None:
     assert told.first == 3 * GOP
     assert told.chosen == 1
     assert [boxes[0][1] for boxes in told.boxes] == list(range(3 * GOP, 4 * GOP))
-    assert known.of_person(1, fragments(0, GOP)) is NOTHING, "too long ago to be waiting anywhere"
-    assert known.of_person(2, fragments(3 * GOP, GOP)) is NOTHING
+    assert known.of_person(1, fragments(0, GOP)) is NO_OVERLAY, "too long ago to be waiting anywhere"
+    assert known.of_person(2, fragments(3 * GOP, GOP)) is NO_OVERLAY
     assert known.of_camera("c0", fragments(3 * GOP + 2, 1)).boxes == told.boxes
 
 

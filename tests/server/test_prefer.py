@@ -11,8 +11,8 @@ from patience import PATIENCE
 
 from server.media.stream_format import Agreement
 from server.messaging.messages import NumberedBox
-from server.service.streaming.broadcaster import Viewer
-from server.service.streaming.frame_buffer import Shelf
+from server.service.streaming.broadcaster import Subscriber
+from server.service.streaming.frame_buffer import FrameBuffer
 from server.service.streaming.splicer import Splicer
 from server.service.view_selection.decider import GopDecision, ObjectChoice
 
@@ -24,7 +24,7 @@ class Site:
 
     def __init__(self) -> None:
         agreement = Agreement()
-        self.shelves = {camera: Shelf(FPS, 40, agreement) for camera in CAMERAS}
+        self.shelves = {camera: FrameBuffer(FPS, 40, agreement) for camera in CAMERAS}
         for seed, camera in enumerate(CAMERAS):
             for unit in encoded(seed):
                 self.shelves[camera].put(unit.pulse, 1, unit.data, key=unit.key)
@@ -43,7 +43,7 @@ class Site:
         self.splicer.decision(decision)
         self.gops += 1
 
-    async def cameras(self, viewer: Viewer) -> str:
+    async def cameras(self, viewer: Subscriber) -> str:
         """Give the cameras that were shown, a letter for each GOP."""
         viewer.close()
         async with asyncio.timeout(PATIENCE):

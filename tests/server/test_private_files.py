@@ -18,10 +18,10 @@ from test_splice import choice
 from server.cli.doctor.disk import disk_findings
 from server.cli.doctor.findings import Level
 from server.media.letterbox import Letterbox
-from server.service.decision_files.live_recorder import LiveRecorder
-from server.service.decision_files.recorder import Recorder
-from server.service.recording.recording_session import Headers
-from server.service.recording.store import Store
+from server.service.decision_files.decision_writer import DecisionWriter
+from server.service.decision_files.live_decision_writer import LiveDecisionWriter
+from server.service.recording.recording_folder import RecordingFolder
+from server.service.recording.recording_session import InitSegments
 from server.system.private_files import make_private_folder
 
 FITS = dict.fromkeys(CAMERAS, Letterbox((WIDTH, HEIGHT), (WIDTH, HEIGHT)))
@@ -56,7 +56,9 @@ def modes(folder: Path) -> dict[bool, set[int]]:
 @pytest.mark.parametrize("mask", [0o000, 0o022, 0o077])
 def test_recordings_are_closed_to_others(tmp_path: Path, who: str, mask: int) -> None:
     with folder_of(who, tmp_path) as around, umask(mask):
-        store = written(Store(around / "site" / "kept", AMPLE), [piece(gop, {1: A}) for gop in range(7)])
+        store = written(
+            RecordingFolder(around / "site" / "kept", AMPLE), [piece(gop, {1: A}) for gop in range(7)]
+        )
         assert modes(around) == {True: {0o700}, False: {0o600}}
         assert store.run is not None
         store.run.number_since(5.0)
@@ -70,7 +72,7 @@ def test_what_a_live_service_writes_down_of_people_is_closed_to_others(
     tmp_path: Path, who: str, mask: int
 ) -> None:
     with folder_of(who, tmp_path) as around, umask(mask):
-        recorder = LiveRecorder(around / "out" / "today", CAMERAS, FITS)
+        recorder = LiveDecisionWriter(around / "out" / "today", CAMERAS, FITS)
         recorder.write(decision(0, choice(1, A), c0=[[(1, *SMALL)]] * GOP))
         recorder.close()
         assert modes(around) == {True: {0o700}, False: {0o600}}
@@ -78,7 +80,7 @@ def test_what_a_live_service_writes_down_of_people_is_closed_to_others(
 
 def test_what_somebody_renders_is_theirs_to_share(tmp_path: Path) -> None:
     with umask(0o022):
-        Recorder(tmp_path / "out", CAMERAS, FITS).close()
+        DecisionWriter(tmp_path / "out", CAMERAS, FITS).close()
     assert modes(tmp_path) == {True: {0o755}, False: {0o644}}
 
 
@@ -105,15 +107,15 @@ def test_a_folder_that_was_there_is_left_as_it_is_and_told_of(
 
 
 def test_runs_that_an_earlier_version_left_open_are_closed_and_nobody_elses(tmp_path: Path) -> None:
-    written(Store(tmp_path, AMPLE), [piece(0, {1: A})]).close()
+    written(RecordingFolder(tmp_path, AMPLE), [piece(0, {1: A})]).close()
     (run,) = (it for it in tmp_path.iterdir() if it.is_dir())
     run.chmod(0o755)
     other = tmp_path / "holiday"
     other.mkdir()
     other.chmod(0o755)
-    again = Store(tmp_path, AMPLE)
+    again = RecordingFolder(tmp_path, AMPLE)
     again.open()
-    again.write(piece(1, {1: A}), head(), Headers(filled()[1]))
+    again.write(piece(1, {1: A}), head(), InitSegments(filled()[1]))
     again.close()
     assert stat.S_IMODE(run.stat().st_mode) == 0o700
     assert stat.S_IMODE(other.stat().st_mode) == 0o755

@@ -20,8 +20,8 @@ from server.config.sections import SiteSettings
 from server.media.codec import agreement_for
 from server.media.letterbox import Letterbox
 from server.messaging.messages import NumberedBox
-from server.service.decision_files.recorder import Recorder
-from server.service.streaming.frame_buffer import Shelf
+from server.service.decision_files.decision_writer import DecisionWriter
+from server.service.streaming.frame_buffer import FrameBuffer
 from server.service.view_selection.decider import GopDecision, ObjectChoice
 
 A, B = CAMERAS
@@ -46,7 +46,7 @@ def test_the_files_are_these_bytes(tmp_path: Path) -> None:
         A: Letterbox((2 * WIDTH, 2 * HEIGHT), (WIDTH, HEIGHT)),
         B: Letterbox((WIDTH, HEIGHT), (WIDTH, HEIGHT)),
     }
-    recorder = Recorder(tmp_path / "out", CAMERAS, fits)
+    recorder = DecisionWriter(tmp_path / "out", CAMERAS, fits)
     boxes: list[list[NumberedBox]] = [[(1, *SMALL)], [(1, *SMALL), (2, *LARGE)]]
     recorder.write(decision(0, choice(1, A), choice(2, None), frames=2, c0=boxes))
     turned_out = (Merge(kept=1, lost=3), Split(kept=1, parted=2, camera=B))
@@ -69,9 +69,9 @@ def test_the_files_are_these_bytes(tmp_path: Path) -> None:
     }
 
 
-def films(folder: Path, codec: Codec = "h264") -> tuple[FilmWriter, dict[str, Shelf]]:
+def films(folder: Path, codec: Codec = "h264") -> tuple[FilmWriter, dict[str, FrameBuffer]]:
     agreement = agreement_for(small_config(encode={"codec": codec}))
-    shelves = {camera: Shelf(FPS, 40, agreement) for camera in CAMERAS}
+    shelves = {camera: FrameBuffer(FPS, 40, agreement) for camera in CAMERAS}
     for seed, camera in enumerate(CAMERAS):
         for unit in encoded(seed, codec=codec):
             shelves[camera].put(unit.pulse, 1, unit.data, key=unit.key)
@@ -147,7 +147,7 @@ def test_a_film_has_the_sites_sound_in_step(tmp_path: Path, codec: Literal["aac"
     recording = write_flashes(tmp_path / "flashes.mkv", SOUNDING)
     config = small_config(sound={"source": str(recording), "codec": codec})
     agreement, track = agreement_for(config), Soundtrack(config)
-    shelves = {camera: Shelf(FPS, SOUNDING, agreement) for camera in CAMERAS}
+    shelves = {camera: FrameBuffer(FPS, SOUNDING, agreement) for camera in CAMERAS}
     for unit in flashing(recording):
         for shelf in shelves.values():
             shelf.put(unit.pulse, 1, unit.data, key=unit.key)

@@ -13,7 +13,7 @@ from test_service_turns import behind, noted
 from test_splice import choice
 
 from server.media.letterbox import Letterbox
-from server.service.decision_files.live_recorder import LiveRecorder
+from server.service.decision_files.live_decision_writer import LiveDecisionWriter
 
 A, B = CAMERAS
 FITS = dict.fromkeys(CAMERAS, Letterbox((WIDTH, HEIGHT), (WIDTH, HEIGHT)))
@@ -27,7 +27,7 @@ def test_what_could_not_be_written_is_said_once_there_is_room(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     caplog.set_level(logging.INFO)
-    recorder = LiveRecorder(tmp_path, CAMERAS, FITS)
+    recorder = LiveDecisionWriter(tmp_path, CAMERAS, FITS)
     recorder.write(decision(0, choice(1, A), c0=[[(1, *SMALL)]] * GOP))
     before = written(tmp_path)
     with files_of_at_most(max(map(len, before.values()))):
@@ -57,7 +57,7 @@ def test_what_could_not_be_written_is_said_once_there_is_room(
 def test_a_disk_that_is_full_at_the_end_is_said_and_all_files_are_whole(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    recorder = LiveRecorder(tmp_path, CAMERAS, FITS)
+    recorder = LiveDecisionWriter(tmp_path, CAMERAS, FITS)
     recorder.write(decision(0, choice(1, A)))
     before = written(tmp_path)
     recorder.late(B, [7], "tracks late")

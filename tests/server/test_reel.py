@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from server.media.containers.fmp4 import init_segment
 from server.media.stream_format import Agreement
-from server.service.streaming.frame_buffer import Shelf
-from server.service.streaming.hls_segmenter import Reel, Segment, plan
+from server.service.streaming.frame_buffer import FrameBuffer
+from server.service.streaming.hls_segmenter import HlsSegment, HlsSegmenter, segment_layout
 from server.service.streaming.splicer import Splicer
 from server.service.view_selection.decider import GopDecision, ObjectChoice
 
@@ -28,7 +28,7 @@ class Site:
 
     def __init__(self, silent: frozenset[int] = frozenset(), begin: int = 0) -> None:
         self.agreement = Agreement()
-        self.shelves = {camera: Shelf(FPS, GOPS * GOP, self.agreement) for camera in CAMERAS}
+        self.shelves = {camera: FrameBuffer(FPS, GOPS * GOP, self.agreement) for camera in CAMERAS}
         self.splicer = Splicer(self.shelves, self.agreement, small_config(http={"hls_segment_s": 0.41}))
         for seed, camera in enumerate(CAMERAS):
             for unit in encoded(seed, GOPS * GOP):
@@ -40,12 +40,12 @@ class Site:
         self.splicer.decision(GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
 
     @property
-    def reel(self) -> Reel:
+    def reel(self) -> HlsSegmenter:
         reel = self.splicer.reel(1)
         assert reel is not None
         return reel
 
-    def decoded(self, segments: list[Segment]) -> list[tuple[float, float, NDArray[np.uint8]]]:
+    def decoded(self, segments: list[HlsSegment]) -> list[tuple[float, float, NDArray[np.uint8]]]:
         """Give when each picture is shown and until when, in pulses, and the picture."""
         assert self.agreement.parameters is not None
         head = init_segment(self.agreement.parameters, WIDTH, HEIGHT)
@@ -79,7 +79,7 @@ def own(camera: int) -> list[NDArray[np.uint8]]:
 def test_a_segment_is_as_many_whole_gops_as_fit(
     fps: float, gop: int, segment_s: float, frames: int, target: int
 ) -> None:
-    found = plan(fps, gop, segment_s, 6.0)
+    found = segment_layout(fps, gop, segment_s, 6.0)
     assert (found.frames, found.target_s) == (frames, target)
     assert found.listed >= 3, "RFC 8216, 6.2.2: a live playlist has three target durations"
     assert round(frames / fps + 1e-9) <= target

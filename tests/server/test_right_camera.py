@@ -8,8 +8,8 @@ import pytest
 
 from benchmarks.stream.right import Right, judge, schedule
 from server.config.sections import EncodeSettings
-from server.service.streaming.media_chunk import Footage
-from server.service.streaming.streams import Gop
+from server.service.streaming.media_chunk import MediaChunk
+from server.service.streaming.spliced_stream import GopAssembler
 
 
 async def test_every_frame_is_the_chosen_cameras_to_the_pixel() -> None:
@@ -22,13 +22,13 @@ async def test_every_frame_of_vp8_is_the_chosen_cameras_too() -> None:
 
 
 async def test_another_cameras_gop_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
-    original = Gop.whole
+    original = GopAssembler.whole
 
-    def mistaken(self: Gop, camera: str) -> Footage | None:
+    def mistaken(self: GopAssembler, camera: str) -> MediaChunk | None:
         wrong = self.first == 40
         return original(self, "c0" if wrong and camera != "c0" else "c3" if wrong else camera)
 
-    monkeypatch.setattr(Gop, "whole", mistaken)
+    monkeypatch.setattr(GopAssembler, "whole", mistaken)
     assert await judge(100, 5, seed=1) == Right(100, 5, contained=90, ts=90, alike=0)
     vp8 = EncodeSettings(codec="vp8")
     assert await judge(100, 5, seed=1, encode=vp8) == Right(100, 5, contained=90, ts=None, alike=0)

@@ -9,17 +9,17 @@ from cameras_by_hand import CAMERAS, FPS, GOP, NO_REASON, encoded, small_config
 from patience import PATIENCE
 
 from server.media.stream_format import Agreement
-from server.service.streaming.broadcaster import Viewer
-from server.service.streaming.frame_buffer import Shelf
+from server.service.streaming.broadcaster import Subscriber
+from server.service.streaming.frame_buffer import FrameBuffer
 from server.service.streaming.splicer import Splicer
 from server.service.view_selection.decider import GopDecision, ObjectChoice
 
 A, B = CAMERAS
 
 
-def filled() -> tuple[Splicer, dict[str, Shelf]]:
+def filled() -> tuple[Splicer, dict[str, FrameBuffer]]:
     agreement = Agreement()
-    shelves = {camera: Shelf(FPS, 40, agreement) for camera in CAMERAS}
+    shelves = {camera: FrameBuffer(FPS, 40, agreement) for camera in CAMERAS}
     for seed, camera in enumerate(CAMERAS):
         for unit in encoded(seed):
             shelves[camera].put(unit.pulse, 1, unit.data, key=unit.key)
@@ -36,13 +36,13 @@ def decision(
     return GopDecision(gop * GOP, frames, choices, {}, merged or {}, (), NO_REASON)
 
 
-async def received(viewer: Viewer) -> list[bytes]:
+async def received(viewer: Subscriber) -> list[bytes]:
     viewer.close()
     async with asyncio.timeout(PATIENCE):
         return [data async for data in viewer]
 
 
-def gops(shelves: dict[str, Shelf], cameras: Iterable[str], first: int = 0) -> list[bytes]:
+def gops(shelves: dict[str, FrameBuffer], cameras: Iterable[str], first: int = 0) -> list[bytes]:
     return [shelves[camera].gop((first + place) * GOP, GOP) for place, camera in enumerate(cameras)]
 
 

@@ -19,8 +19,8 @@ from server.camera.encoding.encoder import AccessUnit, Encoder
 from server.config.sections import EncodeSettings, SiteSettings
 from server.media.containers.fmp4 import init_segment
 from server.media.stream_format import Agreement
-from server.service.streaming.broadcaster import Viewer
-from server.service.streaming.frame_buffer import Shelf
+from server.service.streaming.broadcaster import Subscriber
+from server.service.streaming.frame_buffer import FrameBuffer
 from server.service.streaming.splicer import Splicer
 from server.service.view_selection.decider import GopDecision, ObjectChoice
 
@@ -66,7 +66,7 @@ def shown(splicer_head: bytes, pieces: list[bytes]) -> list[Shown]:
         return found
 
 
-async def received(viewer: Viewer) -> list[bytes]:
+async def received(viewer: Subscriber) -> list[bytes]:
     viewer.close()
     async with asyncio.timeout(PATIENCE):
         return [data async for data in viewer]
@@ -89,7 +89,7 @@ def test_every_pulse_shows_a_cameras_own_picture_of_it_or_the_picture_before(
     preset: str,
 ) -> None:
     agreement = Agreement()
-    shelves = {camera: Shelf(FPS, FRAMES, agreement) for camera in CAMERAS}
+    shelves = {camera: FrameBuffer(FPS, FRAMES, agreement) for camera in CAMERAS}
     splicer = Splicer(shelves, agreement, small_config())
     sent = {camera: taken(seed, missed, preset) for seed, camera in enumerate(CAMERAS)}
     own = {camera: alone(units) for camera, units in sent.items()}
@@ -124,9 +124,9 @@ def test_every_pulse_shows_a_cameras_own_picture_of_it_or_the_picture_before(
             assert pictures[-1].pulse + pictures[-1].lasts == FRAMES
 
 
-def splicing() -> tuple[Splicer, dict[str, Shelf], bytes]:
+def splicing() -> tuple[Splicer, dict[str, FrameBuffer], bytes]:
     agreement = Agreement()
-    shelves = {camera: Shelf(FPS, 40, agreement) for camera in CAMERAS}
+    shelves = {camera: FrameBuffer(FPS, 40, agreement) for camera in CAMERAS}
     splicer = Splicer(shelves, agreement, small_config())
     for unit in taken(0, frozenset(), "ultrafast"):
         shelves["c0"].put(unit.pulse, 1, unit.data, key=unit.key)
@@ -158,7 +158,7 @@ async def test_a_camera_that_fell_silent_stands_still_until_it_comes_back() -> N
     splicer, _, head = splicing()
     viewer = splicer.cameras["c0"].join()
     units = taken(0, frozenset(), "ultrafast")
-    shelf = Shelf(FPS, 10, Agreement())
+    shelf = FrameBuffer(FPS, 10, Agreement())
     for unit in units[: GOP + 2]:
         splicer.frame("c0", shelf.put(unit.pulse, 1, unit.data, key=unit.key))
     for gop in range(2, 14):

@@ -19,7 +19,7 @@ from server.media.containers.fmp4 import Sample, fragment, ticks
 from server.media.containers.mpegts import COUNTERS, PACKET_BYTES, Counters, pack, packets
 from server.media.picture import Picture
 from server.media.stream_format import Agreement
-from server.service.streaming.frame_buffer import Shelf
+from server.service.streaming.frame_buffer import FrameBuffer
 
 CLOCK = 1 << 33
 
@@ -131,7 +131,7 @@ def test_the_time_reference_comes_often_and_before_its_picture(pulse: int, fps: 
 def spliced(cameras: list[int]) -> tuple[bytes, list[tuple[int, int]]]:
     """Give a stream of GOPs of these cameras, and which camera and pulse each picture is."""
     agreement, data, frames = Agreement(), b"", []
-    shelves = [Shelf(FPS, 40, agreement) for _ in CAMERAS]
+    shelves = [FrameBuffer(FPS, 40, agreement) for _ in CAMERAS]
     for seed, shelf in enumerate(shelves):
         for unit in encoded(seed):
             shelf.put(unit.pulse, 1, unit.data, key=unit.key)

@@ -30,7 +30,7 @@ from sounds_by_hand import FRAMES as SOUNDING
 from sounds_by_hand import beeps, sends, write_flashes
 from tokens_by_hand import token_of
 
-from server.service.streaming.broadcaster import Piece
+from server.service.streaming.broadcaster import Chunk
 
 HLS = {**PATIENT, "hls_segment_s": 0.4, "hls_window_s": 8.0}
 """Two GOPs in a segment, and all that there is in the playlist."""
@@ -140,7 +140,7 @@ async def test_grey_is_written_once_for_all_who_are_shown_it(tmp_path: Path) -> 
         for epoch in range(2, 14):
             hall.service.feed(epoch, {camera: {1: None, 2: None} for camera in CAMERAS})
         viewers = [hall.service.splicer.scoped[number].join() for number in (1, 2)]
-        pieces: list[Piece] = [viewer._queue[-1] for viewer in viewers]
+        pieces: list[Chunk] = [viewer._queue[-1] for viewer in viewers]
     assert pieces[0] is pieces[1]
     assert pieces[0].start
 

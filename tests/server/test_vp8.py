@@ -23,9 +23,9 @@ from server.media.stream_format import ParameterMismatchError
 from server.media.vp8.repeat_frame import repeat
 from server.media.vp8.stream_format import Vp8Agreement, size_of
 from server.service.rendering.decided_boxes import first_pulse
-from server.service.rendering.worker.webm_demuxer import webm_frames
-from server.service.streaming.frame_buffer import Shelf
-from server.service.streaming.timeline import Timeline
+from server.service.rendering.worker.demuxers import demux_webm
+from server.service.streaming.frame_buffer import FrameBuffer
+from server.service.streaming.gapless_timeline import GaplessTimeline
 
 FPS, GOP, FRAMES = 25.0, 5, 20
 Pixels = NDArray[np.uint8]
@@ -74,8 +74,8 @@ def test_the_size_is_read_from_key_frames_alone(width: int, height: int) -> None
     assert size_of(key[:9]) is None
 
 
-def shelf(width: int = 64, height: int = 48) -> Shelf:
-    return Shelf(FPS, FRAMES, Vp8Agreement(width, height))
+def shelf(width: int = 64, height: int = 48) -> FrameBuffer:
+    return FrameBuffer(FPS, FRAMES, Vp8Agreement(width, height))
 
 
 def test_a_camera_of_another_size_or_codec_is_refused() -> None:
@@ -114,7 +114,7 @@ def test_a_stream_has_a_picture_for_every_pulse_whatever_does_not_come(
     units = {unit.pulse: unit for unit in encoded(64, 48, missed=frozenset(missed))}
     plain = dict(zip(units, decoded([unit.data for unit in units.values()], "vp8"), strict=True))
     agreement = Vp8Agreement(64, 48)
-    time, on = Timeline(agreement, FPS, GOP), Shelf(FPS, FRAMES, agreement)
+    time, on = GaplessTimeline(agreement, FPS, GOP), FrameBuffer(FPS, FRAMES, agreement)
     shown: list[Picture] = []
     seen: list[int] = []
     """The pulse of the picture that is to be seen at each pulse."""
@@ -141,7 +141,7 @@ def test_a_stream_has_a_picture_for_every_pulse_whatever_does_not_come(
 
 def test_a_long_hole_is_one_picture_that_lasts() -> None:
     agreement = Vp8Agreement(64, 48)
-    time, (first, *_) = Timeline(agreement, FPS, GOP), encoded(64, 48)
+    time, (first, *_) = GaplessTimeline(agreement, FPS, GOP), encoded(64, 48)
     shown = time.take(Picture(0, key=True, fragment=agreement.pack(first.data, 0, FPS, key=True), boot=1))
     shown += time.fill(1000)
     assert [(picture.pulse, picture.lasts) for picture in shown] == [(0, 1), (1, 999)]
@@ -176,10 +176,10 @@ def test_frames_come_out_of_clusters_as_they_went_in_and_damage_ends_them(
         clusters += cluster(content, pulse, FPS, key=key, lasts=lasts)
         expected.append((pulse, key, content, lasts))
         pulse += lasts
-    assert [(it.pulse, it.key, it.data, it.lasts) for it in webm_frames(clusters, FPS)] == expected
+    assert [(it.pulse, it.key, it.data, it.lasts) for it in demux_webm(clusters, FPS)] == expected
     assert first_pulse(clusters, FPS) == first
-    list(webm_frames(clusters[: data.draw(st.integers(0, len(clusters)))], FPS))
-    list(webm_frames(data.draw(st.binary(max_size=100)), FPS))
+    list(demux_webm(clusters[: data.draw(st.integers(0, len(clusters)))], FPS))
+    list(demux_webm(data.draw(st.binary(max_size=100)), FPS))
 
 
 @needs_ffprobe

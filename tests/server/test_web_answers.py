@@ -13,7 +13,7 @@ from halls import A, B, Hall
 
 from server.http.api import openapi
 from server.http.app import make_app
-from server.service.streaming.broadcaster import Viewer
+from server.service.streaming.broadcaster import Subscriber
 
 
 @pytest.mark.parametrize(
@@ -120,11 +120,11 @@ async def test_a_mistake_in_the_middle_of_an_answer_breaks_it_off(
 ) -> None:
     """By an end that looks like one a part of a film would be taken for all of it."""
 
-    async def some(_: Viewer) -> AsyncIterator[SimpleNamespace]:
+    async def some(_: Subscriber) -> AsyncIterator[SimpleNamespace]:
         yield SimpleNamespace(data=b"some of it")
         raise PermissionError(13, "the disk is gone")
 
-    monkeypatch.setattr(Viewer, "pieces", some)
+    monkeypatch.setattr(Subscriber, "pieces", some)
     reader, writer = await asyncio.open_connection("127.0.0.1", busy.port)
     writer.write(f"GET /objects/1/best.mp4 HTTP/{version}\r\nHost: 127.0.0.1\r\n\r\n".encode())
     head = await reader.readuntil(b"\r\n\r\n")

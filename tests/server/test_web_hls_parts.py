@@ -20,7 +20,7 @@ from patience import PATIENCE
 from programs import needs_ffmpeg
 
 from server.http.hls.live_playlist import _newest
-from server.service.streaming.hls_segmenter import Reel
+from server.service.streaming.hls_segmenter import HlsSegmenter
 from server.service.view_selection.decider import GopDecision, ObjectChoice
 
 HTTP = {"hls_segment_s": 0.6, "hls_window_s": 6.0}
@@ -222,7 +222,7 @@ def at(shown: dict[int, NDArray[np.uint8]], pulse: int) -> NDArray[np.uint8]:
     return shown[max(it for it in shown if it <= pulse)]
 
 
-def is_independent(reel: Reel, gop: int) -> bool:
+def is_independent(reel: HlsSegmenter, gop: int) -> bool:
     part = reel.part(gop // PARTS, gop % PARTS)
     return part is not None and part.independent
 

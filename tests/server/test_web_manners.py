@@ -10,7 +10,7 @@ import pytest
 from cameras_by_hand import CAMERAS, GOP, SMALL
 from halls import A, B, Hall, opened
 
-from server.service.streaming.broadcaster import Chunk
+from server.service.streaming.broadcaster import BytesChunk
 
 STREAMS = {
     "/objects/1/best.mp4": "video/mp4",
@@ -128,7 +128,7 @@ async def test_a_viewer_that_does_not_read_loses_whole_gops_and_harms_nobody(bus
     await reader.readuntil(b"mdat")
     gops = [b"<GOP %05d" % number + bytes([65 + number % 26]) * 100_000 + b">" for number in range(150)]
     for gop in gops:
-        channel.publish(Chunk(gop, start=True))
+        channel.publish(BytesChunk(gop, start=True))
         await reader.readuntil(gop)
     slow = next(viewer for viewer in channel._viewers if viewer.lost)
     assert len(slow._queue) <= busy.service.config.http.viewer_queue_gops
@@ -151,7 +151,7 @@ async def test_a_viewer_who_is_gone_while_the_server_waits_for_it_is_forgotten(b
     channel = busy.service.splicer.objects[1]
     _, writer, _ = await asked(busy, "GET /objects/1/best.mp4 HTTP/1.0\r\n\r\n")
     for _ in range(100):
-        channel.publish(Chunk(bytes(100_000), start=True))
+        channel.publish(BytesChunk(bytes(100_000), start=True))
         await asyncio.sleep(0)
     writer.transport.abort()
     await deserted(busy)

@@ -16,8 +16,8 @@ from drawn_by_hand import CAMERAS, GOP, SIZE, Drawn, Image, decoded, drawn_room,
 from halls import B, Hall
 
 from server.http.app_keys import PICTURES
-from server.service.rendering.renderer import CameraView, PersonView, Pictures
-from server.service.rendering.worker.box_overlay import CHOSEN
+from server.service.rendering.render_pool import CameraView, PersonView, RenderPool
+from server.service.rendering.worker.box_overlay import CHOSEN_COLOR
 
 FPS = 25
 SOMEBODY = 1
@@ -35,7 +35,7 @@ def picture_of(jpeg: bytes) -> Image:
 
 def green(image: Image) -> Image:
     """Tell which pixels have the colour of the chosen person's box."""
-    return (np.abs(image.astype(np.int16) - CHOSEN).max(axis=2) < 40).astype(np.uint8)
+    return (np.abs(image.astype(np.int16) - CHOSEN_COLOR).max(axis=2) < 40).astype(np.uint8)
 
 
 def difference(image: Image, other: Image) -> float:
@@ -161,7 +161,7 @@ async def test_fewer_pictures_are_given_when_fewer_are_wanted(drawn: Drawn) -> N
 
 
 async def test_one_process_draws_for_all_who_watch_one_stream(drawn: Drawn) -> None:
-    pictures: Pictures = drawn.app[PICTURES]
+    pictures: RenderPool = drawn.app[PICTURES]
     film = f"/objects/{SOMEBODY}/best.mp4?overlay=1"
     async with drawn.session.get(film) as one, drawn.session.get(film) as other:
         async with drawn.session.get(f"/objects/{SOMEBODY}/best.mjpeg") as third:
@@ -178,7 +178,7 @@ async def test_a_process_that_is_killed_is_replaced_and_the_streams_go_on(
     drawn: Drawn, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("server.service.rendering.worker_process._ANSWER_S", 1000.0)  # nobody waits for that
-    pictures: Pictures = drawn.app[PICTURES]
+    pictures: RenderPool = drawn.app[PICTURES]
     going = asyncio.create_task(drawn.keep_going(GOP / FPS))
     async with (
         drawn.session.get(f"/objects/{SOMEBODY}/best.mp4?overlay=1") as film,
@@ -203,7 +203,7 @@ async def test_a_process_that_is_killed_is_replaced_and_the_streams_go_on(
 
 
 async def test_a_process_ends_some_time_after_its_last_viewer(drawn: Drawn) -> None:
-    pictures: Pictures = drawn.app[PICTURES]
+    pictures: RenderPool = drawn.app[PICTURES]
     pictures._linger_s = 0.2
     async with drawn.session.get("/cameras/c0/live.jpg") as answer:
         await answer.read()
@@ -218,7 +218,7 @@ async def test_a_process_ends_some_time_after_its_last_viewer(drawn: Drawn) -> N
 
 
 async def test_a_process_that_hangs_slows_nobody_down(drawn: Drawn) -> None:
-    pictures: Pictures = drawn.app[PICTURES]
+    pictures: RenderPool = drawn.app[PICTURES]
     async with drawn.session.get("/cameras/c0/live.mjpeg") as answer:
         await anext(parts(answer))
         source = pictures.sources[CameraView("c0")]

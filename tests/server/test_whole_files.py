@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from small_disk import files_of_at_most
 
-from server.service.decision_files.row_files import WholeFiles
+from server.service.decision_files.decision_writer import AtomicFiles
 
 NAMES = ("a", "b", "c")
 rows = st.text(st.sampled_from("0123456789,\n"), max_size=30)
@@ -23,7 +23,7 @@ texts = st.dictionaries(st.sampled_from(NAMES), rows)
 def test_all_or_none(heads: tuple[str, ...], said: list[dict[str, str]], most: int) -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        files = WholeFiles({folder / it: head for it, head in zip(NAMES, heads, strict=True)})
+        files = AtomicFiles({folder / it: head for it, head in zip(NAMES, heads, strict=True)})
         expected = dict(zip(NAMES, heads, strict=True))
         for it in said:
             longer = {which: expected[which] + it.get(which, "") for which in NAMES}
@@ -38,7 +38,7 @@ def test_all_or_none(heads: tuple[str, ...], said: list[dict[str, str]], most: i
 
 def test_after_a_failure_it_goes_on_where_it_was(tmp_path: Path) -> None:
     one, other = tmp_path / "one", tmp_path / "other"
-    files = WholeFiles({one: "head\n", other: ""})
+    files = AtomicFiles({one: "head\n", other: ""})
     with files_of_at_most(8):
         files.append({other: "12\n"})
         with pytest.raises(OSError, match="too large"):
@@ -53,5 +53,5 @@ def test_what_cannot_begin_keeps_no_file_open(tmp_path: Path) -> None:
     opened = len(list(Path("/proc/self/fd").iterdir()))
     for _, missing in itertools.product(range(3), ("no folder/one", "also/none")):
         with pytest.raises(FileNotFoundError):
-            WholeFiles({tmp_path / "there": "", tmp_path / missing: ""})
+            AtomicFiles({tmp_path / "there": "", tmp_path / missing: ""})
     assert len(list(Path("/proc/self/fd").iterdir())) == opened

@@ -11,10 +11,8 @@ import numpy as np
 from bestview.calibration import CalibrationError, MarkedPoints, PointFit, WalkSettings, fit_cameras
 from server.cli.calibrate.points_file import read_points
 from server.config.ground_unit import check_unit
-from server.service.calibration.floor_plan import PlanView, plan_of, plot_plan
-from server.service.calibration.ground_file import ground_file
-from server.service.calibration.outcome import worked_out
-from server.service.calibration.walk_comparison import Walked
+from server.service.calibration.calibration_report import RecordedWalk, calibrate_walk, ground_file_text
+from server.service.calibration.floor_plan import FloorPlanCamera, floor_plan_cameras, plot_floor_plan
 from server.system.errors import UserError
 
 _UNNAMED = "unit"
@@ -31,16 +29,18 @@ def calibrate_points(points: Path, out: Path, plan: Path, unit: str | None) -> l
     unit = asked or _checked(f"{points}: unit", given.unit or _UNNAMED)
     with refusing(points):
         fits = fit_cameras(given.cameras)
-    views = [PlanView(it.camera, fits[it.camera].homography, it.image, it.floor) for it in given.cameras]
-    plot_plan(views, unit, plan)
+    views = [
+        FloorPlanCamera(it.camera, fits[it.camera].homography, it.image, it.floor) for it in given.cameras
+    ]
+    plot_floor_plan(views, unit, plan)
     homographies = {camera: fit.homography for camera, fit in fits.items()}
     residuals = {name: _rounded(fit) for name, fit in fits.items()}
-    out.write_text(ground_file(unit, homographies, {"residuals": residuals}), encoding="utf-8")
+    out.write_text(ground_file_text(unit, homographies, {"residuals": residuals}), encoding="utf-8")
     return [_line(it, fits[it.camera], unit) for it in given.cameras]
 
 
 def calibrate_from_walks(
-    walked: Walked, out: Path, plan: Path, settings: WalkSettings, person: float, *, force: bool
+    walked: RecordedWalk, out: Path, plan: Path, settings: WalkSettings, person: float, *, force: bool
 ) -> list[str]:
     """Lay the cameras on one floor, and write the file and the plan; give the lines to say.
 
@@ -48,12 +48,12 @@ def calibrate_from_walks(
         UserError: the walk says too little.
     """
     with refusing("calibrate"):
-        outcome = worked_out(walked, settings, person)
+        outcome = calibrate_walk(walked, settings, person)
     if outcome.too_little and not force:
         raise UserError(
             f"calibrate: the walk covered too little: {outcome.too_little} (--force writes it all the same)"
         )
-    plot_plan(plan_of(outcome.found), "m", plan)
+    plot_floor_plan(floor_plan_cameras(outcome.found), "m", plan)
     out.write_text(outcome.ground, encoding="utf-8")
     offsets = ["for the configuration:", *outcome.offsets.splitlines()] if outcome.offsets else []
     return [*outcome.lines, *offsets]

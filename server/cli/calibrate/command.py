@@ -42,7 +42,7 @@ def calibrate(
     from server.cli.calibrate.points_file import ENDINGS
     from server.cli.calibrate.walk_input import VideoFormat, read_walks
     from server.cli.render.video_info import parse_size
-    from server.service.calibration.walk_comparison import walk_settings
+    from server.service.calibration.calibration_report import walk_settings
 
     for path in given:
         if not path.exists():

@@ -14,7 +14,7 @@ from bestview.calibration import Walk, make_walk
 from server.cli.generated_config import camera_name
 from server.cli.render.video_info import Size, read_video_info
 from server.cli.track.command import config_for_video, track_one
-from server.service.calibration.walk_comparison import Walked, moment
+from server.service.calibration.calibration_report import RecordedWalk, comparison_step
 from server.system.errors import UserError
 from tracking.motchallenge import MotRow, read_rows
 
@@ -34,7 +34,7 @@ class VideoFormat:
 
 def read_walks(
     given: Sequence[Path], config: Path | None, picture: VideoFormat, progress: Callable[[str], None]
-) -> Walked:
+) -> RecordedWalk:
     """Read tracks, or track people in videos; ``progress`` is told which video is on.
 
     Raises:
@@ -54,7 +54,7 @@ def _is_tracks(path: Path) -> bool:
     return path.name.endswith(ENDINGS) or (path.is_dir() and bool(_files(path)))
 
 
-def walks_from_tracks(given: Sequence[Path], picture: VideoFormat) -> Walked:
+def walks_from_tracks(given: Sequence[Path], picture: VideoFormat) -> RecordedWalk:
     """Read files of tracks, MOTChallenge text; each camera is called like its file.
 
     Raises:
@@ -70,12 +70,12 @@ def walks_from_tracks(given: Sequence[Path], picture: VideoFormat) -> Walked:
         size = picture.size or _size_of(rows[file])
         guessed += [name] if picture.size is None else []
         walks.append(_walk(name, size, rows[file], fps))
-    return Walked(tuple(walks), fps, tuple(guessed), rate_guessed=picture.fps is None)
+    return RecordedWalk(tuple(walks), fps, tuple(guessed), rate_guessed=picture.fps is None)
 
 
 def walks_from_videos(
     videos: Sequence[Path], config: Path | None, picture: VideoFormat, progress: Callable[[str], None]
-) -> Walked:
+) -> RecordedWalk:
     """Track people in each video first, as `myview track` does; the configuration's offsets are left out.
 
     Raises:
@@ -98,7 +98,7 @@ def walks_from_videos(
             track_one(video, None, out, config, None, lambda _: None)
             # With an offset tracks count pulses, and not the video's own frames.
             walks.append(_walk(name, it.size, _rows(out, str(video)), fps, offset))
-    return Walked(tuple(walks), fps)
+    return RecordedWalk(tuple(walks), fps)
 
 
 def _rate(rates: Mapping[str, float]) -> float:
@@ -119,7 +119,7 @@ def _walk(name: str, size: Size, rows: Sequence[MotRow], fps: float, offset: int
     boxes = np.array([row.box for row in rows], dtype=np.float64).reshape(-1, 4)
     # Files count frames from 1, pulses from 0.
     frames = [row.frame - 1 - offset for row in rows]
-    return make_walk(name, size, frames, [row.id for row in rows], boxes, moment(fps))
+    return make_walk(name, size, frames, [row.id for row in rows], boxes, comparison_step(fps))
 
 
 def _rows(path: Path, name: str | None = None) -> list[MotRow]:

@@ -11,18 +11,18 @@ from server.config.sections import SiteSettings
 from server.media.audio.audio_chunk import Heard
 from server.media.containers.mp4_audio import sound_fragment
 from server.media.stream_format import Agreement
-from server.service.streaming.audio_buffer import SoundShelf
-from server.service.streaming.frame_buffer import Shelf
-from server.service.streaming.media_chunk import Footage
-from server.service.streaming.streams import Gop, Showing
-from server.service.streaming.timeline import Timeline
+from server.service.streaming.audio_buffer import AudioBuffer
+from server.service.streaming.frame_buffer import FrameBuffer
+from server.service.streaming.gapless_timeline import GaplessTimeline
+from server.service.streaming.media_chunk import MediaChunk
+from server.service.streaming.spliced_stream import GopAssembler, GopSequencer
 from server.service.view_selection.decider import GopDecision
 
 
 @dataclass(slots=True)
 class _Film:
     file: BinaryIO
-    showing: Showing
+    showing: GopSequencer
     origin: int
     """The pulse that is at time 0."""
     wanted: int
@@ -40,10 +40,10 @@ class FilmWriter:
     def __init__(
         self,
         folder: Path,
-        shelves: Mapping[str, Shelf],
+        shelves: Mapping[str, FrameBuffer],
         agreement: Agreement,
         site: SiteSettings,
-        sound: SoundShelf | None = None,
+        sound: AudioBuffer | None = None,
     ) -> None:
         folder.mkdir()
         self._folder, self._shelves, self._agreement, self._site = folder, shelves, agreement, site
@@ -57,7 +57,7 @@ class FilmWriter:
 
     def write(self, decision: GopDecision) -> None:
         """Append one GOP to everybody's film."""
-        gop = Gop(self._shelves, decision.first, decision.frames, self._site.fps, 0, self._sound)
+        gop = GopAssembler(self._shelves, decision.first, decision.frames, self._site.fps, 0, self._sound)
         for choice in decision.choices:
             film = self._films.get(choice.number)
             if film is None and choice.camera is None:
@@ -81,10 +81,10 @@ class FilmWriter:
     def _begin(self, number: int, decision: GopDecision) -> _Film:
         file = (self._folder / f"object-{number}.{self._agreement.container}").open("wb")
         file.write(self._head(0))
-        showing = Showing(Timeline(self._agreement, self._site.fps, decision.frames))
+        showing = GopSequencer(GaplessTimeline(self._agreement, self._site.fps, decision.frames))
         return _Film(file, showing, decision.first, file.tell(), decision.first)
 
-    def _write(self, film: _Film, footage: Footage) -> None:
+    def _write(self, film: _Film, footage: MediaChunk) -> None:
         if footage.heard is not None:
             film.file.write(_begun_at(film.origin, footage.heard, self._site.fps))
         for picture in footage.pictures:

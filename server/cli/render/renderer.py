@@ -14,9 +14,9 @@ from server.cli.render.soundtrack import Soundtrack
 from server.cli.render.video_info import Size
 from server.config.site_config import Config
 from server.media.codec import agreement_for
-from server.service.decision_files.recorder import Recorder
+from server.service.decision_files.decision_writer import DecisionWriter
 from server.service.ingest.epoch_aligner import Aligner
-from server.service.streaming.frame_buffer import Shelf
+from server.service.streaming.frame_buffer import FrameBuffer
 from server.service.view_selection.decider import Decider, GopDecision, homographies
 
 log = logging.getLogger(__name__)
@@ -33,14 +33,14 @@ class Renderer:
         # What is to be decided, and what the camera that was run first has done since.
         frames = 4 * (config.view.lookahead + config.encode.gop + config.track.window.stride)
         agreement = agreement_for(config)
-        self._shelves = {camera: Shelf(config.site.fps, frames, agreement) for camera in cameras}
+        self._shelves = {camera: FrameBuffer(config.site.fps, frames, agreement) for camera in cameras}
         self._aligner = Aligner(cameras, config.track.window.stride, grace=0)
         for camera in cameras:
             self._aligner.come(camera)
         self._decider = Decider(
             config, homographies(config), lambda camera, pulse: self._shelves[camera].has(pulse)
         )
-        self._recorder = Recorder(folder, cameras, self._decider.people.fits)
+        self._recorder = DecisionWriter(folder, cameras, self._decider.people.fits)
         self._soundtrack = Soundtrack(config)
         shelf = self._soundtrack.shelf
         self._films = FilmWriter(folder / "best", self._shelves, agreement, config.site, shelf)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from server.camera.audio import RecordedSound, open_sound, runs
 from server.config.site_config import Config
 from server.messaging.messages import AudioHeader
-from server.service.streaming.audio_buffer import SoundShelf
+from server.service.streaming.audio_buffer import AudioBuffer
 
 _KEPT_S = 20.0
 _AHEAD_S = 1.0
@@ -27,7 +27,7 @@ class Soundtrack:
         self._begun = False
         self.shelf = None
         if form is not None and self._sound is not None:
-            self.shelf = SoundShelf(form, self._fps, _KEPT_S)
+            self.shelf = AudioBuffer(form, self._fps, _KEPT_S)
 
     def read(self, first: int, until: int) -> None:
         """Put what sounds at the pulses ``first … until - 1`` on the shelf; pulses must grow."""

@@ -17,7 +17,7 @@ from server.http.periodic import again_and_again
 from server.messaging.messages import GopChoices
 from server.service.operator_assist.flags import Flag
 from server.service.service import BestViewService
-from server.service.streaming.broadcaster import Channel, Chunk, Viewer
+from server.service.streaming.broadcaster import Broadcaster, BytesChunk, Subscriber
 
 log = logging.getLogger(__name__)
 
@@ -40,7 +40,7 @@ def event(name: str, content: Any, event_id: int | None = None) -> bytes:
 class _Line:
     """What readers are told who may see the same."""
 
-    channel: Channel
+    channel: Broadcaster
     told: dict[str, bytes] = field(default_factory=dict)
 
 
@@ -63,7 +63,7 @@ class Events:
         """How many are told."""
         return sum(line.channel.viewers for line in self._lines.values())
 
-    def join(self, sees: Scope) -> Viewer:
+    def join(self, sees: Scope) -> Subscriber:
         """Let a reader in; what it should know first comes first."""
         line = self._lines.get(sees) or self._new_line(sees)
         viewer = line.channel.join()
@@ -72,10 +72,10 @@ class Events:
             if chunk is not None:
                 viewer.put_first(chunk)
         for name, content in self._lists(sees).items():
-            viewer.put_first(Chunk(event(name, content), start=True))
+            viewer.put_first(BytesChunk(event(name, content), start=True))
         return viewer
 
-    def leave(self, sees: Scope, viewer: Viewer) -> None:
+    def leave(self, sees: Scope, viewer: Subscriber) -> None:
         """Let a reader go."""
         line = self._lines[sees]
         line.channel.leave(viewer)
@@ -93,7 +93,7 @@ class Events:
             line.channel.close()
 
     def _new_line(self, sees: Scope) -> _Line:
-        line = self._lines[sees] = _Line(Channel(starts_kept=_GOPS_KEPT, queue_starts=_QUEUE))
+        line = self._lines[sees] = _Line(Broadcaster(starts_kept=_GOPS_KEPT, queue_starts=_QUEUE))
         for choices in self._recent:
             line.channel.publish(self._gop(sees, choices))
         if self._closed:
@@ -112,16 +112,16 @@ class Events:
             data = event(name, content)
             if line.told.get(name) != data:
                 line.told[name] = data
-                line.channel.tell(Chunk(data, start=True))
+                line.channel.tell(BytesChunk(data, start=True))
         for viewer in line.channel.who_lost():
             for chunk in self._again(sees, lists):
                 viewer.put(chunk)
-        line.channel.tell(Chunk(b": here\n\n", start=False))
+        line.channel.tell(BytesChunk(b": here\n\n", start=False))
 
-    def _again(self, sees: Scope, lists: dict[str, Any]) -> Iterator[Chunk]:
+    def _again(self, sees: Scope, lists: dict[str, Any]) -> Iterator[BytesChunk]:
         """Give all that holds, to who fell behind: what is told only once may be among what they lost."""
         for name, content in lists.items():
-            yield Chunk(event(name, content), start=True)
+            yield BytesChunk(event(name, content), start=True)
         flags = self._service.assist.flags
         for flag in [*reversed(flags.ended[:_FLAGS_AGAIN]), *flags.open]:
             chunk = self._flag(sees, flag)
@@ -136,13 +136,13 @@ class Events:
             "site": site_for(site_info(service), sees),
         }
 
-    def _gop(self, sees: Scope, choices: GopChoices) -> Chunk:
+    def _gop(self, sees: Scope, choices: GopChoices) -> BytesChunk:
         content = choices_for(choices, sees, self._service.board.resolve)
-        return Chunk(event("gop", content, choices.first), start=True)
+        return BytesChunk(event("gop", content, choices.first), start=True)
 
-    def _flag(self, sees: Scope, flag: Flag) -> Chunk | None:
+    def _flag(self, sees: Scope, flag: Flag) -> BytesChunk | None:
         narrowed = flag_for(flag, sees, self._service.board.resolve)
-        return None if narrowed is None else Chunk(event("flag", narrowed), start=True)
+        return None if narrowed is None else BytesChunk(event("flag", narrowed), start=True)
 
     def _on_flag(self, flag: Flag) -> None:
         for sees, line in self._lines.items():

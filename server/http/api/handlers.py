@@ -14,8 +14,8 @@ from server.http.app_keys import METRICS, SERVICE
 from server.http.connections.listener import still_coming
 from server.messaging.messages import DECODE_ERRORS
 from server.service.readiness import why_not_ready
-from server.service.recording.moments import MomentError, pulse_at
 from server.service.service import BestViewService
+from server.service.time_shift.time_reference import TimeReferenceError, parse_time_reference
 
 routes = web.RouteTableDef()
 
@@ -84,13 +84,13 @@ async def get_choice(request: web.Request) -> web.Response:
         choice = choice_info(service, number)
         return no_object(service, number) if choice is None else answer(choice)
     try:
-        pulse = pulse_at(
+        pulse = parse_time_reference(
             request.query["at"],
             now=service.board.end - 1,
             fps=service.config.site.fps,
             pulse0=service.pulse0,
         )
-    except MomentError as error:
+    except TimeReferenceError as error:
         return problem(400, f"at: {error}")
     choice = choice_info(service, number, pulse)
     if choice is None:

@@ -13,8 +13,7 @@ from aiohttp import web
 
 from server.http.api.handlers import not_now, problem
 from server.http.hls.playlist import Listed, ListedPart, part_name, playlist, playlist_answer
-from server.service.streaming.hls_part import Part
-from server.service.streaming.hls_segmenter import Reel, Segment
+from server.service.streaming.hls_segmenter import HlsPart, HlsSegment, HlsSegmenter
 
 _HELD_BACK = 3
 """Parts that a player stays behind the newest (4.4.3.8: at least twice, better three times their length)."""
@@ -24,11 +23,11 @@ _FAR = 2
 """Segments ahead that may be asked for (6.2.5.2)."""
 _WAIT = 3
 """Target durations after which what was asked for does not come (6.2.5.2)."""
-_WRITTEN: WeakKeyDictionary[Reel, tuple[tuple[int, bool, float | None], str]] = WeakKeyDictionary()
+_WRITTEN: WeakKeyDictionary[HlsSegmenter, tuple[tuple[int, bool, float | None], str]] = WeakKeyDictionary()
 """The newest playlist of each stream, and of what state of it that is."""
 
 
-async def newest(request: web.Request, reel: Reel, pulse0: float | None) -> web.Response:
+async def newest(request: web.Request, reel: HlsSegmenter, pulse0: float | None) -> web.Response:
     """Answer with the newest playlist; where ``_HLS_msn`` asks for more, with the first one that has it."""
     wanted = _wanted(request, reel)
     if isinstance(wanted, web.Response):
@@ -40,14 +39,14 @@ async def newest(request: web.Request, reel: Reel, pulse0: float | None) -> web.
     return playlist_answer(_newest(reel, pulse0))
 
 
-async def coming_part(reel: Reel, number: int, index: int) -> Part | None:
+async def coming_part(reel: HlsSegmenter, number: int, index: int) -> HlsPart | None:
     """Give a part; one that a playlist has promised is waited for."""
     if reel.part(number, index) is None and _is_next(reel, number, index):
         await _waited(reel, number, index)
     return reel.part(number, index)
 
 
-def _newest(reel: Reel, pulse0: float | None) -> str:
+def _newest(reel: HlsSegmenter, pulse0: float | None) -> str:
     """Write the newest playlist, once however many wait for it."""
     state = (reel.until, reel.ended, pulse0)
     known = _WRITTEN.get(reel)
@@ -56,7 +55,7 @@ def _newest(reel: Reel, pulse0: float | None) -> str:
     return known[1]
 
 
-def _written(reel: Reel, pulse0: float | None) -> str:
+def _written(reel: HlsSegmenter, pulse0: float | None) -> str:
     plan, growing = reel.plan, reel.growing
     oldest = reel.until - _RECENT * plan.target_s * plan.fps
     listed = [Listed(it.number, it.first, it.until, _parts(it, oldest)) for it in reel.listed]
@@ -74,23 +73,23 @@ def _written(reel: Reel, pulse0: float | None) -> str:
     return playlist(listed, plan, pulse0, extra, ended=reel.ended, hint=hint)
 
 
-def _parts(segment: Segment, oldest: float) -> list[ListedPart]:
+def _parts(segment: HlsSegment, oldest: float) -> list[ListedPart]:
     if segment.until <= oldest:
         return []
     return [ListedPart(it.footage.until - it.footage.first, it.independent) for it in segment.parts]
 
 
-def _next(reel: Reel) -> tuple[int, int]:
+def _next(reel: HlsSegmenter) -> tuple[int, int]:
     """Give segment and index of the part that comes next."""
     number, pulses = divmod(reel.until, reel.plan.frames)
     return number, pulses // reel.plan.gop
 
 
-def _is_next(reel: Reel, number: int, index: int) -> bool:
+def _is_next(reel: HlsSegmenter, number: int, index: int) -> bool:
     return reel.plan.has_parts and not reel.ended and (number, index) == _next(reel)
 
 
-def _wanted(request: web.Request, reel: Reel) -> tuple[int, int | None] | web.Response | None:
+def _wanted(request: web.Request, reel: HlsSegmenter) -> tuple[int, int | None] | web.Response | None:
     """Give what the playlist is to have, or what is wrong with the question; None: it may be as it is."""
     number, index = request.query.get("_HLS_msn"), request.query.get("_HLS_part")
     if number is None and index is None:
@@ -106,7 +105,7 @@ def _wanted(request: web.Request, reel: Reel) -> tuple[int, int | None] | web.Re
     return int(number), None if index is None else int(index)
 
 
-async def _waited(reel: Reel, number: int, index: int | None) -> bool:
+async def _waited(reel: HlsSegmenter, number: int, index: int | None) -> bool:
     """Wait until a part, or a whole segment, is there; tell whether it is, or the stream is over."""
     try:
         async with asyncio.timeout(_WAIT * reel.plan.target_s):

@@ -6,8 +6,8 @@ from collections.abc import Iterable
 from itertools import pairwise
 
 from server.http.hls.playlist import Listed, head_lines, segment_lines
-from server.service.recording.time_shift import Listing
-from server.service.streaming.hls_segmenter import Plan
+from server.service.streaming.hls_segmenter import SegmentLayout
+from server.service.time_shift.hls_time_shift import SegmentList
 
 MOST = 9_000
 """Segments in a list that is fetched once, because nothing is to follow: two hours of 0.8 s each."""
@@ -17,7 +17,7 @@ _STEP = 64
 """Segments from one time of day to the next: of each segment it would be most of the text."""
 
 
-def newest(listing: Listing) -> Listing:
+def newest(listing: SegmentList) -> SegmentList:
     """Leave out the oldest segments of a list that has become too long.
 
     The new first one has had its time of day before: what stays in a playlist must not change (RFC 8216,
@@ -28,7 +28,7 @@ def newest(listing: Listing) -> Listing:
 
 
 def long_playlist(
-    listing: Listing, plan: Plan, pulse0: float | None, extra: Iterable[str] = (), *, ended: bool
+    listing: SegmentList, plan: SegmentLayout, pulse0: float | None, extra: Iterable[str] = (), *, ended: bool
 ) -> str:
     """Write a playlist of segments without a hole; ``pulse0`` is when pulse 0 was due, unix seconds.
 
@@ -47,7 +47,7 @@ def long_playlist(
     return "\n".join(lines) + "\n"
 
 
-def _told(listing: Listing, number: int, plan: Plan, pulse0: float | None) -> list[str]:
+def _told(listing: SegmentList, number: int, plan: SegmentLayout, pulse0: float | None) -> list[str]:
     """Give the lines of a segment that may not be whole."""
     pulses = listing.pulses_of(number)
     return segment_lines(Listed(number, pulses.start, pulses.stop), plan, pulse0)

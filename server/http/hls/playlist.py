@@ -9,7 +9,7 @@ from datetime import UTC, datetime
 from aiohttp import web
 
 from server.config.sections import SiteSettings
-from server.service.streaming.hls_segmenter import Plan
+from server.service.streaming.hls_segmenter import SegmentLayout
 
 TYPE = "application/vnd.apple.mpegurl"
 _VERSION = 7
@@ -43,7 +43,7 @@ def part_name(segment: int, index: int) -> str:
 
 def playlist(
     segments: Iterable[Listed],
-    plan: Plan,
+    plan: SegmentLayout,
     pulse0: float | None,
     extra: Iterable[str] = (),
     *,
@@ -64,7 +64,7 @@ def playlist(
     return "\n".join(lines) + "\n"
 
 
-def head_lines(plan: Plan, first: int, extra: Iterable[str] = ()) -> list[str]:
+def head_lines(plan: SegmentLayout, first: int, extra: Iterable[str] = ()) -> list[str]:
     """Give the lines before the first segment, whose number is ``first``."""
     return [
         "#EXTM3U",
@@ -87,7 +87,7 @@ def master(address: str, bandwidth: int, codecs: str, site: SiteSettings) -> str
     return "\n".join([*lines, f"#EXT-X-STREAM-INF:{told}", address]) + "\n"
 
 
-def segment_lines(segment: Listed, plan: Plan, pulse0: float | None) -> list[str]:
+def segment_lines(segment: Listed, plan: SegmentLayout, pulse0: float | None) -> list[str]:
     """Give the lines of a segment, with its time of day where ``pulse0`` is known."""
     lines = [_part_line(segment.number, index, it, plan.fps) for index, it in enumerate(segment.parts)]
     if segment.whole:

@@ -17,7 +17,7 @@ from server.http.hls.time_shift_playlist import Stream, playlist_of_the_past, se
 from server.http.hls.token_query import with_token
 from server.http.streams.stream_forms import mp4_head
 from server.http.streams.time_shift import asks_for_the_past, object_past
-from server.service.recording.playback import CameraPast
+from server.service.time_shift.playback import CameraPlayback
 
 routes = web.RouteTableDef()
 
@@ -122,7 +122,9 @@ def _stream(request: web.Request) -> Stream | None:
     if "camera" in request.match_info:
         camera = request.match_info["camera"]
         reel = service.splicer.camera_reel(camera)
-        return None if reel is None else Stream(f"camera {camera}", reel, CameraPast(service.past, camera))
+        return (
+            None if reel is None else Stream(f"camera {camera}", reel, CameraPlayback(service.past, camera))
+        )
     number = int(request.match_info["object"])
     reel = service.splicer.reel(service.board.resolve(number), scoped=sees_one_person(request))
     stream = Stream(f"object {number}", reel, object_past(request, number))

@@ -14,16 +14,15 @@ from server.http.app_keys import SERVICE
 from server.http.hls.long_playlist import MOST, MOST_GROWING, long_playlist, newest
 from server.http.hls.playlist import master, playlist_answer
 from server.http.streams.time_shift import new_timeline, nothing_kept, wish_of
-from server.service.recording.available_range import kept_from
-from server.service.recording.disk_reads import from_disk
-from server.service.recording.moments import MomentError
-from server.service.recording.playback import Source, sounds
-from server.service.recording.playback_audio import Hearing
-from server.service.recording.removed_recordings import forget_gone
-from server.service.recording.time_shift import Listing, Rewound
-from server.service.recording.time_shift_stream import Wish
+from server.service.recording.media_files import run_in_reader_thread
 from server.service.service import BestViewService
-from server.service.streaming.hls_segmenter import Plan, Reel, Segment
+from server.service.streaming.hls_segmenter import HlsSegment, HlsSegmenter, SegmentLayout
+from server.service.time_shift.availability import first_available, forget_missing_ends
+from server.service.time_shift.hls_time_shift import SegmentList, TimeShift
+from server.service.time_shift.playback import PlaybackSource, recorded_audio
+from server.service.time_shift.playback_audio import PlaybackAudio
+from server.service.time_shift.time_reference import TimeReferenceError
+from server.service.time_shift.time_shift_stream import PlaybackRange
 
 _LIVE = "live"
 """The end of a list that has none."""
@@ -36,13 +35,13 @@ class Stream:
     """A stream as HLS has it: what is new, and what is past. ``reel`` is None where nothing is new."""
 
     what: str
-    reel: Reel | None
-    source: Source
+    reel: HlsSegmenter | None
+    source: PlaybackSource
 
     @property
     def exists(self) -> bool:
         """Whether there is or was such a stream."""
-        return self.reel is not None or kept_from(self.source, 0) is not None
+        return self.reel is not None or first_available(self.source, 0) is not None
 
 
 async def playlist_of_the_past(request: web.Request, stream: Stream) -> web.Response:
@@ -54,7 +53,7 @@ async def playlist_of_the_past(request: web.Request, stream: Stream) -> web.Resp
     service = request.app[SERVICE]
     try:
         wish = wish_of(request, service, stream.source.end, endless=_LIVE)
-    except MomentError as error:
+    except TimeReferenceError as error:
         return problem(400, str(error))
     missing = await nothing_kept(stream.source, wish, stream.what)
     if missing is not None:
@@ -77,39 +76,39 @@ async def playlist_of_the_past(request: web.Request, stream: Stream) -> web.Resp
     return playlist_answer(long_playlist(listing, plan, service.pulse0, extra, ended=over))
 
 
-async def segment_of_the_past(request: web.Request, stream: Stream, number: int) -> Segment | None:
+async def segment_of_the_past(request: web.Request, stream: Stream, number: int) -> HlsSegment | None:
     """Give a segment that is not in the newest playlist any more; None where it is not kept."""
     rewound, frames = _rewound(request.app[SERVICE], stream), request.app[SERVICE].splicer.plan.frames
     with suppress(OSError):  # what cannot be read is a hole
-        await from_disk(forget_gone, stream.source, number * frames, (number + 1) * frames)
+        await run_in_reader_thread(forget_missing_ends, stream.source, number * frames, (number + 1) * frames)
     return await rewound.segment(number)
 
 
-def _rewound(service: BestViewService, stream: Stream) -> Rewound:
+def _rewound(service: BestViewService, stream: Stream) -> TimeShift:
     past = service.past
     hearing = partial(_hearing, service)
     timeline = partial(new_timeline, service)
     plan, gop, decided = service.splicer.plan, service.config.encode.gop, past.recent.end
     over = _is_over(stream)
-    return Rewound(stream.source, plan, timeline, hearing, gop=gop, decided=decided, over=over)
+    return TimeShift(stream.source, plan, timeline, hearing, gop=gop, decided=decided, over=over)
 
 
-def _hearing(service: BestViewService) -> Hearing | None:
+def _hearing(service: BestViewService) -> PlaybackAudio | None:
     past, sound = service.past, service.past.sound
-    return None if sound is None else Hearing(sound, lambda: sounds(past))
+    return None if sound is None else PlaybackAudio(sound, lambda: recorded_audio(past))
 
 
 def _is_over(stream: Stream) -> bool:
     return stream.reel is None or stream.reel.ended
 
 
-def _too_long(most: int, plan: Plan, until: int, *, grows: bool) -> str:
+def _too_long(most: int, plan: SegmentLayout, until: int, *, grows: bool) -> str:
     what, instead = ("a list that grows", f"to={_LIVE}, or ") if grows else ("a list", "")
     seconds = most * plan.frames / plan.fps
     return f"to: {what} has {most} segments at most, here {seconds:.0f} s; say {instead}to=p{until}"
 
 
-def _address(wish: Wish, listing: Listing, *, has_end: bool) -> str:
+def _address(wish: PlaybackRange, listing: SegmentList, *, has_end: bool) -> str:
     """Name the playlist of a wish; ``has_end``: it says to when.
 
     One that does not goes on and on where it begins a short while ago, and else has what there is by now, as
@@ -130,7 +129,7 @@ def _master(service: BestViewService, stream: Stream, address: str) -> web.Respo
     return playlist_answer(master(address, round(bits), codecs, site))
 
 
-def _peak(source: Source, fps: float) -> float:
+def _peak(source: PlaybackSource, fps: float) -> float:
     """Give the most bits a second that pictures took, by whole files of the recording and GOPs in memory."""
     rates = [8 * it.length / it.frames for one in source.recorded for it in one.tape.all]
     gop = source.recall(0)

@@ -11,7 +11,7 @@ from prometheus_client.registry import Collector
 from server.config.running_config import ConfigFileState
 from server.http.access.access_control import Access
 from server.http.hls.sessions import Readers
-from server.service.rendering.renderer import Pictures
+from server.service.rendering.render_pool import RenderPool
 from server.service.service import BestViewService
 
 
@@ -125,7 +125,7 @@ class ServiceCollector(Collector):
 class PicturesCollector(Collector):
     """Gives the numbers of the streams that are decoded."""
 
-    def __init__(self, pictures: Pictures) -> None:
+    def __init__(self, pictures: RenderPool) -> None:
         self._pictures = pictures
 
     def collect(self) -> Iterable[Metric]:
@@ -147,7 +147,7 @@ class PicturesCollector(Collector):
 
 def registry(
     service: BestViewService,
-    pictures: Pictures,
+    pictures: RenderPool,
     readers: Readers,
     access: Access,
     on_disk: Callable[[], ConfigFileState],

@@ -22,7 +22,7 @@ from server.http.operator.schema import (
     Pulses,
 )
 from server.media.letterbox import Letterbox
-from server.service.calibration.floor_map import covered
+from server.service.calibration.floor_map import floor_coverage
 from server.service.ingest.ingest import CameraState
 from server.service.service import BestViewService
 
@@ -60,7 +60,7 @@ async def get_floor(request: web.Request) -> web.Response:
     for camera in service.config.cameras:
         own = service.intake.states[camera.id].gauge.size
         if camera.ground is not None and own is not None:
-            part = covered(np.array(camera.ground, dtype=np.float64), own, (site.width, site.height))
+            part = floor_coverage(np.array(camera.ground, dtype=np.float64), own, (site.width, site.height))
             cameras.append(FloorCamera(camera.id, part.homography.tolist(), part.outline.tolist()))
     return answer(Floor(cameras, [it.id for it in service.config.cameras if it.ground is None]))
 

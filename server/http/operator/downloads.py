@@ -13,9 +13,9 @@ from server.http.app_keys import SERVICE
 from server.http.streams.sending import send_bytes
 from server.http.streams.time_shift import led_by, nothing_said, wish_of
 from server.messaging.messages import GopChoices
-from server.service.recording.decision_log import told
-from server.service.recording.moments import MomentError, moment_of
 from server.service.service import BestViewService
+from server.service.time_shift.decision_log import read_decision_lines
+from server.service.time_shift.time_reference import TimeReferenceError, utc_time_of_pulse
 
 routes = web.RouteTableDef()
 
@@ -50,12 +50,12 @@ async def _send(request: web.Request, what: str, head: str, rows: Rows) -> web.S
     end = service.past.recent.end
     try:
         wish = wish_of(request, service, end)
-    except MomentError as error:
+    except TimeReferenceError as error:
         return problem(400, str(error))
     span = range(wish.start, end if wish.end is None else wish.end)
     name = f"{service.config.site.name}-{what}-p{span.start}-p{span.stop - 1}.csv"
     headers = {"Content-Type": "text/csv", "Content-Disposition": f'attachment; filename="{name}"'}
-    kept = told(service.past, span.start, span.stop)
+    kept = read_decision_lines(service.past, span.start, span.stop)
     first = await anext(kept, None)
     if first is None and (missing := nothing_said(service, wish)) is not None:
         return missing
@@ -71,7 +71,7 @@ async def _lines(
     async for line in told_lines:
         gop = decoder.decode(line)
         inside = range(max(gop.first, span.start), min(gop.first + gop.frames, span.stop))
-        yield "".join(rows(gop, inside, lambda pulse: moment_of(pulse, fps, pulse0) or "")).encode()
+        yield "".join(rows(gop, inside, lambda pulse: utc_time_of_pulse(pulse, fps, pulse0) or "")).encode()
 
 
 def _tracks(gop: Told, inside: range, moment: Callable[[int], str]) -> Iterator[str]:

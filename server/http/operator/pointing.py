@@ -13,7 +13,7 @@ from server.http.app_keys import SERVICE
 from server.http.operator.schema import Pointing
 from server.messaging.number_types import Pulse
 from server.messaging.operator_messages import OPERATOR_POINTS_MAX, TOLERANCE_MIN
-from server.service.operator_assist.corrections import Place
+from server.service.operator_assist.corrections import PointedPosition
 from server.service.service import BestViewService
 
 routes = web.RouteTableDef()
@@ -77,9 +77,9 @@ def _wrong(service: BestViewService, point: Point) -> str:
     return f"points: pulse {point.pulse} has not come yet" if point.pulse > service.pulse else ""
 
 
-def _place(point: Point, width: int) -> Place:
+def _place(point: Point, width: int) -> PointedPosition:
     reach = _REACH * width if point.reach is None else min(point.reach, _REACH_MOST * width)
-    return Place(point.pulse, point.x, point.y, max(reach, TOLERANCE_MIN))
+    return PointedPosition(point.pulse, point.x, point.y, max(reach, TOLERANCE_MIN))
 
 
 def _cannot(service: BestViewService) -> str:

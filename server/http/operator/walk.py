@@ -11,9 +11,9 @@ from server.http.access.grants import OPERATING
 from server.http.api.handlers import answer, asked_for, problem
 from server.http.app_keys import SERVICE
 from server.http.operator.schema import OperatorWalk, WalkCamera, WalkPair
-from server.service.calibration.report_text import missed
-from server.service.calibration.walk_session import MOST_S, State
-from server.service.calibration.worker_messages import Done
+from server.service.calibration.calibration_report import coverage_gaps
+from server.service.calibration.walk_session import MAX_WALK_S, WalkState
+from server.service.calibration.worker import CalibrationResult
 from server.service.service import BestViewService
 
 routes = web.RouteTableDef()
@@ -43,12 +43,12 @@ async def post_walk(request: web.Request) -> web.Response:
     walking = service.walking
     if step.do == "start":
         walking.start()
-    elif walking.state is State.NONE:
+    elif walking.state is WalkState.NONE:
         return problem(409, "nobody walks: start the walk first")
     elif step.do == "go_on":
-        if walking.state is not State.WALKING:
+        if walking.state is not WalkState.WALKING:
             walking.go_on()
-    elif walking.state is not State.WORKING:
+    elif walking.state is not WalkState.WORKING:
         walking.finish(step.person)
     return answer(_told(service))
 
@@ -89,17 +89,17 @@ def _file(body: bytes, content_type: str, name: str) -> web.Response:
 
 def _told(service: BestViewService) -> OperatorWalk:
     walking = service.walking
-    done = walking.done or Done()
-    covered = walking.covered()
+    done = walking.done or CalibrationResult()
+    covered = walking.coverage()
     lacking = [
         it.words
         for seen in covered.cameras
-        for it in missed(seen.camera, seen.thirds, seen.deep or float("inf"))
+        for it in coverage_gaps(seen.camera, seen.thirds, seen.deep or float("inf"))
     ]
     return OperatorWalk(
         state=walking.state.value,
         seconds=walking.seconds,
-        most=MOST_S,
+        most=MAX_WALK_S,
         cameras=[WalkCamera(it.camera, it.feet, list(it.thirds), it.deep) for it in covered.cameras],
         pairs=[WalkPair(it.one, it.other, it.seconds) for it in covered.pairs],
         lacking=lacking,

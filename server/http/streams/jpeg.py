@@ -15,14 +15,19 @@ from server.http.connections.viewer_limits import no_place, watching
 from server.http.streams.sending import send_stream, send_viewer
 from server.http.streams.stream_forms import MP4
 from server.media.rendering_messages import Still
-from server.service.rendering.jpeg_series import Series
-from server.service.rendering.multipart_jpeg import BEGIN, CONTENT_TYPE, PULSE, part
-from server.service.rendering.renderer import CameraView, FullError, PersonView, Subject
-from server.service.rendering.stream_source import NoPictureError
+from server.service.rendering.mjpeg_streams import (
+    CONTENT_TYPE,
+    FIRST_BOUNDARY,
+    PULSE_HEADER,
+    MjpegVariant,
+    multipart_part,
+)
+from server.service.rendering.render_pool import CameraView, PersonView, RenderPoolFullError, Subject
+from server.service.rendering.rendered_stream import PictureTimeoutError
 
 routes = web.RouteTableDef()
 
-_EXPOSED = {"Access-Control-Expose-Headers": PULSE}
+_EXPOSED = {"Access-Control-Expose-Headers": PULSE_HEADER}
 
 Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
@@ -42,9 +47,9 @@ def _or_refused(handler: Handler) -> Handler:
             return await handler(request)
         except _RefusedError as refused:
             return refused.answer
-        except FullError:
+        except RenderPoolFullError:
             return not_now("as many pictures as this server makes (http.pictures_max) are being made")
-        except NoPictureError:
+        except PictureTimeoutError:
             return not_now("no picture came in time")
 
     return run
@@ -92,7 +97,7 @@ async def best_with_boxes(request: web.Request) -> web.StreamResponse:
 
 async def _mjpeg(request: web.Request, subject: Subject) -> web.StreamResponse:
     headers = {"Content-Type": CONTENT_TYPE}
-    series = Series(_rate(request), wants_boxes(request))
+    series = MjpegVariant(_rate(request), wants_boxes(request))
     pulse = _newest(request, subject)
     if request.method == "HEAD":
         return _headers_only(headers)
@@ -101,7 +106,7 @@ async def _mjpeg(request: web.Request, subject: Subject) -> web.StreamResponse:
         first = await source.still(_kind(request), pulse)
         viewer = source.series.join(series)
         try:
-            return await send_viewer(request, viewer, BEGIN + part(first), headers)
+            return await send_viewer(request, viewer, FIRST_BOUNDARY + multipart_part(first), headers)
         finally:
             source.series.leave(series, viewer)
 
@@ -109,10 +114,10 @@ async def _mjpeg(request: web.Request, subject: Subject) -> web.StreamResponse:
 async def _still(request: web.Request, subject: Subject) -> web.StreamResponse:
     pulse = _newest(request, subject)
     if request.method == "HEAD":
-        return _headers_only({"Content-Type": "image/jpeg", PULSE: str(pulse)})
+        return _headers_only({"Content-Type": "image/jpeg", PULSE_HEADER: str(pulse)})
     with request.app[PICTURES].using(subject) as source:
         picture = await source.still(_kind(request), pulse)
-    answer = _headers_only({"Content-Type": "image/jpeg", PULSE: str(picture.pulse)})
+    answer = _headers_only({"Content-Type": "image/jpeg", PULSE_HEADER: str(picture.pulse)})
     answer.body = picture.data
     return answer
 

@@ -12,7 +12,7 @@ from functools import lru_cache
 from aiohttp import web
 
 from server.http.traffic import SENT, Sent
-from server.service.streaming.broadcaster import Channel, Piece, Viewer
+from server.service.streaming.broadcaster import Broadcaster, Chunk, Subscriber
 
 log = logging.getLogger(__name__)
 
@@ -27,17 +27,17 @@ _STREAM_HEADERS = {
 }
 
 
-Form = Callable[[Piece], bytes]
+Form = Callable[[Chunk], bytes]
 """How the pieces of a stream become bytes."""
 
 
-def plain(piece: Piece) -> bytes:
+def plain(piece: Chunk) -> bytes:
     """Give a piece's own bytes."""
     return piece.data
 
 
 async def send_stream(
-    request: web.Request, channel: Channel, head: bytes, headers: Mapping[str, str], form: Form = plain
+    request: web.Request, channel: Broadcaster, head: bytes, headers: Mapping[str, str], form: Form = plain
 ) -> web.StreamResponse:
     """Send ``head`` and then the channel for as long as both live."""
     viewer = channel.join()
@@ -48,7 +48,7 @@ async def send_stream(
 
 
 async def send_viewer(
-    request: web.Request, viewer: Viewer, head: bytes, headers: Mapping[str, str], form: Form = plain
+    request: web.Request, viewer: Subscriber, head: bytes, headers: Mapping[str, str], form: Form = plain
 ) -> web.StreamResponse:
     """Send ``head`` and what a viewer is given, from a place that the caller took and will give up."""
 
@@ -69,14 +69,14 @@ async def send_viewer(
 
 def _at_once(
     transport: asyncio.Transport, form: Form, sent: Sent, *, chunked: bool
-) -> Callable[[Piece], bool]:
+) -> Callable[[Chunk], bool]:
     """Give what writes a piece where nothing of the one before waits; what the system leaves follows.
 
     It is called for every viewer of every GOP: what it would look up, the last of them waits for.
     """
     is_closing, waiting, write = transport.is_closing, transport.get_write_buffer_size, transport.write
 
-    def take(piece: Piece) -> bool:
+    def take(piece: Chunk) -> bool:
         if waiting() or is_closing():
             return False
         data = form(piece)

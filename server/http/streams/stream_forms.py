@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from server.service.service import BestViewService
-from server.service.streaming.broadcaster import Piece
-from server.service.streaming.media_chunk import Footage
+from server.service.streaming.broadcaster import Chunk
+from server.service.streaming.media_chunk import MediaChunk
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,7 +17,7 @@ class Form:
     content_type: str
     head: Callable[[BestViewService], bytes | None]
     """What a stream begins with; None: nobody knows yet."""
-    packed: Callable[[Piece], bytes]
+    packed: Callable[[Chunk], bytes]
     """Gives a piece of a stream."""
 
 
@@ -26,12 +26,12 @@ def mp4_head(service: BestViewService) -> bytes | None:
     return service.agreement.head(service.config.site, service.config.sound.format)
 
 
-def _mp4(piece: Piece) -> bytes:
-    return piece.with_sound if isinstance(piece, Footage) else piece.data
+def _mp4(piece: Chunk) -> bytes:
+    return piece.with_sound if isinstance(piece, MediaChunk) else piece.data
 
 
-def _ts(piece: Piece) -> bytes:
-    return piece.ts if isinstance(piece, Footage) else piece.data
+def _ts(piece: Chunk) -> bytes:
+    return piece.ts if isinstance(piece, MediaChunk) else piece.data
 
 
 MP4 = Form("video/mp4", mp4_head, _mp4)

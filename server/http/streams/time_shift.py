@@ -17,18 +17,27 @@ from server.http.connections.viewer_limits import listening, no_ear, no_place, w
 from server.http.hls.sessions import of_live, of_person
 from server.http.streams.sending import send_bytes
 from server.http.streams.stream_forms import Form
-from server.service.recording.available_range import kept_from, known, shown
-from server.service.recording.decision_log import told
-from server.service.recording.disk_reads import from_disk
-from server.service.recording.moments import MomentError, moment_of, pulse_at
-from server.service.recording.past_presence import PastPresence
-from server.service.recording.playback import CameraPast, ObjectPast, Source, sounds
-from server.service.recording.playback_audio import Hearing
-from server.service.recording.removed_recordings import forget_all_gone, forget_gone
-from server.service.recording.time_shift_stream import PastStream, Wish
+from server.service.recording.media_files import run_in_reader_thread
 from server.service.service import BestViewService
-from server.service.streaming.broadcaster import Channel
-from server.service.streaming.timeline import Timeline
+from server.service.streaming.broadcaster import Broadcaster
+from server.service.streaming.gapless_timeline import GaplessTimeline
+from server.service.time_shift.availability import (
+    available_camera_ranges,
+    available_ranges,
+    first_available,
+    forget_missing,
+    forget_missing_ends,
+)
+from server.service.time_shift.decision_log import read_decision_lines
+from server.service.time_shift.playback import CameraPlayback, PersonPlayback, PlaybackSource, recorded_audio
+from server.service.time_shift.playback_audio import PlaybackAudio
+from server.service.time_shift.presence_history import PresenceHistory
+from server.service.time_shift.time_reference import (
+    TimeReferenceError,
+    parse_time_reference,
+    utc_time_of_pulse,
+)
+from server.service.time_shift.time_shift_stream import PlaybackRange, TimeShiftStream
 
 routes = web.RouteTableDef()
 
@@ -46,13 +55,13 @@ async def best_of_the_past(request: web.Request, form: Form) -> web.StreamRespon
     splicer = service.splicer
     channels = splicer.scoped if sees_one_person(request) else splicer.objects
 
-    def live() -> Channel | None:
+    def live() -> Broadcaster | None:
         return channels.get(service.board.resolve(number))
 
     if live() is None:
         if (unread := await unreadable(source, 0)) is not None:
             return unread
-        if kept_from(source, 0) is None:
+        if first_available(source, 0) is None:
             return no_object(service, number)
 
     def named() -> str:
@@ -67,9 +76,9 @@ async def camera_of_the_past(request: web.Request, form: Form) -> web.StreamResp
     camera = request.match_info["camera"]
     if camera not in service.shelves:
         return no_camera(service, camera)
-    source = CameraPast(service.past, camera)
+    source = CameraPlayback(service.past, camera)
 
-    def live() -> Channel | None:
+    def live() -> Broadcaster | None:
         return service.splicer.cameras.get(camera)
 
     return await _stream(request, form, source, f"camera {camera}", live, lambda: of_live(camera))
@@ -82,7 +91,7 @@ async def getobject_past(request: web.Request) -> web.Response:
     source = object_past(request, number)
     if (unread := await unreadable(source, 0)) is not None:
         return unread
-    if kept_from(source, 0) is None:
+    if first_available(source, 0) is None:
         return problem(404, f"nothing is kept of object {number}")
     return await _past(request, source)
 
@@ -94,7 +103,7 @@ async def get_camera_past(request: web.Request) -> web.Response:
     camera = request.match_info["camera"]
     if camera not in service.shelves:
         return no_camera(service, camera)
-    return await _past(request, CameraPast(service.past, camera))
+    return await _past(request, CameraPlayback(service.past, camera))
 
 
 @routes.get("/api/past")
@@ -103,11 +112,11 @@ async def get_told(request: web.Request) -> web.StreamResponse:
     service = request.app[SERVICE]
     try:
         wish = wish_of(request, service, service.past.recent.end)
-    except MomentError as error:
+    except TimeReferenceError as error:
         return problem(400, str(error))
     end = service.past.recent.end if wish.end is None else wish.end
     sees = request.app[ACCESS].grant(request).sees
-    kept = told(service.past, wish.start, end)
+    kept = read_decision_lines(service.past, wish.start, end)
     first = await anext(kept, None)
     if first is None and (missing := nothing_said(service, wish)) is not None:
         return missing
@@ -119,15 +128,17 @@ async def get_told(request: web.Request) -> web.StreamResponse:
         return await send_bytes(request, lines, b"", {"Content-Type": "application/x-ndjson"})
 
 
-def object_past(request: web.Request, number: int) -> ObjectPast:
+def object_past(request: web.Request, number: int) -> PersonPlayback:
     """Give the past of whoever has a number, or had it, as far as whoever asks may see it."""
     service = request.app[SERVICE]
     now = service.board.resolve(number)
     numbers = (number,) if number == now else (now, number)
     if not sees_one_person(request):
-        return ObjectPast(service.past, numbers)
+        return PersonPlayback(service.past, numbers)
     fps, unseen_s = service.config.site.fps, service.config.access.unseen_s
-    return ObjectPast(service.past, numbers, PastPresence(service.past, numbers, round(unseen_s * fps), fps))
+    return PersonPlayback(
+        service.past, numbers, PresenceHistory(service.past, numbers, round(unseen_s * fps), fps)
+    )
 
 
 def wish_of(
@@ -137,7 +148,7 @@ def wish_of(
     *,
     start: int | None = None,
     endless: str | None = None,
-) -> Wish:
+) -> PlaybackRange:
     """Read from= and to=; ``now`` is the pulse that seconds back are counted from.
 
     ``start`` is from when on where from= is left out; None: it must not be. ``endless`` is a word that to=
@@ -151,43 +162,43 @@ def wish_of(
     for name in ("from", "to"):
         if name in request.query and (name, request.query[name]) != ("to", endless):
             try:
-                moments[name] = pulse_at(request.query[name], now=now, fps=fps, pulse0=pulse0)
-            except MomentError as error:
-                raise MomentError(f"{name}: {error}") from error
+                moments[name] = parse_time_reference(request.query[name], now=now, fps=fps, pulse0=pulse0)
+            except TimeReferenceError as error:
+                raise TimeReferenceError(f"{name}: {error}") from error
     start, end = moments.get("from", start), moments.get("to")
     if start is None:
-        raise MomentError("from: is missing; it says from when on, such as ?from=-60")
+        raise TimeReferenceError("from: is missing; it says from when on, such as ?from=-60")
     if end is not None and end <= start:
-        raise MomentError(f"to: p{end} is not after from, which is p{start}")
-    return Wish(start, end)
+        raise TimeReferenceError(f"to: p{end} is not after from, which is p{start}")
+    return PlaybackRange(start, end)
 
 
-async def unreadable(source: Source, start: int, end: int | None = None) -> web.Response | None:
+async def unreadable(source: PlaybackSource, start: int, end: int | None = None) -> web.Response | None:
     """Forget what has gone from the disk where a time begins and ends; say so where nobody can tell."""
     try:
-        await from_disk(forget_gone, source, start, end)
+        await run_in_reader_thread(forget_missing_ends, source, start, end)
     except OSError as error:
         return _unread(error)
     return None
 
 
-async def nothing_kept(source: Source, wish: Wish, what: str) -> web.Response | None:
+async def nothing_kept(source: PlaybackSource, wish: PlaybackRange, what: str) -> web.Response | None:
     """Say that nothing is kept of the time that somebody wants to see, and what is; None: something is."""
     if (unread := await unreadable(source, wish.start, wish.end)) is not None:
         return unread
-    first = kept_from(source, wish.start)
+    first = first_available(source, wish.start)
     if first is not None and (wish.end is None or first < wish.end):
         return None
     try:
-        await from_disk(forget_all_gone, source, 0, sys.maxsize)
+        await run_in_reader_thread(forget_missing, source, 0, sys.maxsize)
     except OSError as error:
         return _unread(error)
-    there = known(source)
+    there = available_ranges(source)
     kept = ", ".join(f"p{it.first} to p{it.end - 1}" for it in there) or "nothing"
     return problem(416, f"of {what} nothing is kept from p{wish.start} on; there is {kept}")
 
 
-def nothing_said(service: BestViewService, wish: Wish) -> web.Response | None:
+def nothing_said(service: BestViewService, wish: PlaybackRange) -> web.Response | None:
     """Say that of a time nothing is kept that was said about it; None: nothing has been said yet."""
     if wish.start >= service.past.recent.end:
         return None
@@ -207,17 +218,17 @@ def _unread(error: OSError) -> web.Response:
     return not_now(f"what is recorded cannot be read: {error.strerror or error}")
 
 
-def new_timeline(service: BestViewService) -> Timeline:
+def new_timeline(service: BestViewService) -> GaplessTimeline:
     """Give the time of one viewer's stream."""
-    return Timeline(service.agreement, service.config.site.fps, service.config.encode.gop)
+    return GaplessTimeline(service.agreement, service.config.site.fps, service.config.encode.gop)
 
 
 async def _stream(
     request: web.Request,
     form: Form,
-    source: Source,
+    source: PlaybackSource,
     what: str,
-    live: Callable[[], Channel | None],
+    live: Callable[[], Broadcaster | None],
     named: Callable[[], str],
 ) -> web.StreamResponse:
     """Stream from a moment on; ``live`` is what the stream goes on with, by that name then."""
@@ -229,7 +240,7 @@ async def _stream(
         return problem(400, "overlay: boxes are not burnt into the past; /api/past tells where they are")
     try:
         wish = wish_of(request, service, source.end)
-    except MomentError as error:
+    except TimeReferenceError as error:
         return problem(400, str(error))
     missing = await nothing_kept(source, wish, what)
     if missing is not None:
@@ -239,7 +250,7 @@ async def _stream(
         return full
     counted = 1
 
-    def joined() -> Channel | None:
+    def joined() -> Broadcaster | None:
         nonlocal counted
         past.viewers -= counted
         counted = 0  # from now on the channel counts
@@ -247,8 +258,10 @@ async def _stream(
         return live()
 
     sound = past.sound
-    hearing = None if sound is None else Hearing(sound, lambda: sounds(past), lambda: source.end)
-    stream = PastStream(source, new_timeline(service), fps, joined, hearing)
+    hearing = (
+        None if sound is None else PlaybackAudio(sound, lambda: recorded_audio(past), lambda: source.end)
+    )
+    stream = TimeShiftStream(source, new_timeline(service), fps, joined, hearing)
     with watching(request, "past") as place:
         past.viewers += 1
         try:
@@ -259,23 +272,29 @@ async def _stream(
             past.viewers -= counted
 
 
-async def _past(request: web.Request, source: Source) -> web.Response:
+async def _past(request: web.Request, source: PlaybackSource) -> web.Response:
     service = request.app[SERVICE]
     fps, pulse0 = service.config.site.fps, service.pulse0
     try:
         wish = wish_of(request, service, source.end, start=0)
-    except MomentError as error:
+    except TimeReferenceError as error:
         return problem(400, str(error))
     end = sys.maxsize if wish.end is None else wish.end
     try:
-        await from_disk(forget_all_gone, source, wish.start, end)
+        await run_in_reader_thread(forget_missing, source, wish.start, end)
     except OSError as error:
         return _unread(error)
     spans = [
         PastSpan(
-            it.first, it.end - it.first, moment_of(it.first, fps, pulse0), moment_of(it.end, fps, pulse0)
+            it.first,
+            it.end - it.first,
+            utc_time_of_pulse(it.first, fps, pulse0),
+            utc_time_of_pulse(it.end, fps, pulse0),
         )
-        for it in known(source, wish.start, end)
+        for it in available_ranges(source, wish.start, end)
     ]
-    views = [PastView(it.camera, it.first, it.end - it.first) for it in shown(source, wish.start, end)]
+    views = [
+        PastView(it.camera, it.first, it.end - it.first)
+        for it in available_camera_ranges(source, wish.start, end)
+    ]
     return answer(Past(spans, views))

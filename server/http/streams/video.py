@@ -13,7 +13,7 @@ from server.http.streams.jpeg import best_with_boxes, wants_boxes
 from server.http.streams.sending import send_stream
 from server.http.streams.stream_forms import MP4, TS, WEBM, Form
 from server.http.streams.time_shift import asks_for_the_past, best_of_the_past, camera_of_the_past
-from server.service.streaming.broadcaster import Channel
+from server.service.streaming.broadcaster import Broadcaster
 
 routes = web.RouteTableDef()
 
@@ -94,7 +94,7 @@ async def _live(request: web.Request, form: Form) -> web.StreamResponse:
 
 
 async def _send(
-    request: web.Request, channel: Channel, stream: str, fetched: str | None, form: Form, beside: int = 0
+    request: web.Request, channel: Broadcaster, stream: str, fetched: str | None, form: Form, beside: int = 0
 ) -> web.StreamResponse:
     """Send a channel, whose viewers hold places by one name, and who fetches the same (HLS) by another.
 

@@ -9,14 +9,14 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from server.service.calibration.walk_samples import Samples, Trail
+from server.service.calibration.walk_samples import CameraWalk, WalkSamples
 
 _FEW = 10
 """Feet below which nothing is said of shares."""
 
 
 @dataclass(frozen=True, slots=True)
-class CameraCovered:
+class CameraCoverage:
     """What one camera has seen of it.
 
     Attributes:
@@ -33,7 +33,7 @@ class CameraCovered:
 
 
 @dataclass(frozen=True, slots=True)
-class PairCovered:
+class PairCoverage:
     """For how many seconds two cameras saw somebody at once."""
 
     one: str
@@ -42,14 +42,14 @@ class PairCovered:
 
 
 @dataclass(frozen=True, slots=True)
-class Covered:
+class WalkCoverage:
     """What all of them have seen of it."""
 
-    cameras: tuple[CameraCovered, ...] = ()
-    pairs: tuple[PairCovered, ...] = ()
+    cameras: tuple[CameraCoverage, ...] = ()
+    pairs: tuple[PairCoverage, ...] = ()
 
 
-def covered(trails: Sequence[Trail], seconds: float) -> Covered:
+def walk_coverage(trails: Sequence[CameraWalk], seconds: float) -> WalkCoverage:
     """Say what was covered; the moments that are compared are so many seconds apart."""
     samples = [it.samples for it in trails]
     moments = 1 + max((int(it.moment.max()) for it in samples if it.moment.size), default=-1)
@@ -60,17 +60,17 @@ def covered(trails: Sequence[Trail], seconds: float) -> Covered:
     cameras = [_camera(trail.camera, it, count) for trail, it in zip(trails, samples, strict=True)]
     both = there.astype(np.int64) @ there.T.astype(np.int64)
     pairs = [
-        PairCovered(trails[one].camera, trails[other].camera, seconds * int(both[one, other]))
+        PairCoverage(trails[one].camera, trails[other].camera, seconds * int(both[one, other]))
         for one, other in combinations(range(len(trails)), 2)
     ]
-    return Covered(tuple(cameras), tuple(pairs))
+    return WalkCoverage(tuple(cameras), tuple(pairs))
 
 
-def _camera(name: str, samples: Samples, count: NDArray[np.int64]) -> CameraCovered:
+def _camera(name: str, samples: WalkSamples, count: NDArray[np.int64]) -> CameraCoverage:
     """Say what one camera has seen; ``count`` is how many cameras saw anybody at each moment, (M,)."""
     shared = count[samples.moment] > 1
     third, tall = samples.third[shared], samples.tall[shared]
     left, middle, right = (float(it) for it in np.bincount(third, minlength=3) / max(1, len(third)))
     small, large = np.quantile(tall, (0.05, 0.95)) if len(tall) >= _FEW else (0.0, 0.0)
     deep = float(large / small) if small > 0 else None
-    return CameraCovered(name, len(third), (left, middle, right), deep)
+    return CameraCoverage(name, len(third), (left, middle, right), deep)

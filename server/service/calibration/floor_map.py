@@ -11,12 +11,12 @@ from server.media.letterbox import Letterbox
 
 Floats = NDArray[np.float64]
 
-FARTHEST = 3.0
+FARTHEST_RATIO = 3.0
 """A camera covers the floor up to so many times the distance of the nearest place that it shows of it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Covered:
+class FloorCoverage:
     """One camera's part of the floor.
 
     Attributes:
@@ -29,7 +29,7 @@ class Covered:
     outline: Floats
 
 
-def covered(own: Floats, size: tuple[int, int], site: tuple[int, int]) -> Covered:
+def floor_coverage(own: Floats, size: tuple[int, int], site: tuple[int, int]) -> FloorCoverage:
     """Give what a camera covers of the floor.
 
     Args:
@@ -46,8 +46,10 @@ def covered(own: Floats, size: tuple[int, int], site: tuple[int, int]) -> Covere
     down = own[2, 1] if own[2, 1] != 0 else own[2, 2]
     matrix = own * np.sign(down)
     near = float((matrix[2, :2] * corners).sum(axis=1).max() + matrix[2, 2])
-    outline = np.empty((0, 2)) if near <= 0 else _mapped(matrix, _cut(corners, matrix[2], near / FARTHEST))
-    return Covered(np.asarray(matrix @ to_own), outline)
+    outline = (
+        np.empty((0, 2)) if near <= 0 else _mapped(matrix, _cut(corners, matrix[2], near / FARTHEST_RATIO))
+    )
+    return FloorCoverage(np.asarray(matrix @ to_own), outline)
 
 
 def _cut(corners: Floats, row: Floats, least: float) -> Floats:

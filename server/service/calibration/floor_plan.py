@@ -25,7 +25,7 @@ _MOST_POINTS = 4000
 
 
 @dataclass(frozen=True, slots=True)
-class PlanView:
+class FloorPlanCamera:
     """One camera on the plan.
 
     Attributes:
@@ -43,12 +43,12 @@ class PlanView:
     floor: int = 0
 
 
-def plan_of(found: WalkCalibration) -> list[PlanView]:
+def floor_plan_cameras(found: WalkCalibration) -> list[FloorPlanCamera]:
     """Give what there is to draw of a calibration from walks."""
-    return [PlanView(it.camera, it.homography, it.image, it.place, it.floor) for it in found.cameras]
+    return [FloorPlanCamera(it.camera, it.homography, it.image, it.place, it.floor) for it in found.cameras]
 
 
-def plot_plan(views: Sequence[PlanView], unit: str, out: Path | BinaryIO) -> None:
+def plot_floor_plan(views: Sequence[FloorPlanCamera], unit: str, out: Path | BinaryIO) -> None:
     """Draw the plan, as PNG: an area and points for each camera, a line from each point to its place."""
     floors = sorted({view.floor for view in views})
     figure = Figure(figsize=(_INCHES, _INCHES * len(floors)), layout="tight")
@@ -67,7 +67,7 @@ def plot_plan(views: Sequence[PlanView], unit: str, out: Path | BinaryIO) -> Non
     figure.savefig(out, dpi=100, format="png", bbox_inches="tight", metadata={"Software": None})
 
 
-def _draw(axis: Axes, view: PlanView, colour: str) -> None:
+def _draw(axis: Axes, view: FloorPlanCamera, colour: str) -> None:
     step = -(-len(view.image) // _MOST_POINTS)
     seen = to_ground(view.homography, view.image[::step])
     axis.fill(*_area(view).T, facecolor=to_rgba(colour, 0.12), edgecolor=colour, linewidth=1)
@@ -81,7 +81,7 @@ def _plain(text: str) -> str:
     return text.replace("$", r"\$")
 
 
-def _area(view: PlanView) -> Floats:
+def _area(view: FloorPlanCamera) -> Floats:
     """Give the outline of the points, (K, 2): convex in the picture, and so on the floor."""
     outline = cv2.convexHull(view.image.astype(np.float32)).reshape(-1, 2)
     return to_ground(view.homography, outline.astype(np.float64))

@@ -11,7 +11,7 @@ from bestview import feet
 from bestview.calibration import Floats, cut_off
 from server.media.letterbox import Letterbox
 from server.messaging.messages import CameraTracks
-from server.service.calibration.worker_messages import Seen
+from server.service.calibration.worker import CameraBoxes
 from server.service.ingest.box_arrays import boxes_array
 
 Ints = NDArray[np.int64]
@@ -20,7 +20,7 @@ _THIRDS = 3
 
 
 @dataclass(frozen=True, slots=True)
-class Samples:
+class WalkSamples:
     """S whole boxes.
 
     Attributes:
@@ -34,7 +34,7 @@ class Samples:
     tall: Floats
 
 
-class Trail:
+class CameraWalk:
     """Collects one camera's words; ``site`` is the size of the site's picture, which boxes come in."""
 
     def __init__(self, camera: str, site: tuple[int, int], step: int) -> None:
@@ -74,11 +74,11 @@ class Trail:
         self._next = max(self._next, until)
 
     @property
-    def seen(self) -> Seen | None:
+    def seen(self) -> CameraBoxes | None:
         """All of it, to be calibrated from; None: the camera has said nothing."""
         if self._size is None:
             return None
-        return Seen(
+        return CameraBoxes(
             self.camera,
             self._size,
             np.concatenate(self._frames).astype(np.int64).tobytes(),
@@ -87,12 +87,12 @@ class Trail:
         )
 
     @property
-    def samples(self) -> Samples:
+    def samples(self) -> WalkSamples:
         """The whole boxes at the moments at which cameras are compared."""
         # Asked for every second: what was put together once is not put together again.
         self._moments, self._third = [np.concatenate(self._moments)], [np.concatenate(self._third)]
         self._tall = [np.concatenate(self._tall)]
-        return Samples(self._moments[0], self._third[0], self._tall[0])
+        return WalkSamples(self._moments[0], self._third[0], self._tall[0])
 
     def _sample(self, frames: Ints, boxes: Floats, size: tuple[int, int]) -> None:
         taken = (frames % self._step == 0) & ~cut_off(boxes, size)

@@ -9,22 +9,21 @@ from typing import Any
 
 from server.config.site_config import Config
 from server.config.source_address import SourceKind, source_kind
-from server.service.calibration.coverage import Covered, covered
-from server.service.calibration.walk_comparison import moment
-from server.service.calibration.walk_samples import Trail
-from server.service.calibration.worker_messages import Done, Task
-from server.service.calibration.worker_process import calibrated
+from server.service.calibration.calibration_report import comparison_step
+from server.service.calibration.coverage import WalkCoverage, walk_coverage
+from server.service.calibration.walk_samples import CameraWalk
+from server.service.calibration.worker import CalibrationResult, CalibrationTask, run_calibration
 from server.service.ingest.epoch_aligner import Epoch
 
-MOST_S = 600.0
+MAX_WALK_S = 600.0
 """Seconds of a walk that are kept; what comes after is left out. One minute is enough."""
 _SHIFT_S = 3.0
 """Seconds that cameras may be out of step, as of `myview calibrate`."""
 
-Work = Callable[[Task], Coroutine[Any, Any, Done]]
+Work = Callable[[CalibrationTask], Coroutine[Any, Any, CalibrationResult]]
 
 
-class State(Enum):
+class WalkState(Enum):
     """How far the walk is."""
 
     NONE = "none"
@@ -33,28 +32,28 @@ class State(Enum):
     DONE = "done"
 
 
-class Walking:
+class WalkSession:
     """Takes in every epoch while somebody walks. It has no clock: frames are counted by pulses."""
 
-    def __init__(self, config: Config, work: Work = calibrated) -> None:
+    def __init__(self, config: Config, work: Work = run_calibration) -> None:
         self._config, self._work = config, work
         self._fps = config.site.fps
-        self._trails: dict[str, Trail] = {}
+        self._trails: dict[str, CameraWalk] = {}
         self._start = 0
         self._last = -1
         """The last pulse that was spoken of."""
         self._epochs = 0
         self._task: asyncio.Task[None] | None = None
-        self.state = State.NONE
-        self.done: Done | None = None
+        self.state = WalkState.NONE
+        self.done: CalibrationResult | None = None
         """What has come of the walk."""
 
     def take(self, epoch: Epoch) -> None:
         """Take in what all cameras said of an epoch."""
         self._last = epoch.last
-        if self.state is not State.WALKING:
+        if self.state is not WalkState.WALKING:
             return
-        if self.seconds >= MOST_S:
+        if self.seconds >= MAX_WALK_S:
             return
         if not self._epochs:
             # Before the first word nobody knew how far pulses are; frames are counted from the walk on.
@@ -67,17 +66,17 @@ class Walking:
         """Begin a walk with what is seen from now on; another that there was is forgotten."""
         self.stop()
         site = (self._config.site.width, self._config.site.height)
-        step = moment(self._fps)
-        self._trails = {it: Trail(it, site, step) for it in self._config.camera_ids}
+        step = comparison_step(self._fps)
+        self._trails = {it: CameraWalk(it, site, step) for it in self._config.camera_ids}
         self._start, self._epochs = self._last + 1, 0
-        self.state = State.WALKING
+        self.state = WalkState.WALKING
 
     def go_on(self) -> None:
         """Go on with the walk that there is."""
         self._end_work()
         for trail in self._trails.values():
             trail.pause(self._last + 1 - self._start)
-        self.done, self.state = None, State.WALKING
+        self.done, self.state = None, WalkState.WALKING
 
     def finish(self, person: float) -> None:
         """Calibrate from the walk, in which people are `person` metres tall."""
@@ -88,28 +87,28 @@ class Walking:
             for it in self._config.cameras
             if source_kind(it.source) in (SourceKind.FILE, SourceKind.FOLDER)
         }
-        task = Task([it for it in seen if it is not None], self._fps, _SHIFT_S, person, offsets)
-        self.done, self.state = None, State.WORKING
+        task = CalibrationTask([it for it in seen if it is not None], self._fps, _SHIFT_S, person, offsets)
+        self.done, self.state = None, WalkState.WORKING
         self._task = asyncio.create_task(self._calibrate(task), name="calibration")
 
     def stop(self) -> None:
         """Forget the walk and what came of it."""
         self._end_work()
         self._trails, self._epochs = {}, 0
-        self.done, self.state = None, State.NONE
+        self.done, self.state = None, WalkState.NONE
 
     @property
     def seconds(self) -> float:
         """For how long was walked."""
         return self._epochs * self._config.track.window.stride / self._fps
 
-    def covered(self) -> Covered:
+    def coverage(self) -> WalkCoverage:
         """Say what was covered of it so far."""
-        return covered(list(self._trails.values()), moment(self._fps) / self._fps)
+        return walk_coverage(list(self._trails.values()), comparison_step(self._fps) / self._fps)
 
-    async def _calibrate(self, task: Task) -> None:
+    async def _calibrate(self, task: CalibrationTask) -> None:
         self.done = await self._work(task)
-        self.state = State.DONE
+        self.state = WalkState.DONE
 
     def _end_work(self) -> None:
         if self._task is not None:

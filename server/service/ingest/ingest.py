@@ -27,8 +27,8 @@ from server.messaging.messages import (
 from server.service.ingest.epoch_aligner import Aligner
 from server.service.ingest.validation import makes_sense
 from server.service.metrics.camera_metrics import Gauge
-from server.service.streaming.audio_buffer import SoundShelf
-from server.service.streaming.frame_buffer import NoPictureError, Shelf, Shelved
+from server.service.streaming.audio_buffer import AudioBuffer
+from server.service.streaming.frame_buffer import FrameBuffer, Shelved, UndecodableFrameError
 
 log = logging.getLogger(__name__)
 
@@ -104,10 +104,10 @@ class Intake:
 
     def __init__(
         self,
-        shelves: Mapping[str, Shelf],
+        shelves: Mapping[str, FrameBuffer],
         aligner: Aligner,
         on_frame: Callable[[str, Shelved], None],
-        sound: SoundShelf | None = None,
+        sound: AudioBuffer | None = None,
         *,
         sounding: str | None = None,
         now: Callable[[], int] = lambda: -1,
@@ -161,7 +161,7 @@ class Intake:
                 return
             shelf = self._shelves[camera]
             frame = shelf.put(head.pulse, head.boot, message.payload, key=head.key, after=head.after)
-        except (*DECODE_ERRORS, NoPictureError) as error:
+        except (*DECODE_ERRORS, UndecodableFrameError) as error:
             state.bad(error)
         except ParameterMismatchError as error:
             state.refused = f"{error}; are all cameras of this site run with the same configuration?"

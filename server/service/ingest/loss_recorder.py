@@ -8,10 +8,10 @@ from collections.abc import Mapping
 
 from camsync import Spell
 from camsync.clock import Clock
-from server.service.decision_files.live_recorder import LiveRecorder
+from server.service.decision_files.live_decision_writer import LiveDecisionWriter
 from server.service.ingest.epoch_aligner import Epoch
 from server.service.ingest.ingest import CameraState
-from server.service.streaming.frame_buffer import Shelf
+from server.service.streaming.frame_buffer import FrameBuffer
 from server.service.view_selection.decider import GopDecision
 
 log = logging.getLogger(__name__)
@@ -22,14 +22,14 @@ class Lacking:
 
     def __init__(
         self,
-        shelves: Mapping[str, Shelf],
+        shelves: Mapping[str, FrameBuffer],
         states: Mapping[str, CameraState],
         stride: int,
         clock: Clock = time.monotonic,
     ) -> None:
         self._shelves, self._states, self._stride = shelves, states, stride
         self._late = {camera: Spell(clock) for camera in shelves}
-        self.recorder: LiveRecorder | None = None
+        self.recorder: LiveDecisionWriter | None = None
         self.late_epochs = 0
         """Windows that were decided without a camera that was there."""
         self.lost_pictures = dict.fromkeys(shelves, 0)

@@ -10,7 +10,7 @@ from server.service.identity.people import People
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class PointedPosition:
     """A place in a frame, in pixels of the site's picture.
 
     Attributes:
@@ -26,7 +26,9 @@ class Place:
     reach: float
 
 
-def pointings(people: People, camera: str, number: int, places: Sequence[Place]) -> OperatorPoints | None:
+def corrections_for_tracker(
+    people: People, camera: str, number: int, places: Sequence[PointedPosition]
+) -> OperatorPoints | None:
     """Say in the camera's own terms where somebody is: by the track that it showed them by.
 
     Frames that are forgotten are left out, and so are those of an earlier run of the camera.

@@ -18,14 +18,14 @@ _SAME_S = 8.0
 
 
 @dataclass(slots=True)
-class _Told:
+class _RecentRisk:
     """One trouble: when it was told last, and the highest risk that it had."""
 
     pulse: int
     risk: float
 
 
-class Budget:
+class FlagBudget:
     """Spends few flags on what is likeliest to fail. It has no clock: it is told which pulse it is.
 
     A risk grows while a trouble lasts: who waits for it to be as high as ``risk`` of the settings asks
@@ -39,8 +39,8 @@ class Budget:
     def __init__(self, settings: FlagSettings, fps: float) -> None:
         self._per_minute, self._least, self._fps = settings.per_minute, settings.risk, fps
         self._first: int | None = None
-        self._told: dict[frozenset[int], _Told] = {}
-        self._before: list[_Told] = []
+        self._told: dict[frozenset[int], _RecentRisk] = {}
+        self._before: list[_RecentRisk] = []
         self._left = float(settings.per_minute)
         """Flags that may be raised now."""
         self._raised: deque[tuple[int, frozenset[int]]] = deque()
@@ -51,7 +51,7 @@ class Budget:
         self._go_on(now)
         known = self._told.get(who)
         if known is None:
-            known = self._told[who] = _Told(now, risk)
+            known = self._told[who] = _RecentRisk(now, risk)
             self._before.append(known)
         known.pulse, known.risk = now, max(known.risk, risk)
 

@@ -11,9 +11,9 @@ import msgspec
 
 from server.config.sections import FlagSettings
 from server.messaging.operator_messages import RiskReason
-from server.service.operator_assist.flag_budget import Budget
+from server.service.operator_assist.flag_budget import FlagBudget
 
-State = Literal["raised", "followed", "answered", "expired"]
+FlagState = Literal["raised", "followed", "answered", "expired"]
 
 _THROUGH_S = 0.4
 """For how long after what was expected somebody must be followed for it to be answered."""
@@ -41,7 +41,7 @@ class Flag(msgspec.Struct, frozen=True, kw_only=True):
     """By how much the tracker is sure, as a cost: 0 is not at all."""
     risk: float
     """How likely it is to go wrong unless somebody helps, in [0, 1]."""
-    state: State
+    state: FlagState
     """raised; followed: somebody points at them; answered: was followed through it; expired: was not."""
 
     @property
@@ -51,7 +51,7 @@ class Flag(msgspec.Struct, frozen=True, kw_only=True):
 
 
 @dataclass(frozen=True, slots=True)
-class Foreseen:
+class RiskEvent:
     """One trouble of one camera, of people."""
 
     camera: str
@@ -63,18 +63,18 @@ class Foreseen:
     risk: float
 
 
-class Flags:
+class FlagQueue:
     """Raises flags, and sees them through. It has no clock: it is told which pulse it is.
 
     What several cameras foresee of the same people, or one foresees again and again, is one flag. Of more
-    than may be raised in a minute the riskiest are (`Budget`).
+    than may be raised in a minute the riskiest are (`FlagBudget`).
     """
 
     def __init__(self, settings: FlagSettings, fps: float) -> None:
         self._settings, self._fps = settings, fps
         self._open: dict[int, Flag] = {}
         self._ended: deque[Flag] = deque(maxlen=_ENDED_MOST)
-        self._budget = Budget(settings, fps)
+        self._budget = FlagBudget(settings, fps)
         self._pointed: dict[int, int] = {}
         """By flag, the last frame in which somebody was pointed at."""
         self._told: dict[int, Flag] = {}
@@ -91,7 +91,7 @@ class Flags:
         """Those that are over, the newest first."""
         return list(reversed(self._ended))
 
-    def step(self, now: int, foreseen: Iterable[Foreseen], resolve: Callable[[int], int]) -> None:
+    def step(self, now: int, foreseen: Iterable[RiskEvent], resolve: Callable[[int], int]) -> None:
         """Take in what is foreseen at a pulse; ``resolve`` gives the number that a merged one goes by now."""
         for flag in list(self._open.values()):
             self._put(self._resolved(flag, resolve))
@@ -122,7 +122,7 @@ class Flags:
         self._tell()
         return [flag.id for flag in mine]
 
-    def _raise(self, now: int, it: Foreseen) -> None:
+    def _raise(self, now: int, it: RiskEvent) -> None:
         self.counts["raised"] += 1
         self._budget.spend(now, frozenset(it.objects))
         self._put(
@@ -139,7 +139,7 @@ class Flags:
             )
         )
 
-    def _see_again(self, flag: Flag, it: Foreseen) -> None:
+    def _see_again(self, flag: Flag, it: RiskEvent) -> None:
         """Take over what a camera says later: it knows better when, but what is followed stays as it is."""
         cameras = flag.cameras if it.camera in flag.cameras else [*flag.cameras, it.camera]
         flag = msgspec.structs.replace(flag, cameras=cameras)
@@ -147,11 +147,11 @@ class Flags:
             flag = msgspec.structs.replace(flag, pulse=it.pulse, margin=it.margin, risk=it.risk)
         self._put(flag)
 
-    def _about(self, it: Foreseen) -> Flag | None:
+    def _about(self, it: RiskEvent) -> Flag | None:
         """Give the flag of the same people."""
         return next((flag for flag in self.open if set(flag.objects) == set(it.objects)), None)
 
-    def _was(self, it: Foreseen) -> bool:
+    def _was(self, it: RiskEvent) -> bool:
         """Say whether a flag that is over was about this."""
         late = it.pulse - self._settings.answer_s * self._fps
         return any(set(flag.objects) == set(it.objects) and flag.pulse >= late for flag in self._ended)
@@ -162,7 +162,7 @@ class Flags:
     def _put(self, flag: Flag) -> None:
         self._open[flag.id] = flag
 
-    def _end(self, flag: Flag, state: State) -> None:
+    def _end(self, flag: Flag, state: FlagState) -> None:
         self.counts[state] += 1
         self._open.pop(flag.id)
         self._pointed.pop(flag.id, None)

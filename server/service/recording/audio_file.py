@@ -14,14 +14,14 @@ from pathlib import Path
 
 from server.media.audio.audio_format import SoundFormat
 
-NAME = "sound"
+AUDIO_NAME = "sound"
 """Of the folder, and what a reference has instead of a camera."""
 
 _HEAD = 8
 """Bytes of a box's size and kind."""
 
 
-def frames_in(
+def read_audio_frames(
     path: Path, offset: int, length: int, begin: int, end: int, form: SoundFormat
 ) -> dict[int, bytes]:
     """Read the frames ``begin … end - 1``, as far as they are in a piece of a file of sound.

@@ -2,18 +2,35 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import os
 import struct
 from collections.abc import Callable, Generator, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, ParamSpec, TypeVar
 
 from server.media.picture import Picture
 from server.media.rendering_messages import TIMESCALE
 from server.media.stream_format import Agreement
 from server.system.private_files import FOLDER, open_private
+
+Given = ParamSpec("Given")
+Read = TypeVar("Read")
+
+_AT_ONCE = 8
+_THREADS = ThreadPoolExecutor(_AT_ONCE, "past")
+
+
+async def run_in_reader_thread(
+    read: Callable[Given, Read], *args: Given.args, **kwargs: Given.kwargs
+) -> Read:
+    """Read something in one of these threads."""
+    return await asyncio.get_running_loop().run_in_executor(_THREADS, partial(read, *args, **kwargs))
+
 
 _HEAD = 8
 """Bytes of a box's size and kind."""
@@ -24,7 +41,7 @@ _NOT_SYNC = 0x00010000
 
 
 @dataclass(frozen=True, slots=True)
-class Gop:
+class RecordedGop:
     """Consecutive frames of one camera that begin with a key frame."""
 
     first: int
@@ -41,7 +58,7 @@ class Gop:
         return b"".join(self.fragments)
 
 
-def pictures_of(gop: Gop, agreement: Agreement) -> list[Picture]:
+def pictures_of_gop(gop: RecordedGop, agreement: Agreement) -> list[Picture]:
     """Give a GOP's pictures as the site's streams have them."""
     told = agreement.told_by(gop.fragments[0])
     return [
@@ -50,7 +67,7 @@ def pictures_of(gop: Gop, agreement: Agreement) -> list[Picture]:
     ]
 
 
-class CameraFile:
+class MediaFile:
     """One camera's file: the header, then GOPs.
 
     A process that is killed in the middle of a GOP leaves a file that plays: until a GOP is there as a
@@ -74,7 +91,7 @@ class CameraFile:
             raise
         self.size = len(header)
 
-    def append(self, gop: Gop) -> tuple[int, int]:
+    def append(self, gop: RecordedGop) -> tuple[int, int]:
         """Append a GOP; give where it is: offset and length.
 
         Raises:
@@ -102,7 +119,7 @@ class CameraFile:
     @property
     def is_there(self) -> bool:
         """Whether it is still where it was made: what is written to a file that was removed is lost."""
-        return is_at(self._handle, self._draft if self._is_empty else self._path)
+        return is_same_file(self._handle, self._draft if self._is_empty else self._path)
 
     def close(self) -> None:
         """Close the file; without a GOP there is none."""
@@ -114,7 +131,7 @@ class CameraFile:
                     self._draft.unlink(missing_ok=True)
 
 
-def is_at(handle: int, path: Path) -> bool:
+def is_same_file(handle: int, path: Path) -> bool:
     """Tell whether an open file is what a path leads to: it may have been removed, or be on another disk."""
     try:
         return os.path.samestat(os.fstat(handle), path.stat())
@@ -143,7 +160,9 @@ def pulse_of(fragment: bytes, fps: float) -> int:
     return round(time * fps / TIMESCALE)
 
 
-def gops(path: Path, offset: int, length: int, fps: float, pulse: int = 0) -> Generator[Gop, None, None]:
+def read_gops(
+    path: Path, offset: int, length: int, fps: float, pulse: int = 0
+) -> Generator[RecordedGop, None, None]:
     """Read the GOPs of a piece of a camera's file, from the one that holds a pulse on.
 
     Raises:
@@ -155,11 +174,11 @@ def gops(path: Path, offset: int, length: int, fps: float, pulse: int = 0) -> Ge
         waiting: list[bytes] = []
         for fragment in _fragments(file.read, length - skipped):
             if is_key(fragment) and waiting:
-                yield Gop(pulse_of(waiting[0], fps), tuple(waiting))
+                yield RecordedGop(pulse_of(waiting[0], fps), tuple(waiting))
                 waiting = []
             waiting.append(fragment)
         if waiting:
-            yield Gop(pulse_of(waiting[0], fps), tuple(waiting))
+            yield RecordedGop(pulse_of(waiting[0], fps), tuple(waiting))
 
 
 def _last_key(file: BinaryIO, offset: int, length: int, fps: float, pulse: int) -> int:

@@ -15,16 +15,16 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from server.service.recording.media_files import write_at
-from server.service.recording.segment_index import Stretch, Tape
+from server.service.recording.segment_index import IndexEntry, SegmentIndex
 from server.system.private_files import write_private
 
-CAMERA = "[A-Za-z0-9][A-Za-z0-9_-]{0,31}"
+CAMERA_PATTERN = "[A-Za-z0-9][A-Za-z0-9_-]{0,31}"
 """A camera id (:data:`server.config.sections.base.Identifier`), or the folder of the sound."""
 _END = "#EXT-X-ENDLIST\n"
 _ENTRY = re.compile(
     r"#EXTINF:[0-9.]+,p([0-9]{1,15})\+([0-9]{1,15})\n"
     r"#EXT-X-BYTERANGE:([0-9]{1,15})@([0-9]{1,15})\n"
-    rf"(?:[^\n]*/)?({CAMERA})/([0-9]{{1,15}})\.mp4\n"
+    rf"(?:[^\n]*/)?({CAMERA_PATTERN})/([0-9]{{1,15}})\.mp4\n"
 )
 _NAME_DIGITS = 12
 
@@ -34,7 +34,7 @@ def file_name(pulse: int) -> str:
     return f"{pulse:0{_NAME_DIGITS}}.mp4"
 
 
-class Playlist:
+class RecordingPlaylist:
     """One stream's references, in memory and on the disk.
 
     ``cameras`` is the way from the playlist to the folder of the cameras, ``header`` that to what their files
@@ -50,7 +50,7 @@ class Playlist:
         self._fps = fps
         self._pulse0 = pulse0
         self._longest_s = longest_s
-        self.tape = Tape()
+        self.tape = SegmentIndex()
         self._tail: int | None = None
         """Where the end line begins in the file; None: there is no file yet."""
         self._end: int | None = None
@@ -65,7 +65,7 @@ class Playlist:
     def read(self) -> None:
         """Take over what the file says."""
         text = self.path.read_text(encoding="utf-8", errors="replace")
-        self.tape = Tape(_parsed(text))
+        self.tape = SegmentIndex(_parsed(text))
         stretches = self.tape.all
         self._end = stretches[-1].end if stretches else None
 
@@ -79,7 +79,7 @@ class Playlist:
         if gone and self.tape.drop_pieces(gone):
             self.stale = True
 
-    def append(self, stretch: Stretch) -> None:
+    def append(self, stretch: IndexEntry) -> None:
         """Add to the file, then to what is known.
 
         Raises:
@@ -122,7 +122,7 @@ class Playlist:
             os.close(handle)
         return True
 
-    def _replace(self, *added: Stretch) -> None:
+    def _replace(self, *added: IndexEntry) -> None:
         self.stale = False  # before it is looked at what there is: more may be found gone meanwhile
         stretches = [*self.tape.all, *added]
         longest = max([self._longest_s, *(it.frames / self._fps for it in stretches)])
@@ -147,7 +147,7 @@ class Playlist:
             raise
         self._tail = len(text.encode())
 
-    def _entry(self, stretch: Stretch, end: int | None) -> str:
+    def _entry(self, stretch: IndexEntry, end: int | None) -> str:
         hole = "" if end in (None, stretch.first) else "#EXT-X-DISCONTINUITY\n"
         date = ""
         if end != stretch.first and self._pulse0 is not None:
@@ -161,7 +161,7 @@ class Playlist:
         )
 
 
-def _parsed(text: str) -> Iterable[Stretch]:
+def _parsed(text: str) -> Iterable[IndexEntry]:
     for found in _ENTRY.finditer(text):
         first, frames, length, offset, camera, file = found.groups()
-        yield Stretch(camera, int(file), int(offset), int(length), int(first), int(frames))
+        yield IndexEntry(camera, int(file), int(offset), int(length), int(first), int(frames))

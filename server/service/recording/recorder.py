@@ -13,13 +13,13 @@ from server.media.containers.mp4_audio import sound_init_segment
 from server.media.h264.annexb import ParameterSets
 from server.media.stream_format import Agreement
 from server.messaging.messages import GopChoices
-from server.service.recording.recent_decisions import Recent
-from server.service.recording.recording_session import Headers, Run, RunHead
-from server.service.recording.retention import Bounds
-from server.service.recording.store import Piece, Store
-from server.service.recording.writer_thread import Writer
-from server.service.streaming.audio_buffer import SoundShelf
-from server.service.streaming.frame_buffer import Shelf
+from server.service.recording.recent_gops import RecentGops
+from server.service.recording.recording_folder import GopRecord, RecordingFolder
+from server.service.recording.recording_session import InitSegments, RecordingSession, SessionInfo
+from server.service.recording.retention import RetentionLimits
+from server.service.recording.writer_thread import WriterThread
+from server.service.streaming.audio_buffer import AudioBuffer
+from server.service.streaming.frame_buffer import FrameBuffer
 from server.system.errors import UserError
 from server.system.private_files import rights_of_others
 
@@ -29,38 +29,40 @@ _SAME_S = 0.5
 """Pulses whose numbers mean the same time but for so much are the same: the pulse server may be another."""
 
 
-class Past:
+class Recorder:
     """Takes every decision over as it is made, and finds it again. ``frames`` is what the shelves keep."""
 
     def __init__(
         self,
         config: Config,
-        shelves: Mapping[str, Shelf],
+        shelves: Mapping[str, FrameBuffer],
         agreement: Agreement,
         frames: int,
-        sound: SoundShelf | None = None,
+        sound: AudioBuffer | None = None,
     ) -> None:
         self._config, self._agreement = config, agreement
         self.sound = sound
         """The newest sound; None: the site has none."""
-        self.recent = Recent(shelves, config.encode.gop, frames)
+        self.recent = RecentGops(shelves, config.encode.gop, frames)
         self.pulse0: float | None = None
         self.numbers_since: float | None = None
         self._held: deque[GopChoices] = deque()
         """Decided, but not all cameras' pictures have come."""
         self._patience = frames // 2
-        self._begin: tuple[ParameterSets, Headers] | None = None
+        self._begin: tuple[ParameterSets, InitSegments] | None = None
         """What this service's files begin with, made of these parameters: every GOP that is played asks."""
         self.viewers = 0
         """How many are watching the past."""
         record = config.record
-        self.store: Store | None = None
-        self.writer: Writer | None = None
+        self.store: RecordingFolder | None = None
+        self.writer: WriterThread | None = None
         if record.folder is not None:
-            bounds = Bounds(record.keep_s, record.most_mb, record.segment_s, record.trust_clock)
-            self.store = store = Store(record.folder, bounds)
+            bounds = RetentionLimits(record.keep_s, record.most_mb, record.segment_s, record.trust_clock)
+            self.store = store = RecordingFolder(record.folder, bounds)
             most = max(4, frames // config.encode.gop)  # no more than the shelves hold anyway
-            self.writer = Writer(self._write, store.abandon, store.close, most, where=str(record.folder))
+            self.writer = WriterThread(
+                self._write, store.abandon, store.close, most, where=str(record.folder)
+            )
 
     def open(self) -> None:
         """Begin to record, where that is configured.
@@ -113,7 +115,7 @@ class Past:
         newest = [self.recent.end_of_camera(camera) for camera in self._config.camera_ids]
         return all(it >= end or it < choices.first - self._patience for it in newest)
 
-    def _hand_over(self, writer: Writer) -> None:
+    def _hand_over(self, writer: WriterThread) -> None:
         choices = self._held.popleft()
         delivered = {
             camera: self.recent.delivered(camera, choices.first, choices.frames)
@@ -122,15 +124,15 @@ class Past:
         cameras = {camera: gop for camera, gop in delivered.items() if gop is not None}
         end = choices.first + choices.frames
         heard = None if self.sound is None else self.sound.between(choices.first, end)
-        writer.put(Piece(choices, cameras, heard))
+        writer.put(GopRecord(choices, cameras, heard))
 
     @property
-    def run(self) -> Run | None:
+    def run(self) -> RecordingSession | None:
         """What this service has recorded; None: nothing."""
         return None if self.store is None else self.store.run
 
     @property
-    def runs(self) -> list[Run]:
+    def runs(self) -> list[RecordingSession]:
         """What this service and those before it have recorded by the same pulses and parameters."""
         if self.store is None:
             return []
@@ -139,20 +141,20 @@ class Past:
         return [*(run for run in tuple(self.store.earlier) if self._fits(run, own)), *current]
 
     @property
-    def numbered(self) -> list[Run]:
+    def numbered(self) -> list[RecordingSession]:
         """Those of them in which people's numbers are the same people's as now."""
         return [run for run in self.runs if run is self.run or self._same_people(run)]
 
     @property
-    def sounding(self) -> list[Run]:
+    def sounding(self) -> list[RecordingSession]:
         """Those of them whose sound is that of this site."""
         own = self._headers
         return [] if own is None else [run for run in self.runs if run.headers.sound == own.sound]
 
-    def _same_people(self, run: Run) -> bool:
+    def _same_people(self, run: RecordingSession) -> bool:
         return self.numbers_since is not None and run.head.numbers_since == self.numbers_since
 
-    def _fits(self, run: Run, own: Headers | None) -> bool:
+    def _fits(self, run: RecordingSession, own: InitSegments | None) -> bool:
         pulse0 = self.pulse0
         if own is None or pulse0 is None or run.head.pulse0 is None:
             return False
@@ -160,7 +162,7 @@ class Past:
         return same and run.headers.pictures == own.pictures
 
     @property
-    def _headers(self) -> Headers | None:
+    def _headers(self) -> InitSegments | None:
         """What this service's files begin with; None: nobody knows yet."""
         parameters, site, sound = self._agreement.parameters, self._config.site, self._config.sound.format
         if parameters is None:
@@ -168,16 +170,16 @@ class Past:
         begin = self._begin
         if begin is None or begin[0] != parameters:
             pictures = init_segment(parameters, site.width, site.height)
-            begin = parameters, Headers(pictures, b"" if sound is None else sound_init_segment(sound))
+            begin = parameters, InitSegments(pictures, b"" if sound is None else sound_init_segment(sound))
             self._begin = begin
         return begin[1]
 
-    def _write(self, piece: Piece) -> None:
+    def _write(self, piece: GopRecord) -> None:
         """Write a piece, in the writer's thread."""
         parameters, headers, site = self._agreement.parameters, self._headers, self._config.site
         if self.store is None or parameters is None or headers is None:
             return
-        head = RunHead(
+        head = SessionInfo(
             site=site.name,
             fps=site.fps,
             width=site.width,

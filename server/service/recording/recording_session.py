@@ -3,7 +3,7 @@
 Pulses and people's numbers may begin anew when a service does; so every run has a folder of its own.
 
 ====================================  ====================================================================
-``RUN/run.json``                      :class:`RunHead`
+``RUN/run.json``                      :class:`SessionInfo`
 ``RUN/cameras/init.mp4``              what a player needs before the first fragment, the same for all
 ``RUN/cameras/c0/000000001250.mp4``   a camera's frames from pulse 1250 on
 ``RUN/cameras/c0.m3u8``               all of that camera
@@ -25,31 +25,31 @@ from typing import Annotated
 
 import msgspec
 
-from server.service.recording.audio_file import NAME as SOUND
-from server.service.recording.playlist_file import CAMERA, Playlist, file_name
-from server.service.recording.segment_index import Stretch
+from server.service.recording.audio_file import AUDIO_NAME as SOUND
+from server.service.recording.playlist_file import CAMERA_PATTERN, RecordingPlaylist, file_name
+from server.service.recording.segment_index import IndexEntry
 from server.service.recording.session_files import (
     MISSING,
-    clear,
     file_size,
     identity_of,
-    is_gone,
+    is_missing,
     media_sizes,
+    remove_session_files,
 )
 from server.system.private_files import FOLDER, write_private
 
-HEAD = "run.json"
+INFO_FILE = "run.json"
 _HEADER = "init.mp4"
 
 
 _LONGEST_S = 1e12
 """Beyond what any clock has counted: what says more was damaged."""
 
-Camera = Annotated[str, msgspec.Meta(pattern=rf"^{CAMERA}\Z")]
+CameraName = Annotated[str, msgspec.Meta(pattern=rf"^{CAMERA_PATTERN}\Z")]
 """A camera's name is part of files' names: what was damaged leads nowhere else."""
 
 
-class RunHead(msgspec.Struct, frozen=True, kw_only=True):
+class SessionInfo(msgspec.Struct, frozen=True, kw_only=True):
     """What holds for a whole run."""
 
     site: str
@@ -57,7 +57,7 @@ class RunHead(msgspec.Struct, frozen=True, kw_only=True):
     width: int
     height: int
     codec: str
-    cameras: list[Camera]
+    cameras: list[CameraName]
     sound: str | None = None
     """The codec of the sound; null: the site had none."""
     began: float
@@ -73,7 +73,7 @@ class RunHead(msgspec.Struct, frozen=True, kw_only=True):
 
 
 @dataclass(frozen=True, slots=True)
-class Headers:
+class InitSegments:
     """What the files of a run begin with: ``ftyp`` and ``moov``."""
 
     pictures: bytes
@@ -82,7 +82,7 @@ class Headers:
 
 
 @dataclass(slots=True)
-class Segment:
+class RecordingSegment:
     """The files that begin with one pulse: one per camera, that of the sound, and their index."""
 
     first: int
@@ -93,23 +93,25 @@ class Segment:
     """Some of its files could not be taken away when they should have been."""
 
 
-class Run:
+class RecordingSession:
     """The folder of one run, this service's or an earlier one's. ``longest_s``: of a segment."""
 
-    def __init__(self, folder: Path, head: RunHead, headers: Headers, longest_s: float) -> None:
+    def __init__(self, folder: Path, head: SessionInfo, headers: InitSegments, longest_s: float) -> None:
         self.folder, self.head, self.headers = folder, head, headers
         self._identity = identity_of(folder)
-        self._head_bytes = file_size(folder / HEAD)
+        self._head_bytes = file_size(folder / INFO_FILE)
         self._longest_s = longest_s
-        self.segments: list[Segment] = []
-        self.objects: dict[int, Playlist] = {}
+        self.segments: list[RecordingSegment] = []
+        self.objects: dict[int, RecordingPlaylist] = {}
         self.cameras = {
             camera: self._playlist(folder / "cameras" / f"{camera}.m3u8") for camera in head.cameras
         }
         self.sound = self._playlist(folder / f"{SOUND}.m3u8", header=f"{SOUND}/{_HEADER}")
 
     @classmethod
-    def begin(cls, folder: Path, head: RunHead, headers: Headers, longest_s: float) -> Run:
+    def begin(
+        cls, folder: Path, head: SessionInfo, headers: InitSegments, longest_s: float
+    ) -> RecordingSession:
         """Make the folder of a new run.
 
         Raises:
@@ -122,7 +124,7 @@ class Run:
         if headers.sound:
             (folder / SOUND).mkdir(mode=FOLDER)
             write_private(folder / SOUND / _HEADER, headers.sound)
-        write_private(folder / HEAD, _text(head))
+        write_private(folder / INFO_FILE, _text(head))
         return cls(folder, head, headers, longest_s)
 
     def number_since(self, since: float | None) -> None:
@@ -142,11 +144,11 @@ class Run:
         self.head = msgspec.structs.replace(self.head, clock=clock, clock0=clock0)
         self._write_head(self.head)
 
-    def _write_head(self, head: RunHead) -> None:
-        draft = self.folder / f".{HEAD}"
+    def _write_head(self, head: SessionInfo) -> None:
+        draft = self.folder / f".{INFO_FILE}"
         try:
             write_private(draft, _text(head))
-            draft.replace(self.folder / HEAD)
+            draft.replace(self.folder / INFO_FILE)
         except OSError:
             with contextlib.suppress(OSError):
                 draft.unlink(missing_ok=True)
@@ -154,14 +156,14 @@ class Run:
         self.head, self._head_bytes = head, len(_text(head))
 
     @classmethod
-    def found(cls, folder: Path, longest_s: float) -> Run:
+    def found(cls, folder: Path, longest_s: float) -> RecordingSession:
         """Take over what an earlier service left.
 
         Raises:
             OSError, msgspec.DecodeError: it is no such folder.
         """
-        head = msgspec.json.decode((folder / HEAD).read_bytes(), type=RunHead)
-        headers = Headers(_read(folder / "cameras" / _HEADER), _read(folder / SOUND / _HEADER))
+        head = msgspec.json.decode((folder / INFO_FILE).read_bytes(), type=SessionInfo)
+        headers = InitSegments(_read(folder / "cameras" / _HEADER), _read(folder / SOUND / _HEADER))
         run = cls(folder, head, headers, longest_s)
         for playlist in (*run.cameras.values(), run.sound):
             if playlist.path.exists():
@@ -169,13 +171,13 @@ class Run:
         for path in sorted((folder / "objects").glob("*.m3u8")):
             if path.stem.isdecimal():
                 run.object(int(path.stem)).read()
-        run.segments = [Segment(first, 0, 0.0) for first in sorted(run._firsts)]
+        run.segments = [RecordingSegment(first, 0, 0.0) for first in sorted(run._firsts)]
         run.recount()
         firsts = {segment.first for segment in run.segments}
         for playlist in run._playlists:  # the files may be gone, and the playlist not written since
             playlist.drop({it.file for it in playlist.tape.all} - firsts)
         with contextlib.suppress(OSError):  # what a process that was killed had begun
-            for draft in (*folder.rglob("*.new"), folder / f".{HEAD}"):
+            for draft in (*folder.rglob("*.new"), folder / f".{INFO_FILE}"):
                 draft.unlink(missing_ok=True)
         return run
 
@@ -220,7 +222,7 @@ class Run:
     def is_there(self) -> bool:
         """Whether it is in place, and whoever begins will find it."""
         try:
-            return self.is_in_place and (self.folder / HEAD).stat().st_size == self._head_bytes
+            return self.is_in_place and (self.folder / INFO_FILE).stat().st_size == self._head_bytes
         except MISSING:
             return False
         except OSError:
@@ -230,7 +232,7 @@ class Run:
         """Say again what segments take, and let go of those of which nothing is left."""
         for segment in self.segments:
             segment.bytes = sum(file_size(it) for it in self.files(segment.first))
-        self.segments = [it for it in self.segments if not all(map(is_gone, self.files(it.first)))]
+        self.segments = [it for it in self.segments if not all(map(is_missing, self.files(it.first)))]
 
     def restore_head(self) -> None:
         """Write again what holds for the whole run: without it nobody finds what is left of it.
@@ -240,7 +242,7 @@ class Run:
         """
         self._write_head(self.head)
 
-    def holds(self, stretch: Stretch) -> bool:
+    def holds(self, stretch: IndexEntry) -> bool:
         """Tell whether a camera's frames that are referred to are on the disk, as far as lengths say.
 
         Raises:
@@ -280,10 +282,10 @@ class Run:
         return sum(it.bytes for it in self.segments) + sum(it.bytes for it in self._playlists)
 
     @property
-    def _playlists(self) -> list[Playlist]:
+    def _playlists(self) -> list[RecordingPlaylist]:
         return [*self.cameras.values(), self.sound, *self.objects.values()]
 
-    def object(self, number: int) -> Playlist:
+    def object(self, number: int) -> RecordingPlaylist:
         """Give somebody's playlist, a new one where there is none."""
         if number not in self.objects:
             path = self.folder / "objects" / f"{number}.m3u8"
@@ -317,7 +319,7 @@ class Run:
         cameras = (self.camera_file(camera, first) for camera in self.head.cameras)
         return [*cameras, self.sound_file(first), self.index_file(first)]
 
-    def drop(self, segments: Collection[Segment]) -> None:
+    def drop(self, segments: Collection[RecordingSegment]) -> None:
         """Take segments away: from what is known, from the disk, and then from the playlists' files.
 
         Only the last of it takes space, so that a full disk has some by then. What the disk does not let go
@@ -357,10 +359,10 @@ class Run:
     def remove(self) -> None:
         """Take away the folder if it is in place, but not what somebody else has put into it."""
         if self.is_in_place:
-            clear(self.folder)
+            remove_session_files(self.folder)
 
-    def _playlist(self, path: Path, cameras: str = "", header: str = _HEADER) -> Playlist:
-        return Playlist(path, cameras, header, self.head.fps, self.head.pulse0, self._longest_s)
+    def _playlist(self, path: Path, cameras: str = "", header: str = _HEADER) -> RecordingPlaylist:
+        return RecordingPlaylist(path, cameras, header, self.head.fps, self.head.pulse0, self._longest_s)
 
 
 def _read(path: Path) -> bytes:
@@ -370,5 +372,5 @@ def _read(path: Path) -> bytes:
         return b""
 
 
-def _text(head: RunHead) -> bytes:
+def _text(head: SessionInfo) -> bytes:
     return msgspec.json.format(msgspec.json.encode(head)) + b"\n"

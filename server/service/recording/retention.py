@@ -12,11 +12,11 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from server.service.recording.recording_session import Run, Segment
+from server.service.recording.recording_session import RecordingSegment, RecordingSession
 
 log = logging.getLogger(__name__)
 
-SHARE = 8
+SEGMENTS_PER_DISK_QUOTA = 8
 """A segment takes at most this part of the disk that the recording may take: only whole segments go."""
 _MEGA = 1_000_000
 _PASSES = 8
@@ -28,7 +28,7 @@ _TOLD_EVERY_S = 3600.0
 
 
 @dataclass(frozen=True, slots=True)
-class Bounds:
+class RetentionLimits:
     """How much is kept."""
 
     keep_s: float
@@ -39,10 +39,10 @@ class Bounds:
 
 
 @dataclass(slots=True)
-class Due:
+class ExpiredSegments:
     """What has to go in one pass."""
 
-    segments: list[tuple[Run, list[Segment]]] = field(default_factory=list)
+    segments: list[tuple[RecordingSession, list[RecordingSegment]]] = field(default_factory=list)
     """The oldest run first, and in each the oldest segment."""
     old: int = 0
     """Segments that go because of their age,"""
@@ -52,31 +52,31 @@ class Due:
     """Segments that go because of what they take."""
 
     @property
-    def last(self) -> tuple[Run, Segment] | None:
+    def last(self) -> tuple[RecordingSession, RecordingSegment] | None:
         """The newest of them."""
         return next(((run, them[-1]) for run, them in reversed(self.segments) if them), None)
 
 
-class Retention:
+class RetentionPolicy:
     """Says what has to go. ``now`` is the recording's own clock."""
 
-    def __init__(self, bounds: Bounds, now: Callable[[], float]) -> None:
+    def __init__(self, bounds: RetentionLimits, now: Callable[[], float]) -> None:
         self._bounds, self._now = bounds, now
         self._quota: int | None = None
         """Segments that go in a pass while there are more of them than may go at once."""
         self._untold_old = self._untold_over = 0
         self._told_at = -math.inf
 
-    def due(self, runs: Sequence[Run]) -> Due:
+    def due(self, runs: Sequence[RecordingSession]) -> ExpiredSegments:
         """Say what has to go of the recordings, which are sorted by age."""
         oldest = self._now() - self._bounds.keep_s
         most = self._bounds.most_mb * _MEGA
-        too_much = sum(run.size for run in runs) - (most - most / SHARE)
+        too_much = sum(run.size for run in runs) - (most - most / SEGMENTS_PER_DISK_QUOTA)
         old = sum(it.written < oldest and not it.is_stuck for run in runs for it in run.segments)
         quota = self._share_of(old)
-        due = Due()
+        due = ExpiredSegments()
         for run in runs:
-            goes: list[Segment] = []
+            goes: list[RecordingSegment] = []
             for segment in run.segments:
                 is_old = segment.written < oldest and (due.old < quota or segment.is_stuck)
                 if not is_old and too_much <= 0:
@@ -91,7 +91,7 @@ class Retention:
         due.held = max(0, old - due.old - due.over)
         return due
 
-    def tell(self, due: Due) -> None:
+    def tell(self, due: ExpiredSegments) -> None:
         """Say in the log what has gone, and why."""
         self._untold_old += due.old
         self._untold_over += due.over

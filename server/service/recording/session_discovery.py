@@ -9,9 +9,9 @@ from collections.abc import Collection
 from pathlib import Path
 
 from server.messaging.messages import DECODE_ERRORS
-from server.service.recording.recording_age import AgeClock
-from server.service.recording.recording_session import HEAD, Run
-from server.service.recording.session_files import MISSING, clear, has_media
+from server.service.recording.age_clock import AgeClock
+from server.service.recording.recording_session import INFO_FILE, RecordingSession
+from server.service.recording.session_files import MISSING, has_media, remove_session_files
 from server.system.private_files import close_to_others
 
 log = logging.getLogger(__name__)
@@ -19,7 +19,7 @@ log = logging.getLogger(__name__)
 _RUN_NAME = re.compile(r"[0-9]{8}T[0-9]{6}Z(-[0-9]+)?")
 
 
-def find_runs(folder: Path, known: Collection[Path], longest_s: float) -> list[Run]:
+def find_sessions(folder: Path, known: Collection[Path], longest_s: float) -> list[RecordingSession]:
     """Return the runs in a folder but those that are known; what is left of such as hardly began is removed.
 
     ``longest_s``: of a segment.
@@ -30,8 +30,8 @@ def find_runs(folder: Path, known: Collection[Path], longest_s: float) -> list[R
     found = []
     for inside in sorted(it for it in folder.iterdir() if it not in known):
         try:
-            (inside / HEAD).stat()
-            run = Run.found(inside, longest_s)
+            (inside / INFO_FILE).stat()
+            run = RecordingSession.found(inside, longest_s)
         except MISSING:
             _tidy(inside)
             continue
@@ -47,7 +47,7 @@ def find_runs(folder: Path, known: Collection[Path], longest_s: float) -> list[R
     return found
 
 
-def date(run: Run, clock: AgeClock) -> None:
+def assign_age(run: RecordingSession, clock: AgeClock) -> None:
     """Say when a run went by the recording's clock that went by another one, or by none.
 
     So does what an earlier version has recorded, and a recording that is put back into another folder. Its
@@ -70,10 +70,10 @@ def _tidy(folder: Path) -> None:
             "recording: %s has no %s, so that it is not played, and not taken away either: "
             "put that back, or remove the folder",
             folder,
-            HEAD,
+            INFO_FILE,
         )
     else:
-        clear(folder)
+        remove_session_files(folder)
 
 
 def _written(path: Path) -> float:

@@ -7,17 +7,19 @@ import os
 import re
 from pathlib import Path
 
-from server.service.recording.audio_file import NAME as SOUND
-from server.service.recording.playlist_file import CAMERA
+from server.service.recording.audio_file import AUDIO_NAME as SOUND
+from server.service.recording.playlist_file import CAMERA_PATTERN
 
 MISSING = (FileNotFoundError, NotADirectoryError, IsADirectoryError)
 """What the system says of a file that is not there, or where something else has its name."""
 _MEDIA = re.compile(r"[0-9]{1,15}\.mp4")
-_OURS = re.compile(rf"[0-9]{{1,15}}\.(mp4|jsonl|m3u8|new)|\.?run\.json|init\.mp4|{CAMERA}\.(m3u8|new)")
+_OURS = re.compile(
+    rf"[0-9]{{1,15}}\.(mp4|jsonl|m3u8|new)|\.?run\.json|init\.mp4|{CAMERA_PATTERN}\.(m3u8|new)"
+)
 """Names of the files that are in a run's folder."""
 
 
-def clear(folder: Path) -> None:
+def remove_session_files(folder: Path) -> None:
     """Take away what a run has in a folder, and the folder if nothing else is in it; what is left stays."""
     if folder.is_symlink():
         return
@@ -62,7 +64,7 @@ def identity_of(folder: Path) -> tuple[int, int] | None:
     return status.st_dev, status.st_ino
 
 
-def is_gone(path: Path) -> bool:
+def is_missing(path: Path) -> bool:
     """Tell whether there surely is no such file: where nobody can tell, there may be one."""
     try:
         path.lstat()

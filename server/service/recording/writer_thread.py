@@ -9,7 +9,7 @@ from collections import deque
 from collections.abc import Callable
 
 from camsync import Spell
-from server.service.recording.store import Piece
+from server.service.recording.recording_folder import GopRecord
 
 log = logging.getLogger(__name__)
 
@@ -20,7 +20,7 @@ _PATIENCE_S = 1.0
 """How long the end of the service waits for the disk."""
 
 
-class Writer:
+class WriterThread:
     """Hands pieces to ``write`` in a thread of its own; at most ``most`` wait, further ones are left out.
 
     When ``write`` fails, ``abandon`` is called once, nothing is written for a while, then it is tried again.
@@ -29,7 +29,7 @@ class Writer:
 
     def __init__(
         self,
-        write: Callable[[Piece], None],
+        write: Callable[[GopRecord], None],
         abandon: Callable[[], None],
         close: Callable[[], None],
         most: int,
@@ -41,7 +41,7 @@ class Writer:
         self._where = where and f" ({where})"
         self._since: float | None = None
         """When what is being written now was begun."""
-        self._waiting: deque[Piece] = deque()
+        self._waiting: deque[GopRecord] = deque()
         self._changed = threading.Condition()
         self._closing = False
         self._failing = Spell(calm=0.0)
@@ -70,7 +70,7 @@ class Writer:
         """Begin."""
         self._thread.start()
 
-    def put(self, piece: Piece) -> None:
+    def put(self, piece: GopRecord) -> None:
         """Have a piece written; never waits."""
         with self._changed:
             if len(self._waiting) >= self._most:
@@ -99,13 +99,13 @@ class Writer:
         except OSError as error:
             log.warning("recording: the end could not be written: %s", error.strerror)
 
-    def _next(self) -> Piece | None:
+    def _next(self) -> GopRecord | None:
         with self._changed:
             while not self._waiting and not self._closing:
                 self._changed.wait()
             return self._waiting.popleft() if self._waiting else None
 
-    def _try(self, piece: Piece) -> bool:
+    def _try(self, piece: GopRecord) -> bool:
         self._since = time.monotonic()
         try:
             self._write(piece)

@@ -15,7 +15,7 @@ _TFDT = b"tfdt"
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class GopOverlay:
     """What is known of the frames of one GOP in one camera."""
 
     first: int
@@ -23,7 +23,7 @@ class Told:
     chosen: int | None = None
 
 
-NOTHING = Told(0, [])
+NO_OVERLAY = GopOverlay(0, [])
 
 
 def first_pulse(fragments: bytes, fps: float) -> int:
@@ -35,7 +35,7 @@ def first_pulse(fragments: bytes, fps: float) -> int:
     return round(int(ticks) * fps / TIMESCALE)
 
 
-class Decided:
+class DecidedBoxes:
     """Keeps the newest ``gops`` decisions; ``resolve`` gives the number that a merged one goes by now."""
 
     def __init__(self, resolve: Callable[[int], int], fps: float, gops: int) -> None:
@@ -51,28 +51,28 @@ class Decided:
         """The last decided frame; None before the first decision."""
         return self._kept[-1].first + self._kept[-1].frames - 1 if self._kept else None
 
-    def of_camera(self, camera: str, fragments: bytes) -> Told:
+    def of_camera(self, camera: str, fragments: bytes) -> GopOverlay:
         """Give everybody's boxes in a camera's GOP."""
         choices = self._of(fragments)
-        return NOTHING if choices is None else Told(choices.first, choices.boxes.get(camera, []))
+        return NO_OVERLAY if choices is None else GopOverlay(choices.first, choices.boxes.get(camera, []))
 
-    def of_person(self, number: int, fragments: bytes, *, alone: bool = False) -> Told:
+    def of_person(self, number: int, fragments: bytes, *, alone: bool = False) -> GopOverlay:
         """Give everybody's boxes in a GOP of a person's stream, and the number that the person has there.
 
         ``alone``: give no box but theirs, by any of their numbers.
         """
         choices = self._of(fragments)
         if choices is None:
-            return NOTHING
+            return NO_OVERLAY
         there = number if number in choices.choices else self._resolve(number)
         camera = choices.choices.get(there)
         if camera is None:
-            return NOTHING
+            return NO_OVERLAY
         boxes = choices.boxes.get(camera, [])
         if alone:
             person = self._resolve(number)
             boxes = [[box for box in frame if self._resolve(box[0]) == person] for frame in boxes]
-        return Told(choices.first, boxes, there)
+        return GopOverlay(choices.first, boxes, there)
 
     def _of(self, fragments: bytes) -> GopChoices | None:
         pulse = first_pulse(fragments, self._fps)

@@ -15,11 +15,11 @@ _ANSWER_S = 5.0
 """An answer that takes longer does not come: the process hangs."""
 
 
-class ProcessDiedError(Exception):
+class WorkerDiedError(Exception):
     """The drawing process has ended, or hangs and was killed."""
 
 
-class DrawProcess:
+class RenderWorker:
     """A running process. Whoever started it calls :meth:`end`."""
 
     def __init__(self, process: asyncio.subprocess.Process) -> None:
@@ -39,7 +39,7 @@ class DrawProcess:
         try:
             process = await start_child("server.service.rendering.worker")
         except OSError as error:
-            raise ProcessDiedError(f"cannot be started: {error.strerror}") from error
+            raise WorkerDiedError(f"cannot be started: {error.strerror}") from error
         started = cls(process)
         started._requests.write(framed(canvas))
         return started
@@ -65,11 +65,11 @@ class DrawProcess:
                     size = int.from_bytes(await self._answers.readexactly(LENGTH_BYTES), "big")
                     return self._decoder.decode(await self._answers.readexactly(size))
             except TimeoutError as error:
-                raise ProcessDiedError(f"gave no answer within {_ANSWER_S:g} s") from error
+                raise WorkerDiedError(f"gave no answer within {_ANSWER_S:g} s") from error
             except (OSError, asyncio.IncompleteReadError) as error:
-                raise ProcessDiedError("died") from error
+                raise WorkerDiedError("died") from error
             except msgspec.DecodeError as error:
-                raise ProcessDiedError(f"gave no sense: {error}") from error
+                raise WorkerDiedError(f"gave no sense: {error}") from error
 
     async def watch(self) -> NoReturn:
         """Wait until it dies by itself, which may be long before it is asked again.
@@ -78,7 +78,7 @@ class DrawProcess:
             ProcessDiedError: it has died.
         """
         await self._process.wait()
-        raise ProcessDiedError("died")
+        raise WorkerDiedError("died")
 
     async def end(self) -> None:
         """End it: it has nothing to save."""

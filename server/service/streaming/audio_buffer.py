@@ -7,7 +7,7 @@ from collections import OrderedDict
 from server.media.audio.audio_chunk import Heard
 from server.media.audio.audio_format import SoundFormat
 from server.messaging.messages import AudioHeader
-from server.service.streaming.timeline import LONGEST_S
+from server.service.streaming.gapless_timeline import LONGEST_GAP_S
 
 _PATIENCE_S = 0.5
 """How long a camera's own stream, which is behind nobody, waits for sound before it has silence instead."""
@@ -15,7 +15,7 @@ _ANEW_S = 10
 """Pulses that go back by more have begun anew."""
 
 
-class SoundShelf:
+class AudioBuffer:
     """Keeps the last ``seconds`` of a site's sound."""
 
     def __init__(self, form: SoundFormat, fps: float, seconds: float) -> None:
@@ -67,13 +67,13 @@ class SoundShelf:
         return self._heard(begin, at)
 
 
-class Following:
+class AudioFollower:
     """The sound of a stream that shows pictures as they come: at most a little behind them, no hole in it.
 
     ``begin`` is the number of its first frame; None: what sounds at the first picture.
     """
 
-    def __init__(self, shelf: SoundShelf, begin: int | None = None) -> None:
+    def __init__(self, shelf: AudioBuffer, begin: int | None = None) -> None:
         self._shelf = shelf
         self._next = begin
 
@@ -84,7 +84,7 @@ class Following:
         begin, end = form.frame_at(first, fps), form.frame_at(until, fps)
         # A hole that the pictures leave one too, as of a machine that slept, is no silence of hours.
         second = form.rate / form.samples
-        if self._next is None or not -_ANEW_S * second <= begin - self._next <= LONGEST_S * second:
+        if self._next is None or not -_ANEW_S * second <= begin - self._next <= LONGEST_GAP_S * second:
             self._next = begin
         late = end - shelf.patience
         heard = shelf.come(self._next, end, late)

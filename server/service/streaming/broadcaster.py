@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 
-class Piece(Protocol):
+class Chunk(Protocol):
     """A piece of a stream; viewers share the bytes."""
 
     @property
@@ -26,7 +26,7 @@ class Piece(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Chunk:
+class BytesChunk:
     """A piece of a stream that is just bytes."""
 
     data: bytes
@@ -34,16 +34,16 @@ class Chunk:
     fills: bool = False
 
 
-class Viewer:
+class Subscriber:
     """One viewer's place in a stream: iterate over it for the bytes to send."""
 
-    def __init__(self, backlog: list[Piece], starts_max: int) -> None:
+    def __init__(self, backlog: list[Chunk], starts_max: int) -> None:
         self._starts_max = starts_max
-        self._queue: deque[Piece] = deque(backlog)
+        self._queue: deque[Chunk] = deque(backlog)
         self._begun = bool(backlog)
         self._closed = False
         self._wake = asyncio.Event()
-        self.at_once: Callable[[Piece], bool] | None = None
+        self.at_once: Callable[[Chunk], bool] | None = None
         """Takes a piece while nothing waits, or says False; waking a task is most of what a piece costs."""
         self.lost = 0
         """GOPs lost because the viewer fell behind."""
@@ -54,7 +54,7 @@ class Viewer:
         """How many pieces wait."""
         return len(self._queue)
 
-    def put(self, piece: Piece) -> None:
+    def put(self, piece: Chunk) -> None:
         """Queue a piece; whoever is too far behind loses all that waits and goes on with the next start.
 
         What comes before a viewer's first start is of no use to them: it is left out.
@@ -86,7 +86,7 @@ class Viewer:
         lost, self._lost_before = self.lost > self._lost_before, self.lost
         return lost
 
-    def put_first(self, piece: Piece) -> None:
+    def put_first(self, piece: Chunk) -> None:
         """Put a piece before all that waits."""
         self._begun |= piece.start
         self._queue.appendleft(piece)
@@ -102,7 +102,7 @@ class Viewer:
         async for piece in self.pieces():
             yield piece.data
 
-    async def pieces(self) -> AsyncIterator[Piece]:
+    async def pieces(self) -> AsyncIterator[Chunk]:
         """Give the pieces in order until the stream ends."""
         while True:
             while self._queue:
@@ -113,7 +113,7 @@ class Viewer:
             await self._wake.wait()
 
 
-class Channel:
+class Broadcaster:
     """Hands every piece to every viewer; whoever comes begins with the newest ``starts_kept`` starts.
 
     Where nothing could be shown for ``queue_starts`` GOPs, whoever comes waits for the next start instead.
@@ -122,8 +122,8 @@ class Channel:
     def __init__(self, *, starts_kept: int = 1, queue_starts: int = 8) -> None:
         self._starts_kept = starts_kept
         self._queue_starts = queue_starts
-        self._kept: deque[Piece] = deque()
-        self._viewers: set[Viewer] = set()
+        self._kept: deque[Chunk] = deque()
+        self._viewers: set[Subscriber] = set()
         self._closed = False
 
     @property
@@ -131,7 +131,7 @@ class Channel:
         """How many are watching."""
         return len(self._viewers)
 
-    def publish(self, piece: Piece) -> None:
+    def publish(self, piece: Chunk) -> None:
         """Send a piece to everybody."""
         self._kept.append(piece)
         starts = sum(kept.start for kept in self._kept)
@@ -141,24 +141,24 @@ class Channel:
             self._kept.clear()
         self.tell(piece)
 
-    def tell(self, piece: Piece) -> None:
+    def tell(self, piece: Chunk) -> None:
         """Send a piece to everybody who is here now, and to nobody who comes later."""
         for viewer in self._viewers:
             viewer.put(piece)
 
-    def join(self) -> Viewer:
+    def join(self) -> Subscriber:
         """Let somebody in; call :meth:`leave` in the end."""
-        viewer = Viewer(list(self._kept), self._queue_starts)
+        viewer = Subscriber(list(self._kept), self._queue_starts)
         self._viewers.add(viewer)
         if self._closed:
             viewer.close()
         return viewer
 
-    def who_lost(self) -> list[Viewer]:
+    def who_lost(self) -> list[Subscriber]:
         """Give those who have lost something since this was last asked."""
         return [viewer for viewer in self._viewers if viewer.has_lost()]
 
-    def leave(self, viewer: Viewer) -> None:
+    def leave(self, viewer: Subscriber) -> None:
         """Let somebody go."""
         self._viewers.discard(viewer)
 

@@ -12,11 +12,11 @@ Shelved: TypeAlias = Picture
 """One frame, ready to be sent to anybody."""
 
 
-class NoPictureError(ValueError):
+class UndecodableFrameError(ValueError):
     """An access unit in which there is no picture, or none that says what it follows."""
 
 
-class Shelf:
+class FrameBuffer:
     """Keeps the last ``frames`` frames of one camera; each is made into a fragment once, when it comes.
 
     All shelves of a site have one ``agreement`` about what its streams are made of.
@@ -45,7 +45,7 @@ class Shelf:
         shelved = Shelved(pulse, key, made, boot, parameters=self._parameters, after=after)
         bridge = self._agreement.bridge(shelved, self._fps)
         if bridge is not None and not bridge.can_follow(shelved):
-            raise NoPictureError(f"no picture can be read in the access unit of pulse {pulse}")
+            raise UndecodableFrameError(f"no picture can be read in the access unit of pulse {pulse}")
         self._shelved[pulse] = shelved
         self.newest = max(self.newest, pulse)
         while len(self._shelved) > self._frames:

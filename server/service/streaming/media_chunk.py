@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from functools import cached_property
 
 from server.media.audio.audio_chunk import Heard
-from server.media.containers.mpegts import Counters, pack
+from server.media.containers.mpegts import Counters, pack, packets, sound_packets
 from server.media.picture import Picture
 
 
-class Footage:
+class MediaChunk:
     """Consecutive pictures as a piece of a stream (:class:`server.service.streaming.broadcaster.Piece`).
 
     Each form is made when it is first asked for, and then shared by all who are given this piece.
@@ -64,3 +64,19 @@ class Footage:
     def ts(self) -> bytes:
         """The pictures as an MPEG transport stream."""
         return pack(self.pictures, self._fps, self._counters, self.heard)
+
+
+class TsContinuity:
+    """Counts the packets of one stream, so that each piece of it goes on where the one before ended."""
+
+    def __init__(self, fps: float) -> None:
+        self._fps = fps
+        self._tables = self._packets = self._sound_packets = 0
+
+    def footage(self, pictures: Sequence[Picture], heard: Heard | None, *, fills: bool = False) -> MediaChunk:
+        """Give the next pictures, at least one, with what is heard meanwhile."""
+        counters = Counters(self._tables, self._packets, self._sound_packets, whole=False)
+        self._sound_packets += 0 if heard is None else sound_packets(heard)
+        self._tables += pictures[0].key
+        self._packets += sum(packets(picture) for picture in pictures)
+        return MediaChunk(pictures, self._fps, counters, fills=fills, heard=heard)

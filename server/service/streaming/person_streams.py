@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
 
-from server.service.streaming.broadcaster import Channel
-from server.service.streaming.hls_segmenter import Reel
+from server.service.streaming.broadcaster import Broadcaster
+from server.service.streaming.hls_segmenter import HlsSegmenter
 from server.service.streaming.presence import Presence
-from server.service.streaming.streams import DecidedStream, Gop
+from server.service.streaming.spliced_stream import GopAssembler, SplicedStream
 
-OfPerson = Callable[[int], Presence]
+PresenceLookup = Callable[[int], Presence]
 """Says what the newest GOP shows of a person."""
 
 
@@ -19,17 +19,19 @@ def always_present(number: int) -> Presence:
     return Presence.PRESENT
 
 
-class PeopleStreams:
+class PersonStreams:
     """Shows every person by the camera that is chosen for them; ``presence`` says whether they are shown."""
 
-    def __init__(self, new_stream: Callable[[], DecidedStream], presence: OfPerson = always_present) -> None:
+    def __init__(
+        self, new_stream: Callable[[], SplicedStream], presence: PresenceLookup = always_present
+    ) -> None:
         self._new_stream, self._presence = new_stream, presence
-        self._streams: dict[int, DecidedStream] = {}
-        self._gone: dict[int, DecidedStream] = {}
+        self._streams: dict[int, SplicedStream] = {}
+        self._gone: dict[int, SplicedStream] = {}
         """Those whose stream has ended a moment ago: players still fetch its end."""
-        self.channels: dict[int, Channel] = {}
+        self.channels: dict[int, Broadcaster] = {}
 
-    def show(self, cameras: Mapping[int, str | None], merged: Mapping[int, int], gop: Gop) -> None:
+    def show(self, cameras: Mapping[int, str | None], merged: Mapping[int, int], gop: GopAssembler) -> None:
         """Pass everybody's chosen GOP on to those who watch it."""
         for number, camera in cameras.items():
             if number not in self._streams:
@@ -63,7 +65,7 @@ class PeopleStreams:
         """How many watch, all streams together."""
         return sum(channel.viewers for channel in self.channels.values())
 
-    def reel(self, number: int) -> Reel | None:
+    def reel(self, number: int) -> HlsSegmenter | None:
         """Return the newest segments of a person's stream, for a while even when it has ended."""
         stream = self._streams.get(number) or self._gone.get(number)
         return None if stream is None else stream.reel

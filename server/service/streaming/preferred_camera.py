@@ -9,26 +9,28 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection
 
-from server.service.streaming.broadcaster import Channel
-from server.service.streaming.person_streams import OfPerson, always_present
+from server.service.streaming.broadcaster import Broadcaster
+from server.service.streaming.person_streams import PresenceLookup, always_present
 from server.service.streaming.presence import Boxes
-from server.service.streaming.streams import DecidedStream, Gop
+from server.service.streaming.spliced_stream import GopAssembler, SplicedStream
 from server.service.view_selection.decider import GopDecision
 
 
-class Preferring:
+class PreferredCameraStreams:
     """The streams that prefer a camera, each from the first viewer to the last.
 
     ``presence`` says whether a person is shown.
     """
 
-    def __init__(self, new_stream: Callable[[], DecidedStream], presence: OfPerson = always_present) -> None:
+    def __init__(
+        self, new_stream: Callable[[], SplicedStream], presence: PresenceLookup = always_present
+    ) -> None:
         self._new_stream, self._presence = new_stream, presence
-        self._streams: dict[tuple[int, str], DecidedStream] = {}
+        self._streams: dict[tuple[int, str], SplicedStream] = {}
         self._before: Boxes | None = None
-        self._now: tuple[GopDecision, Gop] | None = None
+        self._now: tuple[GopDecision, GopAssembler] | None = None
 
-    def channel(self, number: int, camera: str) -> Channel:
+    def channel(self, number: int, camera: str) -> Broadcaster:
         """Give the stream of a person in which a camera is preferred; who asks joins it at once."""
         stream = self._streams.get((number, camera))
         if stream is None:
@@ -37,7 +39,7 @@ class Preferring:
                 self._show(stream, number, camera)  # or there would be nothing to see before the next GOP
         return stream.channel
 
-    def show(self, decision: GopDecision, gop: Gop) -> None:
+    def show(self, decision: GopDecision, gop: GopAssembler) -> None:
         """Pass a GOP on to those who watch; a stream that nobody watches is given up."""
         self._before = None if self._now is None else self._now[0].boxes
         self._now = (decision, gop)
@@ -61,7 +63,7 @@ class Preferring:
         for stream in self._streams.values():
             stream.close()
 
-    def _show(self, stream: DecidedStream, number: int, camera: str) -> None:
+    def _show(self, stream: SplicedStream, number: int, camera: str) -> None:
         assert self._now is not None  # noqa: S101 — who calls has looked
         decision, gop = self._now
         person = decision.merged.get(number, number)

@@ -46,7 +46,7 @@ class PresenceLog:
         if decision.first < self._first:
             self._last.clear()  # pulses have begun anew
         self._first, self._merged = decision.first, decision.merged
-        seen = {number: decision.first + place for number, place in last_places(decision.boxes).items()}
+        seen = {number: decision.first + place for number, place in last_seen_offsets(decision.boxes).items()}
         before, self._last = self._last, {}
         for some in (before, seen):
             for number, pulse in some.items():
@@ -65,7 +65,7 @@ class PresenceLog:
         self._last = {number: pulse for number, pulse in self._last.items() if number in known}
 
 
-def last_places(boxes: Boxes) -> dict[int, int]:
+def last_seen_offsets(boxes: Boxes) -> dict[int, int]:
     """Return of everybody the last frame of a GOP in which a camera has seen them, from 0."""
     last: dict[int, int] = {}
     for frames in boxes.values():

@@ -7,15 +7,15 @@ from collections.abc import Collection, Mapping
 from server.config.site_config import Config
 from server.media.picture import Picture
 from server.media.stream_format import Agreement
-from server.service.streaming.audio_buffer import SoundShelf
-from server.service.streaming.broadcaster import Channel
-from server.service.streaming.frame_buffer import Shelf
-from server.service.streaming.hls_segmenter import Reel, plan
-from server.service.streaming.person_streams import PeopleStreams
-from server.service.streaming.preferred_camera import Preferring
+from server.service.streaming.audio_buffer import AudioBuffer
+from server.service.streaming.broadcaster import Broadcaster
+from server.service.streaming.frame_buffer import FrameBuffer
+from server.service.streaming.gapless_timeline import GaplessTimeline
+from server.service.streaming.hls_segmenter import HlsSegmenter, segment_layout
+from server.service.streaming.person_streams import PersonStreams
+from server.service.streaming.preferred_camera import PreferredCameraStreams
 from server.service.streaming.presence import PresenceLog
-from server.service.streaming.streams import DecidedStream, Gop, LiveStream
-from server.service.streaming.timeline import Timeline
+from server.service.streaming.spliced_stream import GopAssembler, LiveStream, SplicedStream
 from server.service.view_selection.decider import GopDecision
 
 _SILENT_S = 2
@@ -31,15 +31,15 @@ class Splicer:
 
     def __init__(
         self,
-        shelves: Mapping[str, Shelf],
+        shelves: Mapping[str, FrameBuffer],
         agreement: Agreement,
         config: Config,
-        sound: SoundShelf | None = None,
+        sound: AudioBuffer | None = None,
     ) -> None:
         self._shelves, self._agreement, self._config = shelves, agreement, config
         self._sound = sound
         site, http = config.site, config.http
-        self.plan = plan(site.fps, config.encode.gop, http.hls_segment_s, http.hls_window_s)
+        self.plan = segment_layout(site.fps, config.encode.gop, http.hls_segment_s, http.hls_window_s)
         self._live = {
             camera: LiveStream(self._channel(), self._time(), site.fps, sound) for camera in shelves
         }
@@ -47,10 +47,10 @@ class Splicer:
         """Each camera as if it were always chosen."""
         self._presence = PresenceLog(round(config.access.unseen_s * site.fps))
         self._is_scoped = config.access.tokens is not None
-        self._people = PeopleStreams(self._stream)
-        self._scoped = PeopleStreams(self._stream, self._presence.of)
-        self.preferring = Preferring(self._stream)
-        self.preferring_scoped = Preferring(self._stream, self._presence.of)
+        self._people = PersonStreams(self._stream)
+        self._scoped = PersonStreams(self._stream, self._presence.of)
+        self.preferring = PreferredCameraStreams(self._stream)
+        self.preferring_scoped = PreferredCameraStreams(self._stream, self._presence.of)
         self._gops = 0
         self.objects = self._people.channels
         self.scoped = self._scoped.channels
@@ -64,7 +64,7 @@ class Splicer:
     def decision(self, decision: GopDecision) -> None:
         """Pass every object's chosen GOP on to those who watch it; a camera's GOP is put together once."""
         fps = self._config.site.fps
-        gop = Gop(self._shelves, decision.first, decision.frames, fps, self._gops, self._sound)
+        gop = GopAssembler(self._shelves, decision.first, decision.frames, fps, self._gops, self._sound)
         self._gops += 1
         cameras = {choice.number: choice.camera for choice in decision.choices}
         self._people.show(cameras, decision.merged, gop)
@@ -97,23 +97,23 @@ class Splicer:
         """Return how many watch an object's stream."""
         return self._people.watched(number) + self._scoped.watched(number)
 
-    def reel(self, number: int, *, scoped: bool = False) -> Reel | None:
+    def reel(self, number: int, *, scoped: bool = False) -> HlsSegmenter | None:
         """Give the newest segments of an object's stream, for a while even when it has ended."""
         return (self._scoped if scoped else self._people).reel(number)
 
-    def camera_reel(self, camera: str) -> Reel | None:
+    def camera_reel(self, camera: str) -> HlsSegmenter | None:
         """Give the newest segments of a camera."""
         stream = self._decided.get(camera)
         return None if stream is None else stream.reel
 
-    def _channel(self) -> Channel:
-        return Channel(queue_starts=self._config.http.viewer_queue_gops)
+    def _channel(self) -> Broadcaster:
+        return Broadcaster(queue_starts=self._config.http.viewer_queue_gops)
 
-    def _time(self) -> Timeline:
-        return Timeline(self._agreement, self._config.site.fps, self._config.encode.gop)
+    def _time(self) -> GaplessTimeline:
+        return GaplessTimeline(self._agreement, self._config.site.fps, self._config.encode.gop)
 
-    def _stream(self) -> DecidedStream:
-        return DecidedStream(self._channel(), self._time(), Reel(self.plan))
+    def _stream(self) -> SplicedStream:
+        return SplicedStream(self._channel(), self._time(), HlsSegmenter(self.plan))
 
     @property
     def viewers_of_objects(self) -> int:

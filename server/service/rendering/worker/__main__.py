@@ -14,7 +14,7 @@ import cv2
 import msgspec
 
 from server.media.rendering_messages import LENGTH_BYTES, Canvas, Draw, framed
-from server.service.rendering.worker.stream_renderer import Studio
+from server.service.rendering.worker.stream_renderer import StreamRenderer
 from server.system.log_format import formatter
 
 
@@ -23,7 +23,7 @@ def serve(requests: BinaryIO, answers: BinaryIO) -> None:
     first = _message(requests)
     if first is None:
         return
-    studio = Studio(msgspec.msgpack.decode(first, type=Canvas))
+    studio = StreamRenderer(msgspec.msgpack.decode(first, type=Canvas))
     decoder = msgspec.msgpack.Decoder(Draw)
     while (body := _message(requests)) is not None:
         answers.write(framed(studio.draw(decoder.decode(body))))

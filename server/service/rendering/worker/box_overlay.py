@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from server.messaging.number_types import COORDINATE_MAX
 
-CHOSEN = (80, 220, 80)
+CHOSEN_COLOR = (80, 220, 80)
 """Blue, green, red."""
-OTHER = (200, 200, 200)
+OTHER_COLOR = (200, 200, 200)
 _DARK = (0, 0, 0)
 _LINE_AT = 360
 """Picture height in pixels at which a thin line is one pixel wide."""
@@ -32,7 +32,7 @@ def draw_boxes(
     """
     line = max(1, round(image.shape[0] / _LINE_AT))
     for number, *box in sorted(boxes, key=lambda it: (it[0] == chosen, it[0])):
-        width, colour = (2 * line, CHOSEN) if number == chosen else (line, OTHER)
+        width, colour = (2 * line, CHOSEN_COLOR) if number == chosen else (line, OTHER_COLOR)
         left, top, right, bottom = (round(edge) for edge in np.clip(box, -COORDINATE_MAX, COORDINATE_MAX))
         cv2.rectangle(image, (left, top), (right - 1, bottom - 1), colour, width)
         _number(image, (left, top), str(number), colour)

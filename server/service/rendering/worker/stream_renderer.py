@@ -18,14 +18,13 @@ from server.media.color_conversion import bgr
 from server.media.rendering_messages import Canvas, Draw, Drawn, Jpeg, Unit, belongs
 from server.messaging.number_types import PULSE_MAX
 from server.service.rendering.worker.box_overlay import Image, draw_boxes
-from server.service.rendering.worker.mp4_demuxer import frames
-from server.service.rendering.worker.webm_demuxer import webm_frames
+from server.service.rendering.worker.demuxers import demux_mp4, demux_webm
 
 log = logging.getLogger(__name__)
 
 
 @dataclass
-class Painting:
+class DecodedPicture:
     """One decoded frame; what is not asked for is not made."""
 
     pulse: int
@@ -47,7 +46,7 @@ class Painting:
         return image
 
 
-class Studio:
+class StreamRenderer:
     """Answers requests about one stream."""
 
     def __init__(self, canvas: Canvas) -> None:
@@ -59,7 +58,7 @@ class Studio:
         """That something could not be decoded."""
         self._encoder: Encoder | None = None
         self._encoded_last = -1
-        self._last: Painting | None = None
+        self._last: DecodedPicture | None = None
 
     def draw(self, request: Draw) -> Drawn:
         """Decode the frames and give what is wanted of them."""
@@ -84,8 +83,8 @@ class Studio:
         image = self._last.boxed if request.still == "boxed" else self._last.plain
         return self._jpeg(self._last.pulse, image)
 
-    def _paintings(self, request: Draw) -> Iterator[Painting]:
-        unpack = webm_frames if self._canvas.codec == "vp8" else frames
+    def _paintings(self, request: Draw) -> Iterator[DecodedPicture]:
+        unpack = demux_webm if self._canvas.codec == "vp8" else demux_mp4
         for unit in unpack(request.fragments, self._canvas.fps):
             good = bool(unit.data) and unit.pulse <= PULSE_MAX  # no data would mean the end
             self._whole = (self._whole or unit.key) and good
@@ -105,9 +104,9 @@ class Studio:
                 pulse = unit.pulse if frame.pts is None else frame.pts
                 place = pulse - request.first
                 boxes = request.boxes[place] if 0 <= place < len(request.boxes) else []
-                yield Painting(pulse, unit.lasts, frame, boxes, request.chosen)
+                yield DecodedPicture(pulse, unit.lasts, frame, boxes, request.chosen)
 
-    def _encoded(self, painting: Painting) -> Unit:
+    def _encoded(self, painting: DecodedPicture) -> Unit:
         if self._encoder is None or painting.pulse <= self._encoded_last:  # it goes back: begun anew
             self._encoder = Encoder(self._canvas, self._canvas)
         self._encoded_last = painting.pulse

@@ -11,8 +11,8 @@ from functools import partial
 
 from camsync import Spell
 from server.media.rendering_messages import Canvas
-from server.service.rendering.decided_boxes import NOTHING, Decided, Told
-from server.service.rendering.stream_source import Source
+from server.service.rendering.decided_boxes import NO_OVERLAY, DecidedBoxes, GopOverlay
+from server.service.rendering.rendered_stream import RenderedStream
 from server.service.service import BestViewService
 
 log = logging.getLogger(__name__)
@@ -23,7 +23,7 @@ _BESIDE = 2
 """Decisions kept besides those whose frames can still wait for a drawing process."""
 
 
-class FullError(Exception):
+class RenderPoolFullError(Exception):
     """As many pictures as this server makes are being made."""
 
 
@@ -53,13 +53,13 @@ Subject = PersonView | CameraView
 
 
 @dataclass(slots=True)
-class _Running:
-    source: Source
+class _RunningStream:
+    source: RenderedStream
     task: asyncio.Task[None]
     expiry: asyncio.TimerHandle | None = None
 
 
-class Pictures:
+class RenderPool:
     """Starts what is wanted and lets it end when nobody wants it; at most ``http.pictures_max`` at once."""
 
     def __init__(self, service: BestViewService, linger_s: float = _LINGER_S) -> None:
@@ -78,16 +78,16 @@ class Pictures:
             max_kbps=config.encode.max_kbps,
             jpeg_quality=config.http.jpeg_quality,
         )
-        self._decided = Decided(service.board.resolve, config.site.fps, self._queue + _BESIDE)
+        self._decided = DecidedBoxes(service.board.resolve, config.site.fps, self._queue + _BESIDE)
         service.on_decision.append(self._decided.put)
-        self._running: dict[Subject, _Running] = {}
+        self._running: dict[Subject, _RunningStream] = {}
         self._tasks: set[asyncio.Task[None]] = set()
         """Those of sources that are running, or ending."""
         self._restarts = self._lost = 0
         self._failing = Spell()
 
     @property
-    def sources(self) -> dict[Subject, Source]:
+    def sources(self) -> dict[Subject, RenderedStream]:
         """What is drawn now."""
         return {subject: running.source for subject, running in self._running.items()}
 
@@ -107,7 +107,7 @@ class Pictures:
         return self._lost + sum(source.lost for source in self.sources.values())
 
     @contextmanager
-    def using(self, subject: Subject) -> Iterator[Source]:
+    def using(self, subject: Subject) -> Iterator[RenderedStream]:
         """Use a source while inside; the subject must be there.
 
         Raises:
@@ -151,14 +151,14 @@ class Pictures:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
 
-    def _start(self, subject: Subject) -> _Running:
+    def _start(self, subject: Subject) -> _RunningStream:
         if len(self._running) >= self._most:
             self._make_place()
         source = self._source(subject)
         task = asyncio.create_task(source.run(), name=f"draw {subject}")
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
-        running = self._running[subject] = _Running(source, task)
+        running = self._running[subject] = _RunningStream(source, task)
         task.add_done_callback(lambda _: self._ended(subject, running))
         return running
 
@@ -168,11 +168,11 @@ class Pictures:
             if not running.source.users:
                 self._end(subject, running)
                 return
-        raise FullError
+        raise RenderPoolFullError
 
-    def _source(self, subject: Subject) -> Source:
+    def _source(self, subject: Subject) -> RenderedStream:
         splicer, decided = self._service.splicer, self._decided
-        told: Callable[[bytes], Told]
+        told: Callable[[bytes], GopOverlay]
         match subject:
             case PersonView(number, scoped):
                 stream = (splicer.scoped if scoped else splicer.objects)[number]
@@ -182,7 +182,7 @@ class Pictures:
             case CameraView(camera):
                 stream, told = splicer.cameras[camera], _nothing
         live = isinstance(subject, CameraView) and not subject.decided
-        return Source(
+        return RenderedStream(
             str(subject),
             stream,
             told,
@@ -193,17 +193,17 @@ class Pictures:
             silent_holes=isinstance(subject, PersonView) and subject.scoped,  # what was there is not known
         )
 
-    def _end(self, subject: Subject, running: _Running) -> None:
+    def _end(self, subject: Subject, running: _RunningStream) -> None:
         running.task.cancel()
         self._forget(subject, running)
 
-    def _ended(self, subject: Subject, running: _Running) -> None:
+    def _ended(self, subject: Subject, running: _RunningStream) -> None:
         error = None if running.task.cancelled() else running.task.exception()
         if error is not None and (more := self._failing.happened(repr(error))) is not None:
             log.error("drawing %s failed%s", subject, more, exc_info=error)
         self._forget(subject, running)
 
-    def _forget(self, subject: Subject, running: _Running) -> None:
+    def _forget(self, subject: Subject, running: _RunningStream) -> None:
         """Let go of one that is ending; another of the same subject may have begun since."""
         if self._running.get(subject) is not running:
             return
@@ -212,7 +212,7 @@ class Pictures:
         self._lost += running.source.lost
 
 
-def _nothing(fragments: bytes) -> Told:
+def _nothing(fragments: bytes) -> GopOverlay:
     """Frames that are not decided yet have no boxes."""
     del fragments
-    return NOTHING
+    return NO_OVERLAY

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
+from io import FileIO
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +13,8 @@ import numpy as np
 from bestview import Merge, Split
 from server.media.letterbox import Letterbox
 from server.messaging.messages import NumberedBox
-from server.service.decision_files.row_files import WholeFiles
 from server.service.view_selection.decider import GopDecision
-from server.system.private_files import make_private_folder
+from server.system.private_files import make_private_folder, open_private
 from tracking.motchallenge import MotRow, format_row
 
 CHOICES_HEAD = "frame,object,camera\n"
@@ -21,7 +22,7 @@ CORRECTIONS_HEAD = "frame,what,object,other,camera\n"
 LATE_HEAD = "frame,camera,what\n"
 
 
-class Recorder:
+class DecisionWriter:
     """Writes decisions: ``tracks/<camera>.txt``, ``choices.csv``, ``corrections.csv``, ``late.csv``.
 
     ``fits`` may grow: a camera is in it from its first word on. A choice is a line also while nobody sees
@@ -50,7 +51,7 @@ class Recorder:
         self._corrections = folder / "corrections.csv"
         self._late = folder / "late.csv"
         heads = {self._choices: CHOICES_HEAD, self._corrections: CORRECTIONS_HEAD, self._late: LATE_HEAD}
-        self._files = WholeFiles(dict.fromkeys(self._tracks.values(), "") | heads, private=private)
+        self._files = AtomicFiles(dict.fromkeys(self._tracks.values(), "") | heads, private=private)
 
     def write(self, decision: GopDecision, late: Sequence[str] = ()) -> None:
         """Write a decision, and rows of ``late.csv``.
@@ -95,3 +96,46 @@ def _line(correction: Merge | Split) -> str:
     if isinstance(correction, Merge):
         return f"merged,{correction.kept},{correction.lost},"
     return f"split,{correction.kept},{correction.parted},{correction.camera}"
+
+
+class AtomicFiles:
+    """Files to which texts are appended: what is appended at once stands in all of them, or in none."""
+
+    def __init__(self, heads: Mapping[Path, str], *, private: bool = False) -> None:
+        """Begin new files with their heads, ASCII; ``private``: for this user alone.
+
+        Raises:
+            OSError: one cannot be written.
+        """
+        with contextlib.ExitStack() as opened:
+            opener = open_private if private else None
+            self._files = {it: opened.enter_context(FileIO(it, "w", opener=opener)) for it in heads}
+            self.append(heads)
+            self._opened = opened.pop_all()
+
+    def append(self, texts: Mapping[Path, str]) -> None:
+        """Append to some of them, ASCII. It is the system's when this returns.
+
+        Raises:
+            OSError: that cannot be written; all files are as they were.
+        """
+        before = {it: self._files[it].tell() for it in texts}
+        try:
+            for path, text in texts.items():
+                _write(self._files[path], text.encode("ascii"))
+        except OSError:
+            for path, length in before.items():
+                with contextlib.suppress(OSError):  # the first one says it
+                    self._files[path].truncate(length)
+                    self._files[path].seek(length)
+            raise
+
+    def close(self) -> None:
+        """Close all files."""
+        self._opened.close()
+
+
+def _write(file: FileIO, rest: bytes) -> None:
+    """Write all of it: a disk that is nearly full takes a part, and says so only when asked again."""
+    while rest:
+        rest = rest[file.write(rest) :]

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
+import logging
+
 import msgspec
 
+from server.system.child_process import start_child
 
-class Seen(msgspec.Struct, frozen=True, array_like=True):
+
+class CameraBoxes(msgspec.Struct, frozen=True, array_like=True):
     """What one camera saw of a walk: R boxes. Arrays as they lie in memory: they are long."""
 
     camera: str
@@ -19,10 +24,10 @@ class Seen(msgspec.Struct, frozen=True, array_like=True):
     """(R, 4) float64, left, top, right, bottom in pixels of that picture."""
 
 
-class Task(msgspec.Struct, frozen=True):
+class CalibrationTask(msgspec.Struct, frozen=True):
     """A walk to calibrate from."""
 
-    seen: list[Seen]
+    seen: list[CameraBoxes]
     fps: float
     shift: float
     """Seconds that cameras may be out of step."""
@@ -32,7 +37,7 @@ class Task(msgspec.Struct, frozen=True):
     """By camera: what the frames have in them already; of those that it can be set of."""
 
 
-class Done(msgspec.Struct, frozen=True):
+class CalibrationResult(msgspec.Struct, frozen=True):
     """What has come of it."""
 
     error: str = ""
@@ -46,3 +51,25 @@ class Done(msgspec.Struct, frozen=True):
     """The text of the ground file."""
     plan: bytes = b""
     """The floor plan, PNG."""
+
+
+log = logging.getLogger(__name__)
+
+
+async def run_calibration(task: CalibrationTask) -> CalibrationResult:
+    """Let a process of its own calibrate from a walk; it is ended where nobody waits for it any more."""
+    try:
+        process = await start_child("server.service.calibration")
+    except OSError as error:
+        return CalibrationResult(error=f"the calibration cannot be started: {error.strerror}")
+    try:
+        said, _ = await process.communicate(msgspec.msgpack.encode(task))
+        return msgspec.msgpack.decode(said, type=CalibrationResult)
+    except msgspec.DecodeError:
+        log.error("the process that calibrates ended with status %s", process.returncode)  # noqa: TRY400
+        return CalibrationResult(error="the calibration went wrong; the server's log says more")
+    finally:
+        if process.returncode is None:
+            with contextlib.suppress(ProcessLookupError):
+                process.kill()
+            await process.wait()

@@ -1,13 +1,98 @@
-"""What a walk has shown, in plain words, and the same in numbers for the file."""
+"""From what the cameras saw of a walk to all that is said and written of it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
-from bestview.calibration import Spread, WalkCalibration, WalkedCamera, WalkSettings
-from server.service.calibration.walk_comparison import Walked
+from bestview.calibration import (
+    Floats,
+    Spread,
+    Walk,
+    WalkCalibration,
+    WalkedCamera,
+    WalkSettings,
+    calibrate_walks,
+)
+
+_MOMENT_S = 0.2
+"""Seconds between the moments at which cameras are compared: people walk a sixth of their height."""
+
+
+@dataclass(frozen=True, slots=True)
+class RecordedWalk:
+    """The cameras' walks, and how many frames there are in a second.
+
+    `guessed` are cameras whose picture's size is only guessed, from the boxes; `rate_guessed` is whether the
+    rate is only what is usual. `offsets` are by camera those that the frames have in them already; of those
+    that are `live` none can be set.
+    """
+
+    walks: tuple[Walk, ...]
+    fps: float
+    guessed: tuple[str, ...] = ()
+    rate_guessed: bool = False
+    offsets: Mapping[str, int] = field(default_factory=dict)
+    live: tuple[str, ...] = ()
+
+
+def walk_settings(fps: float, shift: float) -> WalkSettings:
+    """Give the settings for recordings of so many frames a second, out of step by `shift` seconds at most."""
+    return WalkSettings(shift=round(shift * fps), step=comparison_step(fps))
+
+
+def comparison_step(fps: float) -> int:
+    """Give the frames between the moments at which cameras are compared."""
+    return max(1, round(_MOMENT_S * fps))
+
+
+def ground_file_text(
+    unit: str, homographies: Mapping[str, Floats], more: Mapping[str, Any] | None = None
+) -> str:
+    """Give its text: the homographies, (3, 3) each, by camera."""
+    matrices = {camera: matrix.tolist() for camera, matrix in homographies.items()}
+    content = {"unit": unit, "homography": matrices, **(more or {})}
+    return json.dumps(content, indent=1) + "\n"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CalibrationReport:
+    """What a walk has shown.
+
+    Attributes:
+        found: the calibration.
+        lines: the same in words: errors, coverage, offsets, and where to walk, too.
+        too_little: what the walk did not cover, where it is a guess for want of that; else empty.
+        offsets: lines of a configuration that bring the cameras into step; empty: they are.
+        ground: the text of the ground file.
+    """
+
+    found: WalkCalibration
+    lines: tuple[str, ...]
+    too_little: str
+    offsets: str
+    ground: str
+
+
+def calibrate_walk(walked: RecordedWalk, settings: WalkSettings, person: float) -> CalibrationReport:
+    """Lay the cameras on one floor, in metres where people are `person` metres tall.
+
+    Raises:
+        CalibrationError: the walk says too little.
+    """
+    found = calibrate_walks(walked.walks, settings, person)
+    missing = [line for it in found.cameras for line in coverage_gaps(it.camera, it.thirds, it.deep)]
+    homographies = {it.camera: it.homography for it in found.cameras}
+    return CalibrationReport(
+        found,
+        (*report_lines(walked, found, settings), *(it.words for it in missing)),
+        next((it.words for it in missing if it.serious), ""),
+        offset_lines(walked, found) if settings.shift else "",
+        ground_file_text("m", homographies, details(walked, found, person)),
+    )
+
 
 _THIRDS = ("left", "middle", "right")
 _LITTLE = 0.03
@@ -21,28 +106,28 @@ _SHALLOW = 1.25
 
 
 @dataclass(frozen=True, slots=True)
-class Missed:
+class CoverageGap:
     """Something that the walk did not cover; serious, where a calibration would be a guess."""
 
     words: str
     serious: bool
 
 
-def missed(camera: str, thirds: Sequence[float], deep: float) -> Iterator[Missed]:
+def coverage_gaps(camera: str, thirds: Sequence[float], deep: float) -> Iterator[CoverageGap]:
     """Say where somebody should walk, too; `thirds` and `deep` are as of a `WalkedCamera`."""
     bare = [name for name, share in zip(_THIRDS, thirds, strict=True) if share < _LITTLE]
     if bare:
         where = " and the ".join(bare)
-        yield Missed(
+        yield CoverageGap(
             f"walk also through the {where} third of camera {camera}, if there is floor and another "
             "camera sees it",
             serious=len(bare) > 1,
         )
     if deep < _SHALLOW:
-        yield Missed(f"walk also nearer to camera {camera}, and farther from it", serious=True)
+        yield CoverageGap(f"walk also nearer to camera {camera}, and farther from it", serious=True)
 
 
-def in_words(walked: Walked, found: WalkCalibration, settings: WalkSettings) -> list[str]:
+def report_lines(walked: RecordedWalk, found: WalkCalibration, settings: WalkSettings) -> list[str]:
     """Give the lines about errors, coverage and offsets."""
     on_floor, in_pictures = _heights(found.heights), _shares(found.picture)
     lines = [f"feet that two cameras see are {on_floor} apart, in the pictures {in_pictures} of the diagonal"]
@@ -65,7 +150,7 @@ def in_words(walked: Walked, found: WalkCalibration, settings: WalkSettings) -> 
     return lines
 
 
-def details(walked: Walked, found: WalkCalibration, person: float) -> dict[str, Any]:
+def details(walked: RecordedWalk, found: WalkCalibration, person: float) -> dict[str, Any]:
     """Give what the file says beside the homographies."""
     return {
         "person": person,
@@ -88,7 +173,7 @@ def _floors(found: WalkCalibration) -> list[str]:
     return [f"{said}; they lie far apart in the file, and offsets hold within each"]
 
 
-def _offsets(walked: Walked, found: WalkCalibration) -> list[str]:
+def _offsets(walked: RecordedWalk, found: WalkCalibration) -> list[str]:
     """Give the offsets as words."""
     first, fps = found.cameras[0].camera, walked.fps
     lines = []
@@ -105,14 +190,14 @@ def _offsets(walked: Walked, found: WalkCalibration) -> list[str]:
     return lines
 
 
-def offset_lines(walked: Walked, found: WalkCalibration) -> str:
+def offset_lines(walked: RecordedWalk, found: WalkCalibration) -> str:
     """Give the lines of a configuration that bring the cameras into step; empty: they are."""
     moved = [it for it in found.cameras if _moved(it) and it.camera not in walked.live]
     lines = [f"  - id: {it.camera}\n    offset: {_use(walked, it)}\n" for it in moved]
     return "".join(["cameras:\n", *lines]) if lines else ""
 
 
-def _offset(walked: Walked, camera: WalkedCamera) -> dict[str, float]:
+def _offset(walked: RecordedWalk, camera: WalkedCamera) -> dict[str, float]:
     return {
         "frames": round(camera.offset, 2),
         "error": round(camera.offset_error, 2),
@@ -120,7 +205,7 @@ def _offset(walked: Walked, camera: WalkedCamera) -> dict[str, float]:
     }
 
 
-def _use(walked: Walked, camera: WalkedCamera) -> int:
+def _use(walked: RecordedWalk, camera: WalkedCamera) -> int:
     """Give the offset to write: what was found comes on top of what the frames have in them already."""
     return walked.offsets.get(camera.camera, 0) + (round(camera.offset) if _moved(camera) else 0)
 

@@ -13,13 +13,13 @@ from server.media.stream_format import Agreement
 
 _LONG_S = 2
 """Holes up to so long get a picture for every pulse, longer ones a single picture that lasts."""
-LONGEST_S = 3600
+LONGEST_GAP_S = 3600
 """Nobody waits that long: a longer hole stays one, and a duration fits into MP4's 32 bits."""
 _ANEW_S = 10
 """A key picture so far back is of pulses that began anew, not a late one."""
 
 
-class Timeline:
+class GaplessTimeline:
     """What a stream has shown so far, and what it must show so that the next picture follows.
 
     ``gop`` is the number of pulses from key picture to key picture.
@@ -63,7 +63,7 @@ class Timeline:
     def fill(self, until: int) -> list[Picture]:
         """Give what repeats the last picture up to a pulse; nothing before the first picture."""
         bridge, missing = self._bridge(), until - self._until
-        if bridge is None or self._newest is None or not 0 < missing <= LONGEST_S * self._fps:
+        if bridge is None or self._newest is None or not 0 < missing <= LONGEST_GAP_S * self._fps:
             return []
         each = 1 if missing <= _LONG_S * self._fps else missing
         filled = bridge.after(self._newest, [(pulse, each) for pulse in range(self._until, until, each)])

@@ -8,22 +8,22 @@ from typing import TYPE_CHECKING
 
 from server.media.picture import Picture
 from server.media.stream_format import Agreement
-from server.service.recording.decision_log import said
-from server.service.recording.media_files import Gop, pictures_of
-from server.service.recording.recorder import Past
-from server.service.streaming.presence import last_places
+from server.service.recording.media_files import RecordedGop, pictures_of_gop
+from server.service.recording.recorder import Recorder
+from server.service.streaming.presence import last_seen_offsets
+from server.service.time_shift.decision_log import read_decisions
 
 if TYPE_CHECKING:
-    from server.service.recording.playback import Source
+    from server.service.time_shift.playback import PlaybackSource
 
 _AHEAD_S = 60.0
 """So much more is read than is asked for: as a rule, the next moment is asked for next."""
 
 
-class PastPresence:
+class PresenceHistory:
     """Says it by what was said about GOPs when they were decided; lately is ``unseen`` frames before."""
 
-    def __init__(self, past: Past, numbers: tuple[int, ...], unseen: int, fps: float) -> None:
+    def __init__(self, past: Recorder, numbers: tuple[int, ...], unseen: int, fps: float) -> None:
         self._past, self._numbers, self._unseen = past, numbers, unseen
         self._ahead = round(_AHEAD_S * fps)
         self._known = range(0)
@@ -42,15 +42,15 @@ class PastPresence:
         decided = self._past.recent.end
         until = max(end, min(end + self._ahead, decided))
         seen: list[int] = []
-        async for it in said(self._past, begin, until):
+        async for it in read_decisions(self._past, begin, until):
             if it.is_numbered:
-                last = last_places(it.choices.boxes)
+                last = last_seen_offsets(it.choices.boxes)
                 seen += [it.choices.first + last[number] for number in self._numbers if number in last]
         self._known, self._seen = range(begin, until), sorted(seen)
 
 
 @dataclass(frozen=True, slots=True)
-class Shown:
+class VisiblePictures:
     """Some pictures of the past, as somebody may see them."""
 
     pictures: list[Picture]
@@ -58,9 +58,11 @@ class Shown:
     """Whether nothing may be heard meanwhile."""
 
 
-async def shown_of(gop: Gop, source: Source, agreement: Agreement, fps: float) -> Shown:
+async def visible_pictures(
+    gop: RecordedGop, source: PlaybackSource, agreement: Agreement, fps: float
+) -> VisiblePictures:
     """Return a GOP's pictures, or grey ones, if there are any, where the person had not been seen lately."""
-    pictures, presence = pictures_of(gop, agreement), source.presence
+    pictures, presence = pictures_of_gop(gop, agreement), source.presence
     if presence is None or await presence.had_been_seen(gop.first, gop.end):
-        return Shown(pictures, silent=False)
-    return Shown(agreement.blank(pictures[0], gop.first, gop.end - gop.first, fps), silent=True)
+        return VisiblePictures(pictures, silent=False)
+    return VisiblePictures(agreement.blank(pictures[0], gop.first, gop.end - gop.first, fps), silent=True)

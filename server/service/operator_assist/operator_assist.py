@@ -9,18 +9,18 @@ import msgspec
 from server.config.site_config import Config
 from server.service.identity.people import People
 from server.service.ingest.epoch_aligner import Epoch
-from server.service.operator_assist.corrections import Place, pointings
-from server.service.operator_assist.flags import Flags, Foreseen
+from server.service.operator_assist.corrections import PointedPosition, corrections_for_tracker
+from server.service.operator_assist.flags import FlagQueue, RiskEvent
 
 
-class Assist:
+class OperatorAssist:
     """Stands between the cameras' trackers, which know tracks, and the operator, who knows people.
 
     ``send`` sends a camera what is pointed at in its picture.
     """
 
     def __init__(self, config: Config, people: People, send: Callable[[str, bytes], None]) -> None:
-        self.flags = Flags(config.view.flags, config.site.fps)
+        self.flags = FlagQueue(config.view.flags, config.site.fps)
         self.points = 0
         """Places that were pointed at and went to a camera."""
         self._people, self._send = people, send
@@ -31,25 +31,27 @@ class Assist:
         people.told.frames = assist.memory if assist.enabled else 0
         self.flags.step(epoch.last, self._foreseen(epoch), people.roll.whose)
 
-    def point(self, number: int, camera: str, places: Sequence[Place]) -> tuple[int, list[int]]:
+    def point(self, number: int, camera: str, places: Sequence[PointedPosition]) -> tuple[int, list[int]]:
         """Tell a camera where somebody is, and that this is who; its tracker goes by that, also in the past.
 
         Returns:
             How many of the places the camera is told, and the flags that are followed by that; none: they are
             forgotten, or the camera has not shown this person since.
         """
-        said = pointings(self._people, camera, number, places)
+        said = corrections_for_tracker(self._people, camera, number, places)
         if said is None:
             return 0, []
         self._send(camera, msgspec.json.encode(said))
         self.points += len(said.points)
         return len(said.points), self.flags.pointed(number, camera, [it.pulse for it in said.points])
 
-    def _foreseen(self, epoch: Epoch) -> Iterator[Foreseen]:
+    def _foreseen(self, epoch: Epoch) -> Iterator[RiskEvent]:
         """Give the troubles of an epoch whose people all have a number."""
         for camera, message in epoch.tracks.items():
             for trouble in message.troubles:
                 whose = [self._people.whose(camera, message.boot, it, message.last) for it in trouble.tracks]
                 known = tuple(dict.fromkeys(number for number in whose if number is not None))
                 if known and len(known) == len(whose):
-                    yield Foreseen(camera, known, trouble.reason, trouble.pulse, trouble.margin, trouble.risk)
+                    yield RiskEvent(
+                        camera, known, trouble.reason, trouble.pulse, trouble.margin, trouble.risk
+                    )

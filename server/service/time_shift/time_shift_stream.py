@@ -9,13 +9,12 @@ from dataclasses import dataclass
 
 from server.media.audio.audio_chunk import Heard
 from server.media.picture import Picture
-from server.service.recording.past_presence import Shown, shown_of
-from server.service.recording.playback import Source, play
-from server.service.recording.playback_audio import Hearing
-from server.service.streaming.broadcaster import Channel
-from server.service.streaming.media_chunk import Footage
-from server.service.streaming.timeline import LONGEST_S, Timeline
-from server.service.streaming.ts_continuity import Tally
+from server.service.streaming.broadcaster import Broadcaster
+from server.service.streaming.gapless_timeline import LONGEST_GAP_S, GaplessTimeline
+from server.service.streaming.media_chunk import MediaChunk, TsContinuity
+from server.service.time_shift.playback import PlaybackSource, play_gops
+from server.service.time_shift.playback_audio import PlaybackAudio
+from server.service.time_shift.presence_history import VisiblePictures, visible_pictures
 
 _LEAD_S = 4.0
 """Seconds of the past that are sent at once: what a player likes to have before it begins."""
@@ -26,14 +25,14 @@ _LATE_S = 1.0
 
 
 @dataclass(frozen=True, slots=True)
-class Wish:
+class PlaybackRange:
     """What somebody wants to see: pulses ``start … end - 1``; without an end it goes on with the present."""
 
     start: int
     end: int | None = None
 
 
-class PastStream:
+class TimeShiftStream:
     """One viewer's stream, without a hole in its time.
 
     ``live`` gives the stream's channel when the present is reached; None: there is none any more. ``hearing``
@@ -42,26 +41,26 @@ class PastStream:
 
     def __init__(
         self,
-        source: Source,
-        timeline: Timeline,
+        source: PlaybackSource,
+        timeline: GaplessTimeline,
         fps: float,
-        live: Callable[[], Channel | None],
-        hearing: Hearing | None = None,
+        live: Callable[[], Broadcaster | None],
+        hearing: PlaybackAudio | None = None,
     ) -> None:
         self._source, self._timeline, self._fps, self._live = source, timeline, fps, live
         self._hearing = hearing
-        self._tally = Tally(fps)
+        self._tally = TsContinuity(fps)
 
-    async def send(self, wish: Wish) -> AsyncGenerator[Footage, None]:
+    async def send(self, wish: PlaybackRange) -> AsyncGenerator[MediaChunk, None]:
         """Give the past in real time after its first seconds; where it has an end, as fast as it is read."""
-        at, pace = wish.start, _Pace(_LEAD_S)
-        async with aclosing(play(self._source, wish.start)) as gops:
+        at, pace = wish.start, _RealTimePacer(_LEAD_S)
+        async with aclosing(play_gops(self._source, wish.start)) as gops:
             async for gop in gops:
                 if wish.end is not None and gop.first >= wish.end:
                     return
-                came = await shown_of(gop, self._source, self._timeline.agreement, self._fps)
+                came = await visible_pictures(gop, self._source, self._timeline.agreement, self._fps)
                 pictures = [it for it in came.pictures if wish.end is None or it.pulse < wish.end]
-                for shown in self._shown(Shown(pictures, came.silent)):
+                for shown in self._shown(VisiblePictures(pictures, came.silent)):
                     footage = await self._recalled(shown)
                     if wish.end is None:
                         await pace.wait((footage.until - footage.first) / self._fps)
@@ -75,12 +74,14 @@ class PastStream:
                 async for footage in joined:
                     yield footage
 
-    async def _joined(self, channel: Channel, at: int, end: int | None) -> AsyncGenerator[Footage, None]:
+    async def _joined(
+        self, channel: Broadcaster, at: int, end: int | None
+    ) -> AsyncGenerator[MediaChunk, None]:
         viewer = channel.join()
         begun = False
         try:
             async for piece in viewer.pieces():
-                came = piece.pictures if isinstance(piece, Footage) else ()
+                came = piece.pictures if isinstance(piece, MediaChunk) else ()
                 pictures = [it for it in came if begun or it.pulse >= at]
                 if not pictures:
                     continue
@@ -91,48 +92,48 @@ class PastStream:
                         yield await self._recalled(shown)
                     begun = True
                 if pictures:
-                    yield self._present(pictures, silent=isinstance(piece, Footage) and piece.silent)
+                    yield self._present(pictures, silent=isinstance(piece, MediaChunk) and piece.silent)
                 if over:
                     return
         finally:
             channel.leave(viewer)
 
-    def _shown(self, gop: Shown) -> Iterator[Shown]:
+    def _shown(self, gop: VisiblePictures) -> Iterator[VisiblePictures]:
         """Give a GOP's pictures as they can be shown, behind what repeats the picture before them."""
         if not gop.pictures:
             return
         yield from self._bridged(gop.pictures[0].pulse)
         shown = [it for picture in gop.pictures for it in self._timeline.take(picture)]
         if shown:
-            yield Shown(shown, gop.silent)
+            yield VisiblePictures(shown, gop.silent)
 
-    def _bridged(self, until: int) -> Iterator[Shown]:
+    def _bridged(self, until: int) -> Iterator[VisiblePictures]:
         """Repeat the last picture up to a pulse, a few seconds at a time: sound goes on meanwhile.
 
         Not for who may see one person alone, of whom nothing was kept then.
         """
         most = round(_BRIDGED_S * self._fps)
-        while (at := self._timeline.until) is not None and at < until <= at + LONGEST_S * self._fps:
+        while (at := self._timeline.until) is not None and at < until <= at + LONGEST_GAP_S * self._fps:
             shown = self._timeline.fill(min(until, at + most))
             if not shown:
                 return
-            yield Shown(shown, silent=self._source.presence is not None)
+            yield VisiblePictures(shown, silent=self._source.presence is not None)
 
-    async def _recalled(self, shown: Shown) -> Footage:
+    async def _recalled(self, shown: VisiblePictures) -> MediaChunk:
         hearing, first, until = self._hearing, shown.pictures[0].pulse, shown.pictures[-1].until
         heard = None if hearing is None else await hearing.beside(first, until)
         return self._footage(shown.pictures, heard, silent=shown.silent)
 
-    def _present(self, pictures: list[Picture], *, silent: bool) -> Footage:
+    def _present(self, pictures: list[Picture], *, silent: bool) -> MediaChunk:
         hearing, first, until = self._hearing, pictures[0].pulse, pictures[-1].until
         heard = None if hearing is None else hearing.live(first, until)
         return self._footage(pictures, heard, silent=silent)
 
-    def _footage(self, pictures: list[Picture], heard: Heard | None, *, silent: bool) -> Footage:
+    def _footage(self, pictures: list[Picture], heard: Heard | None, *, silent: bool) -> MediaChunk:
         return self._tally.footage(pictures, heard.silenced if silent and heard is not None else heard)
 
 
-class _Pace:
+class _RealTimePacer:
     """Lets ``lead_s`` seconds of media through at once, the rest in real time."""
 
     def __init__(self, lead_s: float) -> None:

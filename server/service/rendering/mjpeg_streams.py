@@ -6,9 +6,43 @@ from collections import deque
 from dataclasses import dataclass
 
 from server.media.rendering_messages import Canvas, Drawn, Jpeg, belongs
-from server.service.rendering.multipart_jpeg import part
-from server.service.rendering.pacing import Pace
-from server.service.streaming.broadcaster import Channel, Chunk, Viewer
+from server.service.streaming.broadcaster import Broadcaster, BytesChunk, Subscriber
+
+
+class PicturePacer:
+    """Gives pictures their moments. ``most`` is how many seconds a picture is kept back at the longest."""
+
+    def __init__(self, fps: float, most: float) -> None:
+        self._fps, self._most = fps, most
+        self._zero: float | None = None
+
+    def due(self, pulse: int, now: float) -> float:
+        """Give the moment, in the seconds of ``now``, which rises: as long after the last as pulses tell.
+
+        A picture that comes too late is shown now, and what follows is later by as much. What would have to
+        wait too long, since what lay between did not come, is shown now, and what follows is earlier.
+        """
+        after = pulse / self._fps
+        if self._zero is None or not now <= self._zero + after <= now + self._most:
+            self._zero = now - after
+        return self._zero + after
+
+
+CONTENT_TYPE = "multipart/x-mixed-replace; boundary=picture"
+FIRST_BOUNDARY = b"--picture\r\n"
+"""What the answer begins with."""
+PULSE_HEADER = "X-MyView-Pulse"
+
+
+def multipart_part(picture: Jpeg) -> bytes:
+    """Give one picture with the boundary that ends it: browsers show it only when they have seen that."""
+    head = [
+        "Content-Type: image/jpeg",
+        f"Content-Length: {len(picture.data)}",
+        f"{PULSE_HEADER}: {picture.pulse}",
+    ]
+    return "\r\n".join([*head, "", ""]).encode("ascii") + picture.data + b"\r\n" + FIRST_BOUNDARY
+
 
 _NEWEST = 1
 """A viewer has one picture waiting at the most: the newest."""
@@ -17,7 +51,7 @@ _KEPT_GOPS = 2
 
 
 @dataclass(frozen=True, slots=True)
-class Series:
+class MjpegVariant:
     """Pictures at one rate."""
 
     rate: float
@@ -26,7 +60,7 @@ class Series:
 
 
 @dataclass(frozen=True, slots=True)
-class Due:
+class _ScheduledPicture:
     """A picture and its moment."""
 
     at: float
@@ -34,14 +68,16 @@ class Due:
     boxed: bool
 
 
-class AllSeries:
+class MjpegStreams:
     """All series of one stream. ``live`` pictures are shown as they come, others in pace."""
 
     def __init__(self, canvas: Canvas, *, live: bool) -> None:
         self._fps, self._live = canvas.fps, live
-        self._pace = Pace(canvas.fps, _KEPT_GOPS * canvas.gop / canvas.fps)
-        self._waiting: deque[Due] = deque(maxlen=4 * _KEPT_GOPS * canvas.gop)  # more than the pace keeps
-        self._channels: dict[Series, Channel] = {}
+        self._pace = PicturePacer(canvas.fps, _KEPT_GOPS * canvas.gop / canvas.fps)
+        self._waiting: deque[_ScheduledPicture] = deque(
+            maxlen=4 * _KEPT_GOPS * canvas.gop
+        )  # more than the pace keeps
+        self._channels: dict[MjpegVariant, Broadcaster] = {}
         self._last = -1
         self._closed = False
 
@@ -50,14 +86,14 @@ class AllSeries:
         """How many are watching."""
         return sum(channel.viewers for channel in self._channels.values())
 
-    def join(self, series: Series) -> Viewer:
+    def join(self, series: MjpegVariant) -> Subscriber:
         """Let a viewer in; call :meth:`leave` in the end."""
-        channel = self._channels.setdefault(series, Channel(queue_starts=_NEWEST))
+        channel = self._channels.setdefault(series, Broadcaster(queue_starts=_NEWEST))
         if self._closed:
             channel.close()
         return channel.join()
 
-    def leave(self, series: Series, viewer: Viewer) -> None:
+    def leave(self, series: MjpegVariant, viewer: Subscriber) -> None:
         """Let a viewer go."""
         self._channels[series].leave(viewer)
         if not self._channels[series].viewers:
@@ -73,14 +109,14 @@ class AllSeries:
         for picture, boxed in sorted(pictures, key=lambda it: it[0].pulse):
             if picture.pulse > self._last:
                 at = now if self._live else self._pace.due(picture.pulse, now)
-                self._waiting.append(Due(at, picture, boxed))
+                self._waiting.append(_ScheduledPicture(at, picture, boxed))
         self._last = max(self._last, drawn.newest)
 
     def show(self, now: float) -> float | None:
         """Pass on what is due; give the moment of the next picture, None where none waits."""
         while self._waiting and self._waiting[0].at <= now:
             due = self._waiting.popleft()
-            chunk = Chunk(part(due.picture), start=True)
+            chunk = BytesChunk(multipart_part(due.picture), start=True)
             for series, channel in self._channels.items():
                 if series.boxed is due.boxed and belongs(due.picture.pulse, series.rate, self._fps):
                     channel.publish(chunk)

@@ -11,13 +11,13 @@ from server.media.h264.annexb import nal_units, parameter_sets, sample
 from server.media.picture import Picture
 from server.media.rendering_messages import Canvas, Unit
 from server.media.stream_format import Agreement
-from server.service.streaming.audio_buffer import Following, SoundShelf
-from server.service.streaming.broadcaster import Channel
-from server.service.streaming.timeline import Timeline
-from server.service.streaming.ts_continuity import Tally
+from server.service.streaming.audio_buffer import AudioBuffer, AudioFollower
+from server.service.streaming.broadcaster import Broadcaster
+from server.service.streaming.gapless_timeline import GaplessTimeline
+from server.service.streaming.media_chunk import TsContinuity
 
 
-class Film:
+class OverlayVideo:
     """Takes frames as they are encoded. Processes come and go: its time has no hole and never goes back.
 
     ``sound`` is None at a site without; ``silent_holes``: it is not heard while a hole is bridged.
@@ -27,18 +27,18 @@ class Film:
         self,
         canvas: Canvas,
         queue_gops: int,
-        sound: SoundShelf | None = None,
+        sound: AudioBuffer | None = None,
         *,
         silent_holes: bool = False,
     ) -> None:
-        self._canvas, self._tally = canvas, Tally(canvas.fps)
+        self._canvas, self._tally = canvas, TsContinuity(canvas.fps)
         self._format = None if sound is None else sound.format
-        self._sound = None if sound is None else Following(sound)
+        self._sound = None if sound is None else AudioFollower(sound)
         self._silent_holes = silent_holes
         self._agreement = Agreement()
-        self._time = Timeline(self._agreement, canvas.fps, canvas.gop)
+        self._time = GaplessTimeline(self._agreement, canvas.fps, canvas.gop)
         self._process = 0
-        self.channel = Channel(queue_starts=queue_gops)
+        self.channel = Broadcaster(queue_starts=queue_gops)
         self.wanted = 0
         """How many watch, or wait for its beginning."""
         self.head: bytes | None = None

@@ -8,23 +8,24 @@ from server.media.containers.mpegts import Counters
 from server.media.h264.annexb import ParameterSets
 from server.media.picture import Picture
 from server.media.stream_format import Agreement
-from server.service.streaming.audio_buffer import Following, SoundShelf
-from server.service.streaming.broadcaster import Channel
-from server.service.streaming.frame_buffer import Shelf
-from server.service.streaming.hls_segmenter import Reel
-from server.service.streaming.media_chunk import Footage
+from server.service.streaming.audio_buffer import AudioBuffer, AudioFollower
+from server.service.streaming.broadcaster import Broadcaster
+from server.service.streaming.frame_buffer import FrameBuffer
+from server.service.streaming.gapless_timeline import GaplessTimeline
+from server.service.streaming.hls_segmenter import HlsSegmenter
+from server.service.streaming.media_chunk import MediaChunk, TsContinuity
 from server.service.streaming.presence import Presence
-from server.service.streaming.timeline import Timeline
-from server.service.streaming.ts_continuity import Tally
 
 
 class LiveStream:
     """A camera's own stream: every picture at once."""
 
-    def __init__(self, channel: Channel, time: Timeline, fps: float, sound: SoundShelf | None = None) -> None:
+    def __init__(
+        self, channel: Broadcaster, time: GaplessTimeline, fps: float, sound: AudioBuffer | None = None
+    ) -> None:
         self.channel = channel
-        self._time, self._tally = time, Tally(fps)
-        self._sound = None if sound is None else Following(sound)
+        self._time, self._tally = time, TsContinuity(fps)
+        self._sound = None if sound is None else AudioFollower(sound)
 
     def take(self, frame: Picture) -> None:
         """Send a picture, after what bridges a hole before it."""
@@ -42,14 +43,14 @@ class LiveStream:
         self.channel.publish(self._tally.footage(pictures, heard, fills=fills))
 
 
-class Showing:
+class GopSequencer:
     """What one stream shows, GOP after GOP, each of one camera: there is no hole in its time."""
 
-    def __init__(self, time: Timeline) -> None:
+    def __init__(self, time: GaplessTimeline) -> None:
         self._time = time
         self._camera: str | None = None
 
-    def show(self, camera: str | None, gop: Gop) -> list[Footage]:
+    def show(self, camera: str | None, gop: GopAssembler) -> list[MediaChunk]:
         """Give a camera's GOP, or what bridges it where it is not whole or there is none."""
         before = self._time.fill(gop.first)
         shown = [gop.footage(before)] if before else []
@@ -63,14 +64,14 @@ class Showing:
         pictures += self._time.fill(gop.until)
         return [*shown, gop.footage(pictures)] if pictures else shown
 
-    def hold(self, gop: Gop) -> list[Footage]:
+    def hold(self, gop: GopAssembler) -> list[MediaChunk]:
         """Return what repeats the last picture for a GOP; a grey GOP where it cannot be repeated."""
         self._camera = None  # whatever comes of it late is not for this stream any more
         before, held = self._time.fill(gop.first), self._time.fill(gop.until)
         shown = [gop.footage(it, silent=True) for it in (before, held) if it]
         return shown if held else [*shown, *self.blank(gop)]
 
-    def blank(self, gop: Gop) -> list[Footage]:
+    def blank(self, gop: GopAssembler) -> list[MediaChunk]:
         """Return a grey GOP, after what bridges a hole before it."""
         self._camera = None
         before = self._time.fill(gop.first)
@@ -82,17 +83,17 @@ class Showing:
         return [*shown, grey]
 
 
-class DecidedStream:
+class SplicedStream:
     """A stream of whole GOPs, each of one camera; those that many streams show are put together once.
 
     ``reel`` keeps the newest of them.
     """
 
-    def __init__(self, channel: Channel, time: Timeline, reel: Reel) -> None:
+    def __init__(self, channel: Broadcaster, time: GaplessTimeline, reel: HlsSegmenter) -> None:
         self.channel, self.reel = channel, reel
-        self._showing = Showing(time)
+        self._showing = GopSequencer(time)
 
-    def show(self, camera: str | None, gop: Gop, presence: Presence = Presence.PRESENT) -> None:
+    def show(self, camera: str | None, gop: GopAssembler, presence: Presence = Presence.PRESENT) -> None:
         """Send a camera's GOP, or what bridges it where it is not whole or there is none.
 
         Who is not present is not shown: the last picture stands, or grey.
@@ -114,30 +115,30 @@ class DecidedStream:
         self.channel.close()
 
 
-class Gop:
+class GopAssembler:
     """What the cameras have of the frames ``first … first + frames - 1``; ``tables`` counts GOPs."""
 
     def __init__(
         self,
-        shelves: Mapping[str, Shelf],
+        shelves: Mapping[str, FrameBuffer],
         first: int,
         frames: int,
         fps: float,
         tables: int,
-        sound: SoundShelf | None = None,
+        sound: AudioBuffer | None = None,
     ) -> None:
         self._sound = sound
         self._heard = None if sound is None else sound.between(first, first + frames)
         self.first, self.until = first, first + frames
         self._shelves, self._fps, self._tables = shelves, fps, tables
-        self._whole: dict[str, Footage | None] = {}
-        self._grey: dict[ParameterSets | None, Footage | None] = {}
+        self._whole: dict[str, MediaChunk | None] = {}
+        self._grey: dict[ParameterSets | None, MediaChunk | None] = {}
 
     def pictures(self, camera: str) -> list[Picture]:
         """Give the pictures that have come."""
         return self._shelves[camera].pictures(self.first, self.until - self.first)
 
-    def whole(self, camera: str) -> Footage | None:
+    def whole(self, camera: str) -> MediaChunk | None:
         """Give a camera's GOP, the same to all who ask; None where a picture is missing."""
         if camera not in self._whole:
             pictures = self.pictures(camera)
@@ -145,7 +146,7 @@ class Gop:
             self._whole[camera] = self.footage(pictures) if is_whole else None
         return self._whole[camera]
 
-    def blank(self, agreement: Agreement, newest: Picture | None) -> Footage | None:
+    def blank(self, agreement: Agreement, newest: Picture | None) -> MediaChunk | None:
         """Return a grey GOP that fits after a picture, the same to all of one format; None: there is none."""
         form = None if newest is None else newest.parameters
         if form not in self._grey:
@@ -153,7 +154,7 @@ class Gop:
             self._grey[form] = self.footage(pictures, silent=True) if pictures else None
         return self._grey[form]
 
-    def footage(self, pictures: list[Picture], *, silent: bool = False) -> Footage:
+    def footage(self, pictures: list[Picture], *, silent: bool = False) -> MediaChunk:
         """Put pictures of these frames together; where they are ``silent``, without the site's sound."""
         first, until = pictures[0].pulse, pictures[-1].until
         heard = self._heard  # of all its frames, shared by all who show them
@@ -162,4 +163,4 @@ class Gop:
         if silent and heard is not None:
             heard = heard.silenced
         fills, counters = not pictures[0].key, Counters(self._tables)
-        return Footage(pictures, self._fps, counters, fills=fills, heard=heard, silent=silent)
+        return MediaChunk(pictures, self._fps, counters, fills=fills, heard=heard, silent=silent)

@@ -6,17 +6,60 @@ import asyncio
 import contextlib
 import logging
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from camsync import Spell
 from server.media.rendering_messages import Canvas, Draw, Jpeg, Still
-from server.service.rendering.decided_boxes import Told
-from server.service.rendering.jpeg_series import AllSeries
-from server.service.rendering.overlay_film import Film
-from server.service.rendering.stills import Stills
-from server.service.rendering.worker_process import DrawProcess, ProcessDiedError
-from server.service.streaming.audio_buffer import SoundShelf
-from server.service.streaming.broadcaster import Channel, Piece, Viewer
-from server.service.streaming.media_chunk import Footage
+from server.service.rendering.decided_boxes import GopOverlay
+from server.service.rendering.mjpeg_streams import MjpegStreams
+from server.service.rendering.overlay_video import OverlayVideo
+from server.service.rendering.worker_process import RenderWorker, WorkerDiedError
+from server.service.streaming.audio_buffer import AudioBuffer
+from server.service.streaming.broadcaster import Broadcaster, Chunk, Subscriber
+from server.service.streaming.media_chunk import MediaChunk
+
+
+@dataclass(slots=True)
+class _StillRequest:
+    pulse: int
+    given: asyncio.Event
+    picture: Jpeg | None = None
+
+
+class StillRequests:
+    """Who waits for a picture with boxes or without, and from which frame on it is new enough."""
+
+    def __init__(self) -> None:
+        self._wishes: dict[Still, _StillRequest] = {}
+        self.asked = asyncio.Event()
+        """Somebody has asked since it was cleared."""
+
+    async def get(self, kind: Still, pulse: int) -> Jpeg | None:
+        """Wait for a picture of this frame or a newer one; None: there will be none."""
+        while True:
+            wish = self._wishes.get(kind)
+            if wish is None:
+                wish = self._wishes[kind] = _StillRequest(pulse, asyncio.Event())
+            self.asked.set()
+            await wish.given.wait()
+            if wish.picture is None or wish.picture.pulse >= pulse:
+                return wish.picture  # else it was good enough for who has asked before
+
+    def possible(self, newest: int) -> list[Still]:
+        """List what can be given when ``newest`` is the newest frame."""
+        return [kind for kind, wish in self._wishes.items() if wish.pulse <= newest]
+
+    def give(self, kind: Still, picture: Jpeg | None) -> None:
+        """Give everybody their picture."""
+        wish = self._wishes.pop(kind)
+        wish.picture = picture
+        wish.given.set()
+
+    def close(self) -> None:
+        """Tell everybody who waits that there will be none."""
+        for kind in list(self._wishes):
+            self.give(kind, None)
+
 
 log = logging.getLogger(__name__)
 
@@ -25,11 +68,11 @@ _PATIENCE_S = 8.0
 """How long somebody waits for a first picture: a process may have to start, and even to be replaced."""
 
 
-class NoPictureError(Exception):
+class PictureTimeoutError(Exception):
     """No picture came in time."""
 
 
-class Source:
+class RenderedStream:
     """Decodes one stream while somebody uses it; what is made of it outlives the process that makes it.
 
     A slow process is a slow viewer: it loses whole GOPs, and nobody waits for it. ``told`` gives the boxes of
@@ -40,20 +83,20 @@ class Source:
     def __init__(
         self,
         name: str,
-        stream: Channel,
-        told: Callable[[bytes], Told],
+        stream: Broadcaster,
+        told: Callable[[bytes], GopOverlay],
         canvas: Canvas,
         *,
         live: bool,
         queue_gops: int,
-        sound: SoundShelf | None = None,
+        sound: AudioBuffer | None = None,
         silent_holes: bool = False,
     ) -> None:
         self._name, self._stream, self._told, self._canvas = name, stream, told, canvas
         self._live, self._queue_gops, self._sound = live, queue_gops, sound
         self._silent_holes = silent_holes
         self._begin()
-        self._stills = Stills()
+        self._stills = StillRequests()
         self._used = asyncio.Event()
         self._shown = asyncio.Event()
         self.newest = -1
@@ -61,7 +104,7 @@ class Source:
         self._answered = False
         self.users = 0
         self.restarts = 0
-        self._viewer: Viewer | None = None
+        self._viewer: Subscriber | None = None
         self._lost = 0
         self._dies = Spell()
         self.pid: int | None = None
@@ -100,7 +143,7 @@ class Source:
                 picture = await self._stills.get(kind, pulse)
                 if picture is not None:
                     return picture
-        raise NoPictureError
+        raise PictureTimeoutError
 
     async def film_head(self) -> bytes:
         """Give what the film begins with, when its first frames are there.
@@ -111,7 +154,7 @@ class Source:
         with contextlib.suppress(TimeoutError):
             await asyncio.wait_for(self.film.begun.wait(), _PATIENCE_S)
         if self.film.head is None:
-            raise NoPictureError
+            raise PictureTimeoutError
         return self.film.head
 
     async def run(self) -> None:
@@ -129,7 +172,7 @@ class Source:
         while True:
             try:
                 await self._run_process()
-            except ProcessDiedError as error:
+            except WorkerDiedError as error:
                 pause = _RETRY_FIRST_S if self._answered else min(2 * pause, _RETRY_MAX_S)
                 if (more := self._dies.happened(str(error))) is not None:
                     told = "drawing %s: the process %s%s; starting another"
@@ -148,12 +191,12 @@ class Source:
 
     def _begin(self) -> None:
         """Begin anew what is made of it: whoever comes must not be shown what others saw before."""
-        self.film = Film(self._canvas, self._queue_gops, self._sound, silent_holes=self._silent_holes)
-        self.series = AllSeries(self._canvas, live=self._live)
+        self.film = OverlayVideo(self._canvas, self._queue_gops, self._sound, silent_holes=self._silent_holes)
+        self.series = MjpegStreams(self._canvas, live=self._live)
 
     async def _run_process(self) -> None:
         self.newest, self._answered = -1, False
-        process = await DrawProcess.start(self._canvas)
+        process = await RenderWorker.start(self._canvas)
         self.pid = process.pid
         works = (self._feed(process), self._give_stills(process), process.watch())
         tasks = [asyncio.create_task(work) for work in works]
@@ -168,7 +211,7 @@ class Source:
             self.pid = None
             await asyncio.gather(*tasks, return_exceptions=True)
 
-    async def _feed(self, process: DrawProcess) -> None:
+    async def _feed(self, process: RenderWorker) -> None:
         """Draw what comes, while somebody wants it, until the stream ends."""
         while True:
             await self._used.wait()
@@ -184,7 +227,7 @@ class Source:
                 self._stream.leave(viewer)
                 self._lost, self._viewer = self.lost, None
 
-    async def _draw(self, process: DrawProcess, piece: Piece) -> None:
+    async def _draw(self, process: RenderWorker, piece: Chunk) -> None:
         fragments = piece.data
         told = self._told(fragments)
         drawn = await process.ask(
@@ -199,12 +242,12 @@ class Source:
             )
         )
         self.newest, self._answered = drawn.newest, True
-        self.film.put(drawn.film, silent=isinstance(piece, Footage) and piece.silent)
+        self.film.put(drawn.film, silent=isinstance(piece, MediaChunk) and piece.silent)
         self.series.put(drawn, asyncio.get_running_loop().time())
         self._shown.set()
         self._stills.asked.set()
 
-    async def _give_stills(self, process: DrawProcess) -> None:
+    async def _give_stills(self, process: RenderWorker) -> None:
         while True:
             await self._stills.asked.wait()
             self._stills.asked.clear()

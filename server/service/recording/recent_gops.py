@@ -6,14 +6,14 @@ from collections import deque
 from collections.abc import Mapping
 
 from server.messaging.messages import GopChoices
-from server.service.recording.media_files import Gop
-from server.service.streaming.frame_buffer import Shelf
+from server.service.recording.media_files import RecordedGop
+from server.service.streaming.frame_buffer import FrameBuffer
 
 
-class Recent:
+class RecentGops:
     """Finds GOPs on the shelves, of cameras and of people. ``gop`` is the length of a GOP in frames."""
 
-    def __init__(self, shelves: Mapping[str, Shelf], gop: int, frames: int) -> None:
+    def __init__(self, shelves: Mapping[str, FrameBuffer], gop: int, frames: int) -> None:
         self._shelves, self._gop, self._frames = shelves, gop, frames
         self._choices: deque[GopChoices] = deque()
 
@@ -38,22 +38,22 @@ class Recent:
         """Give the decisions about a pulse and those after it."""
         return [it for it in self._choices if it.first + it.frames > pulse]
 
-    def of_object(self, number: int, pulse: int) -> Gop | None:
+    def of_object(self, number: int, pulse: int) -> RecordedGop | None:
         """Give somebody's GOP that holds a pulse, or the next one; None where nothing follows."""
         followed = (it for it in self._choices if it.first + it.frames > pulse)
         return next((gop for it in followed if (gop := self._whole(number, it)) is not None), None)
 
-    def of_object_before(self, number: int, pulse: int) -> Gop | None:
+    def of_object_before(self, number: int, pulse: int) -> RecordedGop | None:
         """Give somebody's last GOP that ends before a pulse; None where there is none."""
         before = (it for it in reversed(self._choices) if it.first + it.frames <= pulse)
         return next((gop for it in before if (gop := self._whole(number, it)) is not None), None)
 
-    def _whole(self, number: int, choices: GopChoices) -> Gop | None:
+    def _whole(self, number: int, choices: GopChoices) -> RecordedGop | None:
         camera = choices.choices.get(number)
         gop = None if camera is None else self.delivered(camera, choices.first, choices.frames)
         return gop if gop is not None and len(gop.fragments) == choices.frames else None
 
-    def of_camera(self, camera: str, pulse: int) -> Gop | None:
+    def of_camera(self, camera: str, pulse: int) -> RecordedGop | None:
         """Give a camera's GOP that holds a pulse, or the next one, as far as it has come."""
         shelf = self._shelves[camera]
         earliest = max(pulse, shelf.newest - self._frames)
@@ -63,17 +63,17 @@ class Recent:
                 return gop
         return None
 
-    def of_camera_before(self, camera: str, pulse: int) -> Gop | None:
+    def of_camera_before(self, camera: str, pulse: int) -> RecordedGop | None:
         """Give a camera's last GOP that begins before a pulse, up to there; None where there is none."""
         newest = self._shelves[camera].newest
         begin = (min(pulse, newest + 1) - 1) // self._gop * self._gop
         for first in range(begin, max(-1, newest - self._frames), -self._gop):
             gop = self.delivered(camera, first, self._gop)
             if gop is not None:
-                return Gop(gop.first, gop.fragments[: pulse - gop.first])
+                return RecordedGop(gop.first, gop.fragments[: pulse - gop.first])
         return None
 
-    def delivered(self, camera: str, first: int, frames: int) -> Gop | None:
+    def delivered(self, camera: str, first: int, frames: int) -> RecordedGop | None:
         """Give what a camera delivered of a GOP up to the first missing frame; None: not even that."""
         found: list[bytes] = []
         for pulse in range(first, first + frames):
@@ -81,4 +81,4 @@ class Recent:
             if frame is None or (not found and not frame.key):
                 break
             found.append(frame.fragment)
-        return Gop(first, tuple(found)) if found else None
+        return RecordedGop(first, tuple(found)) if found else None

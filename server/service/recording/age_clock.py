@@ -34,7 +34,7 @@ from server.system.private_files import write_private
 
 log = logging.getLogger(__name__)
 
-LEDGER = "clock.json"
+STATE_FILE = "clock.json"
 _BOOT_ID = Path("/proc/sys/kernel/random/boot_id")
 _TRIAL_S = 600.0
 """For so long the machine's clock has not jumped before it counts."""
@@ -73,7 +73,7 @@ class MachineClocks:
     """Whether somebody keeps the first one right."""
 
 
-class Ledger(msgspec.Struct, frozen=True, kw_only=True):
+class AgeClockState(msgspec.Struct, frozen=True, kw_only=True):
     """What ``clock.json`` says: the recording's clock, and the machine's clocks at that moment."""
 
     id: Annotated[str, msgspec.Meta(min_length=1, max_length=64)]
@@ -93,7 +93,7 @@ class AgeClock:
 
     def __init__(self, folder: Path, machine: MachineClocks, *, trusted: bool) -> None:
         self.id = ""
-        self._path, self._machine, self._trusted = folder / LEDGER, machine, trusted
+        self._path, self._machine, self._trusted = folder / STATE_FILE, machine, trusted
         self._seconds, self._at = 0.0, machine.steady()
         self._origin: float | None = None
         self.anchored = 0.0
@@ -109,7 +109,7 @@ class AgeClock:
         """Go on from what the ledger says; where there is none another clock begins."""
         machine, steady = self._machine, self._machine.steady()
         try:
-            ledger = msgspec.json.decode(self._path.read_bytes(), type=Ledger)
+            ledger = msgspec.json.decode(self._path.read_bytes(), type=AgeClockState)
         except (OSError, *DECODE_ERRORS):
             self.id = uuid.uuid4().hex
             self._seconds, self._at, self._origin, self.anchored = 0.0, steady, None, 0.0
@@ -173,7 +173,7 @@ class AgeClock:
             OSError: it cannot be written; it is as before.
         """
         machine = self._machine
-        ledger = Ledger(
+        ledger = AgeClockState(
             id=self.id,
             seconds=self.now,
             boot=machine.boot(),

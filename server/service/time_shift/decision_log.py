@@ -9,12 +9,12 @@ from pathlib import Path
 import msgspec
 
 from server.messaging.messages import DECODE_ERRORS, GopChoices
-from server.service.recording.disk_reads import from_disk
-from server.service.recording.recorder import Past
+from server.service.recording.media_files import run_in_reader_thread
+from server.service.recording.recorder import Recorder
 
 
 @dataclass(frozen=True, slots=True)
-class Said:
+class LoggedDecision:
     """What was said about one GOP."""
 
     choices: GopChoices
@@ -24,29 +24,29 @@ class Said:
     """As it is told; None: it is not on the disk yet."""
 
 
-async def said(past: Past, start: int, end: int) -> AsyncIterator[Said]:
+async def read_decisions(past: Recorder, start: int, end: int) -> AsyncIterator[LoggedDecision]:
     """Return what was said about pulses ``start … end - 1``, in order."""
     at, numbered = start, past.numbered
     for run in past.runs:
         name = run.folder.name.encode()
         for path in run.index_of(at, end):
-            for line, choices in await from_disk(_lines, path, at, end):
+            for line, choices in await run_in_reader_thread(_lines, path, at, end):
                 if run in numbered:
-                    yield Said(choices, line=line)
+                    yield LoggedDecision(choices, line=line)
                 else:
-                    yield Said(choices, is_numbered=False, line=b'{"run":"%b",' % name + line[1:])
+                    yield LoggedDecision(choices, is_numbered=False, line=b'{"run":"%b",' % name + line[1:])
                 at = choices.first + choices.frames
     for choices in past.recent.choices(at):
         if choices.first < end:
-            yield Said(choices)
+            yield LoggedDecision(choices)
 
 
-async def told(past: Past, start: int, end: int) -> AsyncIterator[bytes]:
+async def read_decision_lines(past: Recorder, start: int, end: int) -> AsyncIterator[bytes]:
     """Give the choices about pulses ``start … end - 1`` in order, each as a line of JSON (event ``gop``).
 
     What an earlier run has said has that run's name in it, where its numbers are other people's.
     """
-    async for it in said(past, start, end):
+    async for it in read_decisions(past, start, end):
         yield msgspec.json.encode(it.choices) + b"\n" if it.line is None else it.line
 
 

@@ -19,13 +19,18 @@ import msgspec
 from camsync import Spell
 from server.media.audio.audio_chunk import Heard
 from server.messaging.messages import GopChoices
-from server.service.recording.media_files import Gop, is_at
-from server.service.recording.open_segment import OpenSegment
-from server.service.recording.recording_age import AgeClock, MachineClocks
-from server.service.recording.recording_session import Headers, Run, RunHead, Segment
-from server.service.recording.retention import SHARE, Bounds, Retention
-from server.service.recording.session_discovery import date, find_runs
-from server.service.recording.session_files import clear
+from server.service.recording.age_clock import AgeClock, MachineClocks
+from server.service.recording.media_files import RecordedGop, is_same_file
+from server.service.recording.recording_session import (
+    InitSegments,
+    RecordingSegment,
+    RecordingSession,
+    SessionInfo,
+)
+from server.service.recording.retention import SEGMENTS_PER_DISK_QUOTA, RetentionLimits, RetentionPolicy
+from server.service.recording.segment_writer import SegmentWriter
+from server.service.recording.session_discovery import assign_age, find_sessions
+from server.service.recording.session_files import remove_session_files
 from server.system.private_files import make_private_folder, open_private
 
 log = logging.getLogger(__name__)
@@ -38,28 +43,28 @@ _MACHINE = MachineClocks()
 
 
 @dataclass(frozen=True, slots=True)
-class Piece:
+class GopRecord:
     """One decided GOP on its way to the disk."""
 
     choices: GopChoices
-    cameras: dict[str, Gop]
+    cameras: dict[str, RecordedGop]
     """What each camera delivered of it, from its first frame on."""
     heard: Heard | None = None
     """What is to be heard meanwhile; None at a site without sound."""
 
 
-class Store:
+class RecordingFolder:
     """Writes one run after the other, and takes away what is too old or too much."""
 
-    def __init__(self, folder: Path, bounds: Bounds, machine: MachineClocks = _MACHINE) -> None:
+    def __init__(self, folder: Path, bounds: RetentionLimits, machine: MachineClocks = _MACHINE) -> None:
         self.folder, self._bounds = folder, bounds
         self._clock = AgeClock(folder, machine, trusted=bounds.trust_clock)
-        self._retention = Retention(bounds, lambda: self._clock.now)
+        self._retention = RetentionPolicy(bounds, lambda: self._clock.now)
         self._lock: int | None = None
-        self.earlier: list[Run] = []
+        self.earlier: list[RecordingSession] = []
         """By age; never changed, but replaced: other threads look at it."""
-        self.run: Run | None = None
-        self._open: OpenSegment | None = None
+        self.run: RecordingSession | None = None
+        self._open: SegmentWriter | None = None
         self._end = 0
         self._closed_bytes = 0
         self._left, self._stuck = Spell(), Spell()
@@ -73,7 +78,7 @@ class Store:
         self._take()
         self._retain()
 
-    def write(self, piece: Piece, head: RunHead, headers: Headers) -> None:
+    def write(self, piece: GopRecord, head: SessionInfo, headers: InitSegments) -> None:
         """Write a GOP; ``head`` and ``headers`` are what a run begins with, if it has not begun.
 
         Where the run cannot be written on, but for want of room, another one is begun: its folder, or one in
@@ -115,7 +120,7 @@ class Store:
         """End the run; the playlists become short."""
         try:
             self._finish()
-            if self._lock is not None and is_at(self._lock, self.folder / _LOCK):
+            if self._lock is not None and is_same_file(self._lock, self.folder / _LOCK):
                 self._look_at_the_clock()
         finally:
             if self._lock is not None:
@@ -148,12 +153,12 @@ class Store:
         runs = [run for run in self.earlier if run.is_there]
         current = self.run if self.run is not None and self.run.is_there else None
         known = {run.folder for run in (*runs, current) if run is not None}
-        found = find_runs(self.folder, known, self._bounds.segment_s)
+        found = find_sessions(self.folder, known, self._bounds.segment_s)
         if not known:  # else it is their clock that goes
             self._clock.open()
         for run in found:
             if run.head.clock != self._clock.id:
-                date(run, self._clock)
+                assign_age(run, self._clock)
             run.stamp(self._clock.now)
         self.earlier = sorted(
             [*runs, *found], key=lambda run: run.segments[-1].written if run.segments else 0.0
@@ -165,7 +170,7 @@ class Store:
         Raises:
             OSError: it cannot be written; a BlockingIOError where another process records there.
         """
-        if self._lock is None or not is_at(self._lock, self.folder / _LOCK):
+        if self._lock is None or not is_same_file(self._lock, self.folder / _LOCK):
             self._take()
         if self.run is not None and not self.run.is_there:
             self._leave("it is not there any more")
@@ -194,7 +199,7 @@ class Store:
                 run.restore_head()
         self.earlier = [*self.earlier, run]
 
-    def _put(self, piece: Piece, head: RunHead, headers: Headers) -> None:
+    def _put(self, piece: GopRecord, head: SessionInfo, headers: InitSegments) -> None:
         first, now = piece.choices.first, self._clock.now
         if self._begins(first):
             dated = msgspec.structs.replace(head, clock=self._clock.id, clock0=now - first / head.fps)
@@ -204,7 +209,7 @@ class Store:
         if run.head.numbers_since != head.numbers_since:
             run.number_since(head.numbers_since)
         if self._open is None:
-            self._open = OpenSegment(run, Segment(first, 0, now), headers)
+            self._open = SegmentWriter(run, RecordingSegment(first, 0, now), headers)
             run.segments.append(self._open.segment)
         self._open.write(piece.choices, piece.cameras, piece.heard, now)
         self._end = first + piece.choices.frames
@@ -213,29 +218,29 @@ class Store:
         """Tell whether a GOP is the first of a run: pulses may begin anew."""
         return self.run is None or first < self._end
 
-    def _begin(self, head: RunHead, headers: Headers, first: int) -> None:
+    def _begin(self, head: SessionInfo, headers: InitSegments, first: int) -> None:
         name = datetime.fromtimestamp(head.began, UTC).strftime("%Y%m%dT%H%M%SZ")
         taken = {it.name for it in self.folder.glob(f"{name}*")}
         if name in taken:
             name = next(it for number in range(1, len(taken) + 2) if (it := f"{name}-{number}") not in taken)
         folder = self.folder / name
         try:
-            begun = Run.begin(folder, head, headers, self._bounds.segment_s)
+            begun = RecordingSession.begin(folder, head, headers, self._bounds.segment_s)
         except FileExistsError:
             raise  # it is somebody else's
         except OSError:
-            clear(folder)
+            remove_session_files(folder)
             raise
         if self.run is not None:
             self.earlier = [*self.earlier, self.run]
         self.run, self._end = begun, first
         self._closed_bytes = sum(run.size for run in self.earlier)
 
-    def _is_full(self, segment: Segment, first: int) -> bool:
+    def _is_full(self, segment: RecordingSegment, first: int) -> bool:
         run = self.run
         assert run is not None  # noqa: S101 — a segment is of a run
         long_enough = first - segment.first >= self._bounds.segment_s * run.head.fps
-        return long_enough or segment.bytes * SHARE >= self._bounds.most_mb * _MEGA
+        return long_enough or segment.bytes * SEGMENTS_PER_DISK_QUOTA >= self._bounds.most_mb * _MEGA
 
     def _finish(self) -> None:
         """End the open segment; the playlists that have grown in it become short, if the disk takes it."""

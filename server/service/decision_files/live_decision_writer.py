@@ -8,14 +8,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from server.media.letterbox import Letterbox
-from server.service.decision_files.recorder import Recorder
+from server.service.decision_files.decision_writer import DecisionWriter
 from server.service.view_selection.decider import GopDecision
 
 log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
-class _Late:
+class _LateFrame:
     """A frame that did not count as it should have; what is said of it."""
 
     pulse: int
@@ -27,11 +27,11 @@ class _Late:
         return f"{self.pulse + 1},{self.camera},{self.what}\n"
 
 
-class LiveRecorder:
-    """Writes what :class:`~server.service.decision_files.recorder.Recorder` writes, and what came too late.
+class LiveDecisionWriter:
+    """Writes the files of a running site with a :class:`DecisionWriter`, and lists late frames in ``late.csv``.
 
-    A disk may be full for an hour. Nobody's stream ends for that: decisions are left out as wholes, and once
-    there is room again ``late.csv`` says of which frames.
+    A full disk does not end the streams: whole decisions are skipped until there is room again, and then
+    ``late.csv`` lists the frames that are missing.
     """
 
     def __init__(self, folder: Path, cameras: Sequence[str], fits: Mapping[str, Letterbox]) -> None:
@@ -41,14 +41,14 @@ class LiveRecorder:
             OSError: one cannot be written.
         """
         self._folder = folder
-        self._recorder = Recorder(folder, cameras, fits, private=True)
-        self._late: list[_Late] = []
+        self._recorder = DecisionWriter(folder, cameras, fits, private=True)
+        self._late: list[_LateFrame] = []
         self._missing = range(0)
         """Pulses of which nothing could be written, and ``late.csv`` does not say so yet."""
 
     def late(self, camera: str, pulses: Sequence[int], what: str) -> None:
         """Note frames that came too late to count; they are written with the next decision."""
-        self._late += (_Late(it, camera, what) for it in pulses)
+        self._late += (_LateFrame(it, camera, what) for it in pulses)
 
     def write(self, decision: GopDecision) -> None:
         """Write a decision, or leave it out."""

@@ -8,44 +8,43 @@ from dataclasses import dataclass
 from itertools import islice
 from typing import Protocol
 
-from server.service.recording.disk_reads import from_disk
-from server.service.recording.media_files import Gop, gops
-from server.service.recording.past_presence import PastPresence
-from server.service.recording.recorder import Past
-from server.service.recording.recording_session import Run
-from server.service.recording.segment_index import Stretch, Tape, View
+from server.service.recording.media_files import RecordedGop, read_gops, run_in_reader_thread
+from server.service.recording.recorder import Recorder
+from server.service.recording.recording_session import RecordingSession
+from server.service.recording.segment_index import CameraRange, IndexEntry, SegmentIndex
+from server.service.time_shift.presence_history import PresenceHistory
 
 _AT_ONCE = 8
 """GOPs read from the disk in one go."""
 
 
 @dataclass(frozen=True, slots=True)
-class Recorded:
+class SessionEntries:
     """What a run has recorded of a stream."""
 
-    run: Run
-    tape: Tape
+    run: RecordingSession
+    tape: SegmentIndex
 
 
-class Source(Protocol):
+class PlaybackSource(Protocol):
     """One stream's past."""
 
     @property
-    def presence(self) -> PastPresence | None:
+    def presence(self) -> PresenceHistory | None:
         """What it is shown by to who may see one person alone; None: all of it is shown."""
 
     @property
-    def recorded(self) -> Sequence[Recorded]:
+    def recorded(self) -> Sequence[SessionEntries]:
         """What there is of it on the disk."""
 
-    def recall(self, pulse: int) -> Gop | None:
+    def recall(self, pulse: int) -> RecordedGop | None:
         """Give the GOP in memory that holds a pulse, or the next one; None where nothing follows."""
 
-    def recall_before(self, pulse: int) -> Gop | None:
+    def recall_before(self, pulse: int) -> RecordedGop | None:
         """Give the last GOP in memory that ends before a pulse; None where there is none."""
 
     @property
-    def remembered(self) -> Sequence[View]:
+    def remembered(self) -> Sequence[CameraRange]:
         """What it shows in memory, by camera."""
 
     @property
@@ -54,40 +53,40 @@ class Source(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class ObjectPast:
+class PersonPlayback:
     """Somebody's past. ``numbers``: theirs now, and the one that was asked for."""
 
-    past: Past
+    past: Recorder
     numbers: tuple[int, ...]
-    presence: PastPresence | None = None
-    """As of :class:`Source`."""
+    presence: PresenceHistory | None = None
+    """As of :class:`PlaybackSource`."""
 
     @property
-    def recorded(self) -> Sequence[Recorded]:
+    def recorded(self) -> Sequence[SessionEntries]:
         """What there is of them on the disk: of no run whose numbers are other people's."""
         return [
-            Recorded(run, run.objects[number].tape)
+            SessionEntries(run, run.objects[number].tape)
             for run in self.past.numbered
             for number in self.numbers
             if number in run.objects
         ]
 
-    def recall(self, pulse: int) -> Gop | None:
+    def recall(self, pulse: int) -> RecordedGop | None:
         """Give their GOP in memory that holds a pulse, or the next one."""
         found = [gop for it in self.numbers if (gop := self.past.recent.of_object(it, pulse)) is not None]
         return min(found, key=lambda gop: gop.first, default=None)
 
-    def recall_before(self, pulse: int) -> Gop | None:
+    def recall_before(self, pulse: int) -> RecordedGop | None:
         """Give their last GOP in memory that ends before a pulse."""
         recent = self.past.recent
         found = [gop for it in self.numbers if (gop := recent.of_object_before(it, pulse)) is not None]
         return max(found, key=lambda gop: gop.first, default=None)
 
     @property
-    def remembered(self) -> Sequence[View]:
+    def remembered(self) -> Sequence[CameraRange]:
         """What was chosen for them, as far as it is remembered."""
         return [
-            View(it.choices[number], it.first, it.first + it.frames)
+            CameraRange(it.choices[number], it.first, it.first + it.frames)
             for it in self.past.recent.choices(0)
             for number in self.numbers
             if number in it.choices
@@ -100,34 +99,34 @@ class ObjectPast:
 
 
 @dataclass(frozen=True, slots=True)
-class CameraPast:
+class CameraPlayback:
     """A camera's past."""
 
-    past: Past
+    past: Recorder
     camera: str
     presence: None = None
 
     @property
-    def recorded(self) -> Sequence[Recorded]:
+    def recorded(self) -> Sequence[SessionEntries]:
         """What there is of it on the disk, also of earlier runs by the same pulses."""
         runs = [run for run in self.past.runs if self.camera in run.cameras]
-        return [Recorded(run, run.cameras[self.camera].tape) for run in runs]
+        return [SessionEntries(run, run.cameras[self.camera].tape) for run in runs]
 
-    def recall(self, pulse: int) -> Gop | None:
+    def recall(self, pulse: int) -> RecordedGop | None:
         """Give its GOP in memory that holds a pulse, or the next one, as far as it has come."""
         return self.past.recent.of_camera(self.camera, pulse)
 
-    def recall_before(self, pulse: int) -> Gop | None:
+    def recall_before(self, pulse: int) -> RecordedGop | None:
         """Give its last GOP in memory that ends before a pulse."""
         return self.past.recent.of_camera_before(self.camera, pulse)
 
     @property
-    def remembered(self) -> Sequence[View]:
+    def remembered(self) -> Sequence[CameraRange]:
         """What it delivered, as far as it is in memory."""
         found = []
         gop = self.recall(0)
         while gop is not None:
-            found.append(View(self.camera, gop.first, gop.end))
+            found.append(CameraRange(self.camera, gop.first, gop.end))
             gop = self.recall(gop.end)
         return found
 
@@ -137,12 +136,12 @@ class CameraPast:
         return self.past.recent.end_of_camera(self.camera)
 
 
-def sounds(past: Past) -> Sequence[Recorded]:
+def recorded_audio(past: Recorder) -> Sequence[SessionEntries]:
     """Say what there is of the site's sound on the disk."""
-    return [Recorded(run, run.sound.tape) for run in past.sounding]
+    return [SessionEntries(run, run.sound.tape) for run in past.sounding]
 
 
-async def play(source: Source, start: int) -> AsyncGenerator[Gop, None]:
+async def play_gops(source: PlaybackSource, start: int) -> AsyncGenerator[RecordedGop, None]:
     """Give the GOPs from the one that holds pulse ``start`` to the newest; nothing is given twice.
 
     Between its last GOP and its end nothing is awaited: whoever joins the stream at once misses nothing.
@@ -166,7 +165,7 @@ async def play(source: Source, start: int) -> AsyncGenerator[Gop, None]:
             return
 
 
-async def last_before(source: Source, pulse: int) -> Gop | None:
+async def last_gop_before(source: PlaybackSource, pulse: int) -> RecordedGop | None:
     """Give the last GOP that begins before a pulse, up to there; None where nothing is kept of that time."""
     found = [(one.run, it) for one in source.recorded if (it := one.tape.before(pulse)) is not None]
     run, stretch = max(found, key=lambda it: it[1].first, default=(None, None))
@@ -176,25 +175,25 @@ async def last_before(source: Source, pulse: int) -> Gop | None:
     async with contextlib.aclosing(_read(run, stretch, min(stretch.end, pulse) - 1)) as reading:
         async for last in reading:
             if gop is None or last.first > gop.first:
-                return Gop(last.first, last.fragments[: pulse - last.first])
+                return RecordedGop(last.first, last.fragments[: pulse - last.first])
     return gop
 
 
-def _next_on_disk(source: Source, pulse: int) -> tuple[Run, Stretch] | None:
+def _next_on_disk(source: PlaybackSource, pulse: int) -> tuple[RecordingSession, IndexEntry] | None:
     found = [(one.run, it) for one in source.recorded if (it := one.tape.at_or_after(pulse)) is not None]
     return min(found, key=lambda it: max(it[1].first, pulse), default=None)
 
 
-def _from(gop: Gop, pulse: int) -> Gop:
+def _from(gop: RecordedGop, pulse: int) -> RecordedGop:
     """Leave out what has been given already of a GOP that was not whole yet."""
-    return Gop(max(gop.first, pulse), gop.fragments[max(0, pulse - gop.first) :])
+    return RecordedGop(max(gop.first, pulse), gop.fragments[max(0, pulse - gop.first) :])
 
 
-async def _read(run: Run, stretch: Stretch, pulse: int) -> AsyncGenerator[Gop, None]:
+async def _read(run: RecordingSession, stretch: IndexEntry, pulse: int) -> AsyncGenerator[RecordedGop, None]:
     path = run.camera_file(stretch.camera, stretch.file)
-    reading = gops(path, stretch.offset, stretch.length, run.head.fps, pulse)
+    reading = read_gops(path, stretch.offset, stretch.length, run.head.fps, pulse)
     try:
-        while some := await from_disk(_some, reading, pulse):
+        while some := await run_in_reader_thread(_some, reading, pulse):
             for gop in some:
                 yield gop
     finally:
@@ -204,7 +203,7 @@ async def _read(run: Run, stretch: Stretch, pulse: int) -> AsyncGenerator[Gop, N
             reading.close()
 
 
-def _some(reading: Generator[Gop, None, None], pulse: int) -> list[Gop]:
+def _some(reading: Generator[RecordedGop, None, None], pulse: int) -> list[RecordedGop]:
     """Read some GOPs that end after a pulse; none where there are no more, or they cannot be read."""
     try:
         return list(islice((gop for gop in reading if gop.end > pulse), _AT_ONCE))

@@ -6,15 +6,15 @@ from collections.abc import Callable, Sequence
 
 from server.media.audio.audio_chunk import Heard
 from server.media.audio.audio_format import SoundFormat
-from server.service.recording.audio_file import frames_in
-from server.service.recording.disk_reads import from_disk
-from server.service.recording.playback import Recorded
-from server.service.recording.segment_index import Stretch
-from server.service.streaming.audio_buffer import Following, SoundShelf
-from server.service.streaming.timeline import LONGEST_S
+from server.service.recording.audio_file import read_audio_frames
+from server.service.recording.media_files import run_in_reader_thread
+from server.service.recording.segment_index import IndexEntry
+from server.service.streaming.audio_buffer import AudioBuffer, AudioFollower
+from server.service.streaming.gapless_timeline import LONGEST_GAP_S
+from server.service.time_shift.playback import SessionEntries
 
 
-class Hearing:
+class PlaybackAudio:
     """Finds sound in memory, else on the disk; what was not kept is silent, what may come yet is waited for.
 
     ``recorded`` gives what there is on the disk, ``now`` the pulse after the newest frame of the pictures;
@@ -23,20 +23,20 @@ class Hearing:
 
     def __init__(
         self,
-        shelf: SoundShelf,
-        recorded: Callable[[], Sequence[Recorded]],
+        shelf: AudioBuffer,
+        recorded: Callable[[], Sequence[SessionEntries]],
         now: Callable[[], int] | None = None,
     ) -> None:
         self._shelf, self._recorded, self._now = shelf, recorded, now
         self._next: int | None = None
-        self._live: Following | None = None
+        self._live: AudioFollower | None = None
 
     async def beside(self, first: int, until: int) -> Heard:
         """Give what follows what was heard, now that the pulses ``first … until - 1`` are shown."""
         shelf = self._shelf
         form = shelf.format
         begin, end = form.frame_at(first, shelf.fps), form.frame_at(until, shelf.fps)
-        longest = form.frame_at(round(LONGEST_S * shelf.fps), shelf.fps)
+        longest = form.frame_at(round(LONGEST_GAP_S * shelf.fps), shelf.fps)
         if self._next is None or begin > self._next + longest:  # nor is such a hole bridged by pictures
             self._next = begin
         begin = self._next
@@ -44,7 +44,7 @@ class Hearing:
         frames = {number: shelf.get(number) for number in range(begin, end)}
         missing = [number for number, frame in frames.items() if frame is None]
         if missing and (recorded := self._recorded()):
-            frames |= await from_disk(self._read, recorded, missing[0], missing[-1] + 1)
+            frames |= await run_in_reader_thread(self._read, recorded, missing[0], missing[-1] + 1)
         self._next = next((it for it in missing if it >= late and frames[it] is None), max(begin, end))
         heard = (frames[number] or form.silence for number in range(begin, self._next))
         return Heard(begin, tuple(heard), form)
@@ -52,10 +52,10 @@ class Hearing:
     def live(self, first: int, until: int) -> Heard:
         """Go on with the present: nothing is looked up any more."""
         if self._live is None:
-            self._live = Following(self._shelf, self._next)
+            self._live = AudioFollower(self._shelf, self._next)
         return self._live.beside(first, until)
 
-    def _read(self, recorded: Sequence[Recorded], begin: int, end: int) -> dict[int, bytes]:
+    def _read(self, recorded: Sequence[SessionEntries], begin: int, end: int) -> dict[int, bytes]:
         form, fps = self._shelf.format, self._shelf.fps
         found: dict[int, bytes] = {}
         for one in recorded:
@@ -65,10 +65,10 @@ class Hearing:
 
 
 def _frames_of(
-    recorded: Recorded, stretch: Stretch, begin: int, end: int, form: SoundFormat
+    recorded: SessionEntries, stretch: IndexEntry, begin: int, end: int, form: SoundFormat
 ) -> dict[int, bytes]:
     path = recorded.run.sound_file(stretch.file)
     try:
-        return frames_in(path, stretch.offset, stretch.length, begin, end, form)
+        return read_audio_frames(path, stretch.offset, stretch.length, begin, end, form)
     except OSError:  # retention has just taken it away, or it cannot be read: it is silent
         return {}
