@@ -28,7 +28,7 @@ class _LateFrame:
 
 
 class LiveDecisionWriter:
-    """Writes the files of a running site with a :class:`DecisionWriter`, and lists late frames in ``late.csv``.
+    """Writes the files of a running site (:class:`DecisionWriter`), and late frames to ``late.csv``.
 
     A full disk does not end the streams: whole decisions are skipped until there is room again, and then
     ``late.csv`` lists the frames that are missing.
