@@ -5,7 +5,6 @@ BIN := $(VENV)/bin
 RUNTIME := $(VENV)/.runtime
 STAMP := $(VENV)/.installed
 NODE_STAMP := node_modules/.installed
-TESTED := $(sort $(dir $(wildcard tests/*.py tests/*/*.py)))
 
 # uv takes a seventh of pip's time. It does not read pip's own settings: where those name the index, pip does it.
 install = UV_SYSTEM_CERTS=1 $(BIN)/uv pip install --quiet --python $(BIN)/python --constraint requirements/lock.txt --editable $(1) \
@@ -13,7 +12,7 @@ install = UV_SYSTEM_CERTS=1 $(BIN)/uv pip install --quiet --python $(BIN)/python
 
 DOCS_STAMP := $(VENV)/.docs
 
-.PHONY: demo test test-slow test-loaded lint format bench docs lock clean node_modules
+.PHONY: demo test test-slow test-loaded lint lint-tests format bench docs lock clean node_modules
 
 demo: $(RUNTIME)
 	$(BIN)/myview demo
@@ -33,10 +32,16 @@ lint: $(STAMP) node_modules
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	for room in $(TESTED); do MYPYPATH=tests:$$room $(BIN)/mypy --config-file tests/mypy.ini $$room*.py || exit 1; done
+	@$(MAKE) --no-print-directory lint-tests
 	$(BIN)/lint-imports
 	@if [ -e $(NODE_STAMP) ]; then $(BIN)/node node_modules/typescript/bin/tsc; \
 		else echo "types of the page: left out, npm could not fetch the TypeScript compiler"; fi
+
+# All files of tests at once, and then each conftest.py: those share one name.
+lint-tests: $(STAMP)
+	MYPYPATH=tests $(BIN)/mypy --config-file tests/mypy.ini $$(find tests -name '*.py' ! -name conftest.py)
+	for file in $$(find tests -name conftest.py); do \
+		MYPYPATH=tests $(BIN)/mypy --config-file tests/mypy.ini $$file || exit 1; done
 
 format: $(STAMP)
 	$(BIN)/ruff format .

@@ -11,6 +11,8 @@ import pytest
 from hypothesis import HealthCheck, settings
 from xdist.scheduler import LoadFileScheduling
 
+from fakes.paths import ROOT
+
 _ONE_BY_ONE = ("tests/e2e/", "tests/client/")
 """Folders whose tests run in real time, and do not run beside each other."""
 
@@ -48,7 +50,7 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> _OneSiteAtAT
 @pytest.fixture(scope="session")
 def shared_data() -> Path:
     """Give the folder of real multi-view recordings, or skip: it is not part of the project."""
-    default = Path(__file__).resolve().parents[2] / "shared" / "data"
+    default = ROOT.parent / "shared" / "data"
     folder = Path(os.environ.get("MYVIEW_TEST_DATA", default))
     if not folder.is_dir():
         pytest.skip(f"needs the recordings in {folder} (or in the folder that MYVIEW_TEST_DATA names)")

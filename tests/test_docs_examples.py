@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import importlib
 import io
 import os
 import re
@@ -18,9 +17,11 @@ from typing import Any
 import msgspec
 import pytest
 import typer.main
-from patience import PATIENCE
 from prometheus_client import CollectorRegistry
 
+from fakes import cameras
+from fakes.paths import DOCS, ROOT
+from fakes.timeouts import PATIENCE
 from server.cli.main import app as command_line
 from server.config.sections import HttpSettings
 from server.http.api.schema import CameraInfo, Choice, ObjectInfo, SiteInfo
@@ -29,21 +30,20 @@ from server.http.app_keys import METRICS
 from server.messaging import messages
 from server.service.service import BestViewService
 
-ROOT = Path(__file__).parents[1]
-DOCS = sorted((ROOT / "docs").rglob("*.md"))
-TUTORIALS = sorted((ROOT / "docs" / "tutorials").glob("*.md"))
+PAGES = sorted(DOCS.rglob("*.md"))
+TUTORIALS = sorted((DOCS / "tutorials").glob("*.md"))
 
 
 def reference(page: str) -> str:
     """Return the text of a page of the reference."""
-    return (ROOT / "docs" / "reference" / f"{page}.md").read_text(encoding="utf-8")
+    return (DOCS / "reference" / f"{page}.md").read_text(encoding="utf-8")
 
 
 URL = "http://localhost:8080"
 _BLOCK = re.compile(
     r"^```python runnable\n(.*?)^```\n(?:\n```text output\n(.*?)^```\n)?", re.DOTALL | re.MULTILINE
 )
-_TEST = re.compile(r"`((?:tests/\w+/)?test_\w+\.py)(?:::(test_\w+))?`")
+_TEST = re.compile(r"`((?:tests/(?:\w+/)*)?test_\w+\.py)(?:::(test_\w+))?`")
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class Example:
 
 
 def examples() -> Iterator[Example]:
-    for path in DOCS:
+    for path in PAGES:
         text = path.read_text(encoding="utf-8")
         for found in _BLOCK.finditer(text):
             line = text[: found.start()].count("\n") + 1
@@ -67,10 +67,9 @@ EXAMPLES = list(examples())
 
 
 @pytest.fixture
-def by_hand(monkeypatch: pytest.MonkeyPatch) -> Any:
+def by_hand() -> Any:
     """Give the server tests' cameras whose every word is decided by hand."""
-    monkeypatch.syspath_prepend(str(Path(__file__).parent / "server"))
-    return importlib.import_module("cameras_by_hand")
+    return cameras
 
 
 @pytest.fixture
@@ -129,13 +128,13 @@ def test_the_commands_of_a_tutorial_run(path: Path, tmp_path: Path) -> None:
 
 
 def test_links_between_the_documents_lead_somewhere() -> None:
-    for path in DOCS:
+    for path in PAGES:
         for target in re.findall(r"\]\(([^)#\s:]+)(?:#[^)]*)?\)", path.read_text(encoding="utf-8")):
             assert (path.parent / target).exists(), f"{path.name} links to {target}"
 
 
 def test_links_to_headings_name_one() -> None:
-    for path in DOCS:
+    for path in PAGES:
         for target, heading in re.findall(r"\]\(([^)#\s:]*)#([^)]+)\)", path.read_text(encoding="utf-8")):
             other = path.parent / target if target else path
             assert heading in anchors(other.read_text(encoding="utf-8")), f"{path.name}: {target}#{heading}"
@@ -206,10 +205,9 @@ async def test_every_metric_is_described(by_hand: Any) -> None:
 
 
 def test_every_test_that_a_document_names_is_there() -> None:
-    """`test_x.py::test_y` is in tests/server where no folder is named."""
     named = [
-        (path.name, file if "/" in file else f"tests/server/{file}", test)
-        for path in DOCS
+        (path.name, file, test)
+        for path in PAGES
         for file, test in _TEST.findall(path.read_text(encoding="utf-8"))
     ]
     for document, file, test in named:

@@ -6,6 +6,7 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
+
 from suite import Outcome, closing_line, run_pytest
 
 MIXED = """

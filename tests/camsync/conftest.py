@@ -8,7 +8,8 @@ from collections.abc import AsyncIterator
 from contextlib import AsyncExitStack
 
 import pytest
-from pulses_by_hand import ByHand, Connect, JumpingClock
+
+from fakes.pulses import ByHand, Connect, JumpingClock
 
 
 async def _close(writer: asyncio.StreamWriter) -> None:

@@ -7,12 +7,12 @@ import socket
 from contextlib import suppress
 
 import pytest
-from patience import PATIENCE
-from pulses_by_hand import Connect
 
 from camsync import Listener, PulseServer, SyncError, clients_of
 from camsync.messages import Clients, Greeting, Pong
 from camsync.protocol import MAX_SERVER_LINE, encode, parse_server_line
+from fakes.pulses import Connect
+from fakes.timeouts import PATIENCE
 
 FPS = 50.0
 

@@ -6,14 +6,10 @@ import asyncio
 import socket
 import sys
 import time
-from collections.abc import AsyncIterator, Callable
-from contextlib import ExitStack, asynccontextmanager
 from pathlib import Path
 
 import numpy as np
 import pytest
-from patience import PATIENCE
-from pulses_by_hand import BUSY, JumpingClock
 
 import camsync
 from camsync import (
@@ -30,36 +26,8 @@ from camsync.clock import steady_unix_clock
 from camsync.messages import Beat, Greeting
 from camsync.protocol import encode
 from camsync.pulse_axis import PulseAxis
-
-FPS = 400.0
-QUICK = ClientSettings(backoff_first=0.01, backoff_most=0.05, ping_interval=0.05, silence=0.3)
-
-
-async def take(client: PulseClient, count: int) -> list[Pulse]:
-    async with asyncio.timeout(PATIENCE):
-        return [await anext(client) for _ in range(count)]
-
-
-@asynccontextmanager
-async def pretended_server(answer: Callable[[], bytes]) -> AsyncIterator[tuple[int, asyncio.Semaphore]]:
-    """Say ``answer()`` to every connection and no more; give the port, and a semaphore that counts them."""
-    loop = asyncio.get_running_loop()
-    calls = asyncio.Semaphore(0)
-    with ExitStack() as stack:
-        listener = stack.enter_context(socket.create_server(("127.0.0.1", 0)))
-        listener.settimeout(0.0)
-
-        async def serve() -> None:
-            while True:
-                connection, _ = await loop.sock_accept(listener)
-                stack.enter_context(connection)
-                connection.sendall(answer())
-                calls.release()
-
-        serving = asyncio.create_task(serve())
-        yield listener.getsockname()[1], calls
-        serving.cancel()
-        await asyncio.gather(serving, return_exceptions=True)
+from fakes.pulses import BUSY, FPS, QUICK, JumpingClock, pretended_server, take
+from fakes.timeouts import PATIENCE
 
 
 async def counted(client: PulseClient, number: int) -> None:

@@ -8,12 +8,12 @@ import logging
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from patience import PATIENCE
-from pulses_by_hand import Connect, JumpingClock
 
 from camsync import PulseServer, ServerLimits
 from camsync.messages import Beat, Greeting, Pong, Refusal, Wait
 from camsync.protocol import parse_server_line
+from fakes.pulses import Connect, JumpingClock
+from fakes.timeouts import PATIENCE
 
 FPS = 400.0
 

@@ -8,8 +8,6 @@ from collections.abc import Sequence
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from patience import PATIENCE
-from pulses_by_hand import BUSY, ByHand, Connect
 
 from camsync import ClientSettings, Login, PulseClient, PulseServer, ServerLimits, SyncError
 from camsync.claims import Claims
@@ -17,6 +15,8 @@ from camsync.messages import Hello, Known, Pong
 from camsync.proof import Proof
 from camsync.protocol import LAST_PULSE, ProtocolError, parse_client_line, parse_server_line
 from camsync.pulse_axis import PulseAxis
+from fakes.pulses import BUSY, ByHand, Connect
+from fakes.timeouts import PATIENCE
 from server.messaging import number_types
 
 FPS = 200.0

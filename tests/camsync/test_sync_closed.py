@@ -9,8 +9,6 @@ from contextlib import asynccontextmanager
 from itertools import pairwise
 
 import pytest
-from patience import PATIENCE
-from pulses_by_hand import ByHand, Connect
 
 from camsync import (
     ClientSettings,
@@ -27,6 +25,8 @@ from camsync import (
 from camsync.messages import Challenge, Greeting, Refusal
 from camsync.proof import Proof
 from camsync.protocol import parse_server_line
+from fakes.pulses import ByHand, Connect
+from fakes.timeouts import PATIENCE
 
 FPS = 400.0
 USERS = {"c0": "zero" * 16, "c1": "one!" * 16, "bestview": "best" * 16}

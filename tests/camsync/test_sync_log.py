@@ -5,15 +5,14 @@ from __future__ import annotations
 import logging
 
 import pytest
-from patience import PATIENCE
-from pulses_by_hand import Connect, JumpingClock
-from test_pulse_client import FPS, QUICK, pretended_server, take
 
 from camsync import PulseClient, PulseServer
 from camsync.clock import steady_unix_clock
 from camsync.messages import Beat, Greeting, Pong
 from camsync.protocol import encode
 from camsync.pulse_axis import PulseAxis
+from fakes.pulses import FPS, QUICK, Connect, JumpingClock, pretended_server, take
+from fakes.timeouts import PATIENCE
 
 
 async def test_a_server_that_comes_and_goes_is_not_told_of_each_time(

@@ -7,14 +7,14 @@ import logging
 import socket
 
 import pytest
-from patience import PATIENCE
-from pulses_by_hand import ByHand, Connect
 
 from camsync import ClientSettings, Login, PulseClient, PulseServer, ServerLimits, clients_of
 from camsync.client_eviction import who_makes_room
 from camsync.messages import Challenge, Greeting, Pong
 from camsync.proof import Proof
 from camsync.protocol import parse_server_line
+from fakes.pulses import ByHand, Connect
+from fakes.timeouts import PATIENCE
 
 FPS = 400.0
 HERE = "127.0.0.1"

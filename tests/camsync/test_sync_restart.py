@@ -6,11 +6,11 @@ import asyncio
 from collections.abc import Callable
 
 import pytest
-from patience import PATIENCE
-from pulses_by_hand import BUSY, Connect
 
 from camsync import AxisLostError, ClientSettings, Pulse, PulseClient, PulseServer, ServerLimits
 from camsync.messages import Pong
+from fakes.pulses import BUSY, Connect
+from fakes.timeouts import PATIENCE
 
 FPS = 200.0
 AWAY = round(1.5 * BUSY * FPS)

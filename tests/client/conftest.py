@@ -9,9 +9,9 @@ import pytest
 import pytest_asyncio
 from aiohttp.test_utils import TestServer
 from playwright.async_api import Browser
-from site_by_hand import HandMadeSite
 
 from benchmarks.browser import chromium
+from fakes.http_server import HandMadeSite
 
 
 @pytest_asyncio.fixture(scope="session", loop_scope="session")

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[2]
+from fakes.paths import ROOT
+
 PAGE = (ROOT / "client/page/operator.html").read_text(encoding="utf-8")
 DOCS = (ROOT / "docs/how-to/operate.md").read_text(encoding="utf-8")
 

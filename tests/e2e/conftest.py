@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from spliced import FPS
 
+from fakes.running.stream_frames import FPS
 from synthetic import Scene, write_recording
 
 SECONDS = 20.0

@@ -6,15 +6,15 @@ import asyncio
 from pathlib import Path
 
 import pytest
-from assist_page import PLACE, every_gop_once, helped, opened
-from patience import PATIENCE_MS
 from playwright.async_api import Page
-from programs import needs_chromium
-from running_site import RunningSite
-from two_alike import FRAMES, MET, camera
 
 from client import Gop
 from client.model import Split
+from fakes.programs import needs_chromium
+from fakes.running.assist_page import PLACE, every_gop_once, helped, opened
+from fakes.running.lookalikes import FRAMES, MET, camera
+from fakes.running.site import RunningSite
+from fakes.timeouts import PATIENCE_MS
 
 pytestmark = [
     pytest.mark.live,

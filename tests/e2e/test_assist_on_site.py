@@ -8,12 +8,12 @@ from collections.abc import AsyncIterator
 import aiohttp
 import pytest
 import pytest_asyncio
-from assist_page import PLACE, every_gop_once, helped, opened
-from patience import PATIENCE_MS
 from playwright.async_api import Page
-from programs import needs_chromium
-from running_site import RunningSite
 
+from fakes.programs import needs_chromium
+from fakes.running.assist_page import PLACE, every_gop_once, helped, opened
+from fakes.running.site import RunningSite
+from fakes.timeouts import PATIENCE_MS
 from server.cli.generated_config import DEMO
 
 pytestmark = [

@@ -6,7 +6,8 @@ import asyncio
 from pathlib import Path
 
 import pytest
-from running_site import CAMERAS, MYVIEW, bounded, configuration, running
+
+from fakes.running.site import CAMERAS, MYVIEW, bounded, configuration, running
 
 WRITTEN = ("choices.csv", "corrections.csv", "late.csv", *(f"tracks/{camera}.txt" for camera in CAMERAS))
 

@@ -17,16 +17,16 @@ import numpy as np
 import pytest
 import pytest_asyncio
 import zenoh
-from beeps import heard, write_beeps
-from monitoring_files import ASKED, OF_PROMETHEUS
-from patience import PATIENCE
 from playwright.async_api import Browser, Page
-from programs import needs_chromium
-from promql_series import Printed, given, selectors
-from running_site import CAMERAS, RunningSite, bounded, configuration, running
-from spliced import FPS, pictures, record, shown_from_to
 
 from benchmarks.browser import chromium
+from fakes.programs import needs_chromium
+from fakes.prometheus.monitoring_files import ASKED, OF_PROMETHEUS
+from fakes.prometheus.promql_series import Printed, given, selectors
+from fakes.running.beeps import heard, write_beeps
+from fakes.running.site import CAMERAS, RunningSite, bounded, configuration, running
+from fakes.running.stream_frames import FPS, pictures, record, shown_from_to
+from fakes.timeouts import PATIENCE
 
 pytestmark = [
     pytest.mark.live,

@@ -16,11 +16,11 @@ import schemathesis
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.errors import Unsatisfiable
-from patience import PATIENCE
 from schemathesis import GenerationMode
 from schemathesis.checks import content_type_conformance, response_schema_conformance, status_code_conformance
 
 from benchmarks.fuzz.http_site import Served
+from fakes.timeouts import PATIENCE
 
 CASES = 4
 """Of each operation and mode; endless streams are only begun."""

@@ -5,9 +5,10 @@ from __future__ import annotations
 import os
 
 import pytest
-from command_line import myview
-from halls import busy, hall
-from vp8_by_hand import free
+
+from fakes.command_line import myview
+from fakes.site import busy, hall
+from fakes.vp8_site import free
 
 __all__ = ["busy", "free", "hall", "myview"]
 

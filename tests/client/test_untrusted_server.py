@@ -1,0 +1,260 @@
+"""Whatever a server sends, however long it goes on: a client takes so much of it, and says why in a line."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import struct
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager, suppress
+
+import pytest
+from aiohttp import web
+from aiohttp.test_utils import TestServer
+
+import client
+from client.fmp4 import MAX_BOX, BoxReader, Mp4Error
+from client.recording import Recording
+from client.sse_parser import EventStreamError, SseParser
+from client.webm import LARGEST, ElementReader, WebmError, made
+from client.webm_recording import WebmRecording
+from fakes.http_server import OBJECTS, box, fragment, header
+from fakes.timeouts import PATIENCE
+
+PIECE = bytes(1 << 16)
+ONCE = client.HttpSettings(retries=0)
+HASTY = client.HttpSettings(retries=0, answer_timeout=0.2)
+Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
+
+
+@asynccontextmanager
+async def answering(handler: Handler, path: str = "/{rest:.*}") -> AsyncIterator[str]:
+    app = web.Application()
+    app.router.add_get(path, handler)
+    async with asyncio.timeout(PATIENCE), TestServer(app) as server:
+        yield str(server.make_url("/"))
+
+
+def endless(piece: bytes, status: int = 200, pause: float = 0.0) -> Handler:
+    async def answer(request: web.Request) -> web.StreamResponse:
+        response = web.StreamResponse(status=status)
+        await response.prepare(request)
+        while True:
+            await response.write(piece)  # ends when the client has gone
+            await asyncio.sleep(pause)
+
+    return answer
+
+
+async def ask(url: str, settings: client.HttpSettings = ONCE) -> object:
+    return await client.objects(url, settings)
+
+
+async def ask_status(url: str) -> object:
+    return await client.status(url, ONCE)
+
+
+async def ask_past(url: str) -> object:
+    return [gop async for gop in client.past(url, "-10", settings=ONCE)]
+
+
+async def ask_events(url: str) -> object:
+    return [event async for event in client.events(url, ONCE)]
+
+
+@pytest.mark.parametrize(
+    ("asking", "words"),
+    [
+        (ask, r"the answer is larger than \d+ bytes"),
+        (ask_past, r"a line of the answer is larger than \d+ bytes"),
+        (ask_events, r"a line is larger than \d+ bytes"),
+    ],
+)
+async def test_an_answer_without_end_is_given_up(
+    asking: Callable[[str], Awaitable[object]], words: str
+) -> None:
+    async with answering(endless(PIECE)) as url:
+        with pytest.raises(client.ContractError, match=words):
+            await asking(url)
+
+
+async def test_a_refusal_without_end_is_told_by_its_number() -> None:
+    async with answering(endless(PIECE, status=404)) as url:
+        with pytest.raises(client.NotFoundError, match=r"^404 Not Found$"):
+            await ask(url)
+
+
+@pytest.mark.parametrize("status", [200, 503])
+async def test_an_answer_that_trickles_is_no_answer(status: int) -> None:
+    async with answering(endless(b" ", status, pause=0.01)) as url:
+        with pytest.raises(client.AwayError, match=r"no answer$"):
+            await ask(url, HASTY)
+
+
+@asynccontextmanager
+async def saying(say: Callable[[asyncio.StreamWriter], Awaitable[None]]) -> AsyncIterator[str]:
+    """Answer one request with bytes that need be no HTTP."""
+    over = asyncio.Event()
+
+    async def answer(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        await reader.readuntil(b"\r\n\r\n")
+        with suppress(ConnectionError):
+            await say(writer)
+        writer.close()
+        with suppress(ConnectionError):
+            await writer.wait_closed()
+        over.set()
+
+    async with asyncio.timeout(PATIENCE), await asyncio.start_server(answer, "127.0.0.1", 0) as server:
+        yield f"http://127.0.0.1:{server.sockets[0].getsockname()[1]}"
+        await over.wait()
+
+
+async def test_heads_that_never_end_are_no_answer() -> None:
+    async def trickle(writer: asyncio.StreamWriter) -> None:
+        writer.write(b"HTTP/1.1 200 OK\r\n")
+        while not writer.is_closing():
+            writer.write(b"X: y\r\n")
+            await asyncio.sleep(0.01)
+
+    async with saying(trickle) as url:
+        with pytest.raises(client.AwayError, match=r"no answer$"):
+            await ask(url, HASTY)
+
+
+@pytest.mark.parametrize(
+    ("body", "words"),
+    [
+        (b'{"objects": [], "later": ' + b"[" * 100_000, "nested beyond all measure"),
+        (json.dumps(OBJECTS).encode().replace(b"c0", b"\xff"), "does not answer like MyView"),
+    ],
+)
+async def test_json_that_no_server_means_is_one_clear_line(body: bytes, words: str) -> None:
+    async def answer(_: web.Request) -> web.Response:
+        return web.Response(body=body)
+
+    async with answering(answer) as url:
+        with pytest.raises(client.ContractError, match=words) as caught:
+            await ask(url)
+    assert len(str(caught.value).splitlines()) == 1
+
+
+async def test_a_refusal_that_is_no_text_is_told_by_its_number() -> None:
+    async def answer(_: web.Request) -> web.Response:
+        return web.Response(status=401, body=b'{"error": "\xff"}')
+
+    async with answering(answer) as url:
+        with pytest.raises(client.RefusedError, match=r"^401 Unauthorized$"):
+            await ask(url)
+
+
+@pytest.mark.parametrize("said", [b"SSH-2.0-OpenSSH\r\n\r\n", b"HTTP/1.1 200 OK\r\nX: " + b"x" * 20_000])
+async def test_what_is_no_http_is_one_clear_line(said: bytes) -> None:
+    async def say(writer: asyncio.StreamWriter) -> None:
+        writer.write(said)
+        await writer.drain()
+
+    async with saying(say) as url:
+        with pytest.raises(client.AwayError) as caught:
+            await ask(url)
+    assert len(str(caught.value).splitlines()) == 1
+    assert len(str(caught.value)) < 400
+
+
+async def test_who_leads_in_circles_leads_nowhere() -> None:
+    async def lead(_: web.Request) -> web.Response:
+        raise web.HTTPFound("/api/objects")
+
+    async with answering(lead) as url:
+        with pytest.raises(client.AwayError, match=r"leads on and on, and nowhere$"):
+            await ask(url)
+
+
+async def test_a_token_goes_to_the_server_that_it_is_for_and_not_where_that_leads_on_to() -> None:
+    came: list[str | None] = []
+
+    async def list_nobody(request: web.Request) -> web.Response:
+        came.append(request.headers.get("Authorization"))
+        return web.json_response({"objects": []})
+
+    async with answering(list_nobody) as other:
+
+        async def lead(request: web.Request) -> web.Response:
+            came.append(request.headers.get("Authorization"))
+            raise web.HTTPFound(other + "api/objects")
+
+        async with answering(lead) as url:
+            assert await client.objects(url, client.HttpSettings(token="secret")) == ()  # noqa: S106
+    assert came == ["Bearer secret", None]
+
+
+async def test_a_status_that_cannot_be_read_is_one_clear_line() -> None:
+    async with answering(endless(PIECE), "/api/site") as url:
+        with pytest.raises(client.ContractError, match="larger than"):
+            await ask_status(url)
+
+
+@pytest.mark.parametrize(
+    "typed",
+    [
+        "http://me:QXZ/JKV7@127.0.0.1:9/",
+        "http://127.0.0.1:12/QXZJKV7@127.0.0.1:9/",
+        "http://me:QXZ JKV7@127.0.0.1:9/",
+        "http://me:QXZ#JKV7@127.0.0.1:9/",
+        "http://me:QXZJKV7@127.0.0.1:9/",
+        "http://127.0.0.1:99999/?token=QXZJKV7",
+        "ftp://127.0.0.1:9/?token=QXZJKV7",
+        "127.0.0.1:9/?token=QXZJKV7",
+        "127.0.0.1:9/QXZJKV7/",
+        "http://[::1/?token=QXZJKV7",
+        "?token=QXZJKV7",
+    ],
+)
+async def test_what_is_secret_in_an_address_is_in_no_error(typed: str) -> None:
+    for asking in (ask, ask_status, ask_past, ask_events):
+        with pytest.raises((client.ClientError, ValueError)) as refused:
+            await asking(typed)
+        assert not any(it in str(refused.value) for it in ("QXZ", "JKV7")), refused.value
+
+
+@pytest.mark.parametrize("asking", [ask, ask_status, ask_past, ask_events])
+async def test_who_is_no_myview_is_named_by_host_alone(asking: Callable[[str], Awaitable[object]]) -> None:
+    async with answering(endless(PIECE), "/QXZJKV7/{rest:.*}") as url:
+        typed = url.replace("http://", "http://me:QXZJKV7@") + "QXZJKV7/?token=QXZJKV7"
+        with pytest.raises(client.ContractError, match=r"^http://127\.0\.0\.1:\d+: ") as refused:
+            await asking(typed)
+    assert "QXZ" not in str(refused.value)
+
+
+def test_boxes_without_media_are_not_kept_without_end() -> None:
+    record = Recording(None, None)
+    boxes = list(BoxReader().feed(header() + fragment(1)))
+    for it in boxes[:2]:
+        record.take(it)
+    moof = boxes[2].content
+    (large,) = BoxReader().feed(box(b"moof", moof, box(b"free", bytes(MAX_BOX // 8))))
+    with pytest.raises(Mp4Error, match="boxes without media"):
+        take_often(record, large)
+
+
+def test_elements_without_pictures_are_not_kept_without_end() -> None:
+    (large,) = ElementReader().feed(made(0xEC, bytes(LARGEST // 8)))
+    with pytest.raises(WebmError, match="elements without pictures"):
+        take_often(WebmRecording(None, None), large)
+
+
+def take_often(record: Recording | WebmRecording, part: object) -> None:
+    for _ in range(10):
+        record.take(part)  # type: ignore[arg-type]
+
+
+def test_lines_of_nothing_are_something_to_keep(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("client.sse_parser.MAX_EVENT", 1000)
+    SseParser().feed(b"data:\n" * 900)
+    with pytest.raises(EventStreamError):
+        SseParser().feed(b"data:\n" * 1100)
+
+
+def test_a_size_is_no_promise_to_be_kept() -> None:
+    with pytest.raises(Mp4Error, match="a box of"):
+        list(BoxReader().feed(struct.pack(">I4sQ", 1, b"mdat", 1 << 60)))

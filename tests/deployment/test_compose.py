@@ -1,0 +1,219 @@
+"""The compose files, each way they are put together: every service is held, watched and closed. No engine."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from fakes.paths import ROOT
+from server.config.loader import load_config
+from server.config.site_config import Config
+
+PLAIN, SECURE, SERVER, CAMERAS = (
+    "docker-compose.yml",
+    "docker-compose.secure.yml",
+    "docker-compose.server.yml",
+    "docker-compose.cameras.yml",
+)
+VARIANTS = [
+    (PLAIN,),
+    (PLAIN, SECURE),
+    (PLAIN, SERVER),
+    (PLAIN, SECURE, SERVER),
+    (PLAIN, CAMERAS),
+    (PLAIN, SECURE, CAMERAS),
+]
+SECRETS = "/run/secrets/"
+NEEDS_COMPOSE = pytest.mark.skipif(
+    shutil.which("docker") is None
+    or subprocess.run(["docker", "compose", "version"], capture_output=True, check=False).returncode != 0,
+    reason="needs Docker's command line with Compose; no engine",
+)
+
+
+class Loader(yaml.SafeLoader):
+    """The safe loader, which passes over how compose is told to merge."""
+
+
+Loader.add_constructor("!reset", lambda *_: None)
+Loader.add_constructor("!override", lambda loader, node: loader.construct_sequence(node))
+
+
+def content(name: str) -> dict[str, Any]:
+    found = yaml.load((ROOT / name).read_text(encoding="utf-8"), Loader=Loader)  # noqa: S506 — the safe one
+    assert isinstance(found, dict)
+    return found
+
+
+def composed(files: tuple[str, ...], tmp_path: Path) -> dict[str, Any]:
+    """Give what compose makes of the files; it checks them by its schema."""
+    secrets = tmp_path / "secrets"
+    (secrets / "public").mkdir(parents=True)
+    (secrets / "web").mkdir()
+    plain = {name: it for name, it in os.environ.items() if not name.startswith(("MYVIEW_", "COMPOSE_"))}
+    variables = {
+        "MYVIEW_SECRETS": str(secrets),
+        "MYVIEW_SERVER": "10.0.0.5",
+        "MYVIEW_HEALTH_URL": "https://10.0.0.5",
+    }
+    words = ["docker", "compose", *[word for name in files for word in ("-f", name)]]
+    done = subprocess.run(
+        [*words, "--profile", "*", "config", "--format", "json"],
+        cwd=ROOT,
+        env={**plain, **variables},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert not done.stderr, "compose warns of nothing"
+    found = json.loads(done.stdout)
+    assert isinstance(found, dict)
+    return found
+
+
+@pytest.mark.parametrize("limit", ["mem_limit", "memswap_limit", "cpus", "pids_limit"])
+def test_no_service_can_take_the_whole_host(limit: str) -> None:
+    for name, service in content(PLAIN)["services"].items():
+        assert service.get(limit), name
+
+
+def test_cameras_yield_to_the_best_view_and_the_pulses() -> None:
+    """In containers niceness orders only what is in the same one."""
+    cameras = load_config(ROOT / "configs" / "demo.yaml").camera_ids
+    default = 1024  # docker run --cpu-shares
+    shares = {name: it.get("cpu_shares", default) for name, it in content(PLAIN)["services"].items()}
+    assert all(shares[name] < min(shares["bestview"], shares["sync"]) for name in cameras)
+
+
+def test_every_service_is_closed_watched_and_keeps_little_log() -> None:
+    for name, service in content(PLAIN)["services"].items():
+        assert service["read_only"] is True, name
+        assert service["cap_drop"] == ["ALL"], name
+        assert service["security_opt"] == ["no-new-privileges:true"], name
+        assert service["healthcheck"]["test"][:4] == [
+            "CMD",
+            "python",
+            "-m",
+            "server.supervisor.healthcheck",
+        ], name
+        assert set(service["logging"]["options"]) == {"max-size", "max-file"}, name
+        assert service["init"] is True, name
+
+
+@pytest.mark.parametrize("file", [PLAIN, SECURE, SERVER, CAMERAS])
+def test_no_file_gives_a_service_more_than_it_needs(file: str) -> None:
+    for name, service in content(file)["services"].items():
+        assert not {"privileged", "cap_add", "network_mode", "pid", "ipc", "userns_mode"} & set(service), name
+        assert "docker.sock" not in json.dumps(service), name
+        if file != PLAIN:  # what goes on top takes nothing of it back
+            kept = {"read_only", "cap_drop", "security_opt", "logging", "user", "tmpfs"}
+            assert not kept & set(service), name
+
+
+def test_each_service_has_its_own_secrets_alone() -> None:
+    services, secrets = content(SECURE)["services"], content(SECURE)["secrets"]
+    used = {
+        name: [it if isinstance(it, str) else it["source"] for it in service.get("secrets", ())]
+        for name, service in services.items()
+    }
+    assert used["bestview"] == ["bus", "router_key"]
+    assert used["sync"] == ["pulses"]
+    for camera in load_config(ROOT / "configs" / "demo.yaml").camera_ids:
+        assert used[camera] == [f"{camera}_bus", f"{camera}_pulses", f"{camera}_token"]
+    assert sorted(secrets) == sorted(source for sources in used.values() for source in sources)
+    files = [it["file"] for it in secrets.values()]
+    assert len(set(files)) == len(files)
+    assert all(it.startswith("${MYVIEW_SECRETS:-./secrets}/") for it in files)
+
+
+def test_the_secure_site_trusts_nobody_by_where_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, service in content(SECURE)["services"].items():
+        config = _config(
+            {**content(PLAIN)["services"][name]["environment"], **service["environment"]}, monkeypatch
+        )
+        assert not config.access.open_to_all
+        assert not config.access.trusted_network
+        assert config.sync.users == Path("/run/web/pulses" if name == "bestview" else SECRETS + "pulses")
+        assert config.zenoh.connect.startswith("tls/")
+        assert config.zenoh.listen.startswith("tls/")
+        assert config.zenoh.users == Path(SECRETS + "bus")
+        assert (config.access.tokens is not None) == (config.http.tls.key is not None) == (name == "bestview")
+
+
+@pytest.mark.parametrize("file", [SERVER, CAMERAS])
+def test_what_a_machine_has_to_be_told_stands_in_the_example_of_its_env_file(file: str) -> None:
+    """Or the next command of compose, typed in another shell, would not have it."""
+    needed = set(re.findall(r"\$\{(MYVIEW_\w+):\?", (ROOT / file).read_text(encoding="utf-8")))
+    assert needed
+    text = (ROOT / "docs" / "how-to" / "containers.md").read_text(encoding="utf-8")
+    blocks = [it.partition("\n")[2] for it in text.split("```")[1::2]]
+    (env,) = [it for it in blocks if it.startswith("COMPOSE_FILE=") and file in it]
+    assert needed | {"MYVIEW_CONFIG"} <= {line.partition("=")[0] for line in env.splitlines()}
+
+
+def test_a_port_that_is_published_is_the_one_that_is_listened_on() -> None:
+    plain, server = content(PLAIN)["services"], content(SERVER)["services"]
+    published = {name: [it.rpartition(":")[2] for it in service["ports"]] for name, service in server.items()}
+    assert published["sync"] == [str(plain["sync"]["environment"]["MYVIEW_SYNC__PORT"])]
+    listened = plain["bestview"]["environment"]["MYVIEW_ZENOH__LISTEN"]
+    assert published["bestview"] == [listened.rpartition(":")[2]]
+
+
+def _config(environment: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> Config:
+    with monkeypatch.context() as patch:
+        for name, value in environment.items():
+            if "__" in name:
+                patch.setenv(name, str(value))
+        return load_config(ROOT / "configs" / "demo.yaml")
+
+
+@NEEDS_COMPOSE
+@pytest.mark.parametrize("files", VARIANTS, ids=lambda it: "+".join(name.split(".")[-2] for name in it))
+def test_compose_takes_the_files_together(files: tuple[str, ...], tmp_path: Path) -> None:
+    found = composed(files, tmp_path)
+    for name, service in found["services"].items():
+        assert service["read_only"], name
+        assert service["cap_drop"] == ["ALL"], name
+        assert int(service["mem_limit"]) > 0, name
+        given = {SECRETS + it["target"] for it in service.get("secrets", ())}
+        named = {it for it in service["environment"].values() if it.startswith(SECRETS)}
+        assert name == "sync" or named == given, "what the configuration names is what is there"
+        for mounted in service["volumes"]:
+            assert mounted["read_only"], name
+
+
+@NEEDS_COMPOSE
+def test_pulses_and_bus_are_published_where_cameras_are_elsewhere_alone(tmp_path: Path) -> None:
+    def ports(files: tuple[str, ...], folder: str) -> set[tuple[str, int]]:
+        services = composed(files, tmp_path / folder)["services"].values()
+        return {(it["host_ip"], it["target"]) for service in services for it in service.get("ports", ())}
+
+    assert ports((PLAIN, SECURE), "one") == {("127.0.0.1", 8080)}
+    assert ports((PLAIN, SECURE, SERVER), "many") == {
+        ("127.0.0.1", 8080),
+        ("10.0.0.5", 7400),
+        ("10.0.0.5", 7447),
+    }
+
+
+@NEEDS_COMPOSE
+def test_a_machine_of_cameras_starts_cameras_alone(tmp_path: Path) -> None:
+    services = composed((PLAIN, SECURE, CAMERAS), tmp_path)["services"]
+    cameras = {name: service for name, service in services.items() if not service.get("profiles")}
+    assert set(cameras) == {"c0", "c1", "c2"}
+    for service in cameras.values():
+        assert not service.get("depends_on")
+        assert set(service["networks"]) == {"cameras"}
+        environment = service["environment"]
+        assert environment["MYVIEW_SYNC__HOST"] == "10.0.0.5"
+        assert environment["MYVIEW_ZENOH__CONNECT"] == "tls/10.0.0.5:7447"
+        assert environment["MYVIEW_HEALTH_URL"] == "https://10.0.0.5"

@@ -1,0 +1,48 @@
+"""A site that is told to end takes its drawing processes with it, whatever they are busy with."""
+
+from __future__ import annotations
+
+import asyncio
+import signal
+import time
+from pathlib import Path
+
+import aiohttp
+import pytest
+
+from fakes.running.site import bounded, configuration, running
+
+pytestmark = [pytest.mark.live, pytest.mark.slow]
+
+WITHIN_S = 2.0
+
+
+async def test_drawing_ends_within_two_seconds_of_sigterm(tmp_path: Path) -> None:
+    cameras = [{"id": "c0", "source": "scene:room?camera=0&cameras=1&objects=2&seed=1"}]
+    site = {"name": "drawn", "fps": 25, "width": 320, "height": 180}
+    config = configuration(tmp_path, tmp_path, site=site, cameras=cameras, ground=None)
+    async with running(config) as started:
+        await started.until(lambda: len(started.gops) > 2, "something is decided")
+        async with (
+            aiohttp.ClientSession(started.url) as session,
+            session.get("/cameras/c0/live.mjpeg") as plain,
+            session.get("/cameras/c0/live.mjpeg?overlay=1") as boxed,
+        ):
+            for answer in (plain, boxed):
+                assert answer.status == 200
+                await bounded(answer.content.readexactly(10_000))
+            drawing = processes("server.service.rendering.worker", started.children()["bestview"])
+            assert len(drawing) == 2
+            started.process.send_signal(signal.SIGTERM)
+            told = time.monotonic()
+            while any(Path(f"/proc/{pid}").exists() for pid in drawing):
+                await asyncio.sleep(0.01)
+                assert time.monotonic() < told + WITHIN_S
+            assert await started.ended() == 0
+
+
+def processes(module: str, parent: int) -> list[int]:
+    """Give the pids of a process's children that run a module."""
+    children = Path(f"/proc/{parent}/task").glob("*/children")
+    pids = [int(pid) for path in children for pid in path.read_text().split()]
+    return [pid for pid in pids if module in Path(f"/proc/{pid}/cmdline").read_text().split("\0")]

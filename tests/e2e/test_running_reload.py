@@ -1,0 +1,78 @@
+"""A running site whose configuration is read again, while somebody watches."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import aiohttp
+import pytest
+import yaml
+
+from fakes.running.site import RunningSite, bounded, configuration, running
+from fakes.running.stream_frames import pictures, record
+
+pytestmark = [pytest.mark.live, pytest.mark.slow]
+
+
+async def said(site: RunningSite, text: str) -> None:
+    """Wait until a line of the log has it."""
+
+    async def look() -> None:
+        while not any(text in line for line in site.lines):  # noqa: ASYNC110 — another process: there is no event
+            await asyncio.sleep(0.05)
+
+    await bounded(look())
+
+
+async def read_again(running_site: RunningSite, config: Path, **changes: Any) -> None:
+    """Change the file and have it read."""
+    config.write_text(yaml.safe_dump({**running_site.config, **changes}), encoding="utf-8")
+    running_site.process.send_signal(signal.SIGHUP)
+
+
+async def test_a_bad_file_changes_nothing_and_a_good_one_breaks_no_stream(
+    recording: Path, tmp_path: Path
+) -> None:
+    config = configuration(tmp_path, recording, camera={"at_end": "loop"})
+    async with running(config) as site, aiohttp.ClientSession(site.url) as session:
+
+        async def ask(path: str) -> Any:
+            async with session.get(path) as answer:
+                return await (answer.json() if path.startswith("api") else answer.text())
+
+        await site.until(lambda: bool(site.gops and site.gops[-1].choices), "somebody is shown")
+        processes = site.children()
+        way = f"objects/{min(site.gops[-1].choices)}/best.mp4"
+        viewer = asyncio.create_task(record(session, way, site.pulse + 100, tmp_path / "viewer"))
+
+        await read_again(site, config, site={"fps": "banana"})
+        await said(site, "site.fps: Input should be a valid number")
+        assert "myview_config_differs 1.0" in await ask("metrics")
+        os.kill(processes["c2"], signal.SIGKILL)  # it is started again by what is in force
+        await site.until(lambda: site.state("c2") != "live", "c2 is lost")
+        await site.until(lambda: site.state("c2") == "live", "c2 is back")
+
+        cameras = [dict(it) for it in site.config["cameras"]]
+        cameras[1]["offset"] = 5
+        await read_again(site, config, cameras=cameras, view={"switch_cost_s": 0.7}, encode={"crf": 30})
+        await said(site, "bestview: the configuration was read again: in force now: view.switch_cost_s")
+        await said(site, "c1: the configuration was read again, and changes this camera")
+        assert (await ask("api/operator/choosing"))["values"]["switch_cost_s"] == 0.7
+        assert (await ask("api/operator/config"))["waiting"] == ["encode.crf"]
+        await bounded(viewer)
+        await said(site, "waits for a restart of all processes: encode.crf")
+        now = site.children()
+        assert {it: now[it] for it in processes if it != "c2"} == {
+            it: pid for it, pid in processes.items() if it != "c2"
+        }
+        await site.until(lambda: site.state("c1") == "live", "c1 has begun anew")
+        site.process.send_signal(signal.SIGTERM)
+        assert await site.ended() == 0
+    shown = sorted(pictures(tmp_path / "viewer"))
+    assert len(shown) > 80
+    assert all(after == before + 1 for before, after in pairwise(shown)), "the stream has no hole"

@@ -1,0 +1,128 @@
+"""People who stand and walk before calibrated cameras, as tracks for the identity registry."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from bestview import (
+    Glimpse,
+    IdentityRegistry,
+    IdentitySettings,
+    IdentityUpdate,
+    LocalTrack,
+)
+
+STRIDE = 5
+FOCAL, EYE = 400.0, 3.0
+
+
+def camera_from(side: str) -> NDArray[np.float64]:
+    """Give the ground -> image homography of a level camera 10 m off the middle, looking at it; metres."""
+    level = np.array([[FOCAL, 320.0, 0.0], [0.0, 240.0, FOCAL * EYE], [0.0, 1.0, 0.0]])
+    turned = {
+        "south": [[1, 0, 0], [0, 1, 10], [0, 0, 1]],
+        "west": [[0, -1, 0], [1, 0, 10], [0, 0, 1]],
+        "north": [[-1, 0, 0], [0, -1, 10], [0, 0, 1]],
+    }
+    return np.asarray(level @ np.array(turned[side], float))
+
+
+VIEWS = {side: camera_from(side) for side in ("north", "south", "west")}
+CALIBRATED: Mapping[str, NDArray[np.float64] | None] = {
+    side: np.asarray(np.linalg.inv(view), float) for side, view in VIEWS.items()
+}
+BLIND: Mapping[str, NDArray[np.float64] | None] = dict.fromkeys(VIEWS)
+HOWEVER_MANY = pytest.mark.parametrize("most", [400, 0], ids=["few", "too many at once"])
+"""Who is surely somebody is settled at once where there are too many parts of tracks."""
+
+
+@dataclass(frozen=True)
+class Stay:
+    """A person under one local number in one camera, for some frames, along a line on the ground."""
+
+    camera: str
+    local: int
+    begin: int
+    end: int
+    start: tuple[float, float]
+    speed: tuple[float, float] = (0.0, 0.0)
+    coat: float = 0
+
+    def box(self, frame: int) -> NDArray[np.float64]:
+        x, y = (p + v * frame for p, v in zip(self.start, self.speed, strict=True))
+        u, v, w = VIEWS[self.camera] @ (x, y, 1.0)
+        tall = FOCAL * 1.75 / w
+        return np.array([u / w - 0.2 * tall, v / w - tall, u / w + 0.2 * tall, v / w])
+
+    def track(self, first: int, last: int) -> LocalTrack:
+        boxes = np.full((last - first + 1, 4), np.nan)
+        seen = range(max(first, self.begin), min(last, self.end) + 1)
+        for frame in seen:
+            boxes[frame - first] = self.box(frame)
+        looks = (Glimpse(seen[0], seen[-1], coat(self.coat)),) if seen and self.coat else ()
+        return LocalTrack(self.camera, self.local, first, boxes, looks)
+
+
+def coat(which: float) -> NDArray[np.float64]:
+    """Give a histogram with a hump of its own."""
+    hump = np.exp(-(((np.arange(64) - 8.0 * which) / 4.0) ** 2))
+    return np.asarray(hump / hump.sum())
+
+
+def play(
+    registry: IdentityRegistry,
+    stays: Sequence[Stay],
+    frames: int,
+    begin: int = 0,
+    speaking: Mapping[str, tuple[int, int]] | None = None,
+) -> list[IdentityUpdate]:
+    return list(updates(registry, stays, frames, begin, speaking))
+
+
+def updates(
+    registry: IdentityRegistry,
+    stays: Sequence[Stay],
+    frames: int,
+    begin: int = 0,
+    speaking: Mapping[str, tuple[int, int]] | None = None,
+) -> Iterator[IdentityUpdate]:
+    for last in range(begin + STRIDE - 1, frames, STRIDE):
+        first = last - STRIDE + 1
+        tracks: dict[tuple[str, int], LocalTrack] = {}
+        for stay in stays:
+            if stay.begin <= last and stay.end >= first:
+                track = stay.track(first, last)
+                before = tracks.get((stay.camera, stay.local))
+                if before is not None:
+                    boxes = np.where(np.isnan(track.boxes), before.boxes, track.boxes)
+                    track = replace(track, boxes=boxes, looks=(*before.looks, *track.looks))
+                tracks[stay.camera, stay.local] = track
+        yield registry.update(list(tracks.values()), last, speaking)
+
+
+def registry(
+    homographies: Mapping[str, NDArray[np.float64] | None] = CALIBRATED, **changes: float
+) -> IdentityRegistry:
+    return IdentityRegistry(replace(IdentitySettings(), **changes), homographies)  # type: ignore[arg-type]
+
+
+def both(local: int, start: tuple[float, float], begin: int = 0, end: int = 999) -> list[Stay]:
+    return [Stay("south", local, begin, end, start), Stay("west", local, begin, end, start)]
+
+
+def known(seen: Sequence[IdentityUpdate]) -> dict[tuple[str, int], int]:
+    """Whose each track is after these updates, also where that was settled before."""
+    every = {key: number for update in seen for key, number in update.numbers.items()}
+    newest = {key.track: number for key, number in sorted(every.items())}
+    return {(key.camera, key.local): number for key, number in newest.items() if number}
+
+
+def numbers(update: IdentityUpdate) -> dict[tuple[str, int], int]:
+    """Whose each track is now: its newest episode's; without those that are nobody's yet."""
+    newest = {key.track: number for key, number in update.numbers.items()}
+    return {(key.camera, key.local): number for key, number in newest.items() if number}

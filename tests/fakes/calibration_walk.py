@@ -1,0 +1,101 @@
+"""Somebody who walks about in the synthetic scene, as cameras tell of it; how far off a calibration is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bestview import to_ground
+from fakes.cameras import STRIDE, small_config
+from server.config.site_config import Config
+from server.messaging.messages import Box, CameraTracks, TrackMessage
+from server.service.ingest.epoch_aligner import Epoch
+from synthetic import Scene
+from synthetic.cameras.pinhole import Perspective
+from synthetic.room.hall import Hall
+
+Floats = NDArray[np.float64]
+
+WIDTH, HEIGHT = 320, 180
+TALL = 1.75  # metres
+SITE = {"site": {"name": "hall", "width": WIDTH, "height": HEIGHT}}
+
+
+def walk_config(**changes: Any) -> Config:
+    """Give a site of the scene's size."""
+    return small_config(**{**SITE, **changes})
+
+
+def curved(frames: int, wide: float = 0.3) -> Floats:
+    """Places of somebody who walks in curves through the middle of the scene's floor, (frames, 2) metres."""
+    width, depth = Scene("room", 2, 1).floor
+    time = np.arange(frames)
+    return np.column_stack(
+        [
+            width * (0.5 + wide * np.sin(time / 47.0)),
+            depth * (0.5 + wide * np.sin(time / 31.0 + 1)),
+        ]
+    )
+
+
+def words(config: Config, places: Floats, epoch: int = 0, boot: int = 1) -> Iterator[Epoch]:
+    """Give what the cameras say of somebody who walks, from an epoch on; whole windows alone."""
+    ids = config.camera_ids
+    scene = Scene("room", len(ids), 1, width=WIDTH, height=HEIGHT)
+    for number in range(epoch, epoch + len(places) // STRIDE):
+        first = number * STRIDE
+        part = places[first - epoch * STRIDE :][:STRIDE]
+        said = {
+            camera: _word(camera, [_box(scene, at, place) for place in part], number, boot)
+            for at, camera in enumerate(ids)
+        }
+        yield Epoch(number, first + STRIDE - 1, said)
+
+
+def _word(camera: str, boxes: list[Box | None], epoch: int, boot: int) -> CameraTracks:
+    first, last = epoch * STRIDE, (epoch + 1) * STRIDE - 1
+    track = TrackMessage(id=1, boxes=boxes, confidence=1.0)
+    return CameraTracks(
+        camera=camera,
+        boot=boot,
+        size=(WIDTH, HEIGHT),
+        epoch=epoch,
+        first=first,
+        last=last,
+        final_to=last,
+        ended=False,
+        shed=[],
+        tracks=[track] if any(boxes) else [],
+        solve=None,
+    )
+
+
+def _view(scene: Scene, camera: int) -> Perspective:
+    assert isinstance(scene.world, Hall)
+    return scene.world.view(camera)
+
+
+def _box(scene: Scene, camera: int, place: Floats) -> Box | None:
+    """Give the box of somebody in the camera's picture; None: not all of them is in it."""
+    ends, depth = _view(scene, camera).project(np.array([[*place, 0.0], [*place, TALL]]))
+    (x, bottom), (_, top) = ends.tolist()
+    half = (bottom - top) / 5
+    whole = depth.min() > 0.3 and x - half > 0 and x + half < WIDTH and top > 0 and bottom < HEIGHT
+    return (x - half, top, x + half, bottom) if whole else None
+
+
+def errors_on_floor(found: Sequence[Floats]) -> Floats:
+    """How far off the scene's cameras put known places, metres, the floor turned and shifted at will."""
+    scene = Scene("room", len(found), 1, width=WIDTH, height=HEIGHT)
+    width, depth = scene.floor
+    random = np.random.default_rng(0)
+    places = random.uniform((0.3 * width, 0.3 * depth), (0.7 * width, 0.7 * depth), (50, 2))
+    standing = np.column_stack([places, np.zeros(len(places))])
+    seen = [to_ground(it, _view(scene, at).project(standing)[0]) for at, it in enumerate(found)]
+    x = np.concatenate(seen) @ np.array([1, 1j])
+    y = np.tile(places @ np.array([1, 1j]), len(found))
+    x, y = x - x.mean(), y - y.mean()
+    return np.abs(x * np.exp(1j * np.angle((np.conj(x) * y).sum())) - y)

@@ -1,0 +1,64 @@
+"""Cameras and a best-view service over a real bus and real pulses, in one event loop."""
+
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+
+from camsync import PulseServer, ServerLimits
+from fakes.timeouts import PATIENCE
+from server.camera.process import CameraProcess
+from server.config.pulse_passwords import pulse_users
+from server.config.site_config import Config
+from server.messaging.messages import pulse_client
+from server.service.service import BestViewService
+
+FPS = 50
+
+
+class Running:
+    """A whole site in this event loop: pulses, cameras, best view."""
+
+    def __init__(self, config: Config, out: Path | None = None) -> None:
+        self.config = config
+        self.service = BestViewService(config, out)
+        self._tasks: list[asyncio.Task[None]] = []
+        expect = {*config.camera_ids, pulse_client(0)}
+        self.pulses = PulseServer(
+            FPS,
+            expect=expect,
+            start_timeout=PATIENCE,
+            port=config.sync.port,
+            users=pulse_users(config),
+            limits=ServerLimits(catch_up=PATIENCE),  # a machine that stalls must not skip pulses here
+        )
+
+    def camera(self, camera: str) -> asyncio.Task[None]:
+        task = asyncio.create_task(self._run(camera))
+        self._tasks.append(task)
+        return task
+
+    async def _run(self, camera: str) -> None:
+        # In a thread: it looks at its recording ahead, and here the pulses come from the same loop.
+        process = await asyncio.to_thread(CameraProcess, self.config, camera)
+        await process.run()
+
+    async def start(self) -> asyncio.Task[None]:
+        await self.pulses.start()
+        self.service.open()
+        task = asyncio.create_task(self.service.run())
+        self._tasks.append(task)
+        return task
+
+    async def stop(self) -> None:
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+        self.service.close()
+        await self.pulses.stop()
+
+
+def in_folder(folder: Path) -> dict[str, bytes]:
+    """Give what tracks and choices were written."""
+    files = [*folder.rglob("*.txt"), *folder.rglob("*.csv")]
+    return {str(file.relative_to(folder)): file.read_bytes() for file in files}

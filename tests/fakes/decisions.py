@@ -1,0 +1,67 @@
+"""Decisions of a best-view service, made up and collected."""
+
+from __future__ import annotations
+
+from bestview import Merge, Split
+from fakes.cameras import (
+    CAMERAS,
+    GOP,
+    LARGE,
+    NO_REASON,
+    SMALL,
+    STRIDE,
+    FedService,
+    encoded,
+    small_config,
+    tracks,
+    video,
+    word,
+)
+from server.messaging.epochs import end_of_epoch
+from server.messaging.messages import NumberedBox
+from server.service.view_selection.decider import GopDecision, ObjectChoice
+
+EPOCHS = 8
+
+
+def behind() -> FedService:
+    """Give a service that has heard all cameras, and decided nothing."""
+    service = FedService(small_config())
+    service.come(*CAMERAS)
+    for epoch in range(EPOCHS):
+        for seed, camera in enumerate(CAMERAS):
+            for unit in encoded(seed)[epoch * STRIDE : (epoch + 1) * STRIDE]:
+                service.intake.video(video(camera, unit))
+            boxes = {1: LARGE if (epoch + seed) % 4 < 2 else SMALL}
+            service.intake.tracks(tracks(word(camera, epoch, boxes)))
+    service.pulse = end_of_epoch(EPOCHS - 1, STRIDE)
+    return service
+
+
+def noted(service: FedService) -> list[GopDecision]:
+    """Collect what a service decides."""
+    decided: list[GopDecision] = []
+    publish = service._publish
+
+    def note(decision: GopDecision) -> None:
+        decided.append(decision)
+        publish(decision)
+
+    service._publish = note  # type: ignore[method-assign]
+    return decided
+
+
+def decision(
+    gop: int,
+    *choices: ObjectChoice,
+    frames: int = GOP,
+    corrections: tuple[Merge | Split, ...] = (),
+    **boxes: list[list[NumberedBox]],
+) -> GopDecision:
+    nobody: list[list[NumberedBox]] = [[]] * frames
+    shown = {it: boxes.get(it, nobody) for it in CAMERAS}
+    return GopDecision(gop * GOP, frames, choices, shown, {}, corrections, NO_REASON)
+
+
+def choice(number: int, camera: str | None, before: str | None = None, *, away: bool = False) -> ObjectChoice:
+    return ObjectChoice(number, camera, before, away)

@@ -1,0 +1,135 @@
+"""A site with tokens whose object 1 leaves for a while; object 2 stays in the room."""
+
+from __future__ import annotations
+
+import asyncio
+import io
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from functools import cache
+from pathlib import Path
+from typing import Any, Literal
+
+import aiohttp
+import av
+import numpy as np
+from numpy.typing import NDArray
+
+from fakes.cameras import CAMERAS, FPS, GOP, LARGE, SMALL, encoded
+from fakes.site import A, B, Hall
+from fakes.tokens import bearer, locked
+from server.messaging.messages import Box, GopChoices
+
+Picture = NDArray[np.uint8]
+Codec = Literal["h264", "vp8"]
+
+EPOCHS, GONE = 24, range(4, 16)
+"""Epochs that there are, and those in which object 1 is in no camera."""
+UNSEEN = 2 * GOP
+"""Frames after which object 1 is not shown any more."""
+ACCESS = {"unseen_s": UNSEEN / FPS}
+PATIENT = {"viewer_queue_gops": 100}  # with who reads slowly
+GREY = 128
+ELSEWHERE: Box = (40.0, 10.0, 46.0, 28.0)
+"""Where object 2 is."""
+
+
+@asynccontextmanager
+async def left(folder: Path, **changes: Any) -> AsyncIterator[Hall]:
+    """Serve that site; nothing has been seen yet."""
+    changes = {"access": ACCESS, "http": PATIENT, **changes}
+    async with locked(folder, **changes) as hall:
+        hall.service.frames = EPOCHS * GOP
+        hall.service.come(*CAMERAS)
+        yield hall
+
+
+def go_on(hall: Hall, epochs: range) -> list[GopChoices]:
+    """Let the cameras see some epochs; give what is decided meanwhile."""
+    told: list[GopChoices] = []
+    hall.service.on_decision.append(told.append)
+    for epoch in epochs:
+        there = epoch not in GONE
+        seen_by_a = {1: SMALL if there else None, 2: ELSEWHERE}  # who is named first is object 1
+        hall.service.feed(epoch, {A: seen_by_a, B: {1: LARGE if there else None}})
+    hall.service.on_decision.remove(told.append)
+    return told
+
+
+def expected(told: list[GopChoices], codec: Codec = "h264", *, holds: bool = True) -> dict[int, Picture]:
+    """Say what who may see object 1 alone is to see, by pulse, of decisions from the first one on.
+
+    ``holds``: before it is grey, the last picture stands.
+    """
+    shown: dict[int, Picture] = {}
+    seen_last = -1 - 2 * UNSEEN
+    for gop in told:
+        camera = gop.choices[1]
+        seen = [
+            gop.first + place
+            for frames in gop.boxes.values()
+            for place, boxes in enumerate(frames)
+            if any(box[0] == 1 for box in boxes)
+        ]
+        seen_last = max([seen_last, *seen])
+        ago = gop.first - seen_last
+        for pulse in range(gop.first, gop.first + gop.frames):
+            if ago <= UNSEEN:
+                shown[pulse] = own(camera, codec)[pulse]
+            elif holds and ago <= 2 * UNSEEN:
+                shown[pulse] = shown[pulse - 1]
+            else:
+                shown[pulse] = np.full_like(own(camera)[pulse], GREY)
+    return shown
+
+
+@cache
+def own(camera: str, codec: Codec = "h264") -> list[Picture]:
+    """Decode a camera's own pictures, in YUV 4:2:0."""
+    decoder = av.VideoCodecContext.create(codec, "r")
+    units = encoded(CAMERAS.index(camera), EPOCHS * GOP, codec=codec)
+    packets = [*(av.Packet(unit.data) for unit in units), None]
+    return [it.to_ndarray(format="yuv420p") for packet in packets for it in decoder.decode(packet)]
+
+
+def decoded(data: bytes) -> dict[int, Picture]:
+    """Decode a stream: the picture of each pulse; what cannot be decoded is an error."""
+    with av.open(io.BytesIO(data), "r", options={"err_detect": "explode"}) as stream:
+        stream.streams.video[0].codec_context.options = {"err_detect": "explode"}
+        frames = list(stream.decode(video=0))
+    return {round(float(it.time or 0) * FPS): it.to_ndarray(format="yuv420p") for it in frames}
+
+
+def equal(shown: dict[int, Picture], right: dict[int, Picture]) -> None:
+    """Compare pictures by their pulses; there must be no hole in them, and they reach as far."""
+    assert list(shown) == list(range(min(shown), len(right)))
+    for pulse, picture in shown.items():
+        np.testing.assert_array_equal(picture, right[pulse], str(pulse))
+
+
+def chosen(told: list[GopChoices], codec: Codec = "h264") -> dict[int, Picture]:
+    """Say what everybody else sees."""
+    cameras = {pulse: it.choices[1] for it in told for pulse in range(it.first, it.first + it.frames)}
+    return {pulse: own(camera, codec)[pulse] for pulse, camera in cameras.items()}
+
+
+def is_grey(picture: Picture) -> bool:
+    return bool((picture == GREY).all())
+
+
+async def begun(hall: Hall, path: str, who: str) -> aiohttp.ClientResponse:
+    """Begin to watch."""
+    answer = await hall.session.get(path, headers=bearer(who))
+    assert answer.status == 200, await answer.text()
+    return answer
+
+
+async def fetched(hall: Hall, path: str, who: str) -> bytes:
+    async with await begun(hall, path, who) as answer:
+        return await answer.read()
+
+
+async def to_the_end(hall: Hall, *answers: aiohttp.ClientResponse) -> list[bytes]:
+    """End all streams, and give what was sent."""
+    hall.service.splicer.close()
+    return await asyncio.gather(*(it.read() for it in answers))

@@ -1,0 +1,169 @@
+"""A site that shows the synthetic room with true boxes, fed by hand, and readers of what it draws."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncGenerator, AsyncIterator, Iterator
+from dataclasses import dataclass
+from functools import cache
+
+import aiohttp
+import av
+import numpy as np
+from aiohttp import web
+from numpy.typing import NDArray
+
+from fakes.cameras import GOP, STRIDE, FedService, TrackNumbers, small_config, tracks, video, word
+from fakes.site import Hall
+from fakes.timeouts import PATIENCE
+from server.camera.encoding.encoder import AccessUnit, Encoder
+from server.config.sections import HttpSettings
+from server.http.app import make_app, serving
+from server.messaging.epochs import end_of_epoch
+from server.messaging.messages import Box, GopChoices, TrackMessage
+from synthetic import Scene
+
+SIZE = (320, 180)
+CAMERAS = ("c0", "c1")
+START = 200
+"""The scene's frame at pulse 0: people are in sight."""
+
+MOST = 150
+"""Frames that there are."""
+
+Image = NDArray[np.uint8]
+
+
+@cache
+def room() -> Scene:
+    return Scene("room", len(CAMERAS), 3, 1, *SIZE)
+
+
+@cache
+def units(camera: int, frames: int) -> tuple[AccessUnit, ...]:
+    """Encode what a camera of the room sees from pulse 0 on."""
+    site = small_config(site={"width": SIZE[0], "height": SIZE[1]})
+    encoder = Encoder(site.site, site.encode)
+    return tuple(encoder.encode(pulse, room().image(camera, START + pulse)) for pulse in range(frames))
+
+
+def boxes(camera: int, first: int, frames: int) -> dict[int, list[Box | None]]:
+    """Say where everybody is, by person and frame."""
+    found: dict[int, list[Box | None]] = {}
+    for place in range(frames):
+        truth = room().truth(START + first + place)[camera]
+        for person, box in zip(truth.ids.tolist(), truth.boxes.tolist(), strict=True):
+            found.setdefault(person, [None] * frames)[place] = tuple(box)
+    return found
+
+
+@dataclass
+class Drawn(Hall):
+    """The served room."""
+
+    service: FedService
+    session: aiohttp.ClientSession
+    port: int
+    app: web.Application
+    told: dict[int, GopChoices]
+    """Decisions by their first frame."""
+    epochs: int = 0
+
+    def go_on(self, epochs: int = 1, cameras: tuple[str, ...] = CAMERAS) -> None:
+        """Let the cameras send and the service decide."""
+        for epoch in range(self.epochs, self.epochs + epochs):
+            first = epoch * STRIDE
+            for number, camera in enumerate(CAMERAS):
+                if camera not in cameras:
+                    continue
+                for unit in units(number, MOST)[first : first + STRIDE]:
+                    self.service.intake.video(video(camera, unit))
+                seen = [
+                    TrackMessage(id=person, boxes=places, confidence=1.0)
+                    for person, places in boxes(number, first, STRIDE).items()
+                ]
+                self.service.intake.tracks(tracks(word(camera, epoch, {}, tracks=seen, size=SIZE)))
+            self.service.pulse = end_of_epoch(epoch, STRIDE)
+            self.service.decide()
+        self.epochs += epochs
+
+    async def keep_going(self, period: float) -> None:
+        """Let the cameras send without an end, an epoch each ``period`` seconds."""
+        while True:
+            await asyncio.sleep(period)
+            self.go_on()
+
+
+async def drawn_room(**changes: object) -> AsyncIterator[Drawn]:
+    service = FedService(small_config(site={"width": SIZE[0], "height": SIZE[1]}, **changes))
+    service.decider.people._registry = TrackNumbers()  # type: ignore[assignment]
+    told: dict[int, GopChoices] = {}
+    service.on_decision.append(lambda choices: told.update({choices.first: choices}))
+    app = make_app(service)
+    async with (
+        asyncio.timeout(2 * PATIENCE),
+        serving(app, HttpSettings(port=0)) as port,
+        aiohttp.ClientSession(f"http://127.0.0.1:{port}") as session,
+    ):
+        hall = Drawn(service, session, port, app, told)
+        service.come(*CAMERAS)
+        hall.go_on(4)
+        yield hall
+    service.close()
+
+
+def decoded(camera: int, frames: int) -> Iterator[Image]:
+    """Give a camera's pictures as a viewer sees them."""
+    decoder = av.VideoCodecContext.create("h264", "r")
+    for unit in units(camera, MOST)[:frames]:
+        for picture in decoder.decode(av.Packet(unit.data)):
+            yield picture.to_ndarray(format="bgr24")
+
+
+async def read_film(answer: aiohttp.ClientResponse, frames: int) -> bytes:
+    """Read a stream until it has so many whole frames."""
+    data = b""
+    while whole_frames(data) < frames:
+        data += await answer.content.readany()
+    return data
+
+
+def whole_frames(data: bytes) -> int:
+    place = count = 0
+    while place + 8 <= len(data):
+        size = int.from_bytes(data[place : place + 4], "big")
+        if place + size > len(data):
+            break
+        count += data[place + 4 : place + 8] == b"mdat"
+        place += size
+    return count
+
+
+@dataclass(frozen=True)
+class Part:
+    """One picture of multipart JPEG."""
+
+    pulse: int
+    jpeg: bytes
+
+
+async def parts(answer: aiohttp.ClientResponse) -> AsyncGenerator[Part, None]:
+    """Read multipart JPEG as RFC 2046 has it: by its boundary and the lengths it tells."""
+    boundary = "--" + answer.headers["Content-Type"].partition("boundary=")[2]
+    stream = answer.content
+    assert await stream.readline() == boundary.encode() + b"\r\n"
+    while True:
+        head: dict[str, str] = {}
+        while (line := (await stream.readline()).decode().strip()) != "":
+            name, _, value = line.partition(": ")
+            head[name] = value
+        if not head:
+            return
+        assert head["Content-Type"] == "image/jpeg"
+        jpeg = await stream.readexactly(int(head["Content-Length"]))
+        yield Part(int(head["X-MyView-Pulse"]), jpeg)
+        assert await stream.readline() == b"\r\n"
+        assert await stream.readline() == boundary.encode() + b"\r\n"
+
+
+__all__ = ["CAMERAS", "GOP", "SIZE", "Drawn", "Part", "decoded", "drawn_room", "parts", "read_film"]

@@ -1,0 +1,59 @@
+"""A recorded site whose time shift is fetched as HLS."""
+
+from __future__ import annotations
+
+import asyncio
+import re
+
+from fakes.cameras import CAMERAS, GOP, NO_REASON, encoded, video
+from fakes.recordings import PULSE0
+from fakes.site import Hall
+from server.messaging.messages import GopChoices
+from server.service.view_selection.decider import GopDecision, ObjectChoice
+
+GOPS = 40
+FRAMES = GOPS * GOP
+HTTP = {"hls_segment_s": 0.4, "hls_window_s": 0.8}
+"""Two GOPs in a segment, three segments in a playlist."""
+LENGTH = 2 * GOP
+
+
+def shows(hall: Hall, gops: range, choices: dict[int, str | None] | None = None) -> None:
+    """Decide some GOPs: person 1 is in either camera in turn, or as told; in None no pictures come."""
+    service = hall.service
+    for gop in gops:
+        camera = CAMERAS[gop % 2] if choices is None else choices[gop]
+        for seed, own in enumerate(CAMERAS if camera is not None else ()):
+            for unit in encoded(seed, FRAMES)[gop * GOP : (gop + 1) * GOP]:
+                service.intake.video(video(own, unit))
+        told = {} if camera is None else {1: camera}
+        service.past.put(GopChoices(first=gop * GOP, frames=GOP, choices=told, boxes={}, cuts=[]), PULSE0)
+        choice = ObjectChoice(1, camera, None, away=False)
+        service.splicer.decision(GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
+
+
+async def until_written(hall: Hall, gops: int) -> None:
+    while hall.service.past.writer is not None and hall.service.past.writer.written < gops:  # noqa: ASYNC110
+        await asyncio.sleep(0.001)
+
+
+def forget(hall: Hall) -> None:
+    """Let the disk alone know what was, but for the newest GOP."""
+    hall.service.past.recent._frames = GOP
+    hall.service.past.recent._choices = type(hall.service.past.recent._choices)(
+        [hall.service.past.recent._choices[-1]]
+    )
+
+
+async def fetch(hall: Hall, path: str) -> bytes:
+    async with hall.session.get(path) as answer:
+        assert answer.status == 200, await answer.text()
+        return await answer.read()
+
+
+async def text(hall: Hall, path: str) -> str:
+    return (await fetch(hall, path)).decode()
+
+
+def numbers(playlist: str) -> list[int]:
+    return [int(it) for it in re.findall(r"^([0-9]+)\.m4s$", playlist, re.MULTILINE)]

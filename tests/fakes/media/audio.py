@@ -1,0 +1,144 @@
+"""Small recordings that flash and beep at known moments, and what is heard of them in a stream."""
+
+from __future__ import annotations
+
+import io
+from fractions import Fraction
+from functools import cache
+from itertools import pairwise
+from pathlib import Path
+
+import av
+import msgspec
+import numpy as np
+from av.audio.stream import AudioStream
+from av.video.stream import VideoStream
+from numpy.typing import NDArray
+
+from fakes.cameras import GOP, FedService
+from server.camera.audio import Frame, RecordedSound, runs
+from server.camera.encoding.encoder import AccessUnit, Encoder
+from server.config.sections import EncodeSettings, SiteSettings
+from server.messaging.inbox import Message
+from server.messaging.messages import AudioHeader, ZenohKeys
+
+WIDTH, HEIGHT, FPS = 64, 48, 25
+EVERY = 20
+"""Pictures from one flash to the next: 0.8 s."""
+_LASTS = 2
+"""Pictures that a flash lasts."""
+
+GOPS = 24
+FRAMES = GOPS * GOP
+STEP = 0.04
+"""Seconds: sound that is so far from its picture is out of step."""
+BEEPS = [number / FPS for number in range(EVERY, FRAMES, EVERY)]
+
+
+def write_flashes(
+    path: Path,
+    frames: int,
+    *,
+    codec: str = "aac",
+    rate: int = 48_000,
+    channels: int = 2,
+    pictures: bool = True,
+    options: dict[str, str] | None = None,
+) -> Path:
+    """Write a recording that flashes and beeps at its pictures EVERY, 2 · EVERY and so on."""
+    with av.open(str(path), "w") as container:
+        video = container.add_stream("libx264", rate=FPS) if pictures else None
+        audio = container.add_stream(codec, rate=rate, options=options or {})
+        assert isinstance(audio, AudioStream)
+        audio.layout = "mono" if channels == 1 else "stereo"
+        if isinstance(video, VideoStream):
+            video.width, video.height, video.pix_fmt = WIDTH, HEIGHT, "yuv420p"
+            for number in range(frames):
+                grey = 255 * _is_flash(number)
+                picture = np.full((HEIGHT, WIDTH, 3), grey, dtype=np.uint8)
+                frame = av.VideoFrame.from_ndarray(picture, format="bgr24")
+                frame.pts, frame.time_base = number, Fraction(1, FPS)
+                container.mux(video.encode(frame))
+            container.mux(video.encode(None))
+        for number in range(frames):
+            container.mux(audio.encode(_some_sound(number, rate, audio.layout.name)))
+        container.mux(audio.encode(None))
+    return path
+
+
+def _is_flash(number: int) -> bool:
+    return number >= EVERY and number % EVERY < _LASTS
+
+
+def _some_sound(number: int, rate: int, layout: str) -> av.AudioFrame:
+    samples = rate // FPS
+    time = (number * samples + np.arange(samples)) / rate
+    wave = 0.5 * np.sin(2 * np.pi * 1000 * time) * _is_flash(number)
+    channels = 1 if layout == "mono" else 2
+    interleaved = np.repeat((wave * 32767).astype(np.int16), channels)[None]
+    frame = av.AudioFrame.from_ndarray(interleaved, format="s16", layout=layout)
+    frame.sample_rate, frame.pts, frame.time_base = rate, number * samples, Fraction(1, rate)
+    return frame
+
+
+@cache
+def flashing(recording: Path) -> tuple[AccessUnit, ...]:
+    """Give the recording's pictures as a camera of the hall sends them."""
+    encoder = Encoder(SiteSettings(width=64, height=48, fps=FPS), EncodeSettings(gop=GOP))
+    with av.open(str(recording)) as container:
+        pictures = [it.to_ndarray(format="bgr24") for it in container.decode(video=0)]
+    return tuple(encoder.encode(pulse, picture) for pulse, picture in enumerate(pictures))
+
+
+def sends(service: FedService, recording: Path, silent: range = range(0)) -> list[bytes]:
+    """Send all of the recording's sound, but for some frames; give its frames."""
+    sound = RecordedSound(str(recording), service.config.sound, FPS, 0, "stop")
+    frames = [*sound.until(0), *sound.until(FRAMES)]
+    for message in messages([it for it in frames if it.number not in silent]):
+        service.intake.sound(message)
+    return [frame.data for frame in frames]
+
+
+def messages(frames: list[Frame]) -> list[Message]:
+    """Give frames of sound as they come from the bus."""
+    return [
+        Message(
+            ZenohKeys("hall").sound,
+            b"".join(frame.data for frame in run),
+            msgspec.json.encode(AudioHeader(first=run[0].number, sizes=[len(frame.data) for frame in run])),
+        )
+        for run in runs(frames)
+    ]
+
+
+def packets(stream: bytes) -> list[bytes]:
+    """Give the frames of sound in an MP4."""
+    with av.open(io.BytesIO(stream)) as container:
+        return [bytes(packet) for packet in container.demux(audio=0) if packet.size]
+
+
+def heard(stream: bytes, kind: str | None = None) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Give what is heard of a stream: times of all samples (seconds), and the samples, in one channel."""
+    with av.open(io.BytesIO(stream), format=kind) as container:
+        frames = list(container.decode(audio=0))
+    times = [float(it.time or 0) + np.arange(it.samples) / it.sample_rate for it in frames]
+    return np.concatenate(times), np.concatenate([it.to_ndarray()[0] for it in frames])
+
+
+def beeps(stream: bytes, kind: str | None = None) -> list[float]:
+    """Give when beeps begin in a stream, seconds."""
+    times, samples = heard(stream, kind)
+    return _begins(times[np.abs(samples) > 0.1])
+
+
+def flashes(stream: bytes, kind: str | None = None) -> list[float]:
+    """Give when flashes begin in a stream, seconds."""
+    with av.open(io.BytesIO(stream), format=kind) as container:
+        bright = [it.time for it in container.decode(video=0) if it.to_ndarray(format="gray").mean() > 128]
+    return _begins(np.array(bright, dtype=np.float64))
+
+
+def _begins(times: NDArray[np.float64]) -> list[float]:
+    """Give the first of each group of times that are close to each other."""
+    earlier = [-1.0, *times]
+    return [float(time) for before, time in pairwise(earlier) if time - before > 0.2]

@@ -1,0 +1,76 @@
+"""A stream that Chromium reads into one SourceBuffer and plays: what the page does, without the page."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from typing import Any
+
+from benchmarks.browser import chromium
+from fakes.timeouts import PATIENCE
+from server.service.streaming.splicer import Splicer
+
+READ = """
+  const video = document.createElement('video');
+  const source = new MediaSource();
+  video.muted = true;
+  video.src = URL.createObjectURL(source);
+  await new Promise((done) => source.addEventListener('sourceopen', done, { once: true }));
+  const buffer = source.addSourceBuffer(type);
+  buffer.appendBuffer(await (await fetch(url)).arrayBuffer());
+  await new Promise((done) => buffer.addEventListener('updateend', done, { once: true }));
+  source.endOfStream();
+"""
+"""JavaScript that reads all of ``url``, of MIME type ``type``, into ``buffer``, which ``video`` shows."""
+
+PLAY = (
+    "async ([url, type, rate]) => {"
+    + READ
+    + """
+  const ended = new Promise((done) => video.addEventListener('ended', done, { once: true }));
+  const range = [buffer.buffered.start(0), buffer.buffered.end(0)];
+  const shown = [];
+  const tell = (now, { mediaTime }) => { shown.push(mediaTime); video.requestVideoFrameCallback(tell); };
+  video.requestVideoFrameCallback(tell);
+  video.currentTime = range[0];
+  video.playbackRate = rate;
+  await video.play();
+  await ended;
+  return { ranges: buffer.buffered.length, range, shown, error: video.error?.message ?? '',
+    tracks: [video.webkitAudioDecodedByteCount > 0, video.webkitVideoDecodedByteCount > 0] };
+}"""
+)
+"""Plays it to the end: what was buffered, the frames' media times, the tracks of sound and pictures."""
+
+
+async def seen_in_chromium(
+    port: int, splicer: Splicer, gops: int, show: Callable[[int], None], script: str, *arguments: Any
+) -> dict[str, Any]:
+    """Give what a script says of a stream that it reads; all GOPs but the first follow once it watches."""
+    async with chromium() as browser:
+        page = await browser.new_page(bypass_csp=True)
+        await page.goto(f"http://127.0.0.1:{port}/healthz")
+        playing = asyncio.create_task(page.evaluate(script, list(arguments)))
+        while not splicer.viewers:  # noqa: ASYNC110 — the browser comes when it comes
+            await asyncio.sleep(0.01)
+        for gop in range(1, gops):
+            show(gop)
+            await asyncio.sleep(0.01)
+        splicer.close()
+        async with asyncio.timeout(PATIENCE):
+            found: dict[str, Any] = await playing
+    return found
+
+
+HLS_BY_ITSELF = """async (url) => {
+  const video = document.createElement('video');
+  if (!video.canPlayType('application/vnd.apple.mpegurl')) return null;
+  const end = new Promise((done) => {
+    video.onended = () => done('ended');
+    video.onerror = () => done(video.error.message);
+  });
+  video.muted = true;
+  video.src = url;  // at its own rate: what is live can be played at no other
+  await video.play();
+  return { end: await end, seconds: video.currentTime };
+}"""

@@ -1,0 +1,47 @@
+"""H.264 streams of every kind that an encoder makes."""
+
+from __future__ import annotations
+
+import av
+import numpy as np
+from numpy.typing import NDArray
+
+from server.camera.encoding.encoder import AccessUnit, Encoder
+from server.config.sections import EncodeSettings, SiteSettings
+from server.media.h264.annexb import nal_units, parameter_sets
+from server.media.h264.repeat_picture import Continuing, continuing
+
+PRESETS = ("ultrafast", "superfast", "medium")
+
+
+def encoded(size: tuple[int, int], preset: str, frames: int, gop: int = 6) -> list[AccessUnit]:
+    encoder = Encoder(
+        SiteSettings(width=size[0], height=size[1], fps=25), EncodeSettings(gop=gop, preset=preset)
+    )  # type: ignore[arg-type]
+    noise = np.random.default_rng(0).integers(0, 255, (frames, size[1], size[0], 3), dtype=np.uint8)
+    return [encoder.encode(pulse, np.asarray(picture // 4 * 2)) for pulse, picture in enumerate(noise)]
+
+
+def how(unit: AccessUnit) -> Continuing:
+    found = parameter_sets(nal_units(unit.data))
+    assert found is not None
+    return continuing(found)
+
+
+def decoded(samples: list[bytes]) -> list[NDArray[np.uint8]]:
+    """Decode length-prefixed samples; damage is an error."""
+    decoder = av.CodecContext.create("h264", "r")
+    decoder.options = {"err_detect": "explode"}
+    pictures = []
+    for data in [*samples, None]:
+        pictures += decoder.decode(None if data is None else av.Packet(annex_b(data)))
+    return [picture.to_ndarray(format="yuv420p") for picture in pictures]
+
+
+def annex_b(data: bytes) -> bytes:
+    out, at = b"", 0
+    while at < len(data):
+        length = int.from_bytes(data[at : at + 4], "big")
+        out += b"\x00\x00\x00\x01" + data[at + 4 : at + 4 + length]
+        at += 4 + length
+    return out

@@ -1,0 +1,21 @@
+"""Accessibility faults of a page, found by axe-core."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fakes.page.browser import Visit
+from fakes.paths import AXE
+
+SERIOUS = ("serious", "critical")
+
+
+async def faults(visit: Visit) -> list[Any]:
+    """Give what axe-core finds serious: rule, help, and the elements."""
+    await visit.page.add_script_tag(path=AXE)
+    found = await visit.get("axe.run()")
+    return [
+        (it["id"], it["help"], [node["html"] for node in it["nodes"]])
+        for it in found["violations"]
+        if it["impact"] in SERIOUS
+    ]

@@ -1,0 +1,85 @@
+"""Debian's Chromium, without a screen, opened on a fake site."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+from collections.abc import AsyncIterator
+from dataclasses import dataclass
+from typing import Any
+
+import av
+import numpy as np
+import numpy.typing as npt
+from playwright.async_api import Browser, Page, expect
+
+from fakes.page.site import FakeSite, SiteServer, serving
+from fakes.page.video_pattern import CAMERAS, FPS, GROUNDS
+from fakes.timeouts import PATIENCE_MS
+
+expect.set_options(timeout=PATIENCE_MS)
+
+
+@dataclass(frozen=True, slots=True)
+class Visit:
+    """A page that is open on a site."""
+
+    page: Page
+    server: SiteServer
+
+    async def until(self, condition: str) -> None:
+        """Wait until a JavaScript expression holds."""
+        await self.page.wait_for_function(condition, timeout=PATIENCE_MS)
+
+    async def playing(self, person: int) -> None:
+        """Wait until frames of a person are being shown."""
+        await self.until(
+            f"myview.state === 'playing' && myview.object === {person} && myview.camera !== null"
+            " && myview.switches.at(-1)?.shownAt !== null"
+        )
+
+    async def get(self, expression: str) -> Any:
+        """Give the value of a JavaScript expression."""
+        return await self.page.evaluate(expression)
+
+    async def screenshot(self) -> npt.NDArray[np.int16]:
+        """Give what is on the stage now, shape (height, width, 3), red, green, blue."""
+        image = await self.page.locator("#stage").screenshot()
+        with av.open(io.BytesIO(image), "r") as container:
+            return next(container.decode(video=0)).to_ndarray(format="rgb24").astype(np.int16)
+
+
+@contextlib.asynccontextmanager
+async def visiting(
+    browser: Browser,
+    site: FakeSite | None = None,
+    query: str = "",
+    width: int = 800,
+    height: int = 900,
+    script: str = "",
+) -> AsyncIterator[Visit]:
+    """Open the page on a site, after a script of its own; an exception in the page fails the test."""
+    failures: list[str] = []
+    async with serving(site or FakeSite()) as server:
+        # The site's policy forbids eval, which the conditions of these tests are evaluated with.
+        page = await browser.new_page(viewport={"width": width, "height": height}, bypass_csp=True)
+        page.on("pageerror", lambda error: failures.append(str(error)))
+        if script:
+            await page.add_init_script(script)
+        try:
+            await page.goto(server.url + query)
+            yield Visit(page, server)
+        finally:
+            await page.close()
+    assert not failures
+
+
+async def seconds_of_playing(visit: Visit, seconds: float) -> None:
+    seen = await visit.get("myview.pulse")
+    await visit.until(f"myview.pulse >= {seen + round(seconds * FPS)}")
+
+
+async def camera_on_the_stage(visit: Visit) -> str:
+    """Give the camera whose tint the picture has."""
+    ground = np.median((await visit.screenshot()).reshape(-1, 3), axis=0)
+    return CAMERAS[int(np.abs(np.array(GROUNDS) - ground).sum(axis=1).argmin())]

@@ -1,0 +1,418 @@
+"""A small site that speaks the HTTP contract, for the page to be tried against: three test patterns."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import io
+import json
+import time
+from collections.abc import AsyncIterator
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import av
+from aiohttp import web
+
+from fakes.page.video_pattern import (
+    CAMERAS,
+    FPS,
+    GOP,
+    HEIGHT,
+    SQUARE,
+    WIDTH,
+    pattern,
+    picture,
+    second,
+    square,
+)
+from fakes.paths import PAGE
+
+LOOKAHEAD = 10  # frames between the pulse and what is served
+SEGMENT = 2 * GOP  # frames of a segment of HLS
+HOLD = 3 * GOP  # frames for which person 1 is shown by one camera
+STARTS_AT = 12_345_678  # the pulse of the site's first moment: far from zero, as on a site up for days
+
+REASON = "Another camera sees this person a little better, but not by enough to be worth a cut so soon."
+# As strict as a server may be: nothing from elsewhere, no code or style inside the page.
+POLICY = "default-src 'self'; media-src 'self' blob:; img-src 'self' data: blob:"
+
+
+@dataclass(slots=True)
+class FakeSite:
+    """What the site says, and switches for what may go wrong.
+
+    Args:
+        bursts: Send whole GOPs at once instead of frame by frame.
+        people: Who is known, and whether they are in view.
+        also: Other numbers that somebody once had.
+        split: What every GOP says about numbers that turned out to be somebody else's.
+        first_pulse: Pulse of about the moment at which the site is made.
+        skipped: Pulses whose frames are missing from every stream.
+        codec: What is in the streams; None: no key frame has come yet.
+        opened: Whose stream was asked for, in order.
+        listed: Playlists of HLS that were asked for, in order.
+        fetched: First pulses of the segments of HLS that were asked for, in order.
+        kept_from: The first pulse that can be seen again.
+        recorded: Seconds of the past that are recorded.
+        ahead: Seconds that the streams run ahead of the clock: minutes pass in no time.
+        blind: Pulses, from GOP to GOP, at which the first camera finds nobody.
+        unfound: Share of the look-ahead in which every camera does not find whom others know to be there.
+        operates: Whoever looks at the page may operate.
+        flags: What an operator is asked to look at.
+        pointed: Where the operator pointed, as it was sent.
+        busy: What cameras say that they leave out.
+        pulse0: Unix seconds at which pulse 0 was due.
+    """
+
+    bursts: bool = False
+    people: dict[int, bool] = field(default_factory=lambda: {1: True, 2: True})
+    also: dict[int, list[int]] = field(default_factory=dict)
+    split: list[dict[str, Any]] = field(default_factory=list)
+    first_pulse: int = STARTS_AT
+    skipped: range = range(0)
+    codec: str | None = "avc1.42C01F"
+    opened: list[int] = field(default_factory=list)
+    listed: list[str] = field(default_factory=list)
+    fetched: list[int] = field(default_factory=list)
+    kept_from: int = 0
+    recorded: int = 0
+    ahead: float = 0.0
+    blind: range = range(0)
+    unfound: float = 0.0
+    operates: bool = False
+    flags: list[dict[str, Any]] = field(default_factory=list)
+    pointed: list[dict[str, Any]] = field(default_factory=list)
+    busy: dict[str, str] = field(default_factory=dict)
+    pulse0: float = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.pulse0 = time.time() - (self.first_pulse + LOOKAHEAD + 3 * GOP) / FPS
+
+    @property
+    def edge(self) -> int:
+        """Give the newest pulse that is decided and served."""
+        return int((time.time() + self.ahead - self.pulse0) * FPS) - LOOKAHEAD
+
+    def camera(self, person: int, pulse: int) -> int:
+        return (pulse // HOLD) % len(CAMERAS) if person == 1 else 2
+
+    def shown(self, person: int, pulse: int, held: str | None, preferred: str | None) -> int:
+        """Give the camera of a pulse in a stream that may be held to one, or prefer one."""
+        if held is not None:
+            return CAMERAS.index(held)
+        if preferred is not None:
+            seen = [CAMERAS.index(preferred) or it not in self.blind for it in (pulse, pulse - GOP)]
+            return CAMERAS.index(preferred) if all(seen) else self.camera(person, pulse)
+        return self.camera(person, pulse)
+
+    def site(self) -> dict[str, Any]:
+        return {
+            "name": "Test patterns",
+            "fps": FPS,
+            "width": WIDTH,
+            "height": HEIGHT,
+            "gop": GOP,
+            "lookahead_frames": LOOKAHEAD,
+            "codec": self.codec,
+            "pulse0": self.pulse0,
+            "now": time.time(),
+            "cameras": list(CAMERAS),
+        }
+
+    def objects(self) -> dict[str, Any]:
+        return {"objects": [self._object(person, seen) for person, seen in self.people.items()]}
+
+    def _object(self, person: int, seen: bool) -> dict[str, Any]:
+        return {
+            "object": person,
+            "also": self.also.get(person, []),
+            "first_seen": self.first_pulse,
+            "last_seen": self.edge if seen else self.first_pulse,
+            "visible": seen,
+            "camera": CAMERAS[self.camera(person, self.edge)] if seen else None,
+            "cameras": list(CAMERAS[: 1 + person % 3]) if seen else [],
+            "thumbnail": f"/objects/{person}/thumb.jpg?v=1",
+        }
+
+    def cameras(self) -> dict[str, Any]:
+        return {
+            "cameras": [
+                {"camera": c, "pulse": self.edge, "late": 0, "fps": FPS}
+                | {"state": "live", "message": self.busy.get(c, "")}
+                for c in CAMERAS
+            ]
+        }
+
+    def gop(self, first: int) -> dict[str, Any]:
+        """Give the `gop` event of the frames [first, first + GOP)."""
+        choices = {str(k): CAMERAS[self.camera(k, first)] for k in self.people}
+        cuts = []
+        old, new = self.camera(1, first - 1), self.camera(1, first)
+        if old != new:
+            cuts.append({"object": 1, "from": CAMERAS[old], "to": CAMERAS[new], "pulse": first})
+        boxes = {c: [self._boxes(m, n) for n in range(first, first + GOP)] for m, c in enumerate(CAMERAS)}
+        return {
+            "first": first,
+            "frames": GOP,
+            "choices": choices,
+            "boxes": boxes,
+            "cuts": cuts,
+            "merged": [],
+            "split": self.split,
+        }
+
+    def _boxes(self, camera: int, pulse: int) -> list[list[float]]:
+        corners = {1: square(camera, pulse), 2: second(camera, pulse)}
+        return [
+            [k, left, top, left + SQUARE, top + SQUARE]
+            for k, (left, top) in corners.items()
+            if self.people.get(k) and (camera or pulse not in self.blind)
+        ]
+
+    def choice(self, person: int, first: int) -> dict[str, Any]:
+        """Give why a person is shown as they are in the GOP [first, first + GOP)."""
+        shown = self.camera(person, first)
+        costs = {camera: 0.0 if n == shown else 0.25 * (n + 1) for n, camera in enumerate(CAMERAS)}
+        return {
+            "object": person,
+            "first": first,
+            "frames": GOP,
+            "camera": CAMERAS[shown],
+            "since": first,
+            "costs": costs | {CAMERAS[shown - 1]: None},
+            "seen": {camera: 1.0 - cost for camera, cost in costs.items()},
+            "quality": {camera: 1.0 - cost for camera, cost in costs.items()},
+            "unfound": dict.fromkeys(CAMERAS, self.unfound),
+            "terms": {camera: {"size": 1.0 - cost, "whole": 1.0} for camera, cost in costs.items()},
+            "weights": {"size": 1.0, "whole": 0.1},
+            "before": CAMERAS[shown],
+            "lookahead": LOOKAHEAD,
+            "switch_cost": 7.5,
+            "stay": 0.0,
+            "cut": 9.25,
+            "cut_to": CAMERAS[(shown + 1) % len(CAMERAS)],
+            "reason": REASON,
+        }
+
+    def past(self, person: int, since: int = 0) -> dict[str, Any]:
+        """Give what can be seen again of a person, by camera; from `since` on, which begins a view."""
+        first = (self.edge - self.recorded * FPS) // HOLD * HOLD
+        views = [
+            {"camera": CAMERAS[self.camera(person, pulse)], "first": pulse, "frames": HOLD}
+            for pulse in range(max(first, since), self.edge - HOLD, HOLD)
+        ]
+        return {"spans": [], "views": views}
+
+    async def released(self, first: int) -> AsyncIterator[int]:
+        """Yield the pulses from `first` on, each when it may be sent."""
+        pulse = first
+        while True:
+            until = pulse - pulse % GOP + GOP - 1 if self.bursts else pulse
+            due = self.pulse0 - self.ahead + (until + LOOKAHEAD) / FPS
+            await asyncio.sleep(max(0.0, due - time.time()))
+            yield pulse
+            pulse += 1
+
+    def boundary(self) -> int:
+        """Give the first pulse of the newest whole GOP (in bursts) or of the present one."""
+        edge = self.edge - (GOP - 1 if self.bursts else 0)
+        return edge - edge % GOP
+
+
+def thumbnail(person: int) -> bytes:
+    """Give a JPEG of the person's square."""
+    left, top = (square if person == 1 else second)(0, 10)
+    crop = picture(0, 10)[top - 10 : top + SQUARE + 10, left - 6 : left + SQUARE + 6]
+    file = io.BytesIO()
+    with av.open(file, "w", format="mjpeg") as container:
+        stream = container.add_stream("mjpeg", rate=1)
+        stream.height, stream.width = crop.shape[0] // 2 * 2, crop.shape[1] // 2 * 2
+        stream.pix_fmt = "yuvj420p"
+        frame = av.VideoFrame.from_ndarray(crop[: stream.height, : stream.width].copy(), format="rgb24")
+        container.mux(stream.encode(frame.reformat(format="yuvj420p")))
+        container.mux(stream.encode(None))
+    return file.getvalue()
+
+
+class SiteServer:
+    """Serves a FakeSite and the page on one port, and may go away and come back there."""
+
+    def __init__(self, site: FakeSite) -> None:
+        self.site = site
+        self.port = 0
+        self._runner: web.AppRunner | None = None
+        self._streams: set[asyncio.Transport] = set()
+
+    @property
+    def url(self) -> str:
+        return f"http://127.0.0.1:{self.port}/"
+
+    async def start(self) -> None:
+        app = web.Application()
+        app.router.add_get("/", _file)
+        app.router.add_get("/page/{name}", _file)
+        app.router.add_get("/api/site", self._site)
+        app.router.add_get("/api/session", self._session)
+        app.router.add_get("/api/operator/pointing", self._pointing)
+        app.router.add_post("/api/operator/pointing", self._pointing)
+        app.router.add_get("/api/events", self._events)
+        app.router.add_get("/api/objects/{k}/choice", self._choice)
+        app.router.add_get("/api/objects/{k}/past", self._past)
+        app.router.add_get("/api/past", self._told)
+        app.router.add_get("/objects/{k}/best.mp4", self._best)
+        app.router.add_get("/cameras/{camera}/live.mp4", self._best)
+        app.router.add_get("/{of}/{k}/hls/index.m3u8", self._playlist)
+        app.router.add_get("/{of}/{k}/hls/{file}", self._segment)
+        app.router.add_get("/objects/{k}/thumb.jpg", self._thumbnail)
+        app.router.add_get("/recording.mp4", self._recording)
+        self._runner = web.AppRunner(app, shutdown_timeout=0.05, handler_cancellation=True)
+        await self._runner.setup()
+        listener = web.TCPSite(self._runner, "127.0.0.1", self.port, reuse_address=True)
+        await listener.start()
+        self.port = self._runner.addresses[0][1]
+
+    async def stop(self) -> None:
+        if self._runner:
+            await self._runner.cleanup()
+            self._runner = None
+
+    async def restart_as(self, site: FakeSite) -> None:
+        """Come back as another site on the same port: what a page sees of a server restart."""
+        await self.stop()
+        self.site = site
+        await self.start()
+
+    async def break_streams(self) -> None:
+        """Break the connections of all videos, as a bad network does."""
+        for transport in self._streams:
+            transport.abort()
+
+    async def _site(self, _: web.Request) -> web.Response:
+        return web.json_response(self.site.site())
+
+    async def _session(self, _: web.Request) -> web.Response:
+        """Say that anybody may watch, and who looks at the page maybe operate."""
+        role = "operate" if self.site.operates else "watch"
+        return web.json_response(
+            {"by_token": False, "name": None, "role": role, "object": None, "camera": None}
+        )
+
+    async def _pointing(self, request: web.Request) -> web.Response:
+        taken = 0
+        if request.method == "POST":
+            said = await request.json()
+            self.site.pointed.append(said)
+            taken = len(said["points"])
+        return web.json_response({"cannot": "", "taken": taken, "left_out": 0, "flags": []})
+
+    async def _choice(self, request: web.Request) -> web.Response:
+        k, pulse = int(request.match_info["k"]), int(request.query.get("at", f"p{self.site.edge}")[1:])
+        if pulse < self.site.kept_from:
+            return web.json_response({"error": "nothing is kept of that"}, status=404)
+        return web.json_response(self.site.choice(k, pulse - pulse % GOP))
+
+    async def _past(self, request: web.Request) -> web.Response:
+        first = int(request.query.get("from", "p0")[1:])
+        return web.json_response(self.site.past(int(request.match_info["k"]), first))
+
+    async def _told(self, request: web.Request) -> web.Response:
+        first, end = (int(request.query[name][1:]) for name in ("from", "to"))
+        gops = range(first - first % GOP, min(end, self.site.edge), GOP)
+        return web.Response(text="".join(json.dumps(self.site.gop(it)) + "\n" for it in gops))
+
+    async def _thumbnail(self, request: web.Request) -> web.Response:
+        return web.Response(body=thumbnail(int(request.match_info["k"])), content_type="image/jpeg")
+
+    async def _best(self, request: web.Request) -> web.StreamResponse:
+        site, k = self.site, int(request.match_info.get("k", 1))
+        site.opened.append(k)
+        if k not in site.people:
+            return web.json_response({"error": f"no object {k}"}, status=404)
+        held = request.match_info.get("camera", request.query.get("camera"))
+        first = int(request.query.get("from", f"p{site.boundary()}")[1:])
+        if "from" in request.query and first < site.kept_from:
+            return web.json_response({"error": "nothing is kept there"}, status=416)
+        first -= first % GOP
+        response = web.StreamResponse(headers={"Content-Type": "video/mp4"})
+        await response.prepare(request)
+        transport = request.transport
+        assert isinstance(transport, asyncio.Transport)
+        self._streams.add(transport)
+        with contextlib.suppress(ConnectionError):
+            await response.write(pattern(0).init)
+            async for pulse in site.released(first):
+                if pulse not in site.skipped:
+                    shown = site.shown(k, pulse, held, request.query.get("prefer"))
+                    await response.write(pattern(shown).fragment(pulse))
+        return response
+
+    async def _playlist(self, request: web.Request) -> web.Response:
+        site, lines = self.site, ["#EXTM3U", "#EXT-X-VERSION:7", "#EXT-X-TARGETDURATION:1"]
+        last = site.boundary() - site.boundary() % SEGMENT
+        first = int(request.query.get("from", f"p{last - 8 * SEGMENT}")[1:]) // SEGMENT * SEGMENT
+        begun = datetime.fromtimestamp(site.pulse0 + first / FPS, UTC).isoformat(timespec="milliseconds")
+        lines += [f"#EXT-X-MEDIA-SEQUENCE:{first // SEGMENT}", '#EXT-X-MAP:URI="init.mp4"']
+        lines += ["#EXT-X-START:TIME-OFFSET=0"] if "from" in request.query else []
+        lines += [f"#EXT-X-PROGRAM-DATE-TIME:{begun}"]
+        for pulse in range(first, last, SEGMENT):
+            lines += [f"#EXTINF:{SEGMENT / FPS:.3f},", f"{pulse}.m4s"]
+        site.listed.append(request.path_qs)
+        return web.Response(text="\n".join(lines) + "\n", content_type="application/vnd.apple.mpegurl")
+
+    async def _segment(self, request: web.Request) -> web.Response:
+        site, k, file = self.site, request.match_info["k"], request.match_info["file"]
+        if file == "init.mp4":
+            return web.Response(body=pattern(0).init, content_type="video/mp4")
+        pulses = range(int(file.split(".")[0]), int(file.split(".")[0]) + SEGMENT)
+        shown = [CAMERAS.index(k) if k in CAMERAS else site.camera(int(k), pulse) for pulse in pulses]
+        site.fetched.append(pulses.start)
+        data = b"".join(pattern(m).fragment(n) for m, n in zip(shown, pulses, strict=True))
+        return web.Response(body=data, content_type="video/mp4")
+
+    async def _recording(self, request: web.Request) -> web.Response:
+        frames = range(int(request.query["first"]), int(request.query["end"]))
+        data = pattern(0).init + b"".join(pattern(0).fragment(pulse) for pulse in frames)
+        return web.Response(body=data, content_type="video/mp4")
+
+    async def _events(self, request: web.Request) -> web.StreamResponse:
+        site = self.site
+        response = web.StreamResponse(headers={"Content-Type": "text/event-stream"})
+        await response.prepare(request)
+        with contextlib.suppress(ConnectionError):
+            for name in ("site", "objects", "cameras"):
+                await response.write(_event(name, getattr(site, name)()))
+            said, flags = dict(site.people), list[dict[str, Any]]()
+            async for pulse in site.released(site.boundary() - 2 * GOP):
+                if site.people != said:
+                    said = dict(site.people)
+                    await response.write(_event("objects", site.objects()))
+                if pulse % GOP == 0:
+                    await response.write(_event("gop", site.gop(pulse)))
+                for flag in site.flags:
+                    if flag not in flags:
+                        flags.append(flag)
+                        await response.write(_event("flag", flag))
+        return response
+
+
+def _event(name: str, data: dict[str, Any]) -> bytes:
+    return f"event: {name}\ndata: {json.dumps(data)}\n\n".encode()
+
+
+async def _file(request: web.Request) -> web.StreamResponse:
+    path = PAGE / Path(request.match_info.get("name", "index.html")).name
+    return web.FileResponse(path, headers={"Content-Security-Policy": POLICY})
+
+
+@contextlib.asynccontextmanager
+async def serving(site: FakeSite) -> AsyncIterator[SiteServer]:
+    """Serve a site on a port that the system chooses."""
+    server = SiteServer(site)
+    await server.start()
+    try:
+        yield server
+    finally:
+        await server.stop()

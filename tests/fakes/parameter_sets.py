@@ -1,0 +1,70 @@
+"""Cameras whose H.264 parameter sets differ."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import av
+import numpy as np
+from numpy.typing import NDArray
+
+from fakes.cameras import FPS, GOP, HEIGHT, NO_REASON, WIDTH
+from fakes.site import A, B
+from server.camera.encoding.encoder import AccessUnit, Encoder
+from server.config.sections import EncodeSettings, SiteSettings
+from server.service.streaming.frame_buffer import FrameBuffer
+from server.service.view_selection.decider import GopDecision, ObjectChoice
+
+GOPS = 12
+OWN = {"encode": {"parameters": "own"}}
+MAKES: dict[str, dict[str, Any]] = {A: {"preset": "ultrafast"}, B: {"preset": "medium", "crf": 30}}
+"""CAVLC without and CABAC with the rest of profile High: as different as two makes."""
+MISSING = {(B, 3), (A, 6), (A, 7), (B, 10)}
+"""GOPs that do not come."""
+
+
+@cache
+def sent(camera: str) -> tuple[AccessUnit, ...]:
+    encoder = Encoder(
+        SiteSettings(width=WIDTH, height=HEIGHT, fps=FPS), EncodeSettings(gop=GOP, **MAKES[camera])
+    )
+    rng = np.random.default_rng(sum(camera.encode()))
+    coarse = rng.integers(0, 255, (GOPS * GOP, HEIGHT // 8, WIDTH // 8, 3), dtype=np.uint8)
+    return tuple(
+        encoder.encode(pulse, picture.repeat(8, axis=0).repeat(8, axis=1))
+        for pulse, picture in enumerate(coarse)
+    )
+
+
+def alone(camera: str) -> list[NDArray[np.uint8]]:
+    decoder = av.CodecContext.create("h264", "r")
+    packets = [*(av.Packet(unit.data) for unit in sent(camera)), None]
+    return [it.to_ndarray(format="yuv420p") for packet in packets for it in decoder.decode(packet)]
+
+
+def shown(gop: int) -> tuple[str, int]:
+    """Say whose picture is shown: of which camera, and of which GOP."""
+    camera = (A, B)[gop % 2]
+    return (camera, gop) if (camera, gop) not in MISSING else shown(gop - 1)
+
+
+def expected() -> list[NDArray[np.uint8]]:
+    """Give what is to be seen: where a GOP does not come, the last picture before it."""
+    own, seen = {camera: alone(camera) for camera in MAKES}, []
+    for gop in range(GOPS):
+        camera, real = shown(gop)
+        seen += [own[camera][gop * GOP + n] if real == gop else seen[-1] for n in range(GOP)]
+    return seen
+
+
+def put(shelves: dict[str, FrameBuffer]) -> None:
+    for camera, shelf in shelves.items():
+        for unit in sent(camera):
+            if (camera, unit.pulse // GOP) not in MISSING:
+                shelf.put(unit.pulse, 1, unit.data, key=unit.key)
+
+
+def decision(gop: int) -> GopDecision:
+    choice = ObjectChoice(1, (A, B)[gop % 2], None, away=False)
+    return GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON)

@@ -1,0 +1,43 @@
+"""People whose tracks' identities the test decides."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from bestview import EpisodeKey, IdentitySettings, IdentityUpdate, LocalTrack, Merge, Split
+from fakes.cameras import CAMERAS, HEIGHT, WIDTH
+from server.messaging.messages import Box
+from server.service.identity.people import People
+
+
+def people(**settings: int) -> People:
+    identity = IdentitySettings(**{"confirm": 1, "regroup": 1, **settings})
+    return People(identity, CAMERAS, dict.fromkeys(CAMERAS), (WIDTH, HEIGHT), lag=0)
+
+
+class Dictated:
+    """An identity registry that says what a test wants."""
+
+    def __init__(self, *updates: IdentityUpdate) -> None:
+        self._updates = list(updates)
+
+    def update(
+        self, tracks: list[LocalTrack], last_frame: int, pictures: Mapping[str, tuple[int, int]]
+    ) -> IdentityUpdate:
+        del tracks, last_frame, pictures
+        return self._updates.pop(0)
+
+
+def boxes(it: People, camera: str, pulse: int) -> dict[int, Box]:
+    """Give everybody's box in one frame by number."""
+    [rows] = it.boxes(camera, pulse, 1)
+    numbers = [number for number, *_ in rows]
+    assert numbers == sorted(set(numbers))
+    return {number: (left, top, right, bottom) for number, left, top, right, bottom in rows}
+
+
+def said(numbers: dict[tuple[str, int], int], *corrections: Merge | Split) -> IdentityUpdate:
+    keys = {EpisodeKey(*key, 0): number for key, number in numbers.items()}
+    merged = tuple(it for it in corrections if isinstance(it, Merge))
+    split = tuple(it for it in corrections if isinstance(it, Split))
+    return IdentityUpdate(numbers=keys, born=(), returned=(), gone=(), merged=merged, split=split)

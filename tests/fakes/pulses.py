@@ -1,0 +1,108 @@
+"""What the tests of the pulses share: a client that speaks by hand, as with `nc`; a clock that jumps."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import ExitStack, asynccontextmanager
+from dataclasses import dataclass
+
+from camsync import (
+    ClientSettings,
+    Pulse,
+    PulseClient,
+)
+from camsync.clock import Clock, steady_unix_clock
+from camsync.messages import Beat, ServerLine
+from camsync.protocol import parse_server_line
+from fakes.timeouts import PATIENCE
+
+BUSY = 0.5
+"""Seconds by which a busy machine may measure a clock wrongly."""
+
+
+@dataclass
+class ByHand:
+    """A bare TCP connection to a pulse server."""
+
+    reader: asyncio.StreamReader
+    writer: asyncio.StreamWriter
+
+    async def line(self) -> bytes:
+        async with asyncio.timeout(PATIENCE):
+            return await self.reader.readline()
+
+    async def message(self) -> ServerLine | None:
+        line = await self.line()
+        assert line.endswith(b"\n"), f"the server hung up after {line!r}"
+        return parse_server_line(line.removesuffix(b"\n"))
+
+    async def beat(self) -> Beat:
+        while True:
+            message = await self.message()
+            if isinstance(message, Beat):
+                return message
+
+    async def other(self) -> ServerLine | None:
+        """Give the next message that is no pulse."""
+        while True:
+            message = await self.message()
+            if not isinstance(message, Beat):
+                return message
+
+    async def ended(self) -> bytes:
+        """Read until the server hangs up; give all it said."""
+        async with asyncio.timeout(PATIENCE):
+            try:
+                return await self.reader.read(-1)
+            except ConnectionError:
+                return b""
+
+    def say(self, data: bytes) -> None:
+        self.writer.write(data)
+
+
+class JumpingClock:
+    """The steady clock, plus the jumps it was told to make."""
+
+    def __init__(self) -> None:
+        self._clock: Clock = steady_unix_clock()
+        self.jumped = 0.0
+
+    def __call__(self) -> float:
+        return self._clock() + self.jumped
+
+
+Connect = Callable[..., Awaitable[ByHand]]
+
+
+FPS = 400.0
+QUICK = ClientSettings(backoff_first=0.01, backoff_most=0.05, ping_interval=0.05, silence=0.3)
+
+
+async def take(client: PulseClient, count: int) -> list[Pulse]:
+    async with asyncio.timeout(PATIENCE):
+        return [await anext(client) for _ in range(count)]
+
+
+@asynccontextmanager
+async def pretended_server(answer: Callable[[], bytes]) -> AsyncIterator[tuple[int, asyncio.Semaphore]]:
+    """Say ``answer()`` to every connection and no more; give the port, and a semaphore that counts them."""
+    loop = asyncio.get_running_loop()
+    calls = asyncio.Semaphore(0)
+    with ExitStack() as stack:
+        listener = stack.enter_context(socket.create_server(("127.0.0.1", 0)))
+        listener.settimeout(0.0)
+
+        async def serve() -> None:
+            while True:
+                connection, _ = await loop.sock_accept(listener)
+                stack.enter_context(connection)
+                connection.sendall(answer())
+                calls.release()
+
+        serving = asyncio.create_task(serve())
+        yield listener.getsockname()[1], calls
+        serving.cancel()
+        await asyncio.gather(serving, return_exceptions=True)

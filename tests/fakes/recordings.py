@@ -1,0 +1,138 @@
+"""A recording whose every GOP a test decides."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator, Mapping
+from functools import cache
+from pathlib import Path
+
+import av
+import numpy as np
+from numpy.typing import NDArray
+
+from fakes.cameras import CAMERAS, FPS, GOP, HEIGHT, WIDTH, encoded
+from server.media.containers.fmp4 import init_segment
+from server.media.stream_format import Agreement
+from server.messaging.messages import GopChoices
+from server.service.recording.age_clock import MachineClocks
+from server.service.recording.media_files import RecordedGop, _fragments
+from server.service.recording.recording_folder import GopRecord, RecordingFolder
+from server.service.recording.recording_session import InitSegments, SessionInfo
+from server.service.recording.retention import RetentionLimits
+from server.service.streaming.frame_buffer import FrameBuffer
+
+A, B = CAMERAS
+FRAMES = 200
+PULSE0 = 1_763_700_000.0
+AMPLE = RetentionLimits(keep_s=1e6, most_mb=1e6, segment_s=1.0)
+"""Nothing is taken away; five GOPs in a segment."""
+
+Picture = NDArray[np.uint8]
+
+
+class ClocksByHand:
+    """A machine's clocks as a test says. They stand still until :attr:`now` is set: then time passes."""
+
+    def __init__(self, now: float = PULSE0) -> None:
+        self.wall, self.steady = now, 1000.0
+        self.boot = "first"
+        self.is_kept = True
+        self.machine = MachineClocks(
+            lambda: self.wall, lambda: self.steady, lambda: self.boot, lambda: self.is_kept
+        )
+
+    @property
+    def now(self) -> float:
+        return self.wall
+
+    @now.setter
+    def now(self, now: float) -> None:
+        self.steady += now - self.wall
+        self.wall = now
+
+    def jump(self, seconds: float) -> None:
+        """Set the clock, as somebody does by hand: nobody keeps it any more."""
+        self.wall += seconds
+        self.is_kept = False
+
+    def off(self, seconds: float, *, wrong_by: float = 0.0) -> None:
+        """Switch the machine off for a while; when it is on again its clock is wrong by so much."""
+        self.wall += seconds + wrong_by
+        self.steady = 10.0
+        self.boot += " and the next"
+
+
+@cache
+def filled() -> tuple[dict[str, FrameBuffer], bytes]:
+    """Give a shelf per camera with all its frames, and what every file begins with."""
+    agreement = Agreement()
+    shelves = {camera: FrameBuffer(FPS, FRAMES, agreement) for camera in CAMERAS}
+    for seed, camera in enumerate(CAMERAS):
+        for unit in encoded(seed, FRAMES):
+            shelves[camera].put(unit.pulse, 1, unit.data, key=unit.key)
+    assert agreement.parameters is not None
+    return shelves, init_segment(agreement.parameters, WIDTH, HEIGHT)
+
+
+@cache
+def own_pictures(camera: str) -> list[Picture]:
+    """Decode a camera's own stream: the picture of every pulse in YUV 4:2:0."""
+    decoder = av.VideoCodecContext.create("h264", "r")
+    units = encoded(CAMERAS.index(camera), FRAMES)
+    return [
+        frame.to_ndarray(format="yuv420p") for unit in units for frame in decoder.decode(av.Packet(unit.data))
+    ]
+
+
+def head(began: float = PULSE0, numbers_since: float | None = None) -> SessionInfo:
+    return SessionInfo(
+        site="hall",
+        fps=FPS,
+        width=WIDTH,
+        height=HEIGHT,
+        codec="avc1",
+        cameras=list(CAMERAS),
+        began=began,
+        pulse0=PULSE0,
+        numbers_since=numbers_since,
+    )
+
+
+def piece(
+    gop: int, choices: Mapping[int, str], cameras: tuple[str, ...] = CAMERAS, frames: int = GOP
+) -> GopRecord:
+    """Give a GOP as it was decided; ``frames``: as many of it have come."""
+    first = gop * GOP
+    delivered = {}
+    for camera in cameras:
+        taken = [filled()[0][camera].get(pulse) for pulse in range(first, first + frames)]
+        delivered[camera] = RecordedGop(first, tuple(it.fragment for it in taken if it is not None))
+    boxes = {camera: [[(1, 1.0, 2.0, 3.0, 4.0)]] * GOP for camera in cameras}
+    return GopRecord(
+        GopChoices(first=first, frames=GOP, choices=dict(choices), boxes=boxes, cuts=[]), delivered
+    )
+
+
+def written(store: RecordingFolder, pieces: list[GopRecord], began: float = PULSE0) -> RecordingFolder:
+    """Open a store and write the pieces."""
+    store.open()
+    for it in pieces:
+        store.write(it, head(began), InitSegments(filled()[1]))
+    return store
+
+
+def fragments(data: bytes) -> list[bytes]:
+    """Cut a piece of a stream into its fragments."""
+    return list(_fragments(io.BytesIO(data).read, len(data)))
+
+
+def pictures(path: Path) -> Iterator[tuple[int, Picture]]:
+    """Play a file or playlist from the disk: pulse and picture, frame by frame."""
+    with av.open(str(path), "r") as container:
+        for frame in container.decode(video=0):
+            yield round(float(frame.time or 0) * FPS), frame.to_ndarray(format="yuv420p")
+
+
+def everything_that_plays(folder: Path) -> list[Path]:
+    return [it for it in sorted([*folder.rglob("*.m3u8"), *folder.rglob("*.mp4")]) if it.name != "init.mp4"]

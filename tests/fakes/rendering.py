@@ -1,0 +1,34 @@
+"""Fragments for the rendering worker, and the pictures that it draws."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import av
+import numpy as np
+
+from fakes.cameras import FPS, GOP, HEIGHT, WIDTH, encoded
+from server.media.containers.fmp4 import Sample, fragment
+from server.media.h264.annexb import nal_units, sample
+from server.media.rendering_messages import Canvas
+from server.service.rendering.worker.box_overlay import Image
+
+CANVAS = Canvas(
+    width=WIDTH, height=HEIGHT, fps=FPS, gop=GOP, preset="ultrafast", crf=18, max_kbps=None, jpeg_quality=90
+)  # fmt: skip
+
+
+def fragments(first: int, count: int, seed: int = 0) -> bytes:
+    """Give frames of a camera as the service passes them on."""
+    units = encoded(seed)[first : first + count]
+    return b"".join(
+        fragment([Sample(sample(nal_units(unit.data)), unit.key)], unit.pulse, FPS) for unit in units
+    )
+
+
+@cache
+def shown(seed: int) -> list[Image]:
+    """Give a camera's frames as any decoder shows them."""
+    decoder = av.VideoCodecContext.create("h264", "r")
+    pictures = [picture for unit in encoded(seed) for picture in decoder.decode(av.Packet(unit.data))]
+    return [np.asarray(picture.to_ndarray(format="bgr24"), np.uint8) for picture in pictures]

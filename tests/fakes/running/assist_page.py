@@ -1,0 +1,69 @@
+"""The page of a site on which an operator helps, and what a test of it asks for."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import AsyncIterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import yaml
+from playwright.async_api import Page
+
+from benchmarks.browser import chromium
+from fakes.running.site import PATIENT_CAMERAS, RunningSite, running
+from fakes.running.stream_frames import FPS
+from fakes.timeouts import PATIENCE_MS
+from server.cli.generated_config import DEMO, free_port
+
+GOP = 10
+PLACE = """(wanted) => {
+  const box = myview.boxes.find(([object]) => object === (wanted ?? myview.pointing.object));
+  if (!box) return null;
+  const { left, top, width } = document.querySelector('#boxes').getBoundingClientRect();
+  const scale = width / myview.site.width;
+  return [left + scale * (box[1] + box[3]) / 2, top + scale * (box[2] + box[4]) / 2];
+}"""
+"""Where somebody is on the screen; without a number, who is pointed at."""
+
+
+@contextlib.asynccontextmanager
+async def helped(
+    folder: Path, cameras: Sequence[Mapping[str, Any]], **assist: Any
+) -> AsyncIterator[RunningSite]:
+    """Run a site, at a rate that a busy machine can do; whoever come near each other is a trouble."""
+    bus = f"tcp/127.0.0.1:{free_port()}"
+    content = {
+        **DEMO,
+        "cameras": list(cameras),
+        "site": {"name": "demo", "fps": FPS, "width": 320, "height": 180, "niceness": 1},
+        "sync": {"port": free_port(), "start_timeout_s": 60},
+        "zenoh": {"connect": bus, "listen": bus},
+        "http": {"port": free_port()},
+        "track": {"assist": {"enabled": True, "alike": 1000.0, "margin": 100.0, **assist}, **PATIENT_CAMERAS},
+        "view": {"late_after_s": 60, "flags": {"per_minute": 60, "risk": 0.0}},
+    }
+    path = folder / "demo.yaml"
+    path.write_text(yaml.safe_dump(content), encoding="utf-8")
+    async with running(path) as site:
+        await site.until(lambda: bool(site.gops and site.gops[-1].choices), "somebody is shown")
+        yield site
+
+
+@contextlib.asynccontextmanager
+async def opened(site: RunningSite) -> AsyncIterator[Page]:
+    """Open the page; an error in it fails the test."""
+    errors: list[str] = []
+    async with chromium() as browser:
+        page = await browser.new_page(bypass_csp=True)
+        page.on("pageerror", lambda error: errors.append(str(error)))
+        page.set_default_timeout(PATIENCE_MS)
+        await page.goto(site.url)
+        yield page
+    assert errors == []
+
+
+def every_gop_once(site: RunningSite) -> bool:
+    """Tell whether all that was decided was told, each GOP once."""
+    firsts = [gop.first for gop in site.gops]
+    return firsts == list(range(firsts[0], firsts[0] + GOP * len(firsts), GOP))

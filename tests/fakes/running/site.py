@@ -1,0 +1,170 @@
+"""A whole site, started as an operator starts it: `myview up` with real processes on ports that are free."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import re
+import signal
+import sys
+from collections import defaultdict
+from collections.abc import AsyncIterator, Awaitable, Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from client import Cameras, Gop, HttpSettings, Objects, events
+from fakes.running.stream_frames import FPS
+from fakes.timeouts import PATIENCE
+from server.cli.generated_config import free_port
+
+PATIENT_CAMERAS = {"backlog_s": 60}
+"""For sites that leave nothing out, however late they are: how busy the machine is decides nothing."""
+MYVIEW = [sys.executable, "-m", "server.cli.main"]
+CAMERAS = ("c0", "c1", "c2")
+
+
+def configuration(folder: Path, recording: Path, **sections: Any) -> Path:
+    """Write the configuration of a site of three recorded views; ``sections`` are merged into it."""
+    bus = f"tcp/127.0.0.1:{free_port()}"
+    content: dict[str, Any] = {
+        # Cameras are hardly nicer than what else runs here: where that is much, they would wait for it.
+        "site": {"name": "e2e", "fps": FPS, "width": 320, "height": 180, "niceness": 1},
+        "sync": {"port": free_port(), "start_timeout_s": 60},
+        "zenoh": {"connect": bus, "listen": bus},
+        "http": {"port": free_port()},
+        "track": PATIENT_CAMERAS,
+        "view": {"switch_cost_s": 0.1, "late_after_s": 10},  # a short recording has cuts enough
+        "ground": str(recording / "ground.json"),
+        "cameras": [{"id": name, "source": str(recording / f"{name}.mp4")} for name in CAMERAS],
+    }
+    for camera in content["cameras"]:
+        camera.update(sections.get("camera", {}))
+    for name, value in sections.items():
+        if name != "camera":
+            content[name] = {**content.get(name, {}), **value} if isinstance(value, dict) else value
+    path = folder / "site.yaml"
+    path.write_text(yaml.safe_dump(content), encoding="utf-8")
+    return path
+
+
+@dataclass(slots=True)
+class RunningSite:
+    """`myview up`, its output, and what its events said so far."""
+
+    process: asyncio.subprocess.Process
+    config: dict[str, Any]
+    lines: list[str] = field(default_factory=list)
+    gops: list[Gop] = field(default_factory=list)
+    states: dict[str, list[str]] = field(default_factory=lambda: defaultdict(list))
+    """Of each camera, as the events said them, the newest last."""
+    objects: Objects | None = None
+    heard: asyncio.Condition = field(default_factory=asyncio.Condition)
+
+    @property
+    def url(self) -> str:
+        return f"http://127.0.0.1:{self.config['http']['port']}/"
+
+    @property
+    def pulse(self) -> int:
+        """The last decided frame."""
+        return self.gops[-1].first + self.gops[-1].frames - 1 if self.gops else -1
+
+    def children(self) -> dict[str, int]:
+        """Give the pid of every process of the site by what it does: sync, bestview, c0 …"""
+        found = {}
+        for folder in Path("/proc").iterdir():
+            with contextlib.suppress(OSError, ValueError):
+                words = (folder / "cmdline").read_bytes().decode().split("\0")[:-1]
+                parent = int((folder / "stat").read_text().rpartition(")")[2].split()[1])
+                if parent == self.process.pid and "server.cli.main" in words:
+                    command = words[words.index("server.cli.main") + 1 :]
+                    found[command[2] if command[0] == "camera" else command[0]] = int(folder.name)
+        return found
+
+    def state(self, camera: str) -> str | None:
+        """Give a camera's state as the events said it last."""
+        return self.states[camera][-1] if self.states[camera] else None
+
+    async def until(self, condition: Callable[[], bool], what: str) -> None:
+        """Wait until what the events say fulfils a condition."""
+        try:
+            async with asyncio.timeout(PATIENCE), self.heard:
+                await self.heard.wait_for(condition)
+        except TimeoutError:
+            raise AssertionError(f"{what}: not within {PATIENCE} s\n" + "\n".join(self.lines[-40:])) from None
+
+    async def ended(self) -> int:
+        """Wait until everything has ended by itself; give the exit code."""
+        async with asyncio.timeout(PATIENCE):
+            return await self.process.wait()
+
+    async def listen(self) -> None:
+        """Take the events in, for as long as the site runs; a service that was killed comes back."""
+        async for event in events(self.url, HttpSettings(retries=int(PATIENCE))):
+            async with self.heard:
+                match event:
+                    case Gop():
+                        self.gops.append(event)
+                    case Cameras():
+                        for it in event.cameras:
+                            self.states[it.camera].append(it.state)
+                    case Objects():
+                        self.objects = event
+                self.heard.notify_all()
+
+    async def read_log(self) -> None:
+        """Keep what the processes log."""
+        assert self.process.stderr is not None
+        async for line in self.process.stderr:
+            self.lines.append(line.decode().rstrip())
+
+
+@contextlib.asynccontextmanager
+async def running(config: Path, *arguments: str, listen: bool = True) -> AsyncIterator[RunningSite]:
+    """Run a site; in the end everything must end within 2 s of SIGTERM, with exit code 0."""
+    process = await asyncio.create_subprocess_exec(
+        *MYVIEW,
+        "up",
+        str(config),
+        *arguments,
+        stderr=asyncio.subprocess.PIPE,
+        stdout=asyncio.subprocess.DEVNULL,
+        env={**os.environ, "PYTHONUNBUFFERED": "1"},
+    )
+    site = RunningSite(process, yaml.safe_load(config.read_text(encoding="utf-8")))
+    tasks = [asyncio.create_task(site.read_log())]
+    try:
+        if listen:
+            await until_it_answers(site)
+            tasks.append(asyncio.create_task(site.listen()))
+        yield site
+    finally:
+        if process.returncode is None:
+            process.send_signal(signal.SIGTERM)
+        try:
+            await asyncio.wait_for(process.wait(), PATIENCE)
+        except TimeoutError:
+            process.kill()
+            await process.wait()
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+
+async def until_it_answers(site: RunningSite) -> None:
+    """Wait until the best-view service has said in its log that it listens."""
+    async with asyncio.timeout(PATIENCE):
+        while not any(re.search(r"page, streams and API on http", line) for line in site.lines):
+            if site.process.returncode is not None:
+                raise AssertionError("`myview up` ended:\n" + "\n".join(site.lines))
+            await asyncio.sleep(0.05)
+
+
+async def bounded(work: Awaitable[Any]) -> Any:
+    """Await something, but not for ever."""
+    async with asyncio.timeout(PATIENCE):
+        return await work

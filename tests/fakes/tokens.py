@@ -1,0 +1,50 @@
+"""A file of tokens, of which the test knows every one."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from contextlib import aclosing, asynccontextmanager
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from fakes.site import Hall, opened
+from server.config.tokens_file import token_digest
+
+LATER = "2100-01-01T00:00:00Z"
+"""When a token may have been made that is younger than any service of a test."""
+EVERYBODY: dict[str, dict[str, Any]] = {
+    "lead": {"role": "operate"},
+    "desk": {"role": "watch"},
+    "family": {"role": "watch", "object": 1, "made": LATER},
+    "door": {"role": "watch", "camera": "c0"},
+}
+
+
+def token_of(name: str) -> str:
+    return f"what-{name}-was-given"
+
+
+def bearer(name: str) -> dict[str, str]:
+    """Give the head that a token is sent in."""
+    return {"Authorization": f"Bearer {token_of(name)}"}
+
+
+def line_of(name: str, **what: Any) -> dict[str, Any]:
+    """Give a line of the file."""
+    return {"name": name, "sha256": token_digest(token_of(name)), **(what or EVERYBODY[name])}
+
+
+def write_tokens(path: Path, *lines: dict[str, Any]) -> Path:
+    path.write_text(yaml.safe_dump({"tokens": list(lines)}), encoding="utf-8")
+    return path
+
+
+@asynccontextmanager
+async def locked(folder: Path, *names: str, **changes: Any) -> AsyncIterator[Hall]:
+    """Serve a site that takes tokens: everybody's, or some; they are in `tokens.yaml` in the folder."""
+    path = write_tokens(folder / "tokens.yaml", *map(line_of, names or EVERYBODY))
+    access = {"tokens": str(path), **changes.pop("access", {})}
+    async with aclosing(opened(access=access, **changes)) as halls:
+        yield await anext(halls)

@@ -1,0 +1,38 @@
+"""A served site of VP8 that the test feeds by hand, with cuts."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+
+import av
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from fakes.cameras import CAMERAS, LARGE, SMALL, encoded
+from fakes.site import A, B, Hall, opened
+
+EPOCHS = 8
+"""As many as a camera by hand has pictures of."""
+
+
+@pytest.fixture
+async def free() -> AsyncIterator[Hall]:
+    """A site of VP8; its person is larger in the other camera every GOP, so there are cuts."""
+    changes = {"codec": "vp8"}
+    async for hall in opened(patience=60, encode=changes, http={"viewer_queue_gops": 100}):
+        hall.service.come(*CAMERAS)
+        for epoch in range(3):
+            feed(hall, epoch)
+        yield hall
+
+
+def feed(hall: Hall, epoch: int) -> None:
+    sizes = (SMALL, LARGE) if epoch % 4 < 2 else (LARGE, SMALL)
+    hall.service.feed(epoch, {camera: {1: size} for camera, size in zip((A, B), sizes, strict=True)})
+
+
+def own(camera: int) -> list[NDArray[np.uint8]]:
+    decoder = av.CodecContext.create("vp8", "r")
+    units = encoded(camera, codec="vp8")
+    return [it.to_ndarray(format="yuv420p") for unit in units for it in decoder.decode(av.Packet(unit.data))]

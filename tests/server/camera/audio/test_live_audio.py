@@ -1,0 +1,200 @@
+"""A network camera's sound comes out in step with its pictures, by the camera's own clock."""
+
+from __future__ import annotations
+
+import contextlib
+import http.server
+import threading
+import time
+from collections.abc import Iterator
+from fractions import Fraction
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import av
+import pytest
+
+from fakes.media.audio import EVERY, FPS, beeps, write_flashes
+from fakes.timeouts import PATIENCE
+from server.camera.audio import Frame, LiveSound
+from server.camera.sources.live_stream import Stream
+from server.config.sections import SoundSettings
+from server.media.audio.aac import SAMPLES as FRAME
+from server.media.audio.audio_format import Coding, SoundFormat
+from server.media.containers.mp4_audio import sound_fragment, sound_init_segment
+
+FRAMES = 3 * EVERY
+FORM = SoundFormat(48_000, 2)
+
+
+def send(path: Path, to: Any) -> None:
+    """Send a recording as a camera does that takes it now: each packet when it has been taken."""
+    begin = time.monotonic()
+    with (
+        av.open(str(path)) as recorded,
+        av.open(to, "w", format="mpegts", buffer_size=1316, options={"flush_packets": "1"}) as sent,
+    ):
+        streams = {it.index: sent.add_stream_from_template(it) for it in recorded.streams}
+        for packet in recorded.demux():
+            if packet.dts is None:
+                continue
+            time.sleep(max(0.0, begin + float(packet.dts * packet.time_base) + 0.1 - time.monotonic()))
+            packet.stream = streams[packet.stream.index]
+            sent.mux(packet)
+
+
+@pytest.fixture
+def camera(tmp_path: Path) -> Iterator[str]:
+    """A camera that flashes and beeps, sending what it takes when it takes it; its address."""
+    path = write_flashes(tmp_path / "own.ts", FRAMES)
+
+    class Handler(http.server.BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            self.send_response(200)
+            self.end_headers()
+            with contextlib.suppress(OSError, av.error.FFmpegError):
+                send(path, self.wfile)
+
+        def log_message(self, *_: object) -> None:
+            pass
+
+    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+    thread = threading.Thread(target=server.serve_forever, args=(0.02,))
+    thread.start()
+    yield f"http://127.0.0.1:{server.server_address[1]}/"
+    server.shutdown()
+    thread.join()
+    server.server_close()
+
+
+def test_a_camera_is_heard_beside_its_pictures(camera: str) -> None:
+    sound = LiveSound(SoundSettings(source="c0"), FPS)
+    source = Stream(camera, {"probesize": "20000", "analyzeduration": "200000"}, sound)
+    frames: list[Frame] = []
+    begin = time.monotonic()
+    while len(frames) < (FRAMES - 20) / FPS * FORM.rate / FRAME:
+        time.sleep(1 / FPS)
+        assert time.monotonic() < begin + PATIENCE, "sound comes"
+        frames += sound.at(100 + int((time.monotonic() - begin) * FPS))
+    assert source.take(0) is not None
+    source.close()
+    assert len(moments(frames)) >= 1
+    assert [frame.number for frame in frames] == sorted({frame.number for frame in frames})
+
+
+def moments(frames: list[Frame], form: SoundFormat = FORM) -> list[float]:
+    """Give when beeps begin, seconds after pulse 0."""
+    found = {frame.number: frame.data for frame in frames}
+    data = [found.get(number, form.silence) for number in range(max(found) + 1)]
+    return beeps(sound_init_segment(form) + sound_fragment(form, data, 0))
+
+
+def handed_over(path: Path, sound: LiveSound, first: int) -> list[Frame]:
+    """Hand over a recording as a camera would whose pulse numbers are ``first`` ahead of its clock's."""
+    frames: list[Frame] = []
+    with av.open(str(path)) as container:
+        sound.opened(container.streams.audio[0])
+        for packet in container.demux():
+            if packet.pts is None:
+                continue
+            if packet.stream.type == "audio":
+                sound.packet(packet)
+                continue
+            picture = Fraction(packet.pts * packet.time_base)
+            sound.picture(picture)
+            number = round(picture * FPS)
+            frames += sound.at(first + number + number % 3 // 2)  # one in three waits for the next pulse
+    return frames
+
+
+@pytest.mark.parametrize(
+    ("codec", "sends"), [("aac", "aac"), ("aac", "libopus"), ("opus", "libopus"), ("opus", "aac")]
+)
+def test_a_beep_is_where_the_flash_is_shown_also_after_the_camera_has_begun_anew(
+    tmp_path: Path, codec: Coding, sends: str
+) -> None:
+    path = write_flashes(tmp_path / "own.mp4", FRAMES, codec=sends)
+    settings = SoundSettings(source="c0", codec=codec)
+    sound = LiveSound(settings, FPS)
+    one, two = handed_over(path, sound, 50), handed_over(path, sound, 50 + 2 * FRAMES)
+    numbers = [frame.number for frame in one + two]
+    assert numbers == sorted(set(numbers)), "each once, in order"
+    assert len(two) > 0.9 * len(one)
+    starts = (50, 50 + 2 * FRAMES)
+    expected = [(start + number) / FPS for start in starts for number in range(EVERY, FRAMES, EVERY)]
+    assert settings.format is not None
+    assert moments(one + two, settings.format) == pytest.approx(expected, abs=0.04)
+
+
+@pytest.mark.parametrize(("rate", "channels"), [(48_000, 1), (44_100, 2), (32_000, 1)])
+def test_a_camera_is_heard_on_when_its_sound_changes_while_it_sends(
+    tmp_path: Path, rate: int, channels: int
+) -> None:
+    before = write_flashes(tmp_path / "before.aac", FRAMES, rate=rate, channels=channels, pictures=False)
+    after = write_flashes(tmp_path / "after.aac", FRAMES, pictures=False)
+    both = tmp_path / "both.aac"
+    both.write_bytes(before.read_bytes() + after.read_bytes())
+    sound, frames = LiveSound(SoundSettings(source="c0"), FPS), []
+    with av.open(str(both)) as container:
+        sound.opened(container.streams.audio[0])
+        for packet in container.demux(audio=0):
+            if packet.pts is not None:
+                sound.picture(Fraction(packet.pts * packet.time_base))
+                frames += sound.at(round(packet.pts * packet.time_base * FPS))
+                sound.packet(packet)
+    assert len(moments(frames)) == 2 * len(range(EVERY, FRAMES, EVERY))
+
+
+def shifted(packet: av.Packet[Any], seconds: int) -> av.Packet[Any]:
+    assert packet.pts is not None
+    packet.pts += round(seconds / packet.time_base)
+    packet.dts = packet.pts
+    return packet
+
+
+@pytest.mark.parametrize("sends", ["aac", "libopus"], ids=["passed on", "encoded"])
+@pytest.mark.parametrize("lag", [0.0, 0.1, 0.3, -0.1])
+def test_when_a_cameras_time_steps_back_it_is_heard_on_and_so_it_is_when_it_is_connected_anew(
+    tmp_path: Path, sends: str, lag: float
+) -> None:
+    """As that of MPEG-TS does once in 26.5 hours; the sound's steps ``lag`` after the pictures'."""
+    path = write_flashes(tmp_path / "own.mp4", FRAMES, codec=sends)
+    sound, wrap, step = LiveSound(SoundSettings(source="c0"), FPS), 95_443, FRAMES / FPS / 2
+    frames: list[Frame] = []
+    for again in (0, 1):
+        with av.open(str(path)) as container:
+            sound.opened(container.streams.audio[0])
+            for packet in container.demux():
+                if packet.pts is None:
+                    continue
+                time = float(packet.pts * packet.time_base)
+                is_sound = packet.stream.type == "audio"
+                old = not again and time < step + (lag if is_sound else 0.0)
+                if is_sound:
+                    sound.packet(shifted(packet, wrap if old else 0))
+                else:
+                    sound.picture(Fraction(shifted(packet, wrap if old else 0).pts * packet.time_base))
+                    frames += sound.at(round(time * FPS) + again * 2 * FRAMES)
+    numbers = [frame.number for frame in frames]
+    assert numbers == sorted(set(numbers)), "each once, in order"
+    halves = [0.0, step, FRAMES / FPS, 2 * FRAMES / FPS, 3 * FRAMES / FPS]
+    first, second, _, anew = (
+        sum(begin <= it * FRAME / FORM.rate < end for it in numbers) for begin, end in pairwise(halves)
+    )
+    each = step * FORM.rate / FRAME
+    assert first > 0.9 * each - 3
+    assert second > 0.9 * each - (abs(lag) + 0.1) * FORM.rate / FRAME
+    assert anew > 0.9 * 2 * each - 3
+    assert numbers[-1] < 3 * FRAMES / FPS * FORM.rate / FRAME
+
+
+def test_a_camera_without_sound_is_no_mistake(tmp_path: Path) -> None:
+    path = write_flashes(tmp_path / "own.mp4", 10)
+    sound = LiveSound(SoundSettings(source="c0"), FPS)
+    sound.opened(None)
+    with av.open(str(path)) as container:
+        for packet in container.demux(audio=0):
+            sound.picture(Fraction(0))
+            sound.packet(packet)
+    assert sound.at(5) == []

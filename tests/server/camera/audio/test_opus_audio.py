@@ -1,0 +1,240 @@
+"""Opus where the site says so: passed on byte for byte, or what all else is encoded to, in step to 40 ms."""
+
+from __future__ import annotations
+
+import asyncio
+import io
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import client
+from benchmarks.browser import chromium
+from fakes.cameras import CAMERAS, FPS, GOP, NO_REASON, video
+from fakes.media.audio import (
+    BEEPS,
+    EVERY,
+    FRAMES,
+    GOPS,
+    STEP,
+    beeps,
+    flashes,
+    flashing,
+    heard,
+    packets,
+    sends,
+    write_flashes,
+)
+from fakes.media.browser_playback import PLAY
+from fakes.media.ffprobe import probed
+from fakes.programs import needs_chromium, needs_ffprobe
+from fakes.site import A, Hall, opened
+from server.camera.audio import Frame, RecordedSound
+from server.camera.audio.encoder import Encoding
+from server.camera.audio.passthrough import Passing
+from server.config.loader import build_config
+from server.config.sections import SoundSettings
+from server.media.audio.audio_format import SoundFormat
+from server.media.audio.opus import samples_in
+from server.media.containers.mp4_audio import sound_fragment, sound_init_segment
+from server.service.view_selection.decider import GopDecision, ObjectChoice
+from server.system.errors import UserError
+
+STEREO = SoundSettings(source="here", codec="opus")
+FORM = SoundFormat(48_000, 2, "opus")
+
+
+def as_mp4(frames: list[Frame]) -> bytes:
+    """Give frames 0 to the last one as a stream, silent where there is none."""
+    found = {frame.number: frame.data for frame in frames}
+    data = [found.get(number, FORM.silence) for number in range(max(found) + 1)]
+    return sound_init_segment(FORM) + sound_fragment(FORM, data, 0)
+
+
+@pytest.mark.parametrize("name", ["own.mp4", "own.mkv"])
+def test_opus_is_passed_on_byte_for_byte(tmp_path: Path, name: str) -> None:
+    path = write_flashes(tmp_path / name, FRAMES, codec="libopus")
+    sound = RecordedSound(str(path), STEREO, FPS, 0, "stop")
+    with av.open(str(path)) as container:
+        own = [bytes(it) for it in container.demux(audio=0) if it.size and it.pts is not None and it.pts >= 0]
+    frames = [*sound.until(0), *sound.until(FRAMES + 10)]
+    assert [frame.data for frame in frames] == own
+    first = frames[0].number
+    assert first <= 1, "what the encoder looks ahead for is before the first picture"
+    assert [frame.number for frame in frames] == list(range(first, first + len(own)))
+    assert beeps(as_mp4(frames)) == pytest.approx(BEEPS, abs=STEP)
+
+
+@pytest.mark.parametrize(
+    ("name", "codec", "rate", "channels", "options"),
+    [
+        ("aac.mp4", "aac", 48_000, 2, {}),
+        ("mp3.mkv", "mp3", 32_000, 1, {}),
+        ("mono.mkv", "libopus", 48_000, 1, {}),
+        ("long.mkv", "libopus", 48_000, 2, {"frame_duration": "60"}),
+        ("short.mkv", "libopus", 48_000, 2, {"frame_duration": "10"}),
+    ],
+)
+def test_all_else_is_encoded_to_opus(
+    tmp_path: Path, name: str, codec: str, rate: int, channels: int, options: dict[str, str]
+) -> None:
+    path = write_flashes(tmp_path / name, FRAMES, codec=codec, rate=rate, channels=channels, options=options)
+    sound = RecordedSound(str(path), STEREO, FPS, 0, "stop")
+    frames = [*sound.until(0), *sound.until(FRAMES + 10)]
+    way = getattr(sound._way, "_way", sound._way)
+    assert isinstance(way, Encoding)
+    assert {samples_in(frame.data) for frame in frames} == {960}
+    assert beeps(as_mp4(frames)) == pytest.approx(BEEPS, abs=0.005), "also for what it looks ahead"
+
+
+def test_a_site_of_aac_encodes_opus(tmp_path: Path) -> None:
+    path = write_flashes(tmp_path / "own.mkv", 2 * EVERY, codec="libopus")
+    sound = RecordedSound(str(path), SoundSettings(source="here"), FPS, 0, "stop")
+    assert isinstance(sound._way, Encoding)
+    assert not isinstance(RecordedSound(str(path), STEREO, FPS, 0, "stop")._way, Encoding | Passing)
+
+
+@pytest.mark.parametrize("channels", [1, 2])
+def test_silence_decodes_to_nothing_at_all(channels: int) -> None:
+    form = SoundFormat(48_000, channels, "opus")
+    data = sound_init_segment(form) + sound_fragment(form, [form.silence] * 20, 7)
+    times, samples = heard(data)
+    assert times[0] == pytest.approx(7 * 0.02)
+    assert len(samples) == 20 * 960
+    assert not samples.any()
+
+
+@pytest.mark.parametrize("lasts", ["2.5", "5", "10", "20", "40", "60"])
+@pytest.mark.parametrize("purpose", ["audio", "voip", "lowdelay"])
+def test_a_packet_says_how_long_it_is(lasts: str, purpose: str) -> None:
+    encoder = av.CodecContext.create("libopus", "w")
+    encoder.sample_rate, encoder.layout, encoder.format = 48_000, "mono", "s16"
+    encoder.options = {"frame_duration": lasts, "application": purpose}
+    encoder.open()
+    noise = np.random.default_rng(1).integers(-9000, 9000, (1, 48_000), dtype=np.int16)
+    frame = av.AudioFrame.from_ndarray(noise, format="s16", layout="mono")
+    frame.sample_rate = 48_000
+    fifo = av.AudioFifo()
+    fifo.write(frame)
+    size = round(48 * float(lasts))
+    for piece in fifo.read_many(size):
+        assert {samples_in(bytes(packet)) for packet in encoder.encode(piece)} <= {size}
+
+
+@given(st.binary(max_size=8))
+def test_any_bytes_say_some_length_or_none(data: bytes) -> None:
+    assert 0 <= samples_in(data) <= 63 * 2880
+
+
+def test_another_rate_is_refused_in_one_line(tmp_path: Path) -> None:
+    content = {
+        "cameras": [{"id": "c0", "source": "scene:room"}],
+        "sound": {"source": "c0", "codec": "opus", "rate": 44_100},
+    }
+    with pytest.raises(UserError, match=r"codec: opus has 48000 samples a second; rate says 44100"):
+        build_config(content, where="hall", folder=tmp_path)
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A recording that flashes and beeps."""
+    return write_flashes(tmp_path_factory.mktemp("opus") / "flashes.mkv", FRAMES, codec="libopus")
+
+
+@pytest.fixture
+async def hall(recording: Path, tmp_path: Path) -> AsyncIterator[Hall]:
+    """A site that has that recording's sound, whose first GOP is decided."""
+    record = {"folder": str(tmp_path / "kept"), "segment_s": 0.4}
+    sound = {"source": str(recording), "codec": "opus"}
+    async for hall in opened(sound=sound, record=record, http={"viewer_queue_gops": 100}):
+        hall.service.past.open()
+        hall.service.come(*CAMERAS)
+        for camera in CAMERAS:
+            for unit in flashing(recording):
+                hall.service.intake.video(video(camera, unit))
+        yield hall
+
+
+def decide(hall: Hall, gops: range) -> None:
+    for gop in gops:
+        choice = ObjectChoice(1, CAMERAS[gop % 2], None, away=False)
+        decision = GopDecision(gop * GOP, GOP, (choice,), {A: []}, {}, (), NO_REASON)
+        hall.service.past.put(hall.service.board.put(decision), None)
+        hall.service.splicer.decision(decision)
+
+
+async def watched(hall: Hall, *ways: str) -> list[bytes]:
+    decide(hall, range(1))
+    answers = [await hall.session.get(way) for way in ways]
+    for gop in range(1, GOPS):
+        decide(hall, range(gop, gop + 1))
+        await asyncio.sleep(0.005)
+    hall.service.splicer.close()
+    return [await answer.read() for answer in answers]
+
+
+async def test_streams_live_and_past_have_it_in_step_and_transport_streams_none(
+    hall: Hall, recording: Path
+) -> None:
+    own = sends(hall.service, recording)
+    assert (await hall.get_json("/api/site"))["sound"] == "opus"
+    live, ts = await watched(hall, "/objects/1/best.mp4", "/objects/1/best.ts")
+    while hall.service.past.writer is not None and hall.service.past.writer.written < GOPS:  # noqa: ASYNC110
+        await asyncio.sleep(0.001)
+    assert hall.service.sound is not None
+    hall.service.sound._frames.clear()
+    async with hall.session.get(f"/objects/1/best.mp4?from=p0&to=p{FRAMES}") as answer:
+        past = await answer.read()
+    for data in (live, past):
+        times, _ = heard(data)
+        assert np.diff(times) == pytest.approx(1 / 48_000, abs=1e-4)
+        assert flashes(data) == pytest.approx(BEEPS, abs=0.001)
+        assert beeps(data) == pytest.approx(BEEPS, abs=STEP)
+        got = packets(data)
+        assert got[1:] == own[: len(got) - 1], "the first is from before the first picture"
+    assert flashes(ts, "mpegts") == pytest.approx(BEEPS, abs=0.001)
+    with av.open(io.BytesIO(ts), format="mpegts") as container:
+        assert not container.streams.audio
+
+
+@needs_ffprobe
+async def test_ffprobe_has_nothing_to_say(hall: Hall, recording: Path, tmp_path: Path) -> None:
+    sends(hall.service, recording)
+    live, ts = await watched(hall, "/objects/1/best.mp4", "/objects/1/best.ts")
+    (tmp_path / "live.mp4").write_bytes(live)
+    (tmp_path / "live.ts").write_bytes(ts)
+    found = {it[0]: int(it[1]) for it in probed(tmp_path / "live.mp4", "codec_name,nb_read_frames")}
+    assert found == {"h264": FRAMES, "opus": FRAMES * 2}
+    assert {it[0] for it in probed(tmp_path / "live.ts", "codec_name,nb_read_frames")} == {"h264"}
+
+
+@needs_ffprobe
+async def test_what_somebody_keeps_has_it_too(hall: Hall, recording: Path, tmp_path: Path) -> None:
+    sends(hall.service, recording)
+    decide(hall, range(GOPS))
+    out, url = tmp_path / "one.mp4", f"http://127.0.0.1:{hall.port}/"
+    await client.watch(url, 1, out, start="p0", end=f"p{FRAMES}")
+    data = out.read_bytes()
+    assert flashes(data) == pytest.approx(BEEPS, abs=0.001)
+    assert beeps(data) == pytest.approx(BEEPS, abs=STEP)
+    assert [it[0] for it in probed(out, "codec_name,nb_read_frames")] == ["h264", "opus"]
+
+
+@needs_chromium
+async def test_chromium_plays_it(hall: Hall, recording: Path) -> None:
+    sends(hall.service, recording)
+    decide(hall, range(GOPS))
+    parameters = hall.service.agreement.parameters
+    assert parameters is not None
+    async with chromium() as browser:
+        page = await browser.new_page(bypass_csp=True)
+        await page.goto(f"http://127.0.0.1:{hall.port}/healthz")
+        url = f"/objects/1/best.mp4?from=p0&to=p{FRAMES}"
+        seen = await page.evaluate(PLAY, [url, f'video/mp4; codecs="{parameters.codec},opus"', 4])
+    assert (seen["error"], seen["ranges"], seen["tracks"]) == ("", 1, [True, True])
+    assert seen["range"] == [0, pytest.approx(FRAMES / FPS, abs=0.03)]

@@ -1,0 +1,112 @@
+"""The load ladder: up at once, down slowly, never to and fro."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fakes.cameras import small_config
+from server.camera.load.load_monitor import Load
+from server.camera.load.load_shedder import Bounds, Ladder, Rung, rungs
+
+FPS, STRIDE, GOP = 25.0, 5, 10
+BOUNDS = Bounds(0.5, 0.2)
+BACKLOG_S = 2.0
+
+
+def simulated(seconds: float, carried: Callable[[float], float], *, live: bool = True) -> list[int]:
+    """Give the level at each frame of a camera that needs all of a machine; `carried` is what it is given.
+
+    Searching a frame takes three quarters of a frame's time, all else the rest.
+    """
+    ladder = Ladder(rungs(STRIDE, live=live), BOUNDS)
+    free, levels = 0.0, []
+    for pulse in range(round(seconds * FPS)):
+        due, rung = pulse / FPS, ladder.rung
+        work = 0.75 * rung.searches(pulse, STRIDE) + 0.25 * rung.takes(pulse, STRIDE, GOP)
+        start = max(due, free)
+        free = min(start + work / FPS / carried(start), due + BACKLOG_S)
+        ladder.measured(free - due, free)
+        levels.append(ladder.level)
+    return levels
+
+
+def changes(levels: list[int]) -> int:
+    return sum(one != other for one, other in pairwise(levels))
+
+
+def test_a_camera_that_keeps_up_leaves_nothing_out() -> None:
+    assert set(simulated(120.0, lambda _: 1.05)) == {0}
+
+
+@pytest.mark.parametrize("share", [0.9, 0.7, 0.6, 0.5, 0.4])
+def test_whatever_the_machine_carries_the_camera_is_soon_where_it_keeps_up(share: float) -> None:
+    levels = simulated(600.0, lambda _: share)
+    rung = rungs(STRIDE, live=True)[max(levels)]
+    work = sum(
+        0.75 * rung.searches(it, STRIDE) + 0.25 * rung.takes(it, STRIDE, GOP) for it in range(STRIDE * GOP)
+    )
+    assert work / (STRIDE * GOP) < share  # so high as needed
+    assert levels.index(max(levels)) < 10 * FPS
+    assert changes(levels[-round(240 * FPS) :]) <= 18  # a rung down is tried now and then, no more
+
+
+def test_it_comes_back_by_itself() -> None:
+    levels = simulated(240.0, lambda now: 0.4 if 20.0 <= now < 60.0 else 1.2)
+    assert max(levels[: round(20 * FPS)]) == 0
+    assert levels[round(30 * FPS)] >= 2
+    assert set(levels[round(180 * FPS) :]) == {0}
+
+
+def test_a_short_stall_is_caught_up_with() -> None:
+    levels = simulated(60.0, lambda now: 0.05 if 20.0 <= now < 20.3 else 2.0)
+    assert max(levels) <= 1
+    assert levels[-1] == 0
+
+
+@given(stride=st.integers(1, 20), gop=st.integers(1, 40), live=st.booleans(), pulse=st.integers(0, 10**9))
+def test_no_rung_leaves_out_the_end_of_a_window_or_the_beginning_of_a_gop(
+    stride: int, gop: int, *, live: bool, pulse: int
+) -> None:
+    for rung in rungs(stride, live=live):
+        end = (pulse + 1) * stride - 1
+        assert rung.searches(end, stride)
+        assert rung.takes(end, stride, gop)
+        assert rung.takes(pulse * gop, stride, gop)
+
+
+@given(stride=st.integers(1, 20), live=st.booleans())
+def test_every_rung_leaves_out_more_and_a_recording_is_always_shown_whole(stride: int, *, live: bool) -> None:
+    ladder = rungs(stride, live=live)
+    assert ladder[0] == Rung()
+    frames = range(stride * 60)
+    searched = [sum(it.searches(pulse, stride) for pulse in frames) for it in ladder]
+    taken = [sum(it.takes(pulse, stride, 60) for pulse in frames) for it in ladder]
+    assert all(one >= other for one, other in pairwise(searched))
+    assert (
+        len(set(zip(searched, taken, strict=True))) >= len(ladder) - 1
+    )  # of a stride of 1, the last is alike
+    if not live:
+        assert set(taken) == {len(frames)}
+
+
+@pytest.mark.parametrize("fps", [0.5, 1.0, 2.0, FPS])
+def test_a_frame_may_take_all_the_time_that_it_has_at_any_rate(fps: float) -> None:
+    load = Load(small_config(site={"fps": fps}), "c0", live=True)
+    for pulse in range(200):
+        load.measured(0.95 / fps, pulse / fps)
+        assert load.level == 0
+
+
+def test_the_rungs_are_told_in_words() -> None:
+    assert [it.words for it in rungs(5, live=True)] == [
+        "",
+        "searching every 2nd frame: the machine is too busy",
+        "searching every 3rd frame: the machine is too busy",
+        "searching every 5th frame: the machine is too busy",
+        "showing every 2nd and searching every 5th frame: the machine is too busy",
+    ]

@@ -1,0 +1,452 @@
+"""A camera's own H.264 passes through to the byte where it fits, and where not the reason is said."""
+
+from __future__ import annotations
+
+import http.server
+import re
+import subprocess
+import threading
+import time
+from collections.abc import Iterator, Mapping
+from fractions import Fraction
+from functools import lru_cache
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import av
+import numpy as np
+import pytest
+from av.video.stream import VideoStream
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fakes.cameras import FPS, GOP, HEIGHT, WIDTH, encoded, small_config
+from fakes.media.rtsp_camera import RtspCamera
+from fakes.media.videos import write_video
+from fakes.paths import DOCS
+from fakes.programs import needs_ffmpeg
+from fakes.timeouts import PATIENCE
+from server.camera.audio import LiveSound
+from server.camera.encoding.encoder import AccessUnit, Encoder
+from server.camera.passthrough.access_unit_queue import Waiting
+from server.camera.passthrough.compatibility import wanted_by
+from server.camera.passthrough.encoder import Unit
+from server.camera.passthrough.stream_source import OwnStream
+from server.camera.pipeline import CameraPipeline
+from server.camera.process import CameraProcess
+from server.camera.sources import SourceEnded
+from server.config.site_config import Config
+from server.media.containers.mpegts import Counters, pack
+from server.media.h264.annexb import NAL_AUD, nal_type, nal_units
+from server.media.stream_format import Agreement
+from server.service.streaming.frame_buffer import FrameBuffer
+from server.system.errors import UnavailableError, UserError
+
+FRAMES = 20
+
+
+def site(source: Path | str, h264: str = "pass", **changes: Any) -> Config:
+    camera = {"id": "c0", "source": str(source), "h264": h264, **changes.pop("camera", {})}
+    other = {"id": "c1", "source": "scene:room"}
+    return small_config(cameras=[camera, other], **changes)
+
+
+def written(folder: Path, form: str, seed: int = 0) -> Path:
+    """Write what a camera of the site encoded, as somebody else would have recorded it."""
+    units, path = encoded(seed)[:FRAMES], folder / f"own.{form}"
+    if form == "h264":
+        path.write_bytes(b"".join(unit.data for unit in units))
+        return path
+    if form == "ts":
+        shelf = FrameBuffer(FPS, FRAMES, Agreement())
+        pictures = [shelf.put(unit.pulse, 1, unit.data, key=unit.key) for unit in units]
+        path.write_bytes(pack(pictures, FPS, Counters()))
+        return path
+    with av.open(str(path), "w", format="mp4" if form == "mp4" else "matroska") as container:
+        stream = container.add_stream("h264", rate=FPS)
+        assert isinstance(stream, VideoStream)
+        stream.width, stream.height = WIDTH, HEIGHT
+        stream.codec_context.extradata = units[0].data[: units[0].data.index(b"\x00\x00\x01\x06") - 1]
+        for unit in units:
+            packet = av.Packet(unit.data)
+            packet.stream, packet.pts, packet.dts = stream, unit.pulse, unit.pulse
+            packet.time_base, packet.is_keyframe = Fraction(1, FPS), unit.key
+            container.mux(packet)
+    return path
+
+
+def passed(pipeline: CameraPipeline, pulses: range) -> list[AccessUnit]:
+    """Give what a camera's process sends."""
+    sent = []
+    for pulse in pulses:
+        image = pipeline.take(pulse)
+        if image is not None:
+            sent.append(pipeline.encode(pulse, image))
+    return sent
+
+
+def nals(data: bytes) -> list[bytes]:
+    return [unit for unit in nal_units(data) if nal_type(unit) != NAL_AUD]
+
+
+@pytest.mark.parametrize("form", ["h264", "ts", "mp4", "mkv"])
+def test_access_units_come_out_as_they_went_in(tmp_path: Path, form: str) -> None:
+    pipeline = CameraPipeline(site(written(tmp_path, form)), "c0")
+    assert pipeline.passes
+    sent = passed(pipeline, range(FRAMES))
+    with pytest.raises(SourceEnded):
+        pipeline.take(FRAMES)
+    pipeline.close()
+    for unit, own in zip(sent, encoded(0)[:FRAMES], strict=True):
+        assert (unit.pulse, unit.key, nals(unit.data)) == (own.pulse, own.key, nals(own.data))
+        if form == "h264":
+            assert unit.data == own.data, "to the byte"
+
+
+def test_the_tracker_is_given_the_pictures_that_are_sent(tmp_path: Path) -> None:
+    pipeline = CameraPipeline(site(written(tmp_path, "mp4")), "c0")
+    decoder = av.VideoCodecContext.create("h264", "r")
+    for pulse, unit in enumerate(encoded(0)[:FRAMES]):
+        (picture,) = decoder.decode(av.Packet(unit.data))
+        np.testing.assert_array_equal(pipeline.take(pulse), picture.to_ndarray(format="bgr24"))
+    pipeline.close()
+
+
+def test_it_can_be_cut_with_what_another_camera_encodes(tmp_path: Path) -> None:
+    pipeline = CameraPipeline(site(written(tmp_path, "mp4")), "c0")
+    agreement = Agreement()
+    shelves = [FrameBuffer(FPS, FRAMES, agreement) for _ in range(2)]
+    for shelf, units in zip(shelves, (passed(pipeline, range(FRAMES)), encoded(1)), strict=True):
+        for unit in units:
+            shelf.put(unit.pulse, 1, unit.data, key=unit.key)
+    pipeline.close()
+
+
+def test_a_recording_begins_later_and_again(tmp_path: Path) -> None:
+    camera = {"offset": GOP, "at_end": "loop"}
+    pipeline = CameraPipeline(site(written(tmp_path, "ts"), camera=camera), "c0")
+    sent = passed(pipeline, range(2 * FRAMES + GOP))
+    pipeline.close()
+    assert [unit.pulse for unit in sent] == list(range(GOP, 2 * FRAMES + GOP))
+    assert [nals(it.data) for it in sent] == 2 * [nals(it.data) for it in encoded(0)[:FRAMES]]
+
+
+@needs_ffmpeg
+def test_what_the_manual_tells_to_do_fits(tmp_path: Path) -> None:
+    """A camera that is set up as docs/how-to/run.md says passes through."""
+    manual = (DOCS / "how-to" / "run.md").read_text(encoding="utf-8")
+    (told,) = re.findall(r"^ffmpeg .* (-c:v libx264 .*?) \S+$", manual, re.MULTILINE)
+    gop, path = 10, tmp_path / "told.mp4"
+    test_picture = f"-f lavfi -i testsrc2=size={WIDTH}x{HEIGHT}:rate={FPS} -t 2 -pix_fmt yuv420p"
+    subprocess.run(f"ffmpeg -v error {test_picture} {told} {path}".split(), check=True)
+    config = site(path, encode={"gop": gop}, view={"lookahead": 2 * gop})
+    pipeline = CameraPipeline(config, "c0")
+    assert len(passed(pipeline, range(2 * FPS))) == 2 * FPS
+    pipeline.close()
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({"encode": {"crf": 30}}, "frame 0 has other parameter sets .* than this site encodes with"),
+        ({"encode": {"gop": 4}}, r"frame 4 does not begin a GOP: they begin every 4 frames \(encode.gop\)"),
+        ({"site": {"width": 128}}, r"its pictures are 64x48, the site's 128x48"),
+        ({"site": {"fps": 30}}, r"it has 25 pictures a second, the site 30"),
+        ({"camera": {"offset": 1}}, "frame 0 begins a GOP, where none of the site does"),
+    ],
+)
+def test_what_does_not_fit_is_encoded_or_refused_with_the_reason(
+    tmp_path: Path, changes: dict[str, Any], reason: str
+) -> None:
+    path = written(tmp_path, "mp4")
+    with pytest.raises(UserError, match=f"camera c0: h264: pass: {reason}") as refused:
+        CameraPipeline(site(path, **changes), "c0")
+    assert "\n" not in str(refused.value)
+    pipeline = CameraPipeline(site(path, "auto", **changes), "c0")
+    assert not pipeline.passes
+    assert re.search(reason, pipeline.why_encoded)
+    assert passed(pipeline, range(GOP))[-1].data
+    pipeline.close()
+
+
+@pytest.mark.parametrize(
+    ("codec", "b_frames", "reason"),
+    [("mpeg4", 0, "it is mpeg4, not H.264"), ("libx264", 2, "it has B pictures")],
+)
+def test_other_codecs_and_orders_do_not_fit(tmp_path: Path, codec: str, b_frames: int, reason: str) -> None:
+    path = write_video(tmp_path / "other.mp4", 20, codec=codec, b_frames=b_frames)
+    pipeline = CameraPipeline(site(path, "auto"), "c0")
+    assert reason in pipeline.why_encoded
+    pipeline.close()
+
+
+@pytest.mark.parametrize(
+    ("h264", "gop", "said"),
+    [
+        ("auto", GOP, "camera c0: its own H.264 passes through"),
+        ("auto", 4, "camera c0 is encoded: its own H.264: frame 4 does not begin a GOP"),
+        ("encode", GOP, ""),
+    ],
+)
+def test_the_cameras_process_says_once_whether_it_passes(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, h264: str, gop: int, said: str
+) -> None:
+    caplog.set_level("INFO", "server.camera.process")
+    process = CameraProcess(site(written(tmp_path, "mp4"), h264, encode={"gop": gop}), "c0")
+    process._pipeline.close()
+    assert caplog.text.count("own H.264") == bool(said)
+    assert said in caplog.text
+
+
+def test_part_of_a_gop_cannot_begin_again(tmp_path: Path) -> None:
+    path = tmp_path / "own.h264"
+    path.write_bytes(b"".join(unit.data for unit in encoded(0)[: GOP + 2]))
+    with pytest.raises(UserError, match="its 7 frames are not whole GOPs"):
+        CameraPipeline(site(path, camera={"at_end": "loop"}), "c0")
+
+
+def test_where_all_cameras_pass_their_parameter_sets_are_their_own(tmp_path: Path) -> None:
+    path = written(tmp_path, "mp4")
+    camera = {"source": str(path), "h264": "pass"}
+    config = small_config(cameras=[{"id": "c0", **camera}, {"id": "c1", **camera}], encode={"crf": 30})
+    pipeline = CameraPipeline(config, "c0")
+    assert pipeline.passes
+    pipeline.close()
+
+
+def test_where_each_camera_may_have_its_own_parameter_sets_any_fit(tmp_path: Path) -> None:
+    encode = {"crf": 30, "parameters": "own"}
+    pipeline = CameraPipeline(site(written(tmp_path, "mp4"), encode=encode), "c0")
+    assert pipeline.passes
+    pipeline.close()
+
+
+def test_images_do_not_fit_and_vp8_sites_have_no_such_thing(tmp_path: Path) -> None:
+    pipeline = CameraPipeline(site("scene:room", "auto"), "c0")
+    assert "single images" in pipeline.why_encoded
+    pipeline.close()
+    with pytest.raises(UserError, match=r"c0: h264: auto: encode\.codec is vp8"):
+        site(tmp_path / "own.mp4", "auto", encode={"codec": "vp8"})
+
+
+IMAGE = np.zeros((2, 2, 3), dtype=np.uint8)
+arrivals = st.lists(st.integers(0, 3) | st.just(40), min_size=1, max_size=120)
+"""Units at each pulse; now and then many at once, more than can wait."""
+
+
+@settings(max_examples=200, deadline=None)
+@given(arrivals, st.integers(0, 9), st.integers(1, 6), st.sets(st.integers(0, 119), max_size=5))
+def test_gops_begin_where_the_sites_do_and_are_never_torn(
+    come: list[int], phase: int, gop: int, missed: set[int]
+) -> None:
+    """However units come: each is given once and in order, and in a GOP none is left out."""
+    waiting, count = Waiting(gop), 0
+    given: list[tuple[int, int]] = []
+    for pulse, some in enumerate(come):
+        for _ in range(some):
+            waiting.put(Unit((count + phase) % gop == 0, count.to_bytes(4, "big"), IMAGE))
+            count += 1
+        unit = None if pulse in missed else waiting.take(pulse)
+        if unit is not None:
+            given.append((pulse, int.from_bytes(unit.data, "big")))
+            if pulse % gop == 0:
+                assert unit.key
+    assert all(one < other for (_, one), (_, other) in pairwise(given))
+    before = dict(given)
+    for pulse, number in given:
+        if pulse % gop:
+            assert before.get(pulse - 1) == number - 1, "what it builds on was sent just before it"
+
+
+@given(st.integers(0, 9), st.integers(3, 10), st.lists(st.integers(-1, 1), min_size=100, max_size=100))
+def test_of_a_camera_in_step_nothing_is_lost_however_uneven_the_network_is(
+    phase: int, gop: int, jitter: list[int]
+) -> None:
+    """A unit that comes up to a pulse early or late is there when it is needed."""
+    waiting, given, count = Waiting(gop), [], 0
+    for pulse in range(100):
+        while count <= pulse + jitter[pulse]:
+            waiting.put(Unit((count + phase) % gop == 0, count.to_bytes(4, "big"), IMAGE))
+            count += 1
+        unit = waiting.take(pulse)
+        given.append(None if unit is None else int.from_bytes(unit.data, "big"))
+    begun = next(pulse for pulse, number in enumerate(given) if number is not None)
+    assert begun <= 3 * gop
+    rest = [number for number in given[begun:] if number is not None]
+    assert rest == list(range(rest[0], rest[0] + 100 - begun)), "from the first on, one at every pulse"
+    assert begun - rest[0] <= gop + 2, "no later than a GOP and the cushion"
+
+
+class NetworkCamera:
+    """Serves a transport stream, GOP by GOP, as far as it is let."""
+
+    def __init__(self, gops: list[bytes]) -> None:
+        stop = self._stop = threading.Event()
+        camera, self.let = self, 40
+
+        class Handler(http.server.BaseHTTPRequestHandler):
+            def do_GET(self) -> None:
+                self.send_response(200)
+                self.end_headers()
+                for place, data in enumerate(gops):
+                    while place >= camera.let:
+                        if stop.wait(0.002):
+                            return
+                    try:
+                        self.wfile.write(data)
+                    except OSError:
+                        return
+
+            def log_message(self, *_: object) -> None:
+                pass
+
+        self._server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+        self._server.daemon_threads = True
+        self._thread = threading.Thread(target=self._server.serve_forever, args=(0.02,))
+        self._thread.start()
+        self.url = f"http://127.0.0.1:{self._server.server_address[1]}/live.ts"
+
+    def close(self) -> None:
+        self._stop.set()
+        if self._thread.is_alive():
+            self._server.shutdown()
+            self._thread.join()
+            self._server.server_close()
+
+
+@lru_cache
+def numbers() -> Mapping[tuple[bytes, ...], int]:
+    """Say of what the cameras send which access unit it is."""
+    return {tuple(nals(unit.data)): unit.pulse for unit in encoded(0, 1000)}
+
+
+def until_some_wait(camera: NetworkCamera | RtspCamera, source: OwnStream) -> None:
+    """Let more come until there is enough for a pulse, wherever in a GOP that is.
+
+    Never more than is on its way already: what a slow machine is late with would come all at once, and be
+    too much.
+    """
+    end = time.monotonic() + PATIENCE
+    while True:
+        units = source._waiting._units
+        come = numbers()[tuple(nals(units[-1].data))] // GOP + 1 if units else 0
+        if come == camera.let:
+            if len(units) >= GOP + 2:
+                return
+            camera.let += 1
+        assert time.monotonic() < end, "nothing comes"
+        time.sleep(0.002)
+
+
+@pytest.fixture
+def rtsp() -> Iterator[RtspCamera]:
+    units = encoded(0, 1000)
+    camera = RtspCamera([units[first : first + GOP] for first in range(0, 1000, GOP)], FPS)
+    yield camera
+    camera.close()
+
+
+@pytest.fixture
+def network() -> Iterator[NetworkCamera]:
+    units = encoded(0, 1000)
+    shelf = FrameBuffer(FPS, 1000, Agreement())
+    pictures = [shelf.put(unit.pulse, 1, unit.data, key=unit.key) for unit in units]
+    gops = [pictures[first : first + GOP] for first in range(0, 1000, GOP)]
+    camera = NetworkCamera([pack(gop, FPS, Counters()) for gop in gops])
+    yield camera
+    camera.close()
+
+
+@pytest.mark.parametrize("kind", ["network", "rtsp"])
+def test_a_network_camera_passes_too_in_whole_gops_at_the_sites_pulses(
+    kind: str, request: pytest.FixtureRequest
+) -> None:
+    network = request.getfixturevalue(kind)
+    camera = {"options": {"probesize": "20000", "analyzeduration": "200000"}}
+    pipeline = CameraPipeline(site(network.url, camera=camera), "c0")
+    assert pipeline.passes
+    source = pipeline.source
+    assert isinstance(source, OwnStream)
+    assert pipeline.take(1) is None
+    assert not pipeline.away, "it waits for a GOP to begin"
+    sent: list[AccessUnit] = []
+    for pulse in range(2, 62):
+        until_some_wait(network, source)
+        image = pipeline.take(pulse)
+        if image is not None:
+            sent.append(pipeline.encode(pulse, image))
+    assert len(sent) > 40
+    assert not pipeline.away
+    network.close()
+    for later in range(62, 62 + 4 * FPS):
+        pipeline.take(later)
+    assert pipeline.away
+    pipeline.close()
+    places = [numbers()[tuple(nals(unit.data))] for unit in sent]
+    assert places == sorted(set(places)), "each of them untouched, once and in order"
+    for unit, number in zip(sent, places, strict=True):
+        assert unit.key == (number % GOP == 0)
+        if unit.key:
+            assert unit.pulse % GOP == 0
+        else:
+            assert unit.pulse % GOP == number % GOP
+
+
+@pytest.mark.parametrize("h264", ["pass", "auto"])
+def test_a_network_camera_that_falls_silent_while_it_is_looked_at_is_away(
+    network: NetworkCamera, monkeypatch: pytest.MonkeyPatch, h264: str
+) -> None:
+    """That says nothing of what it sends: it is neither refused for good nor encoded for good."""
+    monkeypatch.setattr("server.camera.passthrough.stream_source.READ_S", 0.5)
+    network.let = 2
+    camera = {"options": {"probesize": "2000", "analyzeduration": "1000"}}
+    with pytest.raises(UnavailableError, match=r"stopped while it was looked at: no answer within 0\.5 s$"):
+        CameraPipeline(site(network.url, h264, camera=camera), "c0")
+
+
+def test_sound_beside_it_waits_as_long_as_the_pictures(network: NetworkCamera) -> None:
+    options = {"probesize": "20000", "analyzeduration": "200000"}
+    config = site(network.url, sound={"source": "c0"})
+    listener = LiveSound(config.sound, FPS)
+    source = OwnStream(network.url, options, listener, wanted_by(config))
+    in_a_row, waited = 0, 0
+    for pulse in range(300):
+        until_some_wait(network, source)
+        listener.at(pulse)
+        if source.take(pulse) is None or source.taken is None:
+            continue
+        before, waited = waited, pulse - numbers()[tuple(nals(source.taken.data))]
+        in_a_row = in_a_row + 1 if waited == before else 0
+        if in_a_row == 0:
+            listener._shifts.clear()  # a GOP was left out: it is another time, of which there is no mean yet
+        if in_a_row == 4 * GOP:
+            break
+    source.close()
+    assert in_a_row == 4 * GOP
+    assert float(listener._shift or 0) == pytest.approx(waited / FPS, abs=0.02), "to within half a frame"
+
+
+def test_a_network_camera_that_comes_back_with_other_pictures_is_away(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    config = site("rtsp://camera", encode={"parameters": "own"})
+    larger = config.site.model_copy(update={"width": 2 * WIDTH, "height": 2 * HEIGHT})
+    encoder = Encoder(larger, config.encode)
+    blank = np.zeros((2 * HEIGHT, 2 * WIDTH, 3), dtype=np.uint8)
+    own = written(tmp_path, "h264").read_bytes()
+    other = b"".join(encoder.encode(pulse, blank).data for pulse in range(FRAMES))
+    path = tmp_path / "own.h264"
+    path.write_bytes(own + other)  # it changes while it is read, and is changed when it is opened again
+    source = OwnStream(str(path), {}, None, wanted_by(config))
+    (tmp_path / "other.h264").write_bytes(other)
+    (tmp_path / "other.h264").replace(path)
+    end = time.monotonic() + PATIENCE
+    while "does not fit any more" not in caplog.text:
+        assert time.monotonic() < end
+        time.sleep(0.02)
+    source.close()
+    assert f"its pictures are {2 * WIDTH}x{2 * HEIGHT}, the site's {WIDTH}x{HEIGHT}" in caplog.text
+    waiting = source._waiting._units
+    assert waiting
+    assert {unit.image.shape for unit in waiting} == {(HEIGHT, WIDTH, 3)}

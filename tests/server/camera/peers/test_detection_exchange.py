@@ -1,0 +1,324 @@
+"""Cameras of one ground tell each other what they find, live as offline; who is away costs next to none."""
+
+from __future__ import annotations
+
+import asyncio
+import csv
+from collections.abc import AsyncIterator
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fakes.camera_processes import Running, in_folder
+from fakes.timeouts import PATIENCE
+from server.camera.peers.cross_view_scorer import Heard, Witness
+from server.camera.peers.detection_exchange import Exchange
+from server.camera.pipeline import CameraPipeline
+from server.cli.generated_config import free_port
+from server.cli.render.camera_workers import CameraWorkers, EpochBatch, run_cameras
+from server.cli.render.renderer import Renderer
+from server.config.loader import build_config
+from server.config.site_config import Config
+from server.messaging.bus import Bus
+from server.messaging.messages import FRAME_DETECTIONS_MAX, FrameDetections, ZenohKeys
+from synthetic import Scene, write_recording
+from tracking import Detections
+
+FRAMES = 60
+FPS = 50.0
+WAIT = 1.0  # seconds that two cameras wait for each other, and for a third one that never comes
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Three views of a room with people in it, small and short."""
+    out = tmp_path_factory.mktemp("recordings") / "room"
+    write_recording(Scene("room", 3, 4, 4, 192, 108, FPS), out, FRAMES / FPS)
+    return out
+
+
+def config_of(
+    recording: Path,
+    views: int = 3,
+    *,
+    use: bool = True,
+    wait: float = PATIENCE,
+    ahead: bool = True,
+    **offsets: int,
+) -> Config:
+    """Give a site of that room's views on ports of its own, some of them with an offset."""
+    bus = f"tcp/127.0.0.1:{free_port()}"
+    cameras = [
+        {"id": f"c{n}", "source": f"c{n}.mp4", "offset": offsets.get(f"c{n}", 0)} for n in range(views)
+    ]
+    content: dict[str, Any] = {
+        "site": {"name": "hall", "fps": FPS, "width": 192, "height": 108},
+        "sync": {"port": free_port(), "start_timeout_s": PATIENCE},
+        "zenoh": {"connect": bus, "listen": bus},
+        "cameras": cameras,
+        "detect": {} if ahead else {"ahead_frames": 0},
+        "ground": "ground.json",
+        "track": {"backlog_s": PATIENCE, "witness": {"use": use}, "witness_wait_s": wait},
+        "view": {"late_after_s": PATIENCE},
+    }
+    return build_config(content, where="hall", folder=recording)
+
+
+def by_itself(config: Config, folder: Path) -> dict[str, bytes]:
+    """Run all cameras in step in this process; give what was written."""
+    folder.mkdir()
+    renderer = Renderer(config, folder)
+    for batch in run_cameras({camera: CameraPipeline(config, camera) for camera in config.camera_ids}):
+        renderer.take(batch)
+    renderer.finish()
+    return in_folder(folder)
+
+
+@pytest.fixture
+async def running() -> AsyncIterator[list[Running]]:
+    sites: list[Running] = []
+    yield sites
+    for it in sites:
+        await it.stop()
+
+
+async def live(config: Config, out: Path, running: list[Running]) -> dict[str, bytes]:
+    """Run a whole site to its end; give what was written."""
+    it = Running(config, out)
+    running.append(it)
+    over = await it.start()
+    cameras = [it.camera(camera) for camera in config.camera_ids]
+    async with asyncio.timeout(PATIENCE):
+        await asyncio.gather(over, *cameras)
+    return in_folder(out)
+
+
+@pytest.mark.slow
+async def test_live_equals_offline_whichever_way_words_go(
+    recording: Path, tmp_path: Path, running: list[Running]
+) -> None:
+    config = config_of(recording, 2, c1=7)
+    told = await live(config, tmp_path / "live", running)
+    here = by_itself(config, tmp_path / "here")
+    assert told == here
+    assert told["late.csv"] == b"frame,camera,what\n"
+
+
+def test_what_others_see_counts_and_workers_that_are_in_step_by_pipes_say_the_same(recording: Path) -> None:
+    config = config_of(recording, 2, c1=7)
+    workers = CameraWorkers(config)
+    workers.start()
+    try:
+        piped = list(workers)
+    finally:
+        workers.close()
+    assert sorted(piped, key=_order) == here_in_step(config)
+    assert sorted(piped, key=_order) != here_in_step(config_of(recording, 2, use=False, c1=7))
+
+
+def here_in_step(config: Config) -> list[EpochBatch]:
+    batches = run_cameras({camera: CameraPipeline(config, camera) for camera in config.camera_ids})
+    return sorted(batches, key=_order)
+
+
+def _order(batch: EpochBatch) -> tuple[str, int]:
+    return batch.camera, batch.tracks.epoch if batch.tracks else -1
+
+
+async def test_a_camera_that_never_comes_is_told_and_does_not_hold_up_the_others(
+    recording: Path, tmp_path: Path, running: list[Running]
+) -> None:
+    config = config_of(recording, wait=0.5)
+    it = Running(config, tmp_path / "out")
+    it.pulses = type(it.pulses)(
+        50, expect={"bestview", "c0", "c1"}, start_timeout=PATIENCE, port=config.sync.port
+    )
+    running.append(it)
+    await it.start()
+    began = asyncio.get_running_loop().time()
+    async with asyncio.timeout(PATIENCE):
+        await asyncio.gather(it.camera("c0"), it.camera("c1"))
+    assert asyncio.get_running_loop().time() - began < FRAMES * 0.5, "not a wait for every frame"
+    with (tmp_path / "out" / "late.csv").open(encoding="ascii", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert {row["camera"] for row in rows if row["what"] == "others not heard"} <= {"c0", "c1"}
+
+
+@pytest.fixture
+async def pair(
+    recording: Path, monkeypatch: pytest.MonkeyPatch
+) -> AsyncIterator[tuple[Bus, Exchange, Exchange]]:
+    """The router, and two of the three cameras on the bus."""
+    monkeypatch.setattr("server.camera.peers.detection_exchange._LISTENERS_S", WAIT / 4)
+    config = config_of(recording, wait=WAIT)
+    router = Bus.router(config.zenoh)
+    exchanges = [
+        Exchange(config, camera, Witness(config, camera, (192, 108), 1), 100) for camera in ("c0", "c1")
+    ]
+    for exchange in exchanges:
+        await exchange.join()
+    yield router, *exchanges
+    for exchange in exchanges:
+        await exchange.leave()
+    router.close()
+
+
+def now() -> float:
+    return asyncio.get_running_loop().time()
+
+
+def word(camera: str, pulse: int) -> FrameDetections:
+    return FrameDetections(
+        camera=camera, boot=1, size=(192, 108), pulse=pulse, boxes=[(1.5, 2.0, 20.25, 60.0, 0.5)]
+    )
+
+
+async def both(one: Exchange, two: Exchange, pulse: int = 0, *, needed: bool = True) -> list[Heard]:
+    """Let both say what they found in a frame, and hear the other."""
+    pair = (("c0", one), ("c1", two))
+    return await asyncio.gather(*(it.of(pulse, word(name, pulse), now(), needed=needed) for name, it in pair))
+
+
+async def test_words_go_both_ways_from_the_first_one_on(pair: tuple[Bus, Exchange, Exchange]) -> None:
+    _, one, two = pair
+    for pulse in range(5):
+        first, second = await both(one, two, pulse)
+        assert first.words == (word("c1", pulse),)
+        assert second.words == (word("c0", pulse),)
+
+
+async def test_a_camera_that_cannot_join_for_a_reason_nobody_foresaw_does_not_go_on_by_itself(
+    recording: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def hearing(*_: object) -> Bus:
+        raise MemoryError("no memory")
+
+    monkeypatch.setattr(Bus, "hearing", hearing)
+    config = config_of(recording, wait=WAIT)
+    alone = Exchange(config, "c0", Witness(config, "c0", (192, 108), 1), 100)
+    await alone.join()
+    with pytest.raises(MemoryError, match="no memory"):
+        await alone.of(0, word("c0", 0), now(), needed=True)
+    await alone.leave()
+
+
+async def test_a_camera_that_is_gone_is_waited_for_once(pair: tuple[Bus, Exchange, Exchange]) -> None:
+    _, one, two = pair
+    await both(one, two, needed=True)
+    await two.leave()
+    began = asyncio.get_running_loop().time()
+    for pulse in range(1, 100):
+        assert (await one.of(pulse, word("c0", pulse), now(), needed=True)).alone
+    assert asyncio.get_running_loop().time() - began < 50 * WAIT
+
+
+async def test_what_is_no_word_is_counted_and_left(pair: tuple[Bus, Exchange, Exchange]) -> None:
+    _, one, two = pair
+    await both(one, two, needed=False)
+    key = ZenohKeys("hall").camera("c1", "found")
+    assert two._bus is not None
+    far = msgspec.json.encode(word("c0", 1))
+    for nonsense in (b"", b"{", b"[1]", b'{"camera": "c1"}', far, b"\xff\xfe"):
+        two._bus.publish(key, nonsense)
+    await two.of(1, word("c1", 1), now(), needed=False)
+    assert (await one.of(1, word("c0", 1), now(), needed=True)).words == (word("c1", 1),)
+    assert one.bad_messages == 6
+
+
+NUMBER = st.floats() | st.integers(-(2**70), 2**70) | st.text(max_size=3) | st.none()
+ROWS = st.lists(st.lists(NUMBER, min_size=4, max_size=6), max_size=4) | NUMBER
+
+
+@settings(deadline=None, max_examples=100)
+@given(
+    st.fixed_dictionaries(
+        {"camera": st.just("c1"), "boot": NUMBER, "size": ROWS, "pulse": NUMBER, "boxes": ROWS}
+    ),
+    st.lists(st.tuples(*[st.floats(-1e6, 1e6)] * 4, st.floats(0, 1)), max_size=FRAME_DETECTIONS_MAX),
+)
+def test_whatever_is_read_as_a_word_can_be_gone_by(message: dict[str, Any], boxes: list[Any]) -> None:
+    config = _room()
+    witness = Witness(config, "c0", (640, 360), 1)
+    seen = Detections(np.array([[300.0, 100.0, 340.0, 220.0]]), np.array([0.5]), np.ones((1, 1)))
+    good = {"camera": "c1", "boot": 1, "size": [640, 360], "pulse": 3, "boxes": boxes}
+    for it in (message, {**good, "boxes": message["boxes"]}, {**good, "size": message["size"]}, good):
+        try:
+            read = msgspec.json.decode(msgspec.json.encode(it), type=FrameDetections)
+        except (msgspec.ValidationError, msgspec.DecodeError, OverflowError):
+            assert it is not good
+            continue
+        if not witness.looks_here(read):
+            continue
+        [score] = witness.scored(seen, [read]).scores
+        assert 0.0 <= score <= 1.0
+
+
+def _room() -> Config:
+    matrices = (
+        [[0.01, 0, -3], [0, 0.02, -2], [0, 0.002, 0.1]],
+        [[0.01, 0.001, -3], [0, 0.02, -2], [0, 0.002, 0.1]],
+    )
+    cameras = [{"id": f"c{n}", "source": "x.mp4", "ground": ground} for n, ground in enumerate(matrices)]
+    return build_config({"cameras": cameras}, where="room", folder=Path())
+
+
+def test_only_the_surest_boxes_are_told_and_in_their_order() -> None:
+    config = _room()
+    boxes = np.arange(4 * 150, dtype=np.float64).reshape(150, 4)
+    scores = np.arange(150) % 101 / 100
+    said = Witness(config, "c0", (640, 360), 1).word(5, Detections(boxes, scores, np.empty((150, 0))))
+    assert said.boxes is not None
+    assert len(said.boxes) == FRAME_DETECTIONS_MAX
+    assert [row[0] for row in said.boxes] == sorted(row[0] for row in said.boxes)
+    left_out = sorted(scores)[: 150 - FRAME_DETECTIONS_MAX]
+    assert sorted(scores) == sorted([*(row[4] for row in said.boxes), *left_out])
+
+
+def test_what_cannot_be_searched_is_no_word_that_nobody_is_there(recording: Path) -> None:
+    config = config_of(recording, ahead=False)
+    pipeline = CameraPipeline(config, "c0")
+    said = []
+    for pulse in range(40):
+        searched = pipeline.search(pulse, None if pulse == 35 else pipeline.take(pulse))
+        assert searched.word is not None
+        said.append(searched.word.boxes is not None)
+        pipeline.follow(searched, Heard())
+    pipeline.close()
+    first = said.index(True)
+    assert 0 < first < 35, "the background is not known at once"
+    assert [pulse for pulse, looked in enumerate(said) if not looked] == [*range(first), 35]
+
+
+def test_a_frame_without_a_needed_word_is_told(recording: Path) -> None:
+    config = config_of(recording)
+    pipeline = CameraPipeline(config, "c0")
+    asked, told = [], []
+    for pulse in range(FRAMES):
+        searched = pipeline.search(pulse, pipeline.take(pulse))
+        if searched.asks:
+            asked.append(pulse)
+        tracks = pipeline.follow(searched, Heard(alone=True))
+        told += tracks.alone if tracks else []
+    told += pipeline.finish(FRAMES).alone
+    pipeline.close()
+    assert asked
+    assert told == asked
+
+
+def test_a_site_with_one_homography_or_none_has_nobody_to_ask(recording: Path) -> None:
+    config = config_of(recording)
+    plain = [camera.model_copy(update={"ground": None}) for camera in config.cameras]
+    for cameras in (plain, [config.cameras[0], *plain[1:]]):
+        lone = config.model_copy(update={"cameras": cameras})
+        assert not any(lone.witnesses(camera) for camera in lone.camera_ids)
+        pipeline = CameraPipeline(lone, "c0")
+        assert pipeline.search(0, pipeline.take(0)).word is None
+        assert pipeline.last_word(1) is None
+        pipeline.close()
+    assert config.witnesses("c1") == ("c0", "c2")
+    assert not config_of(recording, use=False).witnesses("c1")

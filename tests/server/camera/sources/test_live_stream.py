@@ -1,0 +1,345 @@
+"""A camera over the network: its newest picture at every pulse, and a new connection when it was away."""
+
+from __future__ import annotations
+
+import errno
+import http.server
+import os
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import cast
+
+import av
+import cv2
+import numpy as np
+import pytest
+from av.audio.stream import AudioStream
+from av.video.frame import VideoFrame
+from av.video.stream import VideoStream
+
+from fakes.media.videos import HEIGHT, STEP, WIDTH, frame_in, write_video
+from fakes.timeouts import PATIENCE
+from server.camera.audio import LiveSound
+from server.camera.sources import live_stream, open_source
+from server.camera.sources.live_stream import Stream
+from server.camera.sources.opening import Opened, open_video
+from server.config.sections import CameraSettings, SiteSettings, SoundSettings
+from server.system.errors import UnavailableError, UserError
+
+
+class MotionJpeg:
+    """A network camera by hand: shows the picture it is told to, until it is unplugged."""
+
+    def __init__(self) -> None:
+        self.frame, self.width = 0, WIDTH
+        self._unplugged = threading.Event()
+        self._server: http.server.ThreadingHTTPServer | None = None
+        self._thread: threading.Thread | None = None
+
+    def plug_in(self, port: int = 0) -> int:
+        camera, unplugged = self, threading.Event()
+
+        class Handler(http.server.BaseHTTPRequestHandler):
+            def do_GET(self) -> None:
+                self.send_response(200)
+                self.send_header("Content-Type", "multipart/x-mixed-replace; boundary=frame")
+                self.end_headers()
+                while not unplugged.wait(0.02):
+                    grey = np.full((HEIGHT, camera.width, 3), STEP * camera.frame, np.uint8)
+                    jpeg = cv2.imencode(".jpg", grey)[1].tobytes()
+                    part = b"--frame\r\nContent-Type: image/jpeg\r\nContent-Length: %d\r\n\r\n" % len(jpeg)
+                    try:
+                        self.wfile.write(part + jpeg + b"\r\n")
+                    except OSError:
+                        return
+
+            def log_message(self, *_: object) -> None:
+                pass
+
+        http.server.ThreadingHTTPServer.allow_reuse_address = True
+        self._unplugged = unplugged
+        self._server = http.server.ThreadingHTTPServer(("127.0.0.1", port), Handler)
+        self._thread = threading.Thread(target=self._server.serve_forever, args=(0.02,))
+        self._thread.start()
+        return int(self._server.server_address[1])
+
+    def unplug(self) -> None:
+        self._unplugged.set()
+        if self._server is not None and self._thread is not None:
+            self._server.shutdown()
+            self._thread.join()
+            self._server.server_close()
+        self._server = self._thread = None
+
+
+@pytest.fixture
+def camera() -> Iterator[MotionJpeg]:
+    it = MotionJpeg()
+    yield it
+    it.unplug()
+
+
+def until(condition: Callable[[], bool]) -> None:
+    """Wait for what a thread does; there is no event for it from outside."""
+    end = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < end, "it has not come"
+        time.sleep(0.01)
+
+
+def shown(source: Stream) -> int | None:
+    picture = source.take(0)
+    return None if picture is None else frame_in(picture)
+
+
+def test_the_newest_picture_is_shown(camera: MotionJpeg) -> None:
+    source = Stream(f"http://127.0.0.1:{camera.plug_in()}/", {})
+    try:
+        assert source.size == (WIDTH, HEIGHT)
+        until(lambda: shown(source) == 0)
+        camera.frame = 7
+        until(lambda: shown(source) == 7)
+        assert shown(source) == 7, "a picture may be taken more than once"
+    finally:
+        source.close()
+
+
+def test_a_camera_that_was_away_is_shown_again_and_nothing_old_meanwhile(
+    camera: MotionJpeg, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(live_stream, "_STALE_S", 0.2)
+    monkeypatch.setattr(live_stream, "_RETRY_FIRST_S", 0.05)
+    port = camera.plug_in()
+    source = Stream(f"http://127.0.0.1:{port}/", {})
+    try:
+        until(lambda: shown(source) == 0)
+        camera.unplug()
+        until(lambda: shown(source) is None)
+        camera.frame = 9
+        camera.plug_in(port)
+        until(lambda: shown(source) == 9)
+    finally:
+        source.close()
+
+
+def test_a_camera_that_is_away_for_long_is_told_of_once_and_when_it_is_back(
+    camera: MotionJpeg, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level("INFO", "server.camera.sources.live_stream")
+    monkeypatch.setattr(live_stream, "_RETRY_FIRST_S", 0.01)
+    monkeypatch.setattr(live_stream, "_RETRY_MAX_S", 0.01)
+    port = camera.plug_in()
+    source = Stream(f"http://me:hunter2@127.0.0.1:{port}/?p=hunter2", {})
+    try:
+        until(lambda: shown(source) == 0)
+        camera.unplug()
+        until(lambda: source._away._times > 30)
+        camera.plug_in(port)
+        until(lambda: not source._away._times)
+    finally:
+        source.close()
+    *away, back = caplog.records
+    whys = [it.getMessage() for it in away]
+    assert {it.levelname for it in away} == {"WARNING"}
+    assert "Connection refused" in whys[-1]
+    assert len(whys) == len(set(whys)) <= 3, "one for each reason, not for each attempt"
+    assert back.getMessage().startswith(f"http://127.0.0.1:{port}/...: pictures come again, after ")
+    assert not [it for it in caplog.messages if "hunter2" in it]
+
+
+class Halting:
+    """A camera that sends MPEG-TS up to a frame, and the rest when it is told to go on."""
+
+    def __init__(self, film: Path, halt: int) -> None:
+        with av.open(str(film)) as container:
+            places = [packet.pos or 0 for packet in container.demux(video=0) if packet.size]
+        data, at = film.read_bytes(), places[halt]
+        self._parts, self.goes_on = (data[:at], data[at:]), threading.Event()
+        self._server = socket.create_server(("127.0.0.1", 0))
+        self.port = int(self._server.getsockname()[1])
+        self._thread = threading.Thread(target=self._serve)
+        self._thread.start()
+
+    def _serve(self) -> None:
+        connection, _ = self._server.accept()
+        with connection:
+            connection.recv(65536)
+            connection.sendall(b"HTTP/1.0 200 OK\r\n\r\n" + self._parts[0])
+            assert self.goes_on.wait(PATIENCE)
+            connection.sendall(self._parts[1])
+
+    def close(self) -> None:
+        self._thread.join()
+        self._server.close()
+
+
+class Frames:
+    """Notes which frames became the newest: what a camera's sound goes by."""
+
+    def __init__(self) -> None:
+        self.shown: list[int] = []
+
+    def opened(self, stream: object) -> None:
+        assert stream is None
+
+    def picture(self, time: float) -> None:
+        self.shown.append(round(float(time) * 25))
+
+
+def test_a_picture_of_before_a_silence_is_not_shown_after_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(live_stream, "_STALE_S", 0.2)
+    camera = Halting(write_video(tmp_path / "film.ts", 25), halt=20)
+    frames = Frames()
+    quick = {"analyzeduration": "100000", "probesize": "5000"}
+    source = Stream(f"http://127.0.0.1:{camera.port}/", quick, frames)
+    try:
+        until(lambda: len(frames.shown) == 18)  # where the others end is not known yet
+        until(lambda: source.take(0) is None)
+        camera.goes_on.set()
+        until(lambda: len(frames.shown) > 20)
+        assert frames.shown[:20] == [*range(18), 20, 21]
+    finally:
+        camera.goes_on.set()
+        camera.close()
+        source.close()
+
+
+@pytest.mark.timeout(PATIENCE)
+@pytest.mark.parametrize("connected", [True, False])
+def test_pictures_of_another_size_are_no_pictures_of_this_camera(
+    camera: MotionJpeg, monkeypatch: pytest.MonkeyPatch, connected: bool
+) -> None:
+    """Where people stand goes by the size: the camera's process ends, and begins anew with the other one."""
+    monkeypatch.setattr(live_stream, "_RETRY_FIRST_S", 0.05)
+    port = camera.plug_in()
+    source = Stream(f"http://127.0.0.1:{port}/", {})
+
+    def take_them_all() -> None:
+        while True:
+            picture = source.take(0)
+            assert picture is None or picture.shape == (HEIGHT, WIDTH, 3)
+            time.sleep(0.01)
+
+    try:
+        until(lambda: shown(source) == 0)
+        if not connected:
+            camera.unplug()
+        camera.width = 2 * WIDTH
+        if not connected:
+            camera.plug_in(port)
+        with pytest.raises(UnavailableError, match=r"its pictures are 128x48 now, they were 64x48$"):
+            take_them_all()
+    finally:
+        source.close()
+
+
+@pytest.mark.parametrize("kind", [av.error.PatchWelcomeError, av.error.ArgumentError])
+def test_a_picture_that_cannot_be_decoded_cuts_no_connection(
+    camera: MotionJpeg, kind: type[av.error.FFmpegError]
+) -> None:
+    """What damage makes FFmpeg say differs from codec to codec."""
+    damaged = threading.Event()
+
+    class Damaging(Stream):
+        connections = 0
+
+        def _decode(self, packet: av.Packet[VideoStream]) -> bool:
+            return super()._decode(cast("av.Packet[VideoStream]", Damaged()) if damaged.is_set() else packet)
+
+        def _read(self, opened: Opened) -> bool:
+            self.connections += 1
+            return super()._read(opened)
+
+    class Damaged:
+        pts = time_base = None
+
+        def decode(self) -> list[VideoFrame]:
+            damaged.clear()
+            raise kind(1, "not yet implemented")
+
+    source = Damaging(f"http://127.0.0.1:{camera.plug_in()}/", {})
+    try:
+        until(lambda: shown(source) == 0)
+        damaged.set()
+        until(lambda: not damaged.is_set())
+        camera.frame = 5
+        until(lambda: shown(source) == 5)
+        assert source.connections == 1
+    finally:
+        source.close()
+
+
+def test_a_mistake_while_reading_ends_the_connection_and_not_the_camera(
+    camera: MotionJpeg, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(live_stream, "_RETRY_FIRST_S", 0.05)
+
+    class Stumbling(LiveSound):
+        connections = 0
+
+        def opened(self, stream: AudioStream | None) -> None:
+            self.connections += 1
+            if self.connections == 1:
+                raise ValueError("nobody has thought of this")
+            super().opened(stream)
+
+    listener = Stumbling(SoundSettings(source="c0"), 25)
+    source = Stream(f"http://127.0.0.1:{camera.plug_in()}/", {}, listener)
+    try:
+        until(lambda: shown(source) == 0)
+    finally:
+        source.close()
+    assert listener.connections == 2
+    (mistake,) = [it for it in caplog.records if it.exc_info]
+    assert "nobody has thought of this" in str(mistake.exc_info)
+
+
+def test_closing_ends_the_thread(camera: MotionJpeg) -> None:
+    source = Stream(f"http://127.0.0.1:{camera.plug_in()}/", {})
+    source.close()
+    assert not source._thread.is_alive()
+
+
+@pytest.mark.parametrize("url", ["http://127.0.0.1:1/", "rtsp://127.0.0.1:1/", "nonsense://door"])
+def test_a_camera_that_is_not_there_is_refused_in_one_line(url: str) -> None:
+    with pytest.raises(UserError, match="camera door: ") as caught:
+        open_source(CameraSettings(id="door", source=url), SiteSettings())
+    assert "\n" not in str(caught.value)
+    assert url in str(caught.value)
+
+
+@pytest.mark.parametrize("login", ["me:pa@ss:w@", ""])
+def test_a_password_is_in_no_error(login: str) -> None:
+    with pytest.raises(UserError, match="cannot open this video") as caught:
+        open_video(f"rtsp://{login}127.0.0.1:1/user=me_password=w0rd_channel=1", {}, (5.0, 5.0))
+    assert "pa@ss" not in str(caught.value)
+    assert "w0rd" not in str(caught.value)
+    assert "rtsp://127.0.0.1:1/..." in str(caught.value)
+
+
+def test_options_are_passed_on(camera: MotionJpeg) -> None:
+    port = camera.plug_in()
+    source = Stream(f"http://127.0.0.1:{port}/", {"user_agent": "MyView"})
+    source.close()
+
+
+def test_a_host_that_nobody_knows_is_told_from_a_camera_that_fails(monkeypatch: pytest.MonkeyPatch) -> None:
+    """FFmpeg says the same of both."""
+
+    def refused(*_: object, **__: object) -> None:
+        raise OSError(errno.EIO, os.strerror(errno.EIO))
+
+    def unknown(*_: object) -> None:
+        raise socket.gaierror(socket.EAI_NONAME, "Name or service not known")
+
+    monkeypatch.setattr(av, "open", refused)
+    with pytest.raises(UserError, match=r"127.0.0.1/\.\.\.: .*: Input/output error"):
+        open_video("rtsp://127.0.0.1/live")
+    monkeypatch.setattr(socket, "getaddrinfo", unknown)
+    with pytest.raises(UserError, match=r"rtsp://gate/\.\.\.: .*: Name or service not known"):
+        open_video("rtsp://me:hunter2@gate/live")

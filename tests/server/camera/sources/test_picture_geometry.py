@@ -1,0 +1,307 @@
+"""Pictures are shown as they are meant: upright, with square pixels, and all of one size."""
+
+from __future__ import annotations
+
+import http.server
+import threading
+from collections.abc import Iterator
+from fractions import Fraction
+from functools import partial
+from pathlib import Path
+
+import av
+import cv2
+import numpy as np
+import pytest
+from av.stream import Disposition
+from av.video.stream import VideoStream
+from numpy.typing import NDArray
+from PIL import Image as Pillow
+
+from fakes.command_line import Run, myview
+from fakes.media.videos import frame_in, write_timed, write_video
+from server.camera.passthrough.compatibility import MisfitError, Wanted
+from server.camera.passthrough.recording_source import OwnRecording
+from server.camera.passthrough.stream_source import OwnStream
+from server.camera.sources import Folder, Recording
+from server.camera.sources.live_stream import Stream
+from server.cli.generated_config import config_for_videos
+from server.cli.render.video_info import read_video_info
+from tracking.motchallenge import MotRow, read_rows, write_rows
+
+__all__ = ["myview"]
+
+WIDE, HIGH = 96, 64
+WAYS = [(turn, flip) for turn in (0, 90, 180, 270) for flip in (False, True)]
+"""Quarter turns to the left, in degrees, and whether left and right change places after that."""
+SITE = Wanted((WIDE, HIGH), 25.0, 10, None)
+
+Picture = NDArray[np.uint8]
+
+
+def corners() -> Picture:
+    """Draw a picture that can be told from itself turned and mirrored: each quarter has a grey of its own."""
+    picture = np.zeros((HIGH, WIDE, 3), np.uint8)
+    for (row, column), grey in {(0, 0): 40, (0, 1): 100, (1, 0): 160, (1, 1): 220}.items():
+        picture[row * HIGH // 2 :, column * WIDE // 2 :] = grey
+    return picture
+
+
+def turned(picture: Picture, turn: int, *, flip: bool) -> Picture:
+    it = np.rot90(picture, turn // 90)
+    return it[:, ::-1] if flip else it
+
+
+def same(shown: Picture | None, meant: Picture) -> bool:
+    return (
+        shown is not None
+        and shown.shape == meant.shape
+        and bool(np.abs(shown - meant.astype(int)).mean() < 8)
+    )
+
+
+def film(path: Path, turn: int = 0, *, flip: bool = False, frames: int = 20, aspect: str = "1:1") -> Path:
+    def prepare(stream: VideoStream) -> None:
+        if turn or flip:
+            stream.set_display_rotation(turn, hflip=flip)
+        stream.codec_context.sample_aspect_ratio = Fraction(aspect.replace(":", "/"))
+        stream.options = {"preset": "veryfast", "crf": "8", "bf": "0", "g": "10", "sc_threshold": "0"}
+
+    return write_timed(path, [n / 25 for n in range(frames)], pictures=frames * [corners()], prepare=prepare)
+
+
+@pytest.mark.parametrize("suffix", ["mp4", "mkv"])
+@pytest.mark.parametrize(("turn", "flip"), WAYS)
+def test_a_recording_is_shown_as_its_display_matrix_says(
+    tmp_path: Path, suffix: str, turn: int, flip: bool
+) -> None:
+    path = film(tmp_path / f"phone.{suffix}", turn, flip=flip, frames=3)
+    meant = turned(corners(), turn, flip=flip)
+    recording = Recording(str(path))
+    assert recording.size == (meant.shape[1], meant.shape[0]) == read_video_info(path).size
+    assert same(recording.take(0), meant)
+    assert all(same(image, meant) for image in recording.ahead(range(3)))
+    recording.close()
+
+
+def test_a_site_is_as_high_as_its_upright_first_view(tmp_path: Path) -> None:
+    site = config_for_videos([film(tmp_path / "phone.mp4", 90, frames=2)]).site
+    assert (site.width, site.height) == (HIGH, WIDE)
+
+
+def test_tracks_of_a_turned_video_are_in_the_upright_picture(tmp_path: Path, myview: Run) -> None:
+    """The detections are as a program has found them that turns pictures, too."""
+    video = film(tmp_path / "phone.mp4", 90, frames=30)
+    write_rows(tmp_path / "det.txt", [MotRow(n + 1, -1, 20.0, 30.0 + n, 20.0, 30.0, 1.0) for n in range(30)])
+    done = myview("track", video, "--det", tmp_path / "det.txt", "--out", tmp_path / "tracks.txt")
+    assert done.code == 0, done.err
+    rows = read_rows(tmp_path / "tracks.txt")
+    assert len(rows) == 30
+    assert max(row.top + row.height for row in rows) > HIGH, "lower than the picture is stored"
+
+
+@pytest.mark.parametrize("aspect", ["2:1", "3:4"])
+def test_pixels_that_are_not_square_are_made_so(tmp_path: Path, aspect: str) -> None:
+    path = film(tmp_path / "dv.mp4", frames=2, aspect=aspect)
+    width = round(WIDE * Fraction(aspect.replace(":", "/")))
+    recording = Recording(str(path))
+    assert recording.size == (width, HIGH) == read_video_info(path).size
+    assert same(recording.take(0), cv2.resize(corners(), (width, HIGH)))
+    recording.close()
+
+
+@pytest.mark.parametrize(
+    ("turn", "aspect", "why"),
+    [
+        (90, "1:1", "its pictures are shown turned or mirrored"),
+        (180, "1:1", "its pictures are shown turned or mirrored"),
+        (0, "4:3", r"its pictures are shown stretched \(its pixels are 1.33 times as wide as high\)"),
+    ],
+)
+def test_what_is_turned_or_stretched_does_not_pass_through(
+    tmp_path: Path, served: str, turn: int, aspect: str, why: str
+) -> None:
+    path = film(tmp_path / "own.mkv", turn, aspect=aspect, frames=40)
+    with pytest.raises(MisfitError, match=why):
+        OwnRecording(str(path), 0, "stop", SITE)
+    with pytest.raises(MisfitError, match=why):
+        OwnStream(f"{served}/own.mkv", {}, None, SITE)
+
+
+def test_what_lies_as_it_is_passes_through(tmp_path: Path) -> None:
+    OwnRecording(str(film(tmp_path / "own.mp4")), 0, "stop", SITE).close()
+
+
+@pytest.fixture
+def served(tmp_path: Path) -> Iterator[str]:
+    """Serve the test's folder over HTTP; gives the address."""
+
+    class Quiet(http.server.SimpleHTTPRequestHandler):
+        def log_message(self, *_: object) -> None:
+            pass
+
+    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), partial(Quiet, directory=str(tmp_path)))
+    thread = threading.Thread(target=server.serve_forever, args=(0.02,))
+    thread.start()
+    yield f"http://127.0.0.1:{server.server_address[1]}"
+    server.shutdown()
+    thread.join()
+    server.server_close()
+
+
+@pytest.mark.parametrize("turn", [90, 180])
+def test_a_stream_is_shown_upright_from_its_first_picture_on(tmp_path: Path, served: str, turn: int) -> None:
+    film(tmp_path / "camera.mkv", turn)
+    meant = turned(corners(), turn, flip=False)
+    source = Stream(f"{served}/camera.mkv", {})
+    try:
+        assert source.size == (meant.shape[1], meant.shape[0])
+        assert same(source.take(0), meant)
+    finally:
+        source.close()
+
+
+def test_a_size_that_changes_midway_is_fitted_into_the_first_and_said(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    path = tmp_path / "changes.mjpeg"
+    sizes = [(HIGH, WIDE), (HIGH, WIDE), (WIDE, HIGH), (2 * HIGH, 2 * WIDE)]
+    greys = [np.full((*size, 3), 200, np.uint8) for size in sizes]
+    path.write_bytes(b"".join(cv2.imencode(".jpg", grey)[1].tobytes() for grey in greys))
+    recording = Recording(str(path))
+    images = [recording.take(n) for n in range(4)]
+    recording.close()
+    assert [None if it is None else it.shape for it in images] == 4 * [(HIGH, WIDE, 3)]
+    upright = images[2]
+    assert upright is not None
+    assert [round(float(upright[:, x].mean()), -2) for x in (2, WIDE // 2, -2)] == [0, 200, 0], "undistorted"
+    assert caplog.messages[-1] == (
+        f"{path}: its pictures are {HIGH}x{WIDE} from frame 3 on, they were {WIDE}x{HIGH}: "
+        "they are fitted into that"
+    )
+
+
+def test_a_cover_is_no_video_and_of_several_videos_the_first_is_taken(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    path = tmp_path / "two.mkv"
+    with av.open(str(path), "w") as container:
+        streams = []
+        for size, codec in ((32, "mjpeg"), (64, "mpeg4"), (48, "mpeg4")):
+            stream = container.add_stream(codec, rate=25)
+            assert isinstance(stream, VideoStream)
+            stream.width = stream.height = size
+            stream.pix_fmt = "yuvj420p" if codec == "mjpeg" else "yuv420p"
+            streams.append(stream)
+        streams[0].disposition = Disposition.attached_pic
+        for stream in streams:
+            grey = np.full((stream.height, stream.width, 3), 100, np.uint8)
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(grey, format="bgr24")))
+            container.mux(stream.encode(None))
+    with av.open(str(path)) as container:
+        covers = sum(bool(it.disposition & Disposition.attached_pic) for it in container.streams.video)
+    recording = Recording(str(path))
+    recording.close()
+    assert recording.size == ((64, 64) if covers else (32, 32))
+    assert caplog.messages == [f"{path}: there are {3 - covers} videos in it: the first is taken"]
+
+
+def test_what_h264_crops_is_not_shown(tmp_path: Path) -> None:
+    pictures = 3 * [np.full((38, 50, 3), 100, np.uint8)]  # stored as 64x48
+    recording = Recording(str(write_timed(tmp_path / "odd.mp4", [0, 0.04, 0.08], pictures=pictures)))
+    image = recording.take(0)
+    recording.close()
+    assert image is not None
+    assert recording.size == (50, 38)
+    assert image.shape == (38, 50, 3)
+    assert abs(float(image.mean()) - 100) < 4
+
+
+def test_interlaced_pictures_are_said_to_be(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    def interlaced(stream: VideoStream) -> None:
+        stream.options = {"x264-params": "tff=1"}
+
+    path = write_timed(tmp_path / "tape.mp4", [n / 25 for n in range(4)], prepare=interlaced)
+    Recording(str(path)).close()
+    (line,) = caplog.messages
+    assert line.startswith(f"{path}: it is interlaced")
+
+
+@pytest.mark.parametrize("suffix", ["jpg", "png", "tif", "webp"])
+@pytest.mark.parametrize("orientation", [1, 3, 6, 8])
+def test_an_image_is_upright_as_exif_says(tmp_path: Path, suffix: str, orientation: int) -> None:
+    exif = Pillow.Exif()
+    exif[274] = orientation
+    Pillow.fromarray(corners()).save(tmp_path / f"0.{suffix}", exif=exif)
+    meant = turned(corners(), {1: 0, 3: 180, 6: 270, 8: 90}[orientation], flip=False)
+    folder = Folder(str(tmp_path), 0, "stop")
+    assert folder.size == (meant.shape[1], meant.shape[0])
+    assert same(folder.take(0), meant)
+    assert read_video_info(tmp_path).size == folder.size
+
+
+def test_images_of_any_depth_and_kind_are_pictures(tmp_path: Path) -> None:
+    grey = np.full((HIGH, WIDE), 120, np.uint8)
+    kinds = {
+        "grey": grey,
+        "alpha": np.dstack([grey, grey, grey, np.zeros_like(grey)]),
+        "deep": grey.astype(np.uint16) * 257,
+    }
+    for name, image in kinds.items():
+        cv2.imwrite(str(tmp_path / f"{name}.png"), image)
+    Pillow.fromarray(grey).convert("P").save(tmp_path / "palette.png")
+    folder = Folder(str(tmp_path), 0, "stop")
+    for number in range(4):
+        assert same(folder.take(number), np.dstack([grey, grey, grey]))
+
+
+def test_images_of_several_sizes_are_fitted_into_the_first_and_it_is_said(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    for number, (high, wide) in enumerate([(HIGH, WIDE), (WIDE, HIGH), (HIGH, WIDE)]):
+        cv2.imwrite(str(tmp_path / f"{number}.png"), np.full((high, wide, 3), 200, np.uint8))
+    folder = Folder(str(tmp_path), 0, "stop")
+    images = [folder.take(number) for number in range(3)]
+    assert [None if it is None else it.shape for it in images] == 3 * [(HIGH, WIDE, 3)]
+    upright = images[1]
+    assert upright is not None
+    assert [int(upright[HIGH // 2, x, 0]) for x in (2, WIDE // 2, -2)] == [0, 200, 0]
+    assert caplog.messages == [
+        f"{tmp_path / '1.png'}: is {HIGH}x{WIDE}, and the first image {WIDE}x{HIGH}: all are fitted into that"
+    ]
+
+
+def test_images_that_cannot_be_read_are_counted_and_named(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    for number in range(5):
+        cv2.imwrite(str(tmp_path / f"{number}.png"), np.full((HIGH, WIDE, 3), 200, np.uint8))
+    for number in (1, 2, 4):
+        (tmp_path / f"{number}.png").write_bytes(b"no image")
+    folder = Folder(str(tmp_path), 0, "loop")
+    for number in range(12):
+        folder.take(number)
+    folder.close()
+    assert caplog.messages == [
+        f"{tmp_path}: 3 damaged frames show as the picture before them: frames 2 to 3, 5"
+    ]
+
+
+def test_without_a_site_size_and_rate_are_those_of_the_first_view_that_has_them(tmp_path: Path) -> None:
+    """A folder of images has a size, and no rate."""
+    (tmp_path / "images").mkdir()
+    cv2.imwrite(str(tmp_path / "images" / "0.png"), np.zeros((HIGH, WIDE + 1, 3), np.uint8))
+    video = write_video(tmp_path / "video.mp4", 3, fps=30)
+    alone = config_for_videos([tmp_path / "images"]).site
+    assert (alone.fps, alone.width, alone.height) == (25.0, WIDE, HIGH)
+    beside = config_for_videos([tmp_path / "images", video]).site
+    assert (beside.fps, beside.width, beside.height) == (30.0, WIDE, HIGH)
+
+
+def test_an_animated_gif_is_a_video(tmp_path: Path) -> None:
+    frames = [Pillow.fromarray(np.full((48, 64), 10 * n, np.uint8)) for n in range(6)]
+    frames[0].save(tmp_path / "a.gif", save_all=True, append_images=frames[1:], duration=80)
+    recording = Recording(str(tmp_path / "a.gif"), fps=25.0)
+    images = [recording.take(n) for n in range(12)]
+    recording.close()
+    assert [frame_in(it) for it in images if it is not None] == [n // 2 for n in range(12)]

@@ -1,0 +1,191 @@
+"""Frame n of the site's clock is what a recording shows n / fps seconds after its first picture."""
+
+from __future__ import annotations
+
+import re
+from contextlib import suppress
+from itertools import accumulate
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+from av.video.stream import VideoStream
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fakes.command_line import Run, myview
+from fakes.media.videos import STEP, damage, frame_in, write_timed, write_video
+from server.camera.passthrough.compatibility import MisfitError, Wanted
+from server.camera.passthrough.recording_source import OwnRecording
+from server.camera.sources import SourceEnded
+from server.camera.sources.recording import Recording
+from tracking.motchallenge import MotRow, read_rows, write_rows
+
+__all__ = ["myview"]
+
+
+def shown(path: Path, fps: float | None = None) -> list[int]:
+    """Tell which picture of a recording each pulse shows."""
+    recording, frames = Recording(str(path), 0, "stop", fps), list[int]()
+    with suppress(SourceEnded):
+        while (image := recording.take(len(frames))) is not None:
+            frames.append(frame_in(image))
+    recording.close()
+    return frames
+
+
+@pytest.mark.parametrize("suffix", ["mp4", "mkv", "ts"])
+@pytest.mark.parametrize(("own", "fps"), [(30, 25), (25, 30), (25, 12.5), (12, 25), (25, 25)])
+def test_a_view_of_another_rate_shows_the_same_moment_in_the_same_frame(
+    tmp_path: Path, suffix: str, own: int, fps: float
+) -> None:
+    path = write_video(tmp_path / f"view.{suffix}", 25, fps=own)
+    frames = shown(path, fps)
+    assert abs(len(frames) - 25 / own * fps) < 1, "it lasts as long as it does"
+    for pulse, frame in enumerate(frames):
+        assert abs(frame / own - pulse / fps) <= max(0.5 / fps, 1 / own) + 1e-9
+    if own % fps == 0:
+        assert frames == list(range(0, 25, own // int(fps)))
+
+
+@settings(deadline=None, max_examples=10)
+@given(gaps=st.lists(st.integers(1, 12), min_size=2, max_size=24), fps=st.sampled_from([10.0, 25.0, 30.0]))
+def test_pictures_at_uneven_times_are_shown_when_they_were_taken(
+    tmp_path_factory: pytest.TempPathFactory, gaps: list[int], fps: float
+) -> None:
+    times = [it / 50 for it in accumulate(gaps, initial=0)]
+    path = write_timed(tmp_path_factory.mktemp("uneven") / "phone.mp4", times)
+    frames = shown(path, fps)
+    for pulse, frame in enumerate(frames):
+        due = pulse / fps
+        assert times[frame] <= due + 0.5 / fps, "none is shown before its time, but for half a frame"
+        assert not [time for time in times[frame + 1 :] if time <= due], "none when a later one is due"
+    assert len(frames) >= times[-1] * fps
+
+
+def test_a_recording_begins_with_its_first_picture_whatever_time_that_has(tmp_path: Path) -> None:
+    late = write_timed(tmp_path / "late.ts", [3.2 + n / 25 for n in range(10)])
+    assert shown(late, 25) == list(range(10))
+
+
+def test_films_that_were_joined_go_on_where_their_times_begin_again(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    parts = [
+        write_timed(
+            tmp_path / f"{first}.ts",
+            [begin + n / 25 for n in range(10)],
+            pictures=[np.full((48, 64, 3), STEP * (first + n), np.uint8) for n in range(10)],
+        )
+        for first, begin in ((0, 100.0), (10, 0.0))
+    ]
+    joined = tmp_path / "joined.ts"
+    joined.write_bytes(b"".join(part.read_bytes() for part in parts))
+    frames = shown(joined, 25)
+    assert [frames[:10], frames[-9:]] == [list(range(10)), list(range(11, 20))]
+    assert len(frames) == 20
+    assert [line for line in caplog.messages if "its times leap" in line]
+
+
+@pytest.mark.parametrize("b_frames", [0, 2])
+@pytest.mark.parametrize("suffix", ["h264", "avi"])
+def test_pictures_without_times_are_counted_also_where_some_cannot_be_decoded(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, suffix: str, b_frames: int
+) -> None:
+    path = write_video(tmp_path / f"raw.{suffix}", 25, b_frames=b_frames)
+    assert shown(path) == list(range(25))
+    if suffix == "h264":
+        assert caplog.messages == [
+            f"{path}: there are no times in this file: its pictures are counted, 25 a second"
+        ]
+    if suffix == "avi":
+        frames = shown(damage(path, [10]))
+        assert len(frames) == 25
+        assert [frames[n] for n in (2, 5, 22, 23)] == [2, 5, 22, 23]
+
+
+def lost(path: Path, frames: range, into: Path) -> Path:
+    """Write an MPEG transport stream without the packets of some frames, as a bad network loses them."""
+    with av.open(str(path)) as container:
+        places = [packet.pos or 0 for packet in container.demux(video=0) if packet.size]
+    data = path.read_bytes()
+    into.write_bytes(data[: places[frames.start]] + data[places[frames.stop] :])
+    return into
+
+
+def test_frames_that_are_missing_shift_none_after_them_and_are_told_of(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    whole = write_video(tmp_path / "whole.ts", 25)
+    frames = shown(lost(whole, range(10, 12), tmp_path / "lossy.ts"))
+    assert len(frames) == 25
+    assert frames[:10] == list(range(10))
+    assert frames[20:] == list(range(20, 25)), "the next key picture is where it was"
+    assert any(re.search(r"lossy.ts: \d+ (damaged frames|frames are missing)", it) for it in caplog.messages)
+
+
+@pytest.mark.parametrize("suffix", ["mp4", "avi"])
+def test_damaged_frames_are_counted_and_named_once(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, suffix: str
+) -> None:
+    path = damage(write_video(tmp_path / f"hurt.{suffix}", 25, codec="mjpeg"), [3, 4, 9])
+    recording = Recording(str(path), 0, "loop")
+    frames = [frame_in(image) for n in range(75) if (image := recording.take(n)) is not None]
+    recording.close()
+    expected = [2 if n in (3, 4) else 8 if n == 9 else n for n in range(25)]
+    assert frames == 3 * expected
+    assert caplog.messages == [f"{path}: 3 damaged frames show as the picture before them: frames 4 to 5, 10"]
+
+
+def test_another_rate_is_said_once_with_both(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    path = write_video(tmp_path / "view.mp4", 10, fps=30)
+    recording = Recording(str(path), 0, "stop", 25.0)
+    list(recording.ahead(range(5)))
+    recording.close()
+    assert caplog.messages == [
+        f"{path}: it has 30 pictures a second, 25 are taken: each is shown at its time, some are left out"
+    ]
+
+
+def test_uneven_times_are_said(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    path = write_timed(tmp_path / "phone.mp4", [0, 0.04, 0.2, 0.24, 0.4, 0.44, 0.6, 0.64])
+    shown(path)
+    (line,) = caplog.messages
+    assert "its pictures come at uneven times" in line
+
+
+def test_what_is_not_one_picture_a_pulse_does_not_pass_through(tmp_path: Path) -> None:
+    def of_the_site(stream: VideoStream) -> None:
+        stream.options = {**stream.options, "g": "10", "sc_threshold": "0"}
+
+    times = [n / 25 for n in range(41) if n != 35]
+    hole = write_timed(tmp_path / "hole.mp4", times, prepare=of_the_site)
+    with pytest.raises(
+        MisfitError, match=r"frame 35 is shown at 1.44 s, which is frame 36 at the site's 25 "
+    ):
+        OwnRecording(str(hole), 0, "stop", Wanted((64, 48), 25.0, 10, None))
+
+
+def test_views_of_two_rates_are_rendered_to_one_length(tmp_path: Path, myview: Run) -> None:
+    write_video(tmp_path / "a.mp4", 25, fps=25)
+    write_timed(tmp_path / "b.mp4", [n / 30 for n in range(30)], fps=30)
+    done = myview("render", tmp_path / "a.mp4", tmp_path / "b.mp4", "--out", tmp_path / "out")
+    assert done.code == 0
+    assert "the views are of different length" not in done.err
+
+
+def test_detections_go_with_the_pictures_that_they_were_made_of(tmp_path: Path, myview: Run) -> None:
+    """A detector counts pictures; tracks count frames of the site's clock."""
+    times = [(n + 2 * (n // 10)) / 25 for n in range(40)]  # every now and then two are not taken
+    video = write_timed(tmp_path / "phone.mp4", times)
+    made_of = [MotRow(n + 1, -1, 10.0 + n, 5.0, 12.0, 30.0, 1.0) for n in range(len(times))]
+    write_rows(tmp_path / "det.txt", made_of)
+    (tmp_path / "site.yaml").write_text("site: {fps: 25, width: 64, height: 48}")
+    done = myview(
+        *("track", video, "--det", tmp_path / "det.txt", "--config", tmp_path / "site.yaml"),
+        *("--out", tmp_path / "tracks.txt"),
+    )
+    assert done.code == 0, done.err
+    found = {row.frame - 1: row.left for row in read_rows(tmp_path / "tracks.txt")}
+    assert [found[round(time * 25)] for time in times] == [10.0 + n for n in range(len(times))]

@@ -1,0 +1,226 @@
+"""What a camera does with its frames: live as offline, and it says which frames nobody was looked for in."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+import pytest
+
+from bestview import QualitySettings
+from fakes.media.videos import HEIGHT, WIDTH, write_video
+from server.camera.encoding.encoder import AccessUnit
+from server.camera.pipeline import CameraPipeline
+from server.camera.sources import SourceEnded
+from server.cli.render.camera_workers import EpochBatch, run_camera
+from server.config.loader import build_config
+from server.config.sections import SiteSettings
+from server.config.site_config import Config
+from server.messaging.messages import Box, CameraTracks
+from server.system.errors import UserError
+from synthetic import Scene, write_recording
+
+FRAMES = 48
+STRIDE = 5
+LIVE = {"ahead_frames": 0}
+"""The scene is learned as it goes."""
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two views of a room with people in it, small and short."""
+    out = tmp_path_factory.mktemp("recordings") / "room"
+    write_recording(Scene("room", 2, 3, 4, 192, 108, 25.0), out, FRAMES / 25)
+    return out
+
+
+def config_of(recording: Path, *, detect: Mapping[str, Any] = MappingProxyType({}), **camera: Any) -> Config:
+    content = {
+        "detect": dict(detect),
+        "site": {"fps": 25, "width": 192, "height": 108},
+        "cameras": [{"id": "c0", "source": str(recording / "c0.mp4"), **camera}],
+    }
+    return build_config(content, where="site", folder=recording)
+
+
+def offline(config: Config) -> list[EpochBatch]:
+    return list(run_camera(CameraPipeline(config, "c0"), "c0"))
+
+
+def live(config: Config, missed: frozenset[int] = frozenset()) -> tuple[list[AccessUnit], list[CameraTracks]]:
+    """Call the pipeline as the camera's process does: video first, all tracking far behind."""
+    pipeline = CameraPipeline(config, "c0")
+    units, words, backlog = [], [], []
+    pulse = 0
+    while True:
+        if pulse not in missed:
+            try:
+                image = pipeline.take(pulse)
+            except SourceEnded:
+                break
+            if image is not None:
+                units.append(pipeline.encode(pulse, image))
+            backlog.append((pulse, image))
+        pulse += 1
+    for number, image in backlog:
+        words.append(pipeline.track(number, image))
+    words.append(pipeline.finish(pulse))
+    pipeline.close()
+    return units, [word for word in words if word is not None]
+
+
+def test_live_and_offline_give_the_same_tracks_and_the_same_bytes(recording: Path) -> None:
+    config = config_of(recording)
+    units, words = live(config)
+    batches = offline(config)
+    assert words == [batch.tracks for batch in batches]
+    assert units == [unit for batch in batches for unit in batch.units]
+    assert any(word.tracks for word in words), "there are people in it"
+
+
+def test_epochs_follow_one_another_and_the_last_closes_the_recording(recording: Path) -> None:
+    batches = offline(config_of(recording))
+    words = [batch.tracks for batch in batches if batch.tracks is not None]
+    assert [word.epoch for word in words] == list(range(FRAMES // STRIDE + 1))
+    assert [word.ended for word in words] == [False] * (len(words) - 1) + [True]
+    assert [batch.ended for batch in batches] == [word.ended for word in words]
+    assert words[-1].last == words[-1].final_to == FRAMES - 1
+    assert all(not word.shed for word in words)
+
+
+def test_an_offset_moves_everything_by_so_many_pulses(recording: Path) -> None:
+    # Not ahead: who is there in the very first frame has no window of frames before it, moved they have.
+    plain, moved = (offline(config_of(recording, offset=it, detect=LIVE)) for it in (0, 2 * STRIDE))
+    boxes = [_boxes(batches) for batches in (plain, moved)]
+    assert boxes[1] == {(pulse + 2 * STRIDE, track): box for (pulse, track), box in boxes[0].items()}
+    assert [unit.pulse for batch in moved for unit in batch.units] == list(range(10, FRAMES + 10))
+    assert all(not batch.tracks.shed for batch in moved if batch.tracks), "before it begins nothing is missed"
+
+
+def _boxes(batches: list[EpochBatch]) -> dict[tuple[int, int], Box]:
+    return {
+        (batch.tracks.first + place, track.id): box
+        for batch in batches
+        if batch.tracks is not None
+        for track in batch.tracks.tracks
+        for place, box in enumerate(track.boxes)
+        if box is not None
+    }
+
+
+@pytest.mark.parametrize(("detect", "first"), [({}, 0), (LIVE, 24)], ids=["recording", "as if live"])
+def test_people_in_a_recording_are_looked_for_from_its_first_frame_on(
+    recording: Path, detect: dict[str, Any], first: int
+) -> None:
+    pipeline = CameraPipeline(config_of(recording, detect=detect), "c0")
+    searched = [pipeline.search(pulse, pipeline.take(pulse)) for pulse in range(30)]
+    words = [pipeline.follow(it) for it in searched]
+    pipeline.close()
+    assert [it.looked for it in searched] == [pulse >= first for pulse in range(30)]
+    assert [pulse for word in words if word for pulse in word.unsearched] == list(range(first))
+
+
+def test_frames_that_were_missed_are_reported_once_and_begin_a_new_gop_where_they_must(
+    recording: Path,
+) -> None:
+    missed = frozenset({7, 10, 11, 12, 33})
+    units, words = live(config_of(recording), missed)
+    for told in ([word.shed for word in words], [word.unsearched for word in words]):
+        assert sorted(pulse for frames in told for pulse in frames) == sorted(missed)
+    assert [unit.pulse for unit in units if unit.key] == [0, 13, 20, 30, 40]
+
+
+def test_of_a_hole_of_days_its_end_is_told(recording: Path) -> None:
+    pipeline = CameraPipeline(config_of(recording), "c0")
+    late = 100_000 * STRIDE
+    words = [pipeline.track(pulse, None) for pulse in (*range(STRIDE), *range(late, late + STRIDE))]
+    pipeline.close()
+    shed = [word.shed for word in words if word]
+    assert max(map(len, shed)) <= 50_000 + 2 * STRIDE
+    assert [pulse for told in shed for pulse in told][-STRIDE - 1 :] == [*range(late - 1, late + STRIDE)]
+
+
+def test_a_frame_of_which_only_the_number_is_left_is_reported(recording: Path) -> None:
+    pipeline = CameraPipeline(config_of(recording), "c0")
+    for pulse in range(STRIDE):
+        image = pipeline.take(pulse)
+        word = pipeline.track(pulse, None if pulse == 3 else image)
+    pipeline.close()
+    assert word is not None
+    assert word.shed == word.unsearched == [3]
+
+
+def test_a_camera_that_starts_after_its_recording_is_over_says_that_it_is_over(recording: Path) -> None:
+    pipeline = CameraPipeline(config_of(recording), "c0")
+    with pytest.raises(SourceEnded):
+        pipeline.take(1000)
+    word = pipeline.finish(1000)
+    pipeline.close()
+    assert word.ended
+    assert (word.epoch, word.last, word.tracks) == (1000 // STRIDE, 999, [])
+
+
+def test_pictures_of_another_size_are_fitted_and_boxes_say_whose_size(tmp_path: Path) -> None:
+    write_video(tmp_path / "c0.mp4", 6)
+    [*_, last] = offline(config_of(tmp_path))
+    assert last.tracks is not None
+    assert last.tracks.size == (WIDTH, HEIGHT)
+
+
+def test_detections_of_a_file_are_followed_in_the_sites_pixels(recording: Path) -> None:
+    config = config_of(recording, detections="gt/c0.txt")
+    small = config.model_copy(update={"site": SiteSettings(width=96, height=80)})
+    boxes = _boxes(offline(small))
+    assert boxes, "there are people in it"
+    rows = np.loadtxt(recording / "gt" / "c0.txt", delimiter=",", ndmin=2)
+    for (pulse, _), box in boxes.items():
+        left, top, right, bottom = box  # half as large, and 13 rows lower: the rest is black
+        own = (2 * left, 2 * (top - 13), 2 * (right - left), 2 * (bottom - top))
+        assert np.isclose(rows[rows[:, 0] == pulse + 1, 2:6], own).all(axis=1).any()
+
+
+@pytest.mark.parametrize(
+    ("content", "why"), [(None, "No such file"), ("1,2,x\n", "det.txt"), (b"\xff\xfe\x00", "det.txt")]
+)
+def test_detections_that_cannot_be_read_are_refused(
+    tmp_path: Path, content: str | bytes | None, why: str
+) -> None:
+    write_video(tmp_path / "c0.mp4", 3)
+    if content is not None:
+        (tmp_path / "det.txt").write_bytes(content.encode() if isinstance(content, str) else content)
+    with pytest.raises(UserError, match=why) as caught:
+        CameraPipeline(config_of(tmp_path, detections="det.txt"), "c0")
+    assert str(caught.value).startswith("camera c0: detections: ")
+    assert "\n" not in str(caught.value)
+
+
+def test_a_recording_that_ends_before_the_first_pulse_is_refused_offline(recording: Path) -> None:
+    with pytest.raises(UserError, match="camera c0: there is not one picture"):
+        offline(config_of(recording, offset=-1000))
+
+
+def test_sharpness_is_measured_where_it_counts_alone(recording: Path) -> None:
+    config = config_of(recording)
+    weighs = config.model_copy(
+        update={"view": config.view.model_copy(update={"quality": QualitySettings(sharp=0.5)})}
+    )
+    for given, measured in ((config, False), (weighs, True)):
+        tracks = [track for word in live(given)[1] for track in word.tracks]
+        assert tracks, "somebody is there"
+        assert any(track.sharpness is not None for track in tracks) == measured
+    assert live(weighs)[1] == [batch.tracks for batch in offline(weighs)]
+
+
+def test_a_homography_that_has_no_floor_in_the_picture_is_refused(recording: Path) -> None:
+    past_down = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 109.0]]  # the floor ends below the picture
+    with pytest.raises(UserError) as caught:
+        CameraPipeline(config_of(recording, ground=past_down), "c0")
+    assert str(caught.value).startswith(
+        "camera c0: ground: all of its picture, 192x108, lies above the horizon"
+    )
+    assert "\n" not in str(caught.value)
+    past_down[2][2] = 107.0
+    CameraPipeline(config_of(recording, ground=past_down), "c0")

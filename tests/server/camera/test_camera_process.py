@@ -1,0 +1,288 @@
+"""A camera and the best-view service over a real bus and real pulses, in one event loop."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+import time
+from collections.abc import AsyncIterator
+from itertools import pairwise, zip_longest
+from pathlib import Path
+
+import msgspec
+import pytest
+import zenoh
+
+from fakes.camera_processes import FPS, Running, in_folder
+from fakes.media.videos import write_video
+from fakes.timeouts import PATIENCE
+from server.camera.load.load_monitor import Load
+from server.camera.load.load_shedder import Bounds, Ladder, rungs
+from server.camera.pipeline import CameraPipeline
+from server.cli.generated_config import free_port
+from server.cli.render.camera_workers import run_camera
+from server.cli.render.renderer import Renderer
+from server.config.loader import build_config
+from server.config.site_config import Config
+from server.messaging.messages import CameraStatus, CameraTracks, FrameHeader, GopChoices
+from synthetic import Scene, write_recording
+
+FRAMES = 60
+
+
+def site(folder: Path, **cameras: str) -> Config:
+    """Give a small and fast site of recordings, on ports of its own."""
+    bus = f"tcp/127.0.0.1:{free_port()}"
+    content = {
+        "site": {"name": "hall", "fps": FPS, "width": 128, "height": 72},
+        "sync": {"port": free_port(), "start_timeout_s": PATIENCE},
+        "zenoh": {"connect": bus, "listen": bus},
+        "cameras": [{"id": camera, "source": source} for camera, source in cameras.items()],
+        "track": {"backlog_s": PATIENCE},
+        "view": {"late_after_s": PATIENCE},
+    }
+    return build_config(content, where="hall", folder=folder)
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("recordings") / "room"
+    write_recording(Scene("room", 2, 2, 4, 128, 72, FPS), out, FRAMES / FPS)
+    return out
+
+
+@pytest.fixture
+async def running() -> AsyncIterator[list[Running]]:
+    sites: list[Running] = []
+    yield sites
+    for it in sites:
+        await it.stop()
+
+
+class Plain:
+    """A subscriber that knows zenoh and nothing of MyView."""
+
+    def __init__(self, config: Config, key: str) -> None:
+        settings = zenoh.Config()
+        settings.insert_json5("mode", '"client"')
+        settings.insert_json5("connect/endpoints", f'["{config.zenoh.listen}"]')
+        settings.insert_json5("scouting/multicast/enabled", "false")
+        self.samples: list[tuple[str, bytes, bytes]] = []
+        self._came = threading.Condition()
+        self._session = zenoh.open(settings)
+        self._subscriber = self._session.declare_subscriber(key, self._receive)
+
+    def _receive(self, sample: zenoh.Sample) -> None:
+        head = sample.attachment.to_bytes() if sample.attachment is not None else b""
+        with self._came:
+            self.samples.append((str(sample.key_expr), sample.payload.to_bytes(), head))
+            self._came.notify_all()
+
+    def wait_and_close(self, what: str, count: int) -> None:
+        with self._came:
+            assert self._came.wait_for(lambda: len(self.of(what)) >= count, PATIENCE)
+        self._subscriber.undeclare()  # type: ignore[no-untyped-call]
+        self._session.close()  # type: ignore[no-untyped-call]
+
+    def of(self, what: str) -> list[tuple[bytes, bytes]]:
+        return [(payload, head) for key, payload, head in self.samples if key.endswith(what)]
+
+
+def rendered(config: Config, folder: Path) -> dict[str, bytes]:
+    """Run the same recordings the offline way."""
+    folder.mkdir()
+    renderer = Renderer(config, folder)
+    workers = [run_camera(CameraPipeline(config, camera), camera) for camera in config.camera_ids]
+    for batches in zip_longest(*workers):
+        for batch in batches:
+            if batch is not None:
+                renderer.take(batch)
+    renderer.finish()
+    return in_folder(folder)
+
+
+async def test_recordings_run_to_their_end_and_every_frame_and_word_is_there(
+    recording: Path, tmp_path: Path, running: list[Running]
+) -> None:
+    config = site(recording, c0="c0.mp4", c1="c1.mp4")
+    it = Running(config, tmp_path / "out")
+    running.append(it)
+    gops: list[GopChoices] = []
+    it.service.on_decision.append(gops.append)
+    over = await it.start()
+    plain = await asyncio.to_thread(Plain, config, "myview/**")
+    cameras = [it.camera(camera) for camera in config.camera_ids]
+    async with asyncio.timeout(PATIENCE):
+        await asyncio.gather(over, *cameras)
+    await asyncio.to_thread(plain.wait_and_close, "bestview/choices", len(gops))
+
+    for camera in config.camera_ids:
+        shelf = it.service.shelves[camera]
+        assert [pulse for pulse in range(FRAMES + 5) if shelf.has(pulse)] == list(range(FRAMES))
+        assert it.service.intake.states[camera].word == "ended"
+        assert it.service.intake.states[camera].bad_messages == 0
+    assert sum(gop.frames for gop in gops) == FRAMES
+    written = in_folder(tmp_path / "out")
+    assert written["late.csv"] == b"frame,camera,what\n"
+    assert written["choices.csv"].count(b"\n") > 1, "somebody is shown"
+    assert written == rendered(config, tmp_path / "offline"), "live as offline, to the byte"
+
+    frames = [msgspec.json.decode(head, type=FrameHeader) for _, head in plain.of("c0/video")]
+    assert [frame.pulse for frame in frames] == list(range(FRAMES))
+    assert all(frame.due <= frame.encoded and frame.taken <= frame.encoded for frame in frames)
+    words = [msgspec.json.decode(payload, type=CameraTracks) for payload, _ in plain.of("c0/tracks")]
+    assert [word.epoch for word in words] == list(range(FRAMES // 5 + 1))
+    assert words[-1].ended
+    assert words[0].solved_at > 0
+    told = [msgspec.json.decode(payload, type=GopChoices) for payload, _ in plain.of("bestview/choices")]
+    assert told == gops
+    statuses = [msgspec.json.decode(payload, type=CameraStatus) for payload, _ in plain.of("c0/status")]
+    assert statuses[-1].state == "ended"
+    assert statuses[-1].missed == 0
+
+
+async def test_a_camera_that_goes_is_seen_to_be_gone_and_the_others_go_on(
+    tmp_path: Path, running: list[Running]
+) -> None:
+    config = site(tmp_path, c0="scene:room?camera=0&objects=1", c1="scene:room?camera=1&objects=1")
+    it = Running(config)
+    running.append(it)
+    decided = asyncio.Event()
+    it.service.on_decision.append(lambda _: decided.set())
+    await it.start()
+    _, second = it.camera("c0"), it.camera("c1")
+    states = it.service.intake.states
+    async with asyncio.timeout(PATIENCE):
+        await decided.wait()
+        second.cancel()
+        await asyncio.gather(second, return_exceptions=True)
+        while states["c1"].word != "gone":
+            decided.clear()
+            await decided.wait()
+        decided.clear()
+        await decided.wait()
+    assert states["c0"].word == "live"
+
+
+async def test_a_clock_that_is_set_changes_nothing_that_is_measured(
+    tmp_path: Path, running: list[Running], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As of a machine that learns the time only when it has been running for a while."""
+    it = Running(site(tmp_path, c0="scene:room?camera=0&objects=1"))
+    running.append(it)
+    decided = asyncio.Event()
+    it.service.on_decision.append(lambda _: decided.set())
+    await it.start()
+    it.camera("c0")
+    clock = time.time
+    async with asyncio.timeout(PATIENCE):
+        await decided.wait()
+        monkeypatch.setattr(time, "time", lambda: clock() + 3600)
+        for _ in range(4):
+            decided.clear()
+            await decided.wait()
+    gauge = it.service.intake.states["c0"].gauge
+    for spread in (gauge.sync_error, gauge.tracking_delay):
+        assert spread is not None
+        assert abs(spread.worst) < PATIENCE
+
+
+async def test_a_camera_and_a_service_prove_who_they_are_to_pulses_that_ask(
+    tmp_path: Path, running: list[Running]
+) -> None:
+    (tmp_path / "users").write_text("".join(f"{name}:{name * 32}\n" for name in ("c0", "bestview")))
+    config = site(tmp_path, c0="scene:room?objects=1")
+    config = config.model_copy(update={"sync": config.sync.model_copy(update={"users": tmp_path / "users"})})
+    it = Running(config)
+    running.append(it)
+    decided = asyncio.Event()
+    it.service.on_decision.append(lambda _: decided.set())
+    await it.start()
+    it.camera("c0")
+    async with asyncio.timeout(PATIENCE):
+        await decided.wait()
+    assert {client.name for client in it.pulses.clients()} == {"c0", "bestview"}
+    assert it.pulses.refused == 0
+
+
+@pytest.mark.parametrize("what", ["pipeline.CameraPipeline.follow", "status_meter.Meter.status"])
+async def test_a_camera_whose_work_fails_ends_with_that_error(
+    tmp_path: Path, running: list[Running], monkeypatch: pytest.MonkeyPatch, what: str
+) -> None:
+    config = site(tmp_path, c0="scene:room?objects=1")
+    it = Running(config)
+    running.append(it)
+    await it.start()
+
+    def fail(*_: object) -> None:
+        raise ArithmeticError("the camera's own mistake")
+
+    monkeypatch.setattr(f"server.camera.{what}", fail)
+    async with asyncio.timeout(PATIENCE):
+        with pytest.raises(ArithmeticError):
+            await it.camera("c0")
+
+
+async def test_a_camera_started_after_its_recording_was_over_lets_everything_end(
+    tmp_path: Path, running: list[Running]
+) -> None:
+    write_video(tmp_path / "short.mp4", 20)
+    write_video(tmp_path / "long.mp4", 25)
+    config = site(tmp_path, c0="short.mp4", c1="long.mp4")
+    it = Running(config)
+    running.append(it)
+    over = await it.start()
+    first, second = it.camera("c0"), it.camera("c1")
+    async with asyncio.timeout(PATIENCE):
+        while it.service.shelves["c0"].newest < 10:  # noqa: ASYNC110 — no event tells of frames
+            await asyncio.sleep(0.01)
+        first.cancel()  # as if killed, before it could say that it has ended
+        await second
+        await it.camera("c0")
+        await over
+    assert it.service.intake.states["c0"].word == "ended"
+
+
+class Overloaded(Load):
+    """A camera's load that stands on the topmost rung."""
+
+    def __init__(self, config: Config, camera_id: str, *, live: bool) -> None:
+        super().__init__(config, camera_id, live=live)
+        self._ladder = Ladder(rungs(config.track.window.stride, live=True)[-1:], Bounds(1e9, 1e9))
+
+    @property
+    def level(self) -> int:
+        return 4
+
+
+async def test_a_camera_on_the_topmost_rung_shows_every_gop_and_ends_every_window_in_time(
+    recording: Path, tmp_path: Path, running: list[Running], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("server.camera.process.Load", Overloaded)
+    config = site(recording, c0="c0.mp4", c1="c1.mp4")
+    it = Running(config, tmp_path / "out")
+    running.append(it)
+    gops: list[GopChoices] = []
+    it.service.on_decision.append(gops.append)
+    over = await it.start()
+    plain = await asyncio.to_thread(Plain, config, "myview/**")
+    async with asyncio.timeout(PATIENCE):
+        await asyncio.gather(over, *(it.camera(camera) for camera in config.camera_ids))
+    await asyncio.to_thread(plain.wait_and_close, "bestview/choices", len(gops))
+
+    heads = [msgspec.json.decode(head, type=FrameHeader) for _, head in plain.of("c0/video")]
+    frames = [head.pulse for head in heads]
+    assert frames[:6] == [0, 2, 4, 6, 8, 9]
+    assert [head.pulse for head in heads if head.key] == list(range(0, FRAMES, config.encode.gop))
+    pairs = [(before.pulse, head.after) for before, head in pairwise(heads) if not head.key]
+    assert all(before == after for before, after in pairs), "what was not taken costs only itself"
+    words = [msgspec.json.decode(payload, type=CameraTracks) for payload, _ in plain.of("c0/tracks")]
+    assert [word.epoch for word in words] == list(range(FRAMES // 5 + 1))
+    assert sorted(pulse for word in words for pulse in word.shed) == [
+        it for it in range(FRAMES) if it % 5 != 4
+    ], "all but the last of every window, and it is told"
+    assert sum(gop.frames for gop in gops) == FRAMES
+    assert b"not searched" in in_folder(tmp_path / "out")["late.csv"]
+    statuses = [msgspec.json.decode(payload, type=CameraStatus) for payload, _ in plain.of("c0/status")]
+    assert statuses[-1].load_level == 4
+    assert "searching every 5th frame" in statuses[-1].load

@@ -1,0 +1,65 @@
+"""A person out of focus is less sharp, however large or bright; who is hidden is as sharp as they were."""
+
+from __future__ import annotations
+
+import cv2
+import msgspec
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from fakes.cameras import word
+from server.camera.sharpness import Sharpness, sharpness
+from server.messaging.messages import Box
+
+BOX: Box = (20.0, 10.0, 84.0, 138.0)
+
+
+def picture(blur: float = 0.0, contrast: float = 1.0) -> NDArray[np.uint8]:
+    """Give a picture full of stripes and spots."""
+    rng = np.random.default_rng(4)
+    coarse = cv2.resize(rng.uniform(60, 200, (12, 8)), (120, 160), interpolation=cv2.INTER_NEAREST)
+    grey = 128 + contrast * (coarse + rng.normal(0, 10, (160, 120)) - 128)
+    if blur:
+        grey = cv2.GaussianBlur(grey, (0, 0), blur)
+    return np.repeat(np.clip(grey, 0, 255).astype(np.uint8)[:, :, None], 3, axis=2)
+
+
+def test_the_more_blurred_the_less_sharp() -> None:
+    values = [sharpness(picture(blur), BOX) or 0.0 for blur in (0.0, 2.0, 4.0, 8.0)]
+    assert values == sorted(values, reverse=True)
+    assert values[0] > 0.5 > values[2]
+    assert all(0 <= value <= 1 for value in values)
+
+
+def test_light_and_size_make_little_difference_and_blur_makes_much() -> None:
+    plain, faint = sharpness(picture(), BOX), sharpness(picture(contrast=0.5), BOX)
+    twice = cv2.resize(picture(), None, fx=2, fy=2, interpolation=cv2.INTER_CUBIC)
+    large = sharpness(twice, (40.0, 20.0, 168.0, 276.0))
+    assert faint == pytest.approx(plain, abs=0.05)
+    assert large == pytest.approx(plain, abs=0.05)
+
+
+@pytest.mark.parametrize("box", [(0.0, 0.0, 3.0, 90.0), (-40.0, 10.0, 2.0, 90.0), (300.0, 10.0, 340.0, 90.0)])
+def test_of_next_to_nothing_nothing_is_said(box: Box) -> None:
+    assert sharpness(picture(), box) is None
+
+
+def test_who_is_hidden_is_as_sharp_as_they_were_and_who_went_is_forgotten() -> None:
+    it = Sharpness()
+    [seen] = it.measured(word("c0", 0, {1: BOX}), picture()).tracks
+    assert seen.sharpness == sharpness(picture(), BOX)
+    hidden = it.measured(word("c0", 1, {1: None, 2: None}), picture(blur=5.0)).tracks
+    assert [track.sharpness for track in hidden] == [seen.sharpness, None]
+    [ended] = it.measured(word("c0", 2, {1: BOX}), None).tracks
+    assert ended.sharpness == seen.sharpness
+    it.measured(word("c0", 3, {}), picture())
+    [again] = it.measured(word("c0", 4, {1: None}), picture()).tracks
+    assert again.sharpness is None
+
+
+def test_the_rest_of_the_message_stays() -> None:
+    message = word("c0", 0, {1: BOX})
+    told = Sharpness().measured(message, picture())
+    bare = [msgspec.structs.replace(track, sharpness=None) for track in told.tracks]
+    assert msgspec.structs.replace(told, tracks=bare) == message

@@ -1,0 +1,404 @@
+"""`myview doctor` says of a configuration what will not work, and what to do."""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pytest
+
+from camsync import Login, PulseClient, PulseServer
+from fakes.cameras import FPS, HEIGHT, WIDTH, encoded
+from fakes.command_line import Run
+from fakes.doctor import SIZE, config, site
+from fakes.media.rtsp_camera import RtspCamera
+from fakes.media.videos import write_video
+from fakes.programs import needs_openssl
+from fakes.site import Hall
+from fakes.system.ports import free
+from server.cli.doctor import machine
+from server.cli.doctor.camera_probe import CameraProbe
+from server.cli.doctor.cameras import camera_findings, probe_cameras, sound_findings
+from server.cli.doctor.certificates import certificate_finding
+from server.cli.doctor.command import run_checks
+from server.cli.doctor.disk import disk_findings, needed_mb
+from server.cli.doctor.files import file_findings
+from server.cli.doctor.findings import Finding, Level
+from server.cli.doctor.machine import clock_findings, machine_findings
+from server.cli.doctor.ports import port_findings
+from server.cli.doctor.stream_probe import StreamStats
+
+
+class Said(NamedTuple):
+    level: Level
+    text: str
+
+
+def of(findings: list[Finding], check: str) -> list[Said]:
+    return [Said(it.level, it.text) for it in findings if it.check == check]
+
+
+def only(findings: list[Finding], check: str) -> Said:
+    (said,) = of(findings, check)
+    return said
+
+
+def test_a_site_that_is_well_is_said_to_be_so_and_nothing_is_left_behind(myview: Run, tmp_path: Path) -> None:
+    write_video(tmp_path / "c0.mp4", 12)
+    path = site(tmp_path, record={"folder": "kept"})
+    before = sorted(tmp_path.iterdir())
+    ended = myview("doctor", path, "--json", "--seconds", 20)
+    said = json.loads(ended.out)
+    assert (ended.code, ended.err, said["well"]) == (0, "", True)
+    (camera,) = [it for it in said["findings"] if it["check"] == "camera c0"]
+    assert camera["level"] == "ok"
+    assert camera["text"].startswith("64x48 pixels, 25.0 pictures a second, ")
+    assert {it["check"] for it in said["findings"]} >= {
+        "configuration", "http.port", "sync.port", "zenoh.listen", "clock", "disk", "processor", "memory"
+    }  # fmt: skip
+    assert sorted(tmp_path.iterdir()) == before
+
+
+async def test_a_scene_that_there_is_not_is_its_cameras_fault_alone(tmp_path: Path) -> None:
+    there = config(tmp_path, cameras=[{"id": "c0", "source": "scene:nowhere"}])
+    found = [it async for it in run_checks(there, 1.0)]
+    assert only(found, "camera c0").level is Level.BAD
+    assert "there is no scene 'nowhere'" in only(found, "camera c0").text
+    assert {it.check for it in found if it.level is Level.BAD} == {"camera c0"}
+
+
+def test_a_missing_camera_is_one_line_with_what_to_do_and_an_exit_code(myview: Run, tmp_path: Path) -> None:
+    ended = myview("doctor", site(tmp_path))
+    assert (ended.code, ended.err) == (1, "")
+    (line,) = [it for it in ended.out.splitlines() if "camera c0" in it]
+    assert line.startswith("bad ")
+    assert "c0.mp4: no such file or folder" in line
+    assert "→ mend what the configuration says of it, or the file" in line
+    assert ended.out.splitlines()[-1].endswith("1 bad")
+
+
+def test_a_wrong_configuration_is_all_that_is_said(myview: Run, tmp_path: Path) -> None:
+    ended = myview("doctor", site(tmp_path, htp={"port": 1}), "--json")
+    said = json.loads(ended.out)
+    assert (ended.code, said["well"]) == (1, False)
+    (finding,) = said["findings"]
+    assert (finding["check"], finding["level"]) == ("configuration", "bad")
+    assert "did you mean 'http'?" in finding["text"]
+
+
+@pytest.fixture
+def taken() -> Iterator[int]:
+    """Give a port that somebody listens on who never answers."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        yield int(server.getsockname()[1])
+
+
+async def test_a_port_that_something_else_has_is_bad(tmp_path: Path, taken: int) -> None:
+    found, runs = await port_findings(config(tmp_path, sync={"port": taken}))
+    assert not runs
+    assert only(found, "sync.port") == (Level.BAD, f"127.0.0.1:{taken} is taken by something else")
+    assert {only(found, it).level for it in ("http.port", "zenoh.listen")} == {Level.OK}
+
+
+async def test_an_address_of_another_machine_cannot_be_listened_on(tmp_path: Path) -> None:
+    found, _ = await port_findings(config(tmp_path, sync={"bind": "192.0.2.7", "port": 7}))
+    assert only(found, "sync.port").level is Level.BAD
+    assert "192.0.2.7:7" in only(found, "sync.port").text
+
+
+async def test_ports_of_the_very_site_are_no_reason_to_worry(hall: Hall, tmp_path: Path, taken: int) -> None:
+    cameras = [{"id": it, "source": "scene:room"} for it in hall.service.config.camera_ids]
+    changes: Any = {
+        "http": {"port": hall.port},
+        "cameras": cameras,
+        "zenoh": dict.fromkeys(("connect", "listen"), f"tcp/127.0.0.1:{taken}"),
+    }
+    found, runs = await port_findings(config(tmp_path, **changes))
+    assert runs
+    assert only(found, "http.port").text.endswith("by this very site, which runs")
+    assert only(found, "zenoh.listen").level is Level.OK
+    found, runs = await port_findings(config(tmp_path, **changes, site={"name": "another", **SIZE}))
+    assert (runs, only(found, "http.port").level) == (False, Level.BAD)
+    assert only(found, "zenoh.listen").level is Level.BAD
+
+
+async def test_the_pulse_servers_clock_is_compared_where_it_runs(tmp_path: Path) -> None:
+    there = config(tmp_path)
+    assert "is not running" in only(await clock_findings(there), "pulse server").text
+    async with PulseServer(FPS, port=there.sync.port):
+        found = only(await clock_findings(there), "pulse server")
+    assert found.level is Level.OK
+    assert "ms off this machine's" in found.text
+
+
+async def test_a_closed_pulse_server_is_this_site_s_where_it_knows_one_of_its_passwords(
+    tmp_path: Path,
+) -> None:
+    users = {"c0": "0" * 32, "bestview": "1" * 32}
+    (tmp_path / "users").write_text(f"c0:{users['c0']}\n")  # a camera's machine has its own line alone
+    there = config(tmp_path, sync={"port": free(), "users": "users"})
+    login = Login("bestview", users["bestview"])
+    async with (
+        PulseServer(FPS, port=there.sync.port, users=users) as server,
+        PulseClient("127.0.0.1", server.port, "bestview", login=login) as service,
+    ):
+        await anext(aiter(service))
+        assert "ms off this machine's" in only(await clock_findings(there), "pulse server").text
+        found, _ = await port_findings(there)
+        assert only(found, "sync.port").level is Level.OK
+        (tmp_path / "users").write_text(f"c0:{'2' * 32}\n")
+        found, _ = await port_findings(there)
+        assert only(found, "sync.port").level is Level.BAD
+        assert server.clients()[0].name == "bestview", "who asks takes nobody's place"
+
+
+def test_a_network_camera_is_measured_against_the_site(tmp_path: Path) -> None:
+    units = encoded(0, 40)
+    camera = RtspCamera([units[at : at + 5] for at in range(0, 40, 5)], 12.5)
+    cameras = [{"id": "door", "source": camera.url, "options": {"rtsp_transport": "tcp"}}]
+    site_of = config(tmp_path, cameras=cameras, site={"name": "hall", "width": 128, "height": 96})
+    try:
+        camera.let = 1000
+        found = camera_findings(site_of, probe_cameras(site_of, 4.0), runs=False)
+    finally:
+        camera.close()
+    first, *doubts = of(found, "camera door")
+    assert first.level is Level.OK, first
+    assert first.text.startswith("64x48 pixels, ")
+    assert any("are smaller than the site's (128x96)" in it.text for it in doubts)
+    assert all(it.level is Level.WARNING for it in doubts)
+
+
+def test_cameras_are_tried_at_once_and_a_dead_one_holds_nobody_up(tmp_path: Path, taken: int) -> None:
+    write_video(tmp_path / "c0.mp4", 12)
+    silent = {"id": "gate", "source": f"rtsp://127.0.0.1:{taken}/live"}
+    both = config(tmp_path, cameras=[silent, {"id": "c0", "source": "c0.mp4"}])
+    probes = probe_cameras(both, 1.5)
+    assert probes["gate"].problem
+    found = camera_findings(both, probes, runs=False)
+    assert only(found, "camera gate").level is Level.BAD
+    assert only(camera_findings(both, probes, runs=True), "camera gate").level is Level.WARNING
+
+
+@pytest.mark.parametrize(
+    ("found", "words"),
+    [
+        (
+            CameraProbe(size=(640, 360), sent=StreamStats((640, 360), 12.5, 25, 0, 0.0)),
+            "it sends 12.5 pictures a second",
+        ),
+        (
+            CameraProbe(size=(640, 360), sent=StreamStats((640, 360), 25.0, 25, 3, 0.0)),
+            "3 packets could not be decoded",
+        ),
+        (CameraProbe(size=(640, 360), why_encoded="it has B pictures"), "is encoded anew: it has B pictures"),
+        (CameraProbe(size=(640, 360), recorded_fps=30.0), "was recorded at 30 pictures a second"),
+        (CameraProbe(size=(320, 180)), "are smaller than the site's"),
+    ],
+)
+def test_a_camera_that_does_not_fit_is_doubted(tmp_path: Path, found: CameraProbe, words: str) -> None:
+    small = config(tmp_path, site={"width": 640, "height": 360})
+    assert len(of(camera_findings(small, {"c0": CameraProbe(size=(640, 360))}, runs=False), "camera c0")) == 1
+    fine, doubt = of(camera_findings(small, {"c0": found}, runs=False), "camera c0")
+    assert (fine.level, doubt.level) == (Level.OK, Level.WARNING)
+    assert words in doubt.text
+
+
+def test_a_password_from_a_file_is_used_and_others_should_not_read_it(tmp_path: Path, taken: int) -> None:
+    cameras = [
+        {"id": "gate", "source": f"rtsp://me:{{password}}@127.0.0.1:{taken}/live", "password": "secret"}
+    ]
+    there = config(tmp_path, cameras=cameras)
+    missing = only(camera_findings(there, probe_cameras(there, 1.0), runs=False), "camera gate").text
+    assert "the file that it names cannot be read: No such file or directory" in missing
+    (tmp_path / "secret").write_text("open sesame\n")
+    (tmp_path / "secret").chmod(0o644)
+    assert "others may read" in only(file_findings(there), "camera gate").text
+    shown = only(camera_findings(there, probe_cameras(there, 1.0), runs=False), "camera gate").text
+    assert f"rtsp://127.0.0.1:{taken}/..." in shown
+
+
+def test_sound_that_cannot_be_opened_is_bad(tmp_path: Path) -> None:
+    assert sound_findings(config(tmp_path)) == []
+    write_video(tmp_path / "silent.mp4", 3)
+    for source, words in (("none.wav", "none.wav: is neither"), ("silent.mp4", "sound")):
+        found = only(sound_findings(config(tmp_path, sound={"source": source})), "sound")
+        assert found.level is Level.BAD
+        assert words in found.text
+
+
+def test_a_sounds_password_is_not_shown(tmp_path: Path) -> None:
+    there = config(tmp_path, sound={"source": "http://viewer:hunter2@127.0.0.1:9/sound.aac"})
+    said = only(sound_findings(there), "sound").text
+    assert "127.0.0.1" in said
+    assert "hunter2" not in said
+
+
+def test_a_cameras_password_is_not_shown(tmp_path: Path, taken: int) -> None:
+    source = f"rtsp://me:pa@ss:w@127.0.0.1:{taken}/live?x=a:b@c"
+    there = config(tmp_path, cameras=[{"id": "gate", "source": source}])
+    shown = only(camera_findings(there, probe_cameras(there, 1.0), runs=False), "camera gate").text
+    assert "rtsp://...: cannot open" in shown
+
+
+def test_what_a_recording_takes_is_held_against_the_disk(tmp_path: Path) -> None:
+    record: dict[str, Any] = {"folder": "kept", "keep_s": 3600.0, "most_mb": 1e6}
+    probes = {"c0": CameraProbe(size=(WIDTH, HEIGHT), kbps=1000.0)}
+    small = config(tmp_path, record=record)
+    assert needed_mb(small, probes) == pytest.approx((1000 + 8 * 100 * 25 / 1000) * 3600 / 8000)
+    assert only(disk_findings(small, probes), "disk").level is Level.OK
+    assert not (tmp_path / "kept").exists()
+    huge = {"c0": CameraProbe(size=(WIDTH, HEIGHT), kbps=1e12)}
+    assert (
+        only(disk_findings(config(tmp_path, record={**record, "most_mb": 1e12}), huge), "disk").level
+        is Level.BAD
+    )
+    capped = config(tmp_path, record=record, encode={"max_kbps": 500})
+    assert needed_mb(capped, huge) == pytest.approx((500 + 20) * 3600 / 8000)
+    less = disk_findings(config(tmp_path, record={**record, "most_mb": 46.0}), probes)
+    assert "about 6 minutes are kept" in only(less, "record.most_mb").text
+
+
+def test_what_a_running_site_removes_meanwhile_is_not_counted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "kept").mkdir()
+    for name in ("old", "new"):
+        (tmp_path / "kept" / name).write_bytes(bytes(3_000_000))
+    walk = os.walk
+
+    def walked(folder: Path) -> Iterator[Any]:
+        for found in walk(folder):
+            (tmp_path / "kept" / "old").unlink()
+            yield found
+
+    monkeypatch.setattr(os, "walk", walked)
+    findings = disk_findings(config(tmp_path, record={"folder": "kept"}), {})
+    assert "and 3 MB are recorded already" in only(findings, "disk").text
+
+
+def test_a_folder_that_cannot_be_written_is_bad(tmp_path: Path) -> None:
+    (tmp_path / "kept").write_text("a file")
+    assert (
+        only(disk_findings(config(tmp_path, record={"folder": "kept"}), {}), "record.folder").level
+        is Level.BAD
+    )
+
+
+def test_files_that_others_can_read_or_write_are_told_of(tmp_path: Path) -> None:
+    tokens, users = tmp_path / "tokens.yaml", tmp_path / "users"
+    tokens.write_text("tokens: []\n")
+    users.write_text("bestview:secret\n")
+    tokens.chmod(0o666)
+    users.chmod(0o644)
+    changes: Any = {"access": {"tokens": "tokens.yaml"}}
+    bus = {**dict.fromkeys(("connect", "listen"), "tcp/127.0.0.1:7447"), "users": "users"}
+    found = file_findings(config(tmp_path, **changes, zenoh=bus))
+    words = " ".join(it.text for it in found if it.level is Level.WARNING)
+    assert "lets nobody in" in words
+    assert f"others may write {tokens}" in words
+    assert f"others may read {users}" in words
+    assert "no line for c0" in words
+    pulses = file_findings(config(tmp_path, **changes, sync={"port": 7400, "users": "users"}))
+    assert [it.level for it in of(pulses, "sync.users")] == [Level.BAD, Level.WARNING]
+    assert "passwords of bestview" in of(pulses, "sync.users")[0].text
+    users.write_text("bestview:" + "b" * 32 + "\n")
+    pulses = file_findings(config(tmp_path, **changes, sync={"port": 7400, "users": "users"}))
+    assert "no line for c0" in of(pulses, "sync.users")[0].text
+    tokens.write_text("tokens: nonsense\n")
+    assert of(file_findings(config(tmp_path, **changes)), "access.tokens")[0].level is Level.BAD
+
+
+def test_a_site_that_is_open_by_accident_is_bad(tmp_path: Path) -> None:
+    found = only(file_findings(config(tmp_path, http={"host": "0.0.0.0"})), "access")  # noqa: S104
+    assert found.level is Level.BAD
+    assert "http.host" in found.text
+
+
+def test_a_camera_without_a_place_among_those_that_have_one_is_told_of(tmp_path: Path) -> None:
+    ground = [[1.0, 0, 0], [0, 1, 0], [0, 0, 1]]
+    cameras = [{"id": "c0", "source": "x", "ground": ground}, {"id": "c1", "source": "y"}]
+    said = only(file_findings(config(tmp_path, cameras=cameras)), "ground")
+    assert said == (Level.WARNING, "c1: not in the file: known by looks alone")
+
+
+def test_the_processors_are_those_that_this_process_may_use(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(machine, "processors", lambda: 0.5)
+    said = only(machine_findings(config(tmp_path), {"c0": CameraProbe(cores=0.2)}), "processor")
+    assert (said.level, said.text.endswith("of 0.5 cores")) == (Level.WARNING, True)
+
+
+def test_a_machine_that_is_too_small_is_told_of(tmp_path: Path) -> None:
+    small = config(tmp_path)
+    fine, busy = ({"c0": CameraProbe(size=(WIDTH, HEIGHT), cores=cores)} for cores in (0.0, 1000.0))
+    assert only(machine_findings(small, fine), "processor").level is Level.OK
+    assert only(machine_findings(small, busy), "processor").level is Level.WARNING
+    large = config(tmp_path, track={"backlog_s": 1e7})
+    assert only(machine_findings(large, fine), "memory").level is Level.WARNING
+
+
+def expired(folder: Path) -> tuple[Path, Path]:
+    """Make a certificate whose time is over, which takes an authority: that may say when it begins."""
+    certificate, key, asked, settings = (folder / it for it in ("over.pem", "over.key", "asked", "settings"))
+    (folder / "known").touch()
+    (folder / "serial").write_text("01\n")
+    settings.write_text(
+        "[ca]\ndefault_ca = here\n[here]\ndefault_md = sha256\npolicy = any\n"
+        f"database = {folder}/known\nserial = {folder}/serial\nnew_certs_dir = {folder}\n"
+        "[any]\ncommonName = supplied\n"
+    )
+    made = ["openssl", "req", "-new", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes"]
+    made += ["-subj", "/CN=hall", "-out", str(asked), "-keyout", str(key)]
+    signed = ["openssl", "ca", "-batch", "-notext", "-config", str(settings), "-selfsign"]
+    signed += ["-keyfile", str(key), "-in", str(asked), "-out", str(certificate)]
+    signed += ["-startdate", "20200101000000Z", "-enddate", "20200201000000Z"]
+    for command in (made, signed):
+        subprocess.run(command, check=True, capture_output=True)
+    return certificate, key
+
+
+@needs_openssl
+def test_a_certificate_is_good_for_as_long_as_it_says(tmp_path: Path) -> None:
+    def made(name: str, *until: str) -> tuple[Path, Path]:
+        certificate, key = tmp_path / f"{name}.pem", tmp_path / f"{name}.key"
+        request = [
+            "openssl",
+            "req",
+            "-x509",
+            "-newkey",
+            "ec",
+            "-pkeyopt",
+            "ec_paramgen_curve:P-256",
+            "-nodes",
+        ]
+        request += [
+            *until,
+            "-subj",
+            "/CN=hall",
+            "-addext",
+            "subjectAltName=DNS:hall",
+            "-out",
+            str(certificate),
+            "-keyout",
+            str(key),
+        ]
+        subprocess.run(request, check=True, capture_output=True)
+        return certificate, key
+
+    (certificate, key), (other, _) = made("long", "-days", "100"), made("short", "-days", "3")
+    good = certificate_finding("http.tls", certificate, key)
+    assert (good.level, good.text) == (Level.OK, f"{certificate} is good for 100 days, for hall")
+    assert certificate_finding("http.tls", *made("soon", "-days", "3")).level is Level.WARNING
+    over = certificate_finding("http.tls", *expired(tmp_path))
+    assert (over.level, over.text) == (Level.BAD, f"{tmp_path / 'over.pem'}: certificate has expired")
+    wrong = certificate_finding("http.tls", other, key)
+    assert wrong.level is Level.BAD
+    assert "no certificate and its key" in wrong.text
+    assert certificate_finding("http.tls", tmp_path / "none.pem", key).level is Level.BAD

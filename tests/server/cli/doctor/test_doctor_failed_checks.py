@@ -1,0 +1,188 @@
+"""`myview doctor`: a check that fails itself is a finding, too; cameras find their server."""
+
+from __future__ import annotations
+
+import socket
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from fakes.command_line import Run
+from fakes.doctor import config, site
+from fakes.programs import needs_openssl
+from fakes.system.ports import free
+from server.cli.doctor import command, files, ports
+from server.cli.doctor.camera_probe import CameraProbe
+from server.cli.doctor.cameras import camera_findings
+from server.cli.doctor.files import file_findings
+from server.cli.doctor.findings import Finding, Level
+from server.cli.doctor.ports import port_findings
+from server.cli.doctor.reachability import reachability_findings
+
+
+def of(findings: list[Finding], check: str) -> list[tuple[Level, str]]:
+    return [(it.level, it.text) for it in findings if it.check == check]
+
+
+def broken(*_: object, **__: object) -> Any:
+    raise PermissionError(13, "Permission denied", "/closed/door")
+
+
+BROKEN = [(Level.BAD, "/closed/door: Permission denied")]
+
+
+@pytest.mark.parametrize(
+    ("check", "lost"),
+    [
+        ("port_findings", {"http.port", "sync.port", "zenoh.listen"}),
+        ("reachability_findings", {"sync.host", "zenoh.connect"}),
+        ("clock_findings", {"clock", "pulse server"}),
+        ("probe_all", set[str]()),
+        ("camera_findings", {"camera c0"}),
+        ("sound_findings", set[str]()),
+        ("disk_findings", {"record"}),
+        ("machine_findings", {"processor", "memory"}),
+    ],
+)
+async def test_a_check_that_fails_loses_no_other_s_findings(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, check: str, lost: set[str]
+) -> None:
+    there = config(tmp_path)
+    before = {it.check async for it in command.run_checks(there, 1.0)}
+    assert before >= {"http.port", "sync.host", "ground", "clock", "camera c0", "record", "memory"}
+    monkeypatch.setattr(command, check, broken)
+    found = [it async for it in command.run_checks(there, 1.0)]
+    (said,) = [it for it in found if (it.level, it.text) == BROKEN[0]]
+    assert {it.check for it in found if it is not said} == before - lost
+
+
+async def test_nor_does_one_of_several_ports_or_files(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    there = config(tmp_path)
+    monkeypatch.setattr(ports, "_is_ours", broken)
+    with socket.create_server(("127.0.0.1", there.http.port)):
+        found, _ = await port_findings(there)
+    assert of(found, "http.port") == BROKEN
+    assert of(found, "zenoh.listen")[0][0] is Level.OK
+    monkeypatch.setattr(files, "_exposed", broken)
+    assert of(file_findings(there), "access") == BROKEN
+    assert of(file_findings(there), "ground")[0][0] is Level.OK
+
+
+async def test_a_mistake_is_told_without_a_password(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def wrong(*_: object) -> None:
+        raise RuntimeError("cannot be: rtsp://me:hunter2@door/live")
+
+    monkeypatch.setattr(command, "sound_findings", wrong)
+    found = [it async for it in command.run_checks(config(tmp_path), 1.0)]
+    text = "a mistake in MyView: RuntimeError: cannot be: ..."
+    assert of(found, "sound") == [(Level.BAD, text)]
+    assert of(found, "memory")
+
+
+async def test_findings_are_told_as_they_are_found(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    told = []
+
+    def probe_all(*_: object) -> dict[str, CameraProbe]:
+        told.append(capsys.readouterr().out)
+        return {"c0": CameraProbe("away")}
+
+    monkeypatch.setattr(command, "probe_all", probe_all)
+    await command._told(site(tmp_path), 1.0, as_json=False)
+    (before,) = told
+    after = capsys.readouterr().out
+    assert " http.port " in before
+    assert " pulse server " in before
+    assert " camera c0 " in after
+    assert " http.port " not in after
+    assert after.splitlines()[-1].endswith(" bad")
+
+
+async def test_a_server_that_nobody_knows_is_bad(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    ends = {"connect": "tcp/bus:7447", "listen": "tcp/127.0.0.1:7447"}
+    there = config(tmp_path, sync={"host": "pulses", "port": 7400}, zenoh=ends)
+
+    def unknown(*_: object, **__: object) -> None:
+        raise socket.gaierror(socket.EAI_NONAME, "Name or service not known")
+
+    monkeypatch.setattr(socket, "getaddrinfo", unknown)
+    found = await reachability_findings(there)
+    assert of(found, "sync.host") == [(Level.BAD, "pulses:7400 cannot be found: Name or service not known")]
+    assert of(found, "zenoh.connect")[0][0] is Level.BAD
+
+
+async def test_a_way_on_this_machine_leads_to_who_listens(tmp_path: Path) -> None:
+    port, other = free(), free()
+    fine = config(tmp_path, zenoh={"connect": f"tcp/127.0.0.1:{port}", "listen": f"tcp/0.0.0.0:{port}"})
+    assert {it.level for it in await reachability_findings(fine)} == {Level.OK}
+    astray = config(tmp_path, zenoh={"connect": f"tcp/127.0.0.1:{other}", "listen": f"tcp/127.0.0.1:{port}"})
+    text = f"nobody is at 127.0.0.1:{other}, where cameras look, and zenoh.listen is 127.0.0.1:{port}"
+    assert of(await reachability_findings(astray), "zenoh.connect") == [(Level.BAD, text)]
+    with socket.create_server(("127.0.0.1", other)):
+        answered = [(Level.OK, f"127.0.0.1:{other} answers")]  # something may pass it on
+        assert of(await reachability_findings(astray), "zenoh.connect") == answered
+    narrow = config(tmp_path, sync={"host": "127.0.0.2", "port": other})
+    assert of(await reachability_findings(narrow), "sync.host")[0][0] is Level.BAD
+
+
+async def test_two_ports_that_are_one_are_bad(tmp_path: Path) -> None:
+    port = free()
+    found, _ = await port_findings(config(tmp_path, http={"port": port}, sync={"port": port}))
+    assert of(found, "sync.port") == [(Level.BAD, f"127.0.0.1:{port} is what http.port says, too")]
+    assert of(found, "zenoh.listen")[0][0] is Level.OK
+
+
+def test_a_device_is_one_camera_s(tmp_path: Path) -> None:
+    sources = {"c0": "/dev/video9", "c1": "/dev/video9", "c2": "c.mp4", "c3": "c.mp4"}
+    there = config(tmp_path, cameras=[{"id": it, "source": source} for it, source in sources.items()])
+    found = camera_findings(there, {}, runs=False)
+    text = "/dev/video9 is camera c0's, too, and only one can have it"
+    assert [(it.check, it.level, it.text) for it in found] == [("camera c1", Level.BAD, text)]
+
+
+def test_a_wrong_configuration_is_named_with_what_to_do(myview: Run, tmp_path: Path) -> None:
+    path = site(tmp_path, ground="none.json")
+    ended = myview("doctor", path)
+    assert (ended.code, ended.err) == (1, "")
+    line = ended.out.splitlines()[0]
+    why = f"{path}: ground: cannot read {tmp_path / 'none.json'}: No such file or directory"
+    assert f"{why} → mend it there" in line
+
+
+def test_a_missing_file_of_tokens_is_said_once(tmp_path: Path) -> None:
+    found = file_findings(config(tmp_path, access={"tokens": "none.yaml"}))
+    (said,) = [it for it in found if it.level is Level.BAD]
+    assert (said.check, said.do) == ("access.tokens", "`myview token NAME` prints a line for it")
+
+
+@needs_openssl
+def test_the_router_s_certificate_is_for_the_host_that_cameras_look_for(tmp_path: Path) -> None:
+    made = "-newkey ec -pkeyopt ec_paramgen_curve:P-256 -nodes"
+    for line in (
+        f"req -x509 {made} -days 100 -subj /CN=authority -out a.pem -keyout a.key",
+        f"req {made} -subj /CN=router -addext subjectAltName=DNS:elsewhere -out r.csr -keyout r.key",
+        "x509 -req -in r.csr -CA a.pem -CAkey a.key -days 100 -copy_extensions copy -out r.pem",
+    ):
+        subprocess.run(["openssl", *line.split()], cwd=tmp_path, check=True, capture_output=True)
+
+    def bad(host: str, **files: str) -> list[str]:
+        tls = {"authority": "a.pem", "certificate": "r.pem", "key": "r.key", **files}
+        ends = {"connect": f"tls/{host}:7447", "listen": "tls/127.0.0.1:7447"}
+        found = file_findings(config(tmp_path, zenoh={**ends, "tls": tls}))
+        return [it.text for it in found if it.check == "zenoh.tls" and it.level is Level.BAD]
+
+    assert bad("elsewhere") == []
+    (other,) = bad("10.0.0.5")
+    assert "who connects to 10.0.0.5 by" in other
+    assert "certificate is not valid for '10.0.0.5'" in other
+    assert bad("elsewhere", authority="none.pem") == [
+        f"{tmp_path / 'none.pem'}: cannot be read: No such file or directory"
+    ]
+    assert bad("elsewhere", key="none.key") == [
+        f"{tmp_path / 'none.key'}: cannot be read: No such file or directory"
+    ]

@@ -1,0 +1,226 @@
+"""`myview evaluate --views`: choices beside the optimum, by number or through the tracks."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from fakes.command_line import BAD_INPUT, Run, refusal
+from fakes.media.videos import write_video
+
+FRAMES = 20
+SIZE = ("--size", "100x100", "--fps", "10")
+BIG, SMALL = "10,10,50,50", "10,10,20,20"
+
+
+@pytest.fixture
+def evaluate(myview: Run) -> Run:
+    """Give a function that runs `myview evaluate`."""
+    return lambda *arguments: myview("evaluate", *arguments)
+
+
+def write(path: Path, lines: list[str]) -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text("".join(f"{line}\n" for line in lines), encoding="ascii")
+    return path
+
+
+def boxes(places: Mapping[int, str], frames: range = range(1, FRAMES + 1), end: str = "1,1,1") -> list[str]:
+    """Give MOTChallenge rows: everybody at one place all the time."""
+    return [f"{frame},{number},{place},{end}" for frame in frames for number, place in places.items()]
+
+
+def choices(shown: Mapping[int, str], frames: range = range(1, FRAMES + 1)) -> list[str]:
+    return [
+        "frame,object,camera",
+        *(f"{frame},{number},{camera}" for frame in frames for number, camera in shown.items()),
+    ]
+
+
+@pytest.fixture
+def hall(tmp_path: Path) -> Path:
+    """Two people in two cameras: the first is larger in c0, the second in c1."""
+    write(tmp_path / "gt" / "c0.txt", boxes({1: BIG, 2: SMALL}))
+    write(tmp_path / "gt" / "c1.txt", boxes({1: SMALL, 2: BIG}))
+    return tmp_path
+
+
+def judged(printed: str) -> dict[str, list[str]]:
+    """Give the table's rows by what stands first in them."""
+    return {line.split()[0]: line.split() for line in printed.splitlines()}
+
+
+def test_the_best_choices_agree_with_the_optimum(evaluate: Run, hall: Path) -> None:
+    path = write(hall / "choices.csv", choices({1: "c0", 2: "c1"}))
+    code, out, _ = evaluate("--gt", hall, "--views", path, *SIZE)
+    assert code == 0
+    table = judged(out)
+    assert table["person"][3:8] == ["Agree", "Regret", "Visible", "Chosen", "Cuts"]
+    assert table["all"] == ["all", "40", "100.0", "0.0", "100.0", "100.0", "0.0", "0.0", "-"]
+    assert table["2"][:4] == ["2", "2", "20", "100.0"]
+
+
+def test_worse_choices_cost_more_and_everything_is_in_the_file(evaluate: Run, hall: Path) -> None:
+    shown = [
+        *choices({1: "c0"}),
+        *choices({2: "c1"}, range(1, 11))[1:],
+        *choices({2: "c0"}, range(11, 16))[1:],
+    ]
+    path, out = write(hall / "choices.csv", shown), hall / "numbers.json"
+    assert evaluate("--gt", hall, "--views", path, *SIZE, "--switch-cost", 0.2, "--json", out)[0] == 0
+    content = json.loads(out.read_text())["views"]
+    assert content["all"]["frames"] == 40
+    assert content["all"]["agreement"] == 30 / 40
+    assert content["all"]["chosen"] == 35 / 40
+    assert content["all"]["visible"] == 35 / 40
+    assert content["people"]["1"]["regret"] == 0.0
+    # 5 frames of a view two fifths as large as the best, 5 of none, and a cut worth 2 frames.
+    assert content["people"]["2"]["cost"] == pytest.approx(5 * 0.6 + 5 * 1.0 + 2.0)
+    assert content["people"]["2"]["optimum_cost"] == 0.0
+    assert content["people"]["2"]["regret"] is None, "the optimum is free"
+    assert content["people"]["2"]["cuts_per_minute"] == pytest.approx(30.0)
+    assert (content["fps"], content["switch_cost_s"]) == (10.0, 0.2)
+
+
+def test_objects_are_told_apart_by_their_tracks(evaluate: Run, hall: Path) -> None:
+    write(hall / "seen" / "tracks" / "c0.txt", boxes({7: BIG, 4: SMALL}, range(1, 16)))
+    write(hall / "seen" / "tracks" / "c1.txt", boxes({7: SMALL, 4: BIG}, range(1, 16)))
+    path = write(hall / "seen" / "choices.csv", choices({7: "c0", 4: "c1", 9: "c1"}, range(1, 16)))
+    code, out, err = evaluate("--gt", hall, "--tracks", hall / "seen", "--views", path, *SIZE)
+    assert (code, err) == (0, "")
+    table = judged(out)
+    assert table["joint"][0] == "joint"
+    assert table["1"][:4] == ["1", "7", "20", "75.0"]
+    assert table["2"][:4] == ["2", "4", "20", "75.0"]
+    assert table["all"][5] == "75.0", "the last five frames have no choice"
+    assert "none of its objects" in evaluate("--gt", hall, "--views", path, *SIZE)[2]
+
+
+def test_an_object_that_changes_people_stands_for_one_of_them(evaluate: Run, hall: Path) -> None:
+    halves = [*boxes({5: BIG}, range(1, 13)), *boxes({5: SMALL}, range(13, 21))]
+    write(hall / "tracks" / "c0.txt", halves)
+    write(hall / "tracks" / "c1.txt", [])
+    path = write(hall / "choices.csv", choices({5: "c0"}))
+    code, out, _ = evaluate("--gt", hall / "gt", "--tracks", hall / "tracks", "--views", path, *SIZE)
+    assert code == 0
+    table = judged(out)
+    assert table["1"][1] == "5"
+    assert table["2"][1] == "-"
+    assert table["2"][6] == "0.0"
+
+
+def test_who_is_hidden_is_not_visible_unless_told_otherwise(evaluate: Run, tmp_path: Path) -> None:
+    write(tmp_path / "gt" / "c0.txt", boxes({1: BIG}, end="1,1,0.1"))
+    write(tmp_path / "gt" / "c1.txt", boxes({1: SMALL}))
+    path = write(tmp_path / "choices.csv", choices({1: "c0"}))
+    told = [evaluate("--gt", tmp_path, "--views", path, *SIZE, "--visible", it)[1] for it in (0.25, 0)]
+    assert [judged(it)["all"][4] for it in told] == ["0.0", "100.0"]
+
+
+def test_a_rendering_tells_rate_and_sizes_itself(evaluate: Run, hall: Path) -> None:
+    path = write(hall / "choices.csv", choices({1: "c1", 2: "c1"}))
+    assert "size of camera c0's picture is not known" in evaluate("--gt", hall, "--views", path)[2]
+    site = {"fps": 10.0, "switch_cost_s": 0.3, "sizes": {"c0": [100, 100], "c1": [50, 50]}}
+    (hall / "site.json").write_text(json.dumps(site))
+    out = hall / "numbers.json"
+    assert evaluate("--gt", hall, "--views", path, "--json", out)[0] == 0
+    content = json.loads(out.read_text())["views"]
+    assert content["switch_cost_s"] == 0.3
+    # 20 pixels of c1's 50 are four fifths of what 50 of c0's 100 are.
+    assert content["people"]["1"]["cost"] == pytest.approx(20 * 0.2)
+
+
+def test_plots_show_the_choice_and_the_frames_around_its_cuts(evaluate: Run, hall: Path) -> None:
+    for camera in ("c0", "c1"):
+        write_video(hall / f"{camera}.mp4", FRAMES)
+    path = write(
+        hall / "choices.csv", [*choices({1: "c0"}, range(1, 9)), *choices({1: "c1"}, range(9, 21))[1:]]
+    )
+    videos = (hall / "c0.mp4", hall / "c1.mp4")
+    code, _, err = evaluate(
+        "--gt", hall, "--views", path, "--videos", *videos, *SIZE, "--plots", hall / "plots"
+    )
+    assert (code, err) == (0, "")
+    assert {it.name for it in (hall / "plots").iterdir()} == {"choices.png", "person-1.png"}
+    assert all(it.stat().st_size > 1000 for it in (hall / "plots").iterdir())
+
+
+@pytest.mark.parametrize(
+    ("lines", "why"),
+    [
+        (["frame,camera", "1,c0"], "its first line is not frame,object,camera"),
+        (["frame,object,camera", "1,1"], "choices.csv:2: expected 3 fields, found 2"),
+        (["frame,object,camera", "0,1,c0"], "choices.csv:2: frame and object are whole numbers from 1"),
+        (["frame,object,camera", "1,x,c0"], "not '1' and 'x'"),
+        (["frame,object,camera", "1,0,c0"], "not '1' and '0'"),
+        (["frame,object,camera", "99,1,c0"], "begins with frame 99; the ground truth ends with frame 20"),
+        (["frame,object,camera", "1,1,c0", "1,1,c1"], "choices.csv:3: object 1 has two cameras in one frame"),
+        (["frame,object,camera", "1,1,c9"], "camera 'c9' is not among those that are scored (c0, c1)"),
+    ],
+)
+def test_a_file_that_is_none_is_refused(evaluate: Run, hall: Path, lines: list[str], why: str) -> None:
+    code, out, err = evaluate("--gt", hall, "--views", write(hall / "choices.csv", lines), *SIZE)
+    assert (code, out) == (BAD_INPUT, "")
+    assert why in err
+    assert len(err.splitlines()) == 1
+
+
+def test_options_that_make_no_sense_are_refused(evaluate: Run, hall: Path) -> None:
+    path = write(hall / "choices.csv", choices({1: "c0"}))
+    for arguments, why in (
+        ([], "name what is to be scored: --tracks, or --views, or both"),
+        (["--tracks", hall, "--plots", hall / "p"], "--plots and --videos are about choices"),
+        (["--views", hall / "none.csv", *SIZE], "none.csv: cannot be read"),
+        (["--views", path, "--size", "big", "--fps", 10], "--size: 'big' is not WIDTHxHEIGHT"),
+        (["--views", path, "--size", "9x9"], "the number of frames a second is not known"),
+        (["--views", path, "--videos", "c0.mp4", "x.mp4"], "--videos: give one for each of the cameras"),
+    ):
+        code, out, err = evaluate("--gt", hall, *arguments)
+        assert (code, out) == (BAD_INPUT, ""), why
+        assert why in err
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ('{"fps": 3}', "is not what `myview render` writes"),
+        ('{"fps": 3, "switch_cost_s": 1, "sizes": {"c0": [1e999, 9]}}', "is not what `myview render` writes"),
+        ("[" * 100_000, "is not what `myview render` writes"),
+        ('{"fps": 3, "switch_cost_s": NaN, "sizes": {"c0": [9, 9]}}', "makes no sense"),
+        ('{"fps": 3, "switch_cost_s": 1, "sizes": {"c0": [9, 0]}}', "makes no sense"),
+        ('{"fps": 0, "switch_cost_s": 1, "sizes": {"c0": [9, 9]}}', "makes no sense"),
+    ],
+)
+def test_a_site_that_makes_no_sense_is_refused(evaluate: Run, hall: Path, text: str, why: str) -> None:
+    path = write(hall / "choices.csv", choices({1: "c0"}))
+    (hall / "site.json").write_text(text)
+    assert why in refusal(evaluate("--gt", hall, "--views", path))
+
+
+def test_somebody_twice_in_a_frame_is_refused(evaluate: Run, hall: Path) -> None:
+    write(hall / "gt" / "c1.txt", [*boxes({2: SMALL}), *boxes({2: BIG}, range(7, 9))])
+    path = write(hall / "choices.csv", choices({1: "c0"}))
+    line = refusal(evaluate("--gt", hall, "--views", path, *SIZE))
+    assert line.endswith("--gt: camera c1: person 2 is twice in frame 7")
+
+
+def test_all_that_is_asked_for_is_written_or_nothing(evaluate: Run, hall: Path) -> None:
+    path = write(hall / "choices.csv", choices({1: "c0"}))
+    given = ("--gt", hall, "--views", path, *SIZE, "--plots", hall / "plots")
+    assert "cannot write there" in refusal(evaluate(*given, "--json", path / "numbers.json"))
+    assert not (hall / "plots").exists()
+
+
+def test_views_may_be_folders_of_images(evaluate: Run, hall: Path) -> None:
+    for camera in ("c0", "c1"):
+        (hall / "views" / camera).mkdir(parents=True)
+        cv2.imwrite(str(hall / "views" / camera / "1.png"), np.zeros((100, 100, 3), dtype=np.uint8))
+    path = write(hall / "choices.csv", choices({1: "c0", 2: "c1"}))
+    videos = ("--videos", hall / "views" / "c0", hall / "views" / "c1")
+    same = evaluate("--gt", hall, "--views", path, *SIZE)
+    assert evaluate("--gt", hall, "--views", path, *videos, "--fps", 10) == same

@@ -1,0 +1,154 @@
+"""What is written down: tracks and choices to the byte, and a film per person."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+import av
+import numpy as np
+import pytest
+
+from bestview import Merge, Split
+from fakes.cameras import CAMERAS, FPS, GOP, HEIGHT, LARGE, SMALL, WIDTH, encoded, small_config
+from fakes.decisions import choice, decision
+from fakes.media.audio import BEEPS, STEP, beeps, flashes, flashing, heard, write_flashes
+from fakes.media.audio import FRAMES as SOUNDING
+from server.cli.render.films import FilmWriter
+from server.cli.render.soundtrack import Soundtrack
+from server.config.sections import SiteSettings
+from server.media.codec import agreement_for
+from server.media.letterbox import Letterbox
+from server.messaging.messages import NumberedBox
+from server.service.decision_files.decision_writer import DecisionWriter
+from server.service.streaming.frame_buffer import FrameBuffer
+
+A, B = CAMERAS
+SITE = SiteSettings(width=WIDTH, height=HEIGHT, fps=FPS)
+Codec = Literal["h264", "vp8"]
+
+
+def test_the_files_are_these_bytes(tmp_path: Path) -> None:
+    fits = {
+        A: Letterbox((2 * WIDTH, 2 * HEIGHT), (WIDTH, HEIGHT)),
+        B: Letterbox((WIDTH, HEIGHT), (WIDTH, HEIGHT)),
+    }
+    recorder = DecisionWriter(tmp_path / "out", CAMERAS, fits)
+    boxes: list[list[NumberedBox]] = [[(1, *SMALL)], [(1, *SMALL), (2, *LARGE)]]
+    recorder.write(decision(0, choice(1, A), choice(2, None), frames=2, c0=boxes))
+    turned_out = (Merge(kept=1, lost=3), Split(kept=1, parted=2, camera=B))
+    recorder.write(
+        decision(
+            1, choice(1, B), choice(2, A, away=True), frames=1, corrections=turned_out, c1=[[(2, *LARGE)]]
+        )
+    )
+    recorder.write_late([f"{frame},{B},tracks late\n" for frame in (4, 5)])
+    recorder.close()
+    files = {str(path.relative_to(tmp_path / "out")): path.read_bytes() for path in tmp_path.rglob("*.*")}
+    assert files == {
+        "tracks/c0.txt": b"1,1,20.00,20.00,12.00,36.00,1.00,-1,-1,-1\n"
+        b"2,1,20.00,20.00,12.00,36.00,1.00,-1,-1,-1\n"
+        b"2,2,40.00,8.00,32.00,80.00,1.00,-1,-1,-1\n",
+        "tracks/c1.txt": b"6,2,20.00,4.00,16.00,40.00,1.00,-1,-1,-1\n",
+        "choices.csv": b"frame,object,camera\n1,1,c0\n2,1,c0\n6,1,c1\n6,2,c0\n",
+        "corrections.csv": b"frame,what,object,other,camera\n6,merged,1,3,\n6,split,1,2,c1\n",
+        "late.csv": b"frame,camera,what\n4,c1,tracks late\n5,c1,tracks late\n",
+    }
+
+
+def films(folder: Path, codec: Codec = "h264") -> tuple[FilmWriter, dict[str, FrameBuffer]]:
+    agreement = agreement_for(small_config(encode={"codec": codec}))
+    shelves = {camera: FrameBuffer(FPS, 40, agreement) for camera in CAMERAS}
+    for seed, camera in enumerate(CAMERAS):
+        for unit in encoded(seed, codec=codec):
+            shelves[camera].put(unit.pulse, 1, unit.data, key=unit.key)
+    return FilmWriter(folder, shelves, agreement, SITE), shelves
+
+
+def own_pictures(seed: int, codec: Codec) -> list[np.ndarray[tuple[int, ...], np.dtype[np.uint8]]]:
+    decoder = av.VideoCodecContext.create(codec, "r")
+    units = encoded(seed, codec=codec)
+    decoded = [picture for unit in units for picture in decoder.decode(av.Packet(unit.data))]
+    decoded += decoder.decode(None)
+    return [np.asarray(picture.to_ndarray(format="yuv420p"), dtype=np.uint8) for picture in decoded]
+
+
+@pytest.mark.parametrize(("codec", "container"), [("h264", "mp4"), ("vp8", "webm")])
+def test_a_film_begins_at_time_0_and_shows_the_chosen_cameras_pixels(
+    tmp_path: Path, codec: Codec, container: str
+) -> None:
+    it, _ = films(tmp_path / "best", codec)
+    for gop, camera in [(2, A), (3, B), (4, A)]:
+        it.write(decision(gop, choice(7, camera)))
+    it.close()
+    assert it.numbers == [7]
+    with av.open(str(tmp_path / "best" / f"object-7.{container}"), "r") as film:
+        assert film.duration == 3 * GOP / FPS * av.time_base
+        pictures = list(film.decode(video=0))
+    assert [picture.time for picture in pictures] == [number / FPS for number in range(3 * GOP)]
+    alone = [own_pictures(seed, codec) for seed in range(2)]
+    for number, picture in enumerate(pictures):
+        seed = 1 if GOP <= number < 2 * GOP else 0
+        np.testing.assert_array_equal(picture.to_ndarray(format="yuv420p"), alone[seed][2 * GOP + number])
+
+
+def test_a_film_ends_with_the_last_gop_in_which_the_person_was_about(tmp_path: Path) -> None:
+    it, _ = films(tmp_path / "best")
+    story = [(0, False), (1, True), (2, False), (3, True), (4, True)]
+    for gop, away in story:
+        it.write(decision(gop, choice(1, A, away=away)))
+    it.close()
+    with av.open(str(tmp_path / "best" / "object-1.mp4"), "r") as film:
+        assert len(list(film.decode(video=0))) == 3 * GOP, "who comes back is shown all the way"
+
+
+@pytest.mark.parametrize(("codec", "container"), [("h264", "mp4"), ("vp8", "webm")])
+def test_what_cannot_be_shown_or_did_not_come_is_bridged_as_it_is_live(
+    tmp_path: Path, codec: Codec, container: str
+) -> None:
+    it, shelves = films(tmp_path / "best", codec)
+    for pulse in (3 * GOP + 2, *range(5 * GOP, 6 * GOP)):
+        del shelves[A]._shelved[pulse]
+    shown: list[str | None] = [A, None, B, A, B, A, B]
+    for gop, camera in enumerate(shown):
+        if camera is None:
+            for shelf in shelves.values():
+                for pulse in range(gop * GOP, (gop + 1) * GOP):
+                    del shelf._shelved[pulse]
+        it.write(decision(gop, choice(1, camera)))
+    it.close()
+    with av.open(str(tmp_path / "best" / f"object-1.{container}"), "r") as film:
+        pictures = list(film.decode(video=0))
+    assert [round(float(picture.time or 0) * FPS) for picture in pictures] == list(range(7 * GOP))
+    alone = {A: own_pictures(0, codec), B: own_pictures(1, codec)}
+    last = pictures[0].to_ndarray(format="yuv420p")
+    for pulse, picture in enumerate(pictures):
+        camera = shown[pulse // GOP]
+        if camera is not None and shelves[camera].has(pulse) and not 3 * GOP + 2 < pulse < 4 * GOP:
+            last = alone[camera][pulse]
+        np.testing.assert_array_equal(picture.to_ndarray(format="yuv420p"), last, str(pulse))
+
+
+@pytest.mark.parametrize("codec", ["aac", "opus"])
+def test_a_film_has_the_sites_sound_in_step(tmp_path: Path, codec: Literal["aac", "opus"]) -> None:
+    recording = write_flashes(tmp_path / "flashes.mkv", SOUNDING)
+    config = small_config(sound={"source": str(recording), "codec": codec})
+    agreement, track = agreement_for(config), Soundtrack(config)
+    shelves = {camera: FrameBuffer(FPS, SOUNDING, agreement) for camera in CAMERAS}
+    for unit in flashing(recording):
+        for shelf in shelves.values():
+            shelf.put(unit.pulse, 1, unit.data, key=unit.key)
+    it = FilmWriter(tmp_path / "best", shelves, agreement, config.site, track.shelf)
+    begin = 3
+    for gop in range(begin, SOUNDING // GOP):
+        track.read(gop * GOP, (gop + 1) * GOP)
+        it.write(decision(gop, choice(1, CAMERAS[gop % 2])))
+    it.close()
+    data = (tmp_path / "best" / "object-1.mp4").read_bytes()
+    expected = [at - begin * GOP / FPS for at in BEEPS]
+    assert flashes(data) == pytest.approx(expected, abs=0.001)
+    assert beeps(data) == pytest.approx(expected, abs=STEP)
+    times, _ = heard(data)
+    assert np.diff(times) == pytest.approx(1 / 48_000, abs=1e-4)
+    assert 0 <= times[0] < 0.022
+    assert times[-1] == pytest.approx((SOUNDING - begin * GOP) / FPS, abs=0.03)

@@ -1,0 +1,170 @@
+"""`myview render` as a process: all of it is there, or nothing."""
+
+from __future__ import annotations
+
+import csv
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import av
+import cv2
+import numpy as np
+import pytest
+
+from fakes.media.audio import EVERY, beeps, write_flashes
+from fakes.media.videos import damage, write_video
+from fakes.paths import ROOT
+from fakes.timeouts import PATIENCE
+from server.cli.generated_config import camera_name, config_for_videos, free_port
+from synthetic import Scene, write_recording
+
+MYVIEW = [sys.executable, "-m", "server.cli.main"]
+
+
+@pytest.fixture(scope="module")
+def views(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two views of a room; the second ends fifteen frames earlier."""
+    folder = tmp_path_factory.mktemp("views")
+    for name, frames in (("long", 80), ("short", 65)):
+        write_recording(Scene("room", 2, 4, 4, 192, 108, 25.0), folder / name, frames / 25)
+    return folder
+
+
+def render(*arguments: object) -> subprocess.CompletedProcess[str]:
+    command = [*MYVIEW, "render", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False, cwd=ROOT)
+
+
+def test_two_views_become_films_tracks_choices_and_plots_and_the_shorter_one_is_said_once(
+    views: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    done = render(views / "long" / "c0.mp4", views / "short" / "c1.mp4", "--out", out)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr.splitlines() == [
+        "the views are of different length: c0 with frame 80, c1 with frame 65; the shorter ones end first"
+    ]
+    assert done.stdout.startswith(f"{out}: best views of ")
+    files = {str(path.relative_to(out)) for path in out.rglob("*") if path.is_file()}
+    films = {name for name in files if name.startswith("best/object-")}
+    assert films
+    assert files - films == {
+        "choices.csv",
+        "choices.png",
+        "corrections.csv",
+        "late.csv",
+        "site.json",
+        "tracks/c0.txt",
+        "tracks/c0.png",
+        "tracks/c1.txt",
+        "tracks/c1.png",
+    }
+    assert (out / "late.csv").read_text() == "frame,camera,what\n"
+    with (out / "choices.csv").open(encoding="ascii", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert {f"best/object-{row['object']}.mp4" for row in rows} <= films
+    assert all(row["camera"] == "c0" for row in rows if int(row["frame"]) > 65), "only c0 is left"
+    for film in films:
+        with av.open(str(out / film), "r") as container:
+            pictures = list(container.decode(video=0))
+        assert pictures[0].time == 0
+        assert 0 < len(pictures) <= 80
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
+@pytest.mark.slow
+def test_the_sound_of_the_configuration_is_under_every_film(views: Path, tmp_path: Path) -> None:
+    write_flashes(tmp_path / "beeps.wav", 80, codec="pcm_s16le", pictures=False)
+    (tmp_path / "site.yaml").write_text("sound: {source: beeps.wav}", encoding="utf-8")
+    out = tmp_path / "out"
+    done = render(views / "long" / "c0.mp4", "--config", tmp_path / "site.yaml", "--out", out)
+    assert done.returncode == 0, done.stderr
+    with (out / "choices.csv").open(encoding="ascii", newline="") as file:
+        rows = [(int(row["object"]), int(row["frame"]) - 1) for row in csv.DictReader(file)]
+    for number in {number for number, _ in rows}:
+        frames = [frame for it, frame in rows if it == number]
+        data = (out / "best" / f"object-{number}.mp4").read_bytes()
+        expected = [at - frames[0] for at in range(EVERY, 80, EVERY) if frames[0] <= at <= frames[-1]]
+        assert [25 * at for at in beeps(data)] == pytest.approx(expected, abs=1)
+
+
+def test_an_error_on_the_way_leaves_nothing(tmp_path: Path) -> None:
+    write_video(tmp_path / "c0.mp4", 25)
+    damage(write_video(tmp_path / "c1.mp4", 5), [0, 1, 2, 3, 4])
+    before = sorted(tmp_path.iterdir())
+    done = render(tmp_path / "c0.mp4", tmp_path / "c1.mp4", "--out", tmp_path / "out")
+    assert done.returncode == 2
+    [line] = done.stderr.splitlines()
+    assert line.startswith(f"myview: camera c1: {tmp_path / 'c1.mp4'}: there is not one picture")
+    assert sorted(tmp_path.iterdir()) == before
+
+
+@contextmanager
+def begun(folder: Path) -> Iterator[subprocess.Popen[str]]:
+    """Begin a long rendering, and go on once it has begun to write."""
+    (folder / "many").mkdir()
+    cv2.imwrite(str(folder / "one.jpg"), np.zeros((90, 160, 3), np.uint8))
+    for number in range(2000):
+        os.link(folder / "one.jpg", folder / "many" / f"{number:04}.jpg")
+    command = [*MYVIEW, "render", str(folder / "many"), "--out", str(folder / "out")]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT)
+    try:
+        end = time.monotonic() + PATIENCE
+        while not list(folder.glob(".out-*/tracks/many.txt")):
+            assert process.poll() is None
+            assert time.monotonic() < end
+            time.sleep(0.02)
+        yield process
+    finally:
+        process.kill()
+        process.communicate()
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)])
+def test_a_rendering_that_is_broken_off_leaves_nothing(
+    tmp_path: Path, number: signal.Signals, code: int
+) -> None:
+    with begun(tmp_path) as process:
+        process.send_signal(number)
+        _, err = process.communicate(timeout=PATIENCE)
+    assert process.returncode == code
+    assert err == ""
+    assert not list(tmp_path.glob("*out*"))
+
+
+def test_a_view_is_named_after_its_file_as_far_as_a_camera_can_be() -> None:
+    names = ["c0.mp4", "my view (1).mp4", "ä.mp4", "-x.mp4", f"{'long' * 20}.mp4", "a/b/hall-2.avi"]
+    assert [camera_name(Path(name)) for name in names] == [
+        "c0",
+        "my-view-1-",
+        "view",
+        "x",
+        "long" * 8,
+        "hall-2",
+    ]
+
+
+def test_a_recording_is_played_once_whatever_the_configuration_says(tmp_path: Path) -> None:
+    path = write_video(tmp_path / "c0.mp4", 3)
+    base = {"cameras": [{"id": "c0", "source": "elsewhere", "at_end": "loop", "offset": 7}]}
+    [camera] = config_for_videos([path], base=base).cameras
+    assert (camera.at_end, camera.offset, camera.source) == ("stop", 7, str(path))
+
+
+def test_rate_and_size_are_the_first_views_unless_the_configuration_says(tmp_path: Path) -> None:
+    path = write_video(tmp_path / "c0.mp4", 3)
+    site = config_for_videos([path]).site
+    assert (site.fps, site.width, site.height) == (25.0, 64, 48)
+    assert config_for_videos([path], base={"site": {"fps": 10}}).site.fps == 10
+
+
+def test_a_port_that_is_free_is_given_even_if_the_wanted_one_is_not() -> None:
+    first = free_port()
+    assert free_port(first) == first
+    assert free_port(1) != 0

@@ -1,0 +1,213 @@
+"""`myview status` says of a site what the site says of itself, once or again and again."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pytest
+from aiohttp import web
+from aiohttp.test_utils import TestServer
+from rich.console import Console
+
+import client
+from client.status.prometheus_text import Metrics, service_of
+from fakes.cameras import CAMERAS, FPS, small_config, status, tracks, word
+from fakes.command_line import Run
+from fakes.site import A, B, Hall, see
+from fakes.timeouts import PATIENCE
+from fakes.tokens import locked, token_of
+from server.cli.status import command
+from server.cli.status.command import status_live, status_once
+from server.cli.status.display import Rates, render_status
+from server.config.sections import HttpSettings
+from server.http.app import make_app, serving
+from server.messaging.messages import SolverReport
+from server.service.service import BestViewService
+from server.system.errors import UnavailableError, UserError
+
+
+def url(hall: Hall) -> str:
+    return f"http://127.0.0.1:{hall.port}"
+
+
+def printed(now: client.SiteNow, rates: Rates = Rates(), notice: str = "") -> str:  # noqa: B008 — frozen
+    console = Console(width=200, record=True, file=None)
+    with console.capture() as said:
+        console.print(render_status(now, rates, notice))
+    return said.get()
+
+
+async def test_a_site_is_shown_as_it_is(busy: Hall) -> None:
+    solve = SolverReport(objective=-4.0, bound=-4.0, gap=0.0, integral=True, rounds=1)
+    busy.service.intake.status(status(A, fps=24.5, missed=3, shed=2, waiting=7, in_step=False))
+    busy.service.intake.tracks(tracks(word(A, 2, {}, solve=solve, solved_at=0.25)))
+    busy.service.decider.people.roll.names[1] = "Ann"
+    now = await client.status(url(busy))
+    assert (now.name, now.ready, now.why, now.pulse) == ("hall", True, "2 of 2 cameras", 14)
+    one, two = now.cameras
+    assert (one.camera, one.state, one.fps, one.missed, one.shed, one.waiting) == (A, "live", 24.5, 3, 2, 7)
+    assert (one.certified, one.tracking_delay_s, one.in_step) == (1.0, 0.25, False)
+    assert (two.camera, two.certified, two.waiting) == (B, None, None)
+    ann, other = now.people
+    assert (ann.name, ann.camera, ann.cameras, ann.since_s) == ("Ann", B, (A, B), 10 / FPS)
+    assert other.camera == A
+    assert now.service is not None
+    assert now.service.viewers["object"] == 0
+    assert now.service.decided_pulse == busy.service.board.end
+    text = printed(now)
+    assert "hall  " in text
+    assert "ready" in text
+    assert next(it for it in text.splitlines() if it.startswith(A)).split()[:3] == [A, "live", "24.5"]
+    assert "counts by itself" in text
+    assert "1 Ann" in text
+    assert "not recording" in text
+
+
+async def test_a_site_that_is_not_ready_says_why_and_is_a_failure(
+    hall: Hall, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert not await status_once(url(hall), None, as_json=False)
+    said = capsys.readouterr().out
+    assert "not ready: " in said
+    assert "no camera delivers frames" in said
+    assert "nobody is known" in said
+    see(hall)
+    assert await status_once(url(hall), None, as_json=True)
+    told = json.loads(capsys.readouterr().out)
+    assert msgspec.convert(told, client.SiteNow).ready
+    assert [it["camera"] for it in told["cameras"]] == list(CAMERAS)
+
+
+async def test_who_sees_one_camera_alone_is_shown_it_alone_and_no_metrics(tmp_path: Path) -> None:
+    async with locked(tmp_path) as hall:
+        see(hall)
+        now = await client.status(url(hall), client.HttpSettings(token=token_of("door")))
+        assert (now.service, now.pulse, now.ready) == (None, None, True)
+        assert [(it.camera, it.certified) for it in now.cameras] == [(A, None)]
+        assert "viewers" not in printed(now)
+        assert (
+            await client.status(url(hall), client.HttpSettings(token=token_of("desk")))
+        ).service is not None
+        with pytest.raises(UserError, match="MYVIEW_TOKEN"):
+            await status_once(url(hall), None, as_json=False)
+
+
+async def test_nothing_that_is_said_commands_the_terminal(busy: Hall) -> None:
+    now = await client.status(url(busy))
+    evil = "\x1b[2J\x1b]0;owned\x07\nnew [red]line"
+    camera = msgspec.structs.replace(now.cameras[0], message=evil, state=evil, camera=evil)
+    person = msgspec.structs.replace(now.people[0], name=evil, camera=evil, cameras=(evil,))
+    said = printed(
+        msgspec.structs.replace(now, name=evil, ready=False, why=evil, cameras=(camera,), people=(person,)),
+        notice=evil,
+    )
+    assert said.count("·[2J·]0;owned· new [red]line") == 10
+    assert now.service is not None
+    counted = msgspec.structs.replace(now.service, viewers={evil: 1}, waiting={evil: 2})
+    said += printed(msgspec.structs.replace(now, service=counted))
+    assert said.count("·[2J·]0;owned· new [red]line") == 12
+    assert all(it.isprintable() or it == "\n" for it in said)
+
+
+async def test_rates_are_between_two_looks_at_one_run(busy: Hall) -> None:
+    one = await client.status(url(busy))
+    assert one.service is not None
+    later = msgspec.structs.replace(
+        one.service, cpu_s=one.service.cpu_s + 1.0, sent_bytes=one.service.sent_bytes + 500
+    )
+    two = msgspec.structs.replace(one, now=one.now + 2.0, service=later)
+    assert Rates.between(one, two) == Rates(pytest.approx(0.5), pytest.approx(250.0))
+    assert "0.50 cores" in printed(two, Rates.between(one, two))
+    for other in (None, two, msgspec.structs.replace(one, service=None)):
+        assert Rates.between(other, one) == Rates()
+    restarted = msgspec.structs.replace(two, service=msgspec.structs.replace(later, began=1.0))
+    assert Rates.between(one, restarted) == Rates()
+
+
+async def test_a_server_that_goes_and_comes_back_is_waited_for(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(command, "_EVERY_S", 0.01)
+    said: list[Any] = []
+
+    async def until(met: Any) -> None:
+        while not any(met(it) for it in said):
+            await asyncio.sleep(0.01)
+            said.extend(map(json.loads, capsys.readouterr().out.splitlines()))
+
+    async with asyncio.timeout(PATIENCE):
+        async with serving(make_app(BestViewService(small_config())), HttpSettings(port=0)) as port:
+            live = asyncio.create_task(status_live(f"http://127.0.0.1:{port}", None, as_json=True))
+            await until(lambda it: it.get("name") == "hall")
+        await until(lambda it: "away" in it)
+        said.clear()
+        async with serving(make_app(BestViewService(small_config())), HttpSettings(port=port)):
+            await until(lambda it: it.get("name") == "hall")
+            live.cancel()
+            with pytest.raises(asyncio.CancelledError):
+                await live
+
+
+async def test_the_picture_says_that_the_server_is_away_and_that_it_was_restarted(
+    busy: Hall, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    now = await client.status(url(busy))
+    assert now.service is not None
+    other = msgspec.structs.replace(now, service=msgspec.structs.replace(now.service, began=1.0))
+    answers = iter([now, client.AwayError("hall: no answer"), other])
+
+    async def answer(*_: Any) -> client.SiteNow:
+        given = next(answers, None)
+        if given is None:
+            raise client.RefusedError("a token is needed")
+        if isinstance(given, Exception):
+            raise given
+        return given
+
+    monkeypatch.setattr(command, "_EVERY_S", 0.0)
+    monkeypatch.setattr(command, "status", answer)
+    monkeypatch.setattr(command, "Console", lambda: Console(force_terminal=True, width=200))
+    with pytest.raises(UserError, match="a token is needed; --token, or MYVIEW_TOKEN"):
+        await status_live("hall", None, as_json=False)
+    said = capsys.readouterr().out
+    assert "hall: no answer; trying again" in said
+    assert said.index("trying again") < said.index("the service was restarted")
+
+
+async def test_what_is_no_myview_or_not_there_is_one_line(hall: Hall) -> None:
+    with pytest.raises(UserError, match="is not an address"):
+        await status_once("ftp://hall", None, as_json=False)
+    with pytest.raises(UnavailableError, match="status: http"):
+        await status_once("http://127.0.0.1:9", None, as_json=False)
+    with pytest.raises(UserError):
+        await status_once(f"{url(hall)}/api", None, as_json=False)
+
+
+def test_numbers_that_are_none_are_passed_over() -> None:
+    found = Metrics("myview_pulse +Inf\nmyview_decided_pulse NaN\nmyview_recorded_bytes 7\n")
+    assert found.get("myview_pulse") is None
+    assert (service_of(found).decided_pulse, service_of(found).recorded_bytes) == (0, 7)
+
+
+@pytest.mark.parametrize("wrong", [{"fps": 0.0}, {"now": 1e300}])
+async def test_a_site_that_no_site_is_like_is_one_line(hall: Hall, wrong: dict[str, float]) -> None:
+    async def site(_: web.Request) -> web.Response:
+        here = await client.site(url(hall))
+        return web.json_response({**msgspec.to_builtins(here), **wrong})
+
+    app = web.Application()
+    app.router.add_get("/api/site", site)
+    async with TestServer(app) as server:
+        with pytest.raises(UserError, match="does not answer like MyView"):
+            await status_once(str(server.make_url("/")), None, as_json=False)
+
+
+def test_the_command_refuses_in_one_line(myview: Run) -> None:
+    ended = myview("status", "http://127.0.0.1:9", "--once")
+    assert (ended.code, ended.out) == (3, "")
+    assert ended.err.startswith("myview: status: http://127.0.0.1:9")
+    assert len(ended.err.splitlines()) == 1

@@ -1,0 +1,322 @@
+"""The command line: exit code 0, or one line that says what is wrong, and nothing half-written."""
+
+from __future__ import annotations
+
+import os
+import resource
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from fakes.command_line import Run, refusal
+from fakes.media.videos import write_video
+from fakes.system.ports import free
+from fakes.timeouts import PATIENCE
+from server.system.errors import UnavailableError
+from synthetic import scene_names
+
+
+@pytest.fixture
+def run(myview: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Run:
+    """Give a function that runs `myview` in an empty folder."""
+    monkeypatch.chdir(tmp_path)
+    return myview
+
+
+def written(folder: Path) -> set[str]:
+    return {path.name for path in folder.iterdir()}
+
+
+def site(folder: Path, **changes: Any) -> Path:
+    content = {
+        # In this process, which is to stay as it is.
+        "site": {"width": 64, "height": 48, "niceness": 0},
+        "cameras": [{"id": "c0", "source": "c0.mp4"}],
+        **{f: {"port": free()} for f in ("sync", "http")},
+        "zenoh": dict.fromkeys(("connect", "listen"), f"tcp/127.0.0.1:{free()}"),
+        **changes,
+    }
+    path = folder / "site.yaml"
+    path.write_text(yaml.safe_dump(content))
+    return path
+
+
+@pytest.fixture
+def taken() -> Iterator[int]:
+    """Give a port that somebody listens on."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        yield int(server.getsockname()[1])
+
+
+COMMANDS = ["sync", "bestview", "up"]
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize(
+    ("changes", "why"),
+    [
+        ({"htp": {"port": 1}}, "htp: unknown key; did you mean 'http'?"),
+        ({"cameras": [{"id": "a", "source": "x"}] * 2}, "two cameras are called 'a'"),
+        ({"cameras": [{"id": "a", "source": "x", "ground": [[0] * 3] * 3}]}, "not invertible"),
+        ({"cameras": []}, "cameras"),
+        ({"cameras": [{"id": "bestview-1", "source": "x"}]}, "is what a best-view service is called"),
+        ({"zenoh": {"listen": "nonsense"}}, "zenoh.listen"),
+        ({"sync": {"port": 70000}}, "sync.port"),
+        ({"site": {"fps": float("inf")}}, "site.fps"),
+    ],
+)
+def test_a_wrong_configuration_is_refused(
+    run: Run, tmp_path: Path, command: str, changes: dict[str, Any], why: str
+) -> None:
+    assert why in refusal(run(command, site(tmp_path, **changes)))
+
+
+@pytest.mark.parametrize("command", [["sync"], ["camera"], ["bestview"], ["up"]])
+def test_a_missing_configuration_is_refused(run: Run, command: list[str]) -> None:
+    arguments = [*command, "none.yaml", *(["c0"] if command == ["camera"] else [])]
+    assert "none.yaml: cannot read the configuration: No such file" in refusal(run(*arguments))
+
+
+def test_a_configuration_of_odd_keys_or_a_section_from_outside_that_is_none_is_refused(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "odd.yaml").write_text("1: 2\n")
+    assert "mapping of sections" in refusal(run("sync", "odd.yaml"))
+    monkeypatch.setenv("MYVIEW_CAMERAS", "no json")
+    assert "environment" in refusal(run("sync", site(tmp_path)))
+
+
+def test_a_key_that_is_no_section_is_none_from_outside_either(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MYVIEW_GROUND__X", "1")
+    assert "there is no section 'ground'" in refusal(run("sync", site(tmp_path)))
+
+
+DETECTIONS = "".join(f"{n},-1,{n},10,20,40,0.9,-1,-1,-1\n" for n in range(1, 200))
+
+
+@pytest.mark.parametrize(
+    ("words", "why"),
+    [
+        (["track", "--det", "det.txt", "--out", "det.txt"], "is read, and would be replaced"),
+        (["track", "--det", "det.txt", "--out", "sub/../det.txt"], "is read, and would be replaced"),
+        (["calibrate", "points.json", "--out", "points.json"], "is read, and would be replaced"),
+        (["calibrate", "points.json", "--out", "g.json", "--plan", "points.json"], "would be replaced"),
+        (["calibrate", "points.json", "--out", "g.json", "--unit", "metres"], "did you mean 'm'?"),
+        (["evaluate", "--gt", "det.txt", "--tracks", "det.txt", "--json", "det.txt"], "would be replaced"),
+        (["track", "--det", "det.txt", "--out", "pipe"], "is no ordinary file"),
+        (["track", "det.txt", "--out", "t.txt"], "this is text, and no video"),
+        (["render", "det.txt", "--out", "r"], "this is text, and no video"),
+        (["track", "--det", "det.txt", "--out", "t" * 300], "File name too long"),
+        (["watch", "http://127.0.0.1:1", "--out", "x.mp4"], "say whom by --object"),
+        (["watch", "http://127.0.0.1:1", "--object", "1", "--out", "sub"], "is a folder"),
+    ],
+    ids=lambda it: " ".join(it)[:40] if isinstance(it, list) else "",
+)
+def test_what_is_read_or_is_no_file_is_not_replaced_and_what_makes_no_sense_is_not_passed_over(
+    run: Run, tmp_path: Path, words: list[str], why: str
+) -> None:
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "det.txt").write_text(DETECTIONS)
+    (tmp_path / "points.json").write_text('{"cameras": {}}')
+    os.mkfifo(tmp_path / "pipe")
+    before = written(tmp_path)
+    assert why in refusal(run(*words))
+    assert written(tmp_path) == before
+    assert (tmp_path / "det.txt").read_text() == DETECTIONS
+
+
+def test_a_disk_that_takes_no_more_is_one_line_and_leaves_nothing(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "det.txt").write_text(DETECTIONS)
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    ignored = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (64, before[1]))
+    try:
+        line = refusal(run("track", "--det", "det.txt", "--out", "t.txt"))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        signal.signal(signal.SIGXFSZ, ignored)
+    assert "t.txt: cannot write there: File too large" in line
+    assert written(tmp_path) == {"det.txt"}
+
+
+def test_a_level_of_the_log_that_is_none_is_refused(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MYVIEW_LOG", "loud")
+    assert "MYVIEW_LOG" in refusal(run("sync", site(tmp_path)))
+
+
+def test_a_camera_that_is_not_configured_is_refused_with_those_that_are(run: Run, tmp_path: Path) -> None:
+    assert "there is no camera 'c9'; there are c0" in refusal(run("camera", site(tmp_path), "c9"))
+
+
+@pytest.mark.parametrize("command", [["up"], ["camera", "c0"]])
+@pytest.mark.parametrize("content", [None, b"", b"no video at all"])
+def test_a_missing_or_broken_video_is_refused(
+    run: Run, tmp_path: Path, command: list[str], content: bytes | None
+) -> None:
+    if content is not None:
+        (tmp_path / "c0.mp4").write_bytes(content)
+    line = refusal(run(command[0], site(tmp_path), *command[1:]))
+    assert "camera c0: " in line
+    assert "c0.mp4" in line
+
+
+@pytest.mark.parametrize("section", ["http", "sync", "zenoh"])
+def test_a_port_in_use_is_refused_and_nothing_is_written(
+    run: Run, tmp_path: Path, taken: int, section: str
+) -> None:
+    write_video(tmp_path / "c0.mp4", 3)
+    address = dict.fromkeys(("connect", "listen"), f"tcp/127.0.0.1:{taken}")
+    path = site(tmp_path, **{section: address if section == "zenoh" else {"port": taken}})
+    assert f"{section}." in refusal(run("up", path, "--out", "out"))
+    if section != "sync":
+        assert f"{section}." in refusal(run("bestview", path, "--out", "out"))
+    else:
+        assert "the port is in use" in refusal(run("sync", path))
+    assert written(tmp_path) == {"c0.mp4", "site.yaml"}
+
+
+def test_the_port_on_the_command_line_goes_before_the_configurations(
+    run: Run, tmp_path: Path, taken: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MYVIEW_HTTP__PORT", "1")  # so that what the command sets is undone
+    assert f"127.0.0.1:{taken}" in refusal(run("up", site(tmp_path), "--port", taken))
+    assert f"127.0.0.1:{taken}" in refusal(run("demo", "--port", taken, "--no-browser"))
+
+
+@pytest.mark.parametrize("command", ["up", "bestview"])
+def test_an_output_folder_with_something_in_it_is_refused(run: Run, tmp_path: Path, command: str) -> None:
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "mine.txt").write_text("mine")
+    line = refusal(run(command, site(tmp_path), "--out", "out"))
+    assert "out: is there already and is not an empty folder" in line
+
+
+def test_scene_says_which_there_are_and_how_many_look_where_nobody_says(run: Run, tmp_path: Path) -> None:
+    shown = run("scene", "--help").out
+    assert all(f"{name}:" in shown for name in scene_names())
+    ended = run("scene", "fish", "--out", "fish", "--seconds", 0.2, "--size", "128x72")
+    assert (ended.code, ended.err) == (0, "")
+    assert ended.out.splitlines()[-1] == "fish: 1 view, gt/"
+    assert written(tmp_path / "fish") == {"c0.mp4", "gt"}
+
+
+def test_scene_writes_a_recording_or_refuses(run: Run, tmp_path: Path) -> None:
+    small = ["--cameras", 1, "--objects", 1, "--size", "128x72"]
+    ended = run("scene", "room", "--out", "room", "--seconds", 0.2, *small)
+    assert (ended.code, ended.err) == (0, "")
+    assert written(tmp_path / "room") == {"c0.mp4", "gt", "ground.json"}
+    assert "not an empty folder" in refusal(run("scene", "room", "--out", "room", *small))
+    assert "there is no scene 'cellar'" in refusal(run("scene", "cellar", "--out", "new", *small))
+    assert "WIDTHxHEIGHT" in refusal(run("scene", "room", "--out", "new", "--size", "big"))
+    assert "must be even" in refusal(run("scene", "room", "--out", "new", "--size", "129x72"))
+    assert "cameras must be" in refusal(run("scene", "room", "--out", "new", "--cameras", 100))
+    assert "cannot write there" in refusal(run("scene", "room", "--out", "room/c0.mp4/x", *small))
+    assert written(tmp_path) == {"room"}
+
+
+def test_track_writes_a_file_or_refuses(run: Run, tmp_path: Path) -> None:
+    rows = [f"{frame},-1,10,10,8,20,0.9,-1,-1,-1\n" for frame in range(1, 31)]
+    (tmp_path / "det.txt").write_text("".join(rows))
+    (tmp_path / "bad.txt").write_text("1,2,three\n")
+    write_video(tmp_path / "my view (1).mp4", 12)
+    before = written(tmp_path)
+    assert "name a video, or its detections" in refusal(run("track", "--out", "t.txt"))
+    assert "no solver is called 'oracle'" in refusal(
+        run("track", "--det", "det.txt", "--out", "t.txt", "--solver", "oracle")
+    )
+    assert "no such file" in refusal(run("track", "none.mp4", "--out", "t.txt"))
+    assert "No such file" in refusal(run("track", "--det", "none.txt", "--out", "t.txt"))
+    assert "bad.txt" in refusal(run("track", "--det", "bad.txt", "--out", "t.txt"))
+    assert "is a folder" in refusal(run("track", "--det", "det.txt", "--out", tmp_path))
+    assert "cannot write there" in refusal(run("track", "--det", "det.txt", "--out", "det.txt/t.txt"))
+    assert written(tmp_path) == before
+    ended = run("track", "--det", "det.txt", "--out", "t.txt")
+    assert (ended.code, ended.out, ended.err) == (0, "t.txt: 1 people\n", "")
+    assert len((tmp_path / "t.txt").read_text().splitlines()) == 30
+    assert run("track", "my view (1).mp4", "--out", "v.txt").code == 0
+
+
+def test_track_takes_its_settings_from_a_configuration_wherever_it_is(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "det.txt").write_text("1,-1,10,10,8,20,0.9,-1,-1,-1\n")
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "sub" / "ground.json").write_text('{"homography": {}}')
+    path = site(tmp_path / "sub", ground="ground.json", track={"window": {"window": 10, "birth_window": 10}})
+    assert run("track", "--det", "det.txt", "--out", "t.txt", "--config", path).code == 0
+    path = site(tmp_path / "sub", track={"window": {"widow": 10}})
+    assert "widow" in refusal(run("track", "--det", "det.txt", "--out", "t.txt", "--config", path))
+
+
+@pytest.mark.parametrize("seconds", ["nan", "-1"])
+@pytest.mark.parametrize("command", [["demo", "--no-browser"], ["watch", "http://127.0.0.1:1"]], ids=" ".join)
+def test_seconds_that_are_none_are_refused(run: Run, command: list[str], seconds: str) -> None:
+    done = run(*command, "--seconds", seconds)
+    assert done.code == 2
+    assert "--seconds" in done.err
+
+
+def test_watch_says_in_one_line_that_nobody_is_there_now(run: Run) -> None:
+    done = run("watch", f"http://127.0.0.1:{free()}")
+    assert (done.code, done.out) == (UnavailableError.code, "")
+    (line,) = done.err.splitlines()
+    assert line.startswith("myview: watch: ")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "why"),
+    [
+        (["none.mp4"], "none.mp4: no such file or folder"),
+        (["c0.mp4", "none.mp4"], "none.mp4: no such file or folder"),
+        (["empty.mp4"], "empty.mp4: cannot open this video"),
+        (["c0.mp4", "empty.mp4"], "empty.mp4"),
+        (["c0.mp4", "sub/c0.mp4"], "two cameras are called 'c0'"),
+        (["c0.mp4", "--det", "a.txt", "--det", "b.txt"], "--det: 2 detection files for 1 views"),
+        (["c0.mp4", "--det", "a.txt", "b.txt"], "--det: 2 detection files for 1 views"),
+        (["--det", "a.txt", "b.txt", "--", "c0.mp4"], "--det: 2 detection files for 1 views"),
+        (["c0.mp4", "--det", "a.txt"], "a.txt"),
+        (["c0.mp4", "--ground", "none.json"], "none.json"),
+        (["c0.mp4", "--config", "none.yaml"], "none.yaml: cannot read the configuration"),
+        (["c0.mp4", "--config", "wrong.yaml"], "unknown key"),
+        (["/dev/null"], "/dev/null: is not a recorded video"),
+    ],
+)
+def test_render_refuses_and_leaves_nothing(run: Run, tmp_path: Path, arguments: list[str], why: str) -> None:
+    write_video(tmp_path / "c0.mp4", 5)
+    (tmp_path / "sub").mkdir()
+    write_video(tmp_path / "sub" / "c0.mp4", 5)
+    (tmp_path / "empty.mp4").write_bytes(b"")
+    (tmp_path / "wrong.yaml").write_text("sight: {}\n")
+    before = written(tmp_path)
+    assert why in refusal(run("render", "--out", "out", *arguments))
+    assert written(tmp_path) == before
+
+
+def test_help_names_every_command_of_the_contract(run: Run) -> None:
+    ended = run("--help")
+    assert ended.code == 0
+    for command in ("demo", "up", "sync", "camera", "bestview", "render", "track", "scene", "watch"):
+        assert command in ended.out
+
+
+def test_it_says_which_version_it_is(run: Run) -> None:
+    ended = run("--version")
+    assert ended.code == 0
+    assert ended.out == f"myview {version('myview')}\n"
+
+
+def test_help_does_not_wait_for_what_only_commands_need() -> None:
+    look = "import sys, server.cli.main; print(*{'numpy', 'scipy', 'cv2', 'pydantic'} & set(sys.modules))"
+    command = [sys.executable, "-c", look]
+    loaded = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=True)
+    assert loaded.stdout.split() == []

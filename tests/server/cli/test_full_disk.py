@@ -1,0 +1,122 @@
+"""A full disk: nothing empty or half-written is left; of what is recorded live, what came before is kept."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import pytest
+
+import client
+from fakes.cameras import CAMERAS, LARGE, SMALL
+from fakes.command_line import Run, myview
+from fakes.media.videos import write_video
+from fakes.recordings import A, B, pictures
+from fakes.site import Hall, opened
+from fakes.system.full_disk import files_of_at_most
+from server.cli.watch import run_watch
+from server.system.errors import UserError
+
+__all__ = ["myview"]
+
+FRAMES = 30
+
+
+@pytest.fixture
+async def hall() -> AsyncIterator[Hall]:
+    async for it in opened():
+        it.service.come(*CAMERAS)
+        for epoch in range(7):
+            it.service.feed(epoch, {A: {1: LARGE, 2: SMALL}, B: {1: SMALL}})
+        yield it
+
+
+async def recorded(hall: Hall, out: Path) -> None:
+    await run_watch(f"http://127.0.0.1:{hall.port}", 1, out, None, "p0", f"p{FRAMES}")
+
+
+async def size_of_it(hall: Hall, folder: Path) -> int:
+    """Record it on a disk with room enough; give the bytes of its stream."""
+    whole = await client.watch(
+        f"http://127.0.0.1:{hall.port}", 1, folder / "w.mp4", start="p0", end=f"p{FRAMES}"
+    )
+    return whole.bytes
+
+
+@pytest.mark.parametrize("most", [0, 1, 500])
+async def test_a_disk_that_takes_no_picture_is_left_as_it_was(hall: Hall, tmp_path: Path, most: int) -> None:
+    out = tmp_path / "one.mp4"
+    with (
+        files_of_at_most(most),
+        pytest.raises(UserError, match=r"one.mp4: cannot write there: File too large$"),
+    ):
+        await recorded(hall, out)
+    assert not list(tmp_path.iterdir())
+
+
+async def test_an_older_film_is_still_there_where_there_was_no_room_for_a_new_one(
+    hall: Hall, tmp_path: Path
+) -> None:
+    out = tmp_path / "one.mp4"
+    out.write_bytes(b"older")
+    with files_of_at_most(100), pytest.raises(UserError, match=r"File too large$"):
+        await recorded(hall, out)
+    assert out.read_bytes() == b"older"
+    assert [it.name for it in tmp_path.iterdir()] == ["one.mp4"]
+
+
+@pytest.mark.parametrize("part", [0.3, 0.6, 0.95])
+async def test_a_disk_that_fills_up_keeps_whole_pictures_and_nothing_else(
+    hall: Hall, tmp_path: Path, part: float
+) -> None:
+    (tmp_path / "ample").mkdir()
+    size, out = await size_of_it(hall, tmp_path / "ample"), tmp_path / "small" / "one.mp4"
+    out.parent.mkdir()
+    with (
+        files_of_at_most(round(part * size)),
+        pytest.raises(UserError, match=r"File too large; what was recorded before that is kept$"),
+    ):
+        await recorded(hall, out)
+    assert all(it.stat().st_size for it in out.parent.iterdir()), "none is empty"
+    assert "one.mp4" in {it.name for it in out.parent.iterdir()} <= {"one.mp4", "one.vtt", "one.ass"}
+    shown = [place for place, _ in pictures(out)]
+    assert 0 < len(shown) < FRAMES
+    assert shown == list(range(shown[0], shown[0] + len(shown))), "each is whole"
+
+
+async def test_a_film_without_room_for_its_boxes_is_kept_without_them(hall: Hall, tmp_path: Path) -> None:
+    out = tmp_path / "one.mp4"
+    (tmp_path / "one.ass").mkdir()  # nothing can be written there
+    with pytest.raises(UserError, match=r"kept$"):
+        await recorded(hall, out)
+    (tmp_path / "one.ass").rmdir()
+    assert [it.name for it in tmp_path.iterdir()] == ["one.mp4"]
+    assert [place for place, _ in pictures(out)] == list(range(FRAMES))
+
+
+@pytest.mark.parametrize("most", [0, 1000])
+@pytest.mark.parametrize(
+    "command",
+    [
+        "scene room --cameras 1 --objects 1 --seconds 0.4 --size 64x48",
+        "render {video}",
+        "track --det {det}",
+        "calibrate {points}",
+    ],
+)
+def test_a_command_that_finds_no_room_says_so_in_one_line_and_leaves_nothing(
+    tmp_path: Path, myview: Run, command: str, most: int
+) -> None:
+    (tmp_path / "given").mkdir()
+    video = write_video(tmp_path / "given" / "c0.mp4", 12)
+    det = tmp_path / "given" / "det.txt"
+    det.write_text("".join(f"{n},-1,10,5,20,30,1\n" for n in range(1, 200)), encoding="ascii")
+    points = tmp_path / "given" / "points.csv"
+    pairs = "c0,212,300,0,0\nc0,430,296,2.5,0\nc0,390,200,2.5,4\nc0,250,202,0,4\n"
+    points.write_text(f"camera,image_x,image_y,floor_x,floor_y\n{pairs}", encoding="ascii")
+    words = command.format(video=video, det=det, points=points).split()
+    with files_of_at_most(most):
+        done = myview(*words, "--out", tmp_path / "out")
+    assert done.code == 2
+    assert [line.rpartition(": ")[2] for line in done.err.splitlines()] == ["File too large"]
+    assert [it.name for it in tmp_path.iterdir()] == ["given"]

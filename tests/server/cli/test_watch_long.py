@@ -1,0 +1,156 @@
+"""What is watched for a day is written down as what is watched for a minute: its length takes no memory."""
+
+from __future__ import annotations
+
+import json
+import tracemalloc
+from collections.abc import AsyncIterator, Iterator
+from pathlib import Path
+
+import pytest
+
+import client
+from client.model import Box, Gop, Site
+from client.sidecar import sidecars, write_sidecars
+from client.spool import Spool
+from client.stream_events import Commentary, Frame
+from fakes.cameras import CAMERAS, GOP, LARGE, SMALL
+from fakes.recordings import A, B
+from fakes.site import Hall, opened
+
+SITE = Site("hall", 25.0, 320, 240, GOP, 25, None, None, 0.0, ("c0",))
+BOX = Box(1, 40.04, 60.0, 80.0, 160.0)
+VTT = """WEBVTT
+
+NOTE the best view of object 1 of hall; boxes: object, left, top, right, bottom \
+in pixels of a picture of 320x240
+
+p7
+00:00:00.080 --> 00:00:00.120
+{"camera":"c0","boxes":[[1,40.0,60.0,80.0,160.0],[2,1.3,2.0,3.0,4.0]]}
+
+p8
+00:00:00.120 --> 00:00:00.160
+{"camera":"c1","boxes":[]}
+"""
+DRAWN = """Dialogue: 0,00:00:00.08,00:00:00.12,Shown,,0,0,0,,{\\pos(0,0)\\p1}m 40 60 l 80 60 80 160 40 160
+Dialogue: 1,00:00:00.08,00:00:00.12,Name,,0,0,0,,{\\pos(40,58)}1
+Dialogue: 0,00:00:00.08,00:00:00.12,Other,,0,0,0,,{\\pos(0,0)\\p1}m 1 2 l 3 2 3 4 1 4
+Dialogue: 1,00:00:00.08,00:00:00.12,Name,,0,0,0,,{\\pos(1,0)}2
+"""
+
+
+def written(film: Path, frames: list[Frame]) -> tuple[str, str]:
+    write_sidecars(film, iter(frames), 5, 1, SITE)
+    vtt, ass = (path.read_bytes().decode() for path in sidecars(film))
+    return vtt, ass.partition("Effect, Text\n")[2]
+
+
+def test_the_files_are_these_to_the_byte(tmp_path: Path) -> None:
+    frames = [Frame(7, "c0", (BOX, Box(2, 1.26, 2.0, 3.0, 4.0))), Frame(8, "c1", ())]
+    assert written(tmp_path / "one.mp4", frames) == (VTT, DRAWN)
+    head = "\n".join(VTT.split("\n")[:3]) + "\n"
+    assert written(tmp_path / "none.mp4", []) == (head, "\n")
+
+
+def peak(film: Path, frames: int) -> int:
+    """Give the bytes that writing takes at most."""
+    everything: Iterator[Frame] = (Frame(pulse, "c0", (BOX,) * 5) for pulse in range(frames))
+    tracemalloc.start()
+    try:
+        write_sidecars(film, everything, 0, 1, SITE)
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+
+
+def test_ten_times_as_many_frames_take_no_more_memory(tmp_path: Path) -> None:
+    film = tmp_path / "one.mp4"
+    peak(film, 10)  # whatever is there but once
+    few, many = peak(film, 100), peak(film, 1000)
+    assert film.with_suffix(".ass").stat().st_size > 500_000
+    assert many < few + 50_000
+
+
+def told(gop: int) -> Gop:
+    boxes = tuple((BOX,) * 5 for _ in range(GOP))
+    return Gop(first=gop * GOP, frames=GOP, choices={1: "c0"}, boxes={"c0": boxes}, cuts=())
+
+
+def held(folder: Path, gops: int) -> int:
+    """Give the bytes of memory that stay when so much has been said."""
+    spool = Spool(folder)
+    commentary = Commentary(1, keep=spool)
+    commentary.take(told(0))
+    tracemalloc.start()
+    try:
+        for gop in range(gops):
+            commentary.take(told(gop))
+        kept = tracemalloc.get_traced_memory()[0]
+    finally:
+        tracemalloc.stop()
+    assert sum(1 for _ in commentary.frames(0, gops * GOP)) == gops * GOP
+    spool.close()
+    return kept
+
+
+def test_boxes_wait_on_the_disk_for_the_end(tmp_path: Path) -> None:
+    packed = GOP * 5 * 30  # bytes of a GOP's boxes, at least
+    assert held(tmp_path, 500) < 500 * packed / 2
+    assert not list(tmp_path.iterdir()), "the file has no name: it goes with the process"
+
+
+def test_what_is_said_again_counts_and_what_comes_late_is_in_its_place(tmp_path: Path) -> None:
+    spool = Spool(tmp_path)
+    commentary = Commentary(1, keep=spool)
+    for gop in (2, 0, 1):
+        commentary.take(told(gop))
+    again = tuple((BOX,) for _ in range(GOP))
+    commentary.take(Gop(first=GOP, frames=GOP, choices={1: "c1"}, boxes={"c1": again}, cuts=()))
+    frames = list(commentary.frames(0, 3 * GOP))
+    assert [it.pulse for it in frames] == list(range(3 * GOP))
+    assert [len(it.boxes) for it in frames] == [5] * GOP + [1] * GOP + [5] * GOP
+    assert frames[GOP].camera == "c1"
+    spool.close()
+
+
+def test_where_boxes_cannot_be_kept_the_choices_are(tmp_path: Path) -> None:
+    commentary = Commentary(1, keep=Spool(tmp_path / "none"))
+    commentary.take(SITE)
+    commentary.take(told(0))
+    assert commentary.camera_at(0.1) == "c0"
+    assert list(commentary.frames(0, GOP)) == []
+
+
+@pytest.fixture
+async def hall() -> AsyncIterator[Hall]:
+    """Person 1 in both cameras."""
+    async for it in opened():
+        it.service.come(*CAMERAS)
+        for epoch in range(7):
+            it.service.feed(epoch, {A: {1: LARGE}, B: {1: SMALL}})
+        yield it
+
+
+async def test_the_film_is_there_before_anything_is_written_beside_it(
+    hall: Hall, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "one.mp4"
+    names: list[list[str]] = []
+
+    def killed(*_: object) -> None:
+        names.append(sorted(it.name for it in tmp_path.iterdir()))
+        raise MemoryError
+
+    monkeypatch.setattr("client.player.write_sidecars", killed)
+    with pytest.raises(MemoryError):
+        await client.watch(f"http://127.0.0.1:{hall.port}", 1, out, start="p0", end="p25")
+    assert names == [["one.mp4"]]
+
+
+async def test_boxes_of_what_is_watched_are_beside_it(hall: Hall, tmp_path: Path) -> None:
+    out = tmp_path / "one.mp4"
+    await client.watch(f"http://127.0.0.1:{hall.port}", 1, out, start="p0", end="p25")
+    cues = out.with_suffix(".vtt").read_text().strip().split("\n\n")[2:]
+    assert [json.loads(it.split("\n")[2])["boxes"] for it in cues] == [[[1, *LARGE]]] * 25
+    assert sorted(it.name for it in tmp_path.iterdir()) == ["one.ass", "one.mp4", "one.vtt"]

@@ -1,0 +1,144 @@
+"""`watch --out x.webm`: a film of a site of VP8, from time 0, that is whole and can be searched."""
+
+from __future__ import annotations
+
+import asyncio
+import subprocess
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import client
+from client.webm import CLUSTER, ElementReader, WebmError, at_time, made, number
+from client.webm_recording import WebmChangedError, WebmRecording, write_indexed
+from fakes.cameras import FPS, GOP, HEIGHT, STRIDE, WIDTH, encoded
+from fakes.programs import needs_ffmpeg
+from fakes.site import Hall
+from fakes.vp8_site import EPOCHS, feed, own
+from server.media.containers.webm import cluster, header
+
+
+async def test_a_film_is_recorded_over_cuts_with_the_boxes_beside_it(free: Hall, tmp_path: Path) -> None:
+    out, seconds = tmp_path / "one.webm", 3 * GOP / FPS
+    watching = asyncio.create_task(client.watch(f"http://127.0.0.1:{free.port}", 1, out, seconds))
+    while not free.service.splicer.viewers:  # noqa: ASYNC110 — it comes when it comes
+        await asyncio.sleep(0.01)
+    for epoch in range(3, EPOCHS):
+        feed(free, epoch)
+        await asyncio.sleep(0.02)
+    free.service.splicer.close()
+    done = await watching
+    assert (done.complete, done.fragments) == (True, 3 * GOP)
+    assert sorted(it.name for it in tmp_path.iterdir()) == ["one.ass", "one.vtt", "one.webm"]
+    with av.open(str(out)) as film:
+        assert film.duration == round(seconds * av.time_base)
+        shown = [(frame.time, frame.to_ndarray(format="yuv420p")) for frame in film.decode(video=0)]
+    assert [time for time, _ in shown] == pytest.approx([n / FPS for n in range(3 * GOP)])
+    alone = [own(camera) for camera in range(2)]
+    firsts = range(0, EPOCHS * STRIDE, GOP)
+    (begun,) = [n for n in firsts if any(np.array_equal(shown[0][1], camera[n]) for camera in alone)]
+    for n, (_, picture) in enumerate(shown):
+        assert any(np.array_equal(picture, camera[begun + n]) for camera in alone), f"frame {n}"
+
+
+async def test_a_name_of_another_container_is_refused_in_a_line(
+    free: Hall, busy: Hall, tmp_path: Path
+) -> None:
+    with pytest.raises(client.NotFoundError, match=r"these streams are VP8 .* there is best\.webm"):
+        await client.watch(f"http://127.0.0.1:{free.port}", 1, tmp_path / "one.mp4", 1.0)
+    with pytest.raises(client.NotFoundError, match=r"these streams are H\.264 .* there is best\.mp4"):
+        await client.watch(f"http://127.0.0.1:{busy.port}", 1, tmp_path / "one.webm", 1.0)
+    assert not list(tmp_path.iterdir())
+
+
+async def test_who_only_watches_need_not_know_the_container(free: Hall) -> None:
+    watching = asyncio.create_task(client.watch(f"http://127.0.0.1:{free.port}", 1, None, GOP / FPS))
+    while not free.service.splicer.viewers:  # noqa: ASYNC110 — it comes when it comes
+        await asyncio.sleep(0.01)
+    for epoch in range(3, EPOCHS):
+        feed(free, epoch)
+        await asyncio.sleep(0.01)
+    assert (await watching).fragments == GOP
+
+
+START = 1000
+HEAD = header(WIDTH, HEIGHT, FPS)
+
+
+def stream(first: int, until: int) -> bytes:
+    units = encoded(0, codec="vp8")
+    return HEAD + b"".join(
+        cluster(units[n].data, START + n, FPS, key=units[n].key) for n in range(first, until)
+    )
+
+
+def take(record: WebmRecording, data: bytes, step: int) -> bool:
+    """Take a connection's bytes, as the network cuts them."""
+    record.reconnected()
+    reader = ElementReader()
+    for at in range(0, len(data), step):
+        for element in reader.feed(data[at : at + step]):
+            if not record.take(element):
+                return False
+    return True
+
+
+@settings(max_examples=15, deadline=None)
+@given(data=st.data())
+def test_however_often_it_was_interrupted_the_film_is_the_same(
+    data: st.DataObject, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    folder = tmp_path_factory.mktemp("film")
+    part, out = folder / "part", folder / "film.webm"
+    cuts = sorted(data.draw(st.sets(st.integers(0, 29), max_size=3)))
+    with part.open("wb") as file:
+        record = WebmRecording(file, 30 / FPS)
+        for first, last in zip([0, *cuts], [*cuts, 40], strict=True):
+            whole = stream(max(0, first // GOP - 1) * GOP, last)  # some of it again
+            torn = data.draw(st.integers(0, 20)) if last < 40 else 0
+            more = take(record, whole[: len(whole) - torn], data.draw(st.integers(50, 5000)))
+        assert not more, "it is full"
+    write_indexed(part, out)
+    keys = [n for n in range(30) if n % GOP == 0]
+    with av.open(str(out)) as film:
+        frames = [(frame.time, frame.key_frame) for frame in film.decode(video=0)]
+        assert [time for time, _ in frames] == pytest.approx([n / FPS for n in range(30)])
+        assert [round(time * FPS) for time, key in frames if key] == keys
+        assert film.duration == round(30 / FPS * av.time_base)
+        for number in keys:  # by the index
+            film.seek(round((number + 2) / FPS * av.time_base))
+            assert next(film.decode(video=0)).time == pytest.approx(number / FPS)
+
+
+@needs_ffmpeg
+def test_ffmpeg_has_nothing_to_complain_of(tmp_path: Path) -> None:
+    part, out = tmp_path / "part", tmp_path / "film.webm"
+    with part.open("wb") as file:
+        assert take(WebmRecording(file, None), stream(0, 40), 1000)
+    for film in (part, out):  # while it is recorded, too
+        if film is out:
+            write_indexed(part, out)
+        command = ["ffmpeg", "-nostdin", "-v", "warning", "-i", str(film), "-f", "null", "-"]
+        assert subprocess.run(command, capture_output=True, text=True, check=True).stderr == ""
+
+
+def test_another_format_ends_the_recording_and_damage_is_named() -> None:
+    record = WebmRecording(None, None)
+    assert take(record, stream(0, 5), 100)
+    with pytest.raises(WebmChangedError):
+        take(record, header(2 * WIDTH, HEIGHT, FPS) + stream(5, 10)[len(HEAD) :], 100)
+    with pytest.raises(WebmError):
+        list(ElementReader().feed(b"\x00\x00\x00\x18ftyp"))
+
+
+def test_a_cluster_that_tells_its_time_twice_and_once_too_short_for_it_is_refused() -> None:
+    timestamp = 0xE7  # RFC 9559
+    twice = made(CLUSTER, number(timestamp, 0x10_0000) + number(timestamp, 1, 1))
+    (element,) = ElementReader().feed(twice)
+    assert len(at_time(element, 0xFF)) == len(twice)
+    with pytest.raises(WebmError, match="room for its time"):
+        at_time(element, 0x100)

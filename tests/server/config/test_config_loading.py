@@ -1,0 +1,220 @@
+"""A configuration is right, or one line says what is wrong with it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from fakes.paths import ROOT
+from server.cli.generated_config import DEMO
+from server.config.loader import build_config, load_config
+from server.system.errors import UserError
+
+
+def site(**changes: Any) -> dict[str, Any]:
+    return {"cameras": [{"id": "c0", "source": "c0.mp4"}, {"id": "c1", "source": "c1.mp4"}], **changes}
+
+
+def complaint(content: dict[str, Any], folder: Path = Path()) -> str:
+    with pytest.raises(UserError) as caught:
+        build_config(content, where="site.yaml", folder=folder)
+    text = str(caught.value)
+    assert "\n" not in text, "an error is one line"
+    assert text.startswith("site.yaml: ")
+    return text
+
+
+def test_unknown_key_is_refused_and_the_likely_one_is_named() -> None:
+    assert "cameras.0.sourc: unknown key; did you mean 'source'?" in complaint(
+        {"cameras": [{"id": "c0", "source": "x", "sourc": "y"}]}
+    )
+    assert "http.prt: unknown key; did you mean 'port'?" in complaint(site(http={"prt": 1}))
+
+
+def test_unknown_key_in_a_librarys_settings_is_refused_at_any_depth() -> None:
+    assert "did you mean 'stride'?" in complaint(site(track={"window": {"strid": 5}}))
+    assert "unknown key" in complaint(site(detect={"median": {"no_such": 5}}))
+
+
+@pytest.mark.parametrize("detect", [{"ahead_every": 0}, {"ahead_frames": -1}])
+def test_a_recording_cannot_be_looked_at_ahead_in_no_steps(detect: dict[str, Any]) -> None:
+    assert "detect: ahead_frames must be at least 0, and ahead_every at least 1" in complaint(
+        site(detect=detect)
+    )
+
+
+@pytest.mark.parametrize(
+    ("detect", "said"),
+    [
+        ({"bins": 0}, "bins must be 1 to 256, not 0"),
+        ({"work_width": 0}, "work_width must be at least 1, not 0"),
+        ({"median": {"samples": 0}}, "samples must be at least 1, not 0"),
+        ({"median": {"learn_every": 0}}, "learn_every must be at least 1, not 0"),
+        ({"median": {"bootstrap_frames": 0}}, "bootstrap_frames must be at least 1, not 0"),
+        ({"ghosts": {"check_every": 0}}, "check_every must be at least 1, not 0"),
+    ],
+)
+def test_counts_of_nothing_are_refused(detect: dict[str, Any], said: str) -> None:
+    assert said in complaint(site(detect=detect))
+
+
+def test_two_cameras_of_one_name_are_refused() -> None:
+    cameras = [{"id": "c0", "source": "a"}, {"id": "c0", "source": "b"}]
+    assert "two cameras are called 'c0'" in complaint({"cameras": cameras})
+
+
+def test_homography_that_is_not_invertible_is_refused_with_its_camera() -> None:
+    flat = [[1.0, 2.0, 3.0], [2.0, 4.0, 6.0], [0.0, 0.0, 1.0]]
+    text = complaint({"cameras": [{"id": "door", "source": "a", "ground": flat}]})
+    assert "camera door" in text
+    assert "not invertible" in text
+
+
+def test_ground_file_is_checked_as_a_cameras_own_homography_is(tmp_path: Path) -> None:
+    (tmp_path / "ground.json").write_text('{"homography": {"c0": [[1, 0], [0, 1]]}}')
+    assert "camera c0" in complaint(site(ground="ground.json"), tmp_path)
+    (tmp_path / "ground.json").write_text("not json")
+    assert "cannot read" in complaint(site(ground="ground.json"), tmp_path)
+    assert "No such file" in complaint(site(ground="absent.json"), tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("unit", "meant"), [("M", "m"), ("metres", "m"), ("meteres", "m"), ("Cm", "cm"), ("millimeter", "mm")]
+)
+def test_a_unit_that_was_meant_for_metres_is_refused_with_what_was_meant(
+    unit: str, meant: str, tmp_path: Path
+) -> None:
+    said = f"{unit!r} is not understood; did you mean {meant!r}?"
+    cameras = [{"id": "c0", "source": "a", "ground_unit": unit}]
+    assert f"cameras.0.ground_unit: {said}" in complaint({"cameras": cameras})
+    (tmp_path / "ground.json").write_text(json.dumps({"unit": unit, "homography": {}}))
+    assert f"unit: {said}" in complaint(site(ground="ground.json"), tmp_path)
+
+
+@pytest.mark.parametrize("unit", [1, "", ["m"]])
+def test_a_unit_that_is_no_word_is_refused(unit: Any, tmp_path: Path) -> None:
+    (tmp_path / "ground.json").write_text(json.dumps({"unit": unit, "homography": {}}))
+    assert f"unit: {unit!r} is no unit" in complaint(site(ground="ground.json"), tmp_path)
+
+
+@pytest.mark.parametrize("unit", ["m", "cm", "mm", "ft", "grid (of 358 x 360)", "person"])
+def test_any_other_word_is_a_unit(unit: str) -> None:
+    cameras = [{"id": "c0", "source": "a", "ground_unit": unit}]
+    assert build_config({"cameras": cameras}, where="", folder=Path()).cameras[0].ground_unit == unit
+
+
+def test_a_floor_that_one_camera_has_mirrored_is_refused_with_its_camera() -> None:
+    level = [[3.0, 0.0, -960.0], [0.0, 0.0, 1200.0], [0.0, 1.0, -240.0]]
+    down = [[0.02, 0.0, 0.0], [0.0, -0.02, 0.0], [0.0, 0.0, 1.0]]
+    past = [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, -1.0, 900.0]]
+    ways = {"c0": level, "c1": down, "c2": [[-it for it in row] for row in level]}
+
+    def cameras(grounds: dict[str, Any]) -> dict[str, Any]:
+        return {"cameras": [{"id": it, "source": "a", "ground": of} for it, of in grounds.items()]}
+
+    build_config(cameras(ways), where="", folder=Path())
+    assert "ground: camera c9 has the floor mirrored against camera c0: " in complaint(
+        cameras(ways | {"c9": past})
+    )
+
+
+def test_with_temporal_consistency_the_lookahead_covers_its_stages() -> None:
+    track = {"tracker": "temporal", "temporal": {"stages": 2, "stage_s": 0.4}}
+    wrong = complaint(site(view={"lookahead": 28}, track=track))
+    assert "must be at least 29 (encode.gop + the frames of all stages of track.temporal, less one)" in wrong
+    enough = build_config(site(view={"lookahead": 29}, track=track), where="", folder=Path())
+    assert enough.track.lag(25.0) == 19
+
+
+def test_stages_without_end_are_refused_before_anybody_counts_their_frames() -> None:
+    track = {"tracker": "temporal", "temporal": {"stage_s": float("inf")}}
+    assert "track.temporal: stages must be 1 to 1000, and stage_s" in complaint(site(track=track))
+
+
+def test_lookahead_shorter_than_the_trackers_lag_is_refused_with_the_least_that_would_do() -> None:
+    assert "must be at least 20" in complaint(site(view={"lookahead": 19}))
+
+
+def test_who_is_settled_must_have_been_told_first() -> None:
+    identity = {"told_after": 7, "regroup": 4, "settled_after": 14}
+    assert "view.identity.settled_after: is 14 frames but must be at least 15" in complaint(
+        site(view={"identity": identity})
+    )
+    config = build_config(
+        site(view={"identity": identity | {"settled_after": 15}}), where="site.yaml", folder=Path()
+    )
+    assert config.view.identity.settled_after == 15
+
+
+@pytest.mark.parametrize(
+    ("section", "value"),
+    [
+        ("site", {"fps": 0}),
+        ("site", {"width": 333}),
+        ("encode", {"gop": 0}),
+        ("http", {"port": 70000}),
+        ("view", {"min_shot_s": 1e9}),
+        ("view", {"goes_on_s": float("inf")}),
+    ],
+)
+def test_values_out_of_range_are_refused(section: str, value: dict[str, Any]) -> None:
+    assert f"{section}.{next(iter(value))}" in complaint(site(**{section: value}))
+
+
+def test_unknown_solver_is_refused_with_the_known_ones() -> None:
+    assert "columns" in complaint(site(track={"solver": "oracle"}))
+
+
+def test_environment_goes_before_the_file(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("MYVIEW_HTTP__PORT", "9999")
+    config = build_config(site(http={"port": 1234}), where="site.yaml", folder=Path())
+    assert config.http.port == 9999
+    assert config.http.host == "127.0.0.1"
+
+
+def test_environment_for_an_unknown_section_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("MYVIEW_HTP__PORT", "9999")
+    assert "MYVIEW_HTP__PORT" in complaint(site())
+
+
+def test_a_list_from_the_environment_is_json_and_who_writes_another_is_told(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("MYVIEW_VIEW__FLAGS__REASONS", '["gap"]')
+    assert build_config(site(), where="", folder=Path()).view.flags.reasons == ["gap"]
+    monkeypatch.setenv("MYVIEW_VIEW__FLAGS__REASONS", "gap")
+    assert "a list, or a whole section, must be JSON" in complaint(site())
+
+
+def test_paths_are_relative_to_the_configuration(tmp_path: Path) -> None:
+    path = tmp_path / "site.yaml"
+    path.write_text(yaml.safe_dump(site()))
+    config = load_config(path)
+    assert config.camera("c0").source == str(tmp_path / "c0.mp4")
+
+
+@pytest.mark.parametrize("content", ["[1, 2]", "a: [", "", "\x00"])
+def test_what_is_no_mapping_of_sections_is_refused(content: str, tmp_path: Path) -> None:
+    path = tmp_path / "site.yaml"
+    path.write_text(content)
+    with pytest.raises(UserError, match=r"site\.yaml") as caught:
+        load_config(path)
+    assert "\n" not in str(caught.value)
+    assert "<unicode string>" not in str(caught.value)
+
+
+def test_every_example_configuration_loads() -> None:
+    examples = sorted((ROOT / "configs").glob("*.yaml"))
+    assert examples
+    for example in examples:
+        load_config(example)
+
+
+def test_the_demos_example_is_the_demo() -> None:
+    example = load_config(ROOT / "configs" / "demo.yaml")
+    embedded = build_config(DEMO, where="demo", folder=Path())
+    assert example == embedded

@@ -1,0 +1,110 @@
+"""Pulses with passwords: every process of a site proves who it is, and what is wrong is one line."""
+
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from camsync import Login, PulseClient, clients_of
+from fakes.command_line import Run, refusal
+from fakes.timeouts import PATIENCE
+from server.cli.generated_config import free_port
+from server.config.loader import load_config
+from server.config.pulse_passwords import pulse_clients, pulse_login, pulse_users
+from server.config.running_config import ActiveConfig
+from server.config.site_config import Config
+from server.supervisor.sync_process import sync_process
+from server.system.errors import UserError
+
+LONG = "0123456789abcdef" * 2
+RIGHT = f"c0:{LONG}\nbestview:{LONG}!\nauditor:{LONG}?\n"
+
+
+def site(folder: Path, users: str | None = RIGHT, **changes: Any) -> Path:
+    """Write a site's configuration, and its file of passwords."""
+    if users is not None:
+        (folder / "sync.users").write_text(users, encoding="utf-8")
+    path = folder / "site.yaml"
+    content = {
+        "cameras": [{"id": "c0", "source": "scene:room"}],
+        "sync": {"port": free_port(), "users": "sync.users"},
+        **changes,
+    }
+    path.write_text(yaml.safe_dump(content), encoding="utf-8")
+    return path
+
+
+def test_the_server_knows_all_and_a_process_its_own(tmp_path: Path) -> None:
+    config = load_config(site(tmp_path))
+    assert pulse_users(config) == {"c0": LONG, "bestview": LONG + "!", "auditor": LONG + "?"}
+    assert pulse_login(config, "c0") == Login("c0", LONG)
+    assert LONG not in repr(pulse_login(config, "c0")), "nor does it stand in any log"
+
+
+def test_without_a_file_nobody_is_asked(tmp_path: Path) -> None:
+    config = load_config(site(tmp_path, sync={"port": 7400}))
+    assert (pulse_users(config), pulse_login(config, "c0")) == (None, None)
+
+
+def test_a_process_needs_no_line_but_its_own(tmp_path: Path) -> None:
+    config = load_config(site(tmp_path, f"c0:{LONG}\n"))
+    assert pulse_login(config, "c0") == Login("c0", LONG)
+    with pytest.raises(UserError, match="has no line for 'bestview', as which this process comes"):
+        pulse_login(config, "bestview")
+
+
+def test_every_service_of_a_site_has_its_line(tmp_path: Path) -> None:
+    config = load_config(site(tmp_path, view={"share": {"of": 3}}))
+    assert pulse_clients(config) == ("c0", "bestview", "bestview-1", "bestview-2")
+    with pytest.raises(UserError, match="has no line for bestview-1, bestview-2: pulses would wait"):
+        pulse_users(config)
+
+
+@pytest.mark.parametrize(
+    ("users", "words"),
+    [
+        (None, r"sync\.users: cannot read .*sync\.users: No such file"),
+        ("c0\n", "line 1 is no name:password"),
+        (f"c0:{LONG}\nc0:{LONG}\n", "lines 1 and 2 are for the same name"),
+        (f"c0:{LONG}\nbestview:secret\n", "the password of 'bestview' has less than 32 characters"),
+        (f"c0:{LONG}\n", "has no line for bestview"),
+    ],
+)
+def test_a_server_that_could_not_know_who_comes_refuses_with_one_line(
+    myview: Run, tmp_path: Path, users: str | None, words: str
+) -> None:
+    path = site(tmp_path, users)
+    with pytest.raises(UserError, match=words) as caught:
+        pulse_users(load_config(path))
+    line = refusal(myview("sync", path))
+    assert line == f"myview: {caught.value}"
+    assert "secret" not in line
+
+
+async def test_the_process_lets_in_who_knows_a_password(tmp_path: Path) -> None:
+    running = ActiveConfig(site(tmp_path))
+    serving = asyncio.create_task(sync_process(running))
+    try:
+        async with asyncio.timeout(PATIENCE):
+            await _pulses_come(running.now)
+            sync = running.now.sync
+            login = pulse_login(running.now, "auditor")
+            assert await clients_of(sync.host, sync.port, PATIENCE, login) == ()
+    finally:
+        serving.cancel()
+        await asyncio.gather(serving, return_exceptions=True)
+
+
+async def _pulses_come(config: Config) -> None:
+    """Come as all whom the server waits for."""
+    sync = config.sync
+
+    async def first(name: str) -> None:
+        async with PulseClient(sync.host, sync.port, name, login=pulse_login(config, name)) as client:
+            assert not (await anext(client)).own
+
+    await asyncio.gather(*(first(name) for name in pulse_clients(config)))

@@ -1,0 +1,133 @@
+"""The file of tokens, and the command that makes one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from fakes.command_line import Run, refusal
+from fakes.tokens import LATER, line_of, write_tokens
+from server.config.tokens_file import read_tokens, token_digest
+from server.system.errors import UserError
+
+SUM = token_digest("x")
+
+
+def test_tokens_are_read_in_the_order_of_the_file(tmp_path: Path) -> None:
+    path = write_tokens(tmp_path / "tokens.yaml", *map(line_of, ("lead", "desk", "family", "door")))
+    tokens = read_tokens(path)
+    assert [it.name for it in tokens] == ["lead", "desk", "family", "door"]
+    assert [(it.role, it.object, it.camera) for it in tokens] == [
+        ("operate", None, None),
+        ("watch", None, None),
+        ("watch", 1, None),
+        ("watch", None, "c0"),
+    ]
+
+
+def test_a_file_without_tokens_lets_nobody_in(tmp_path: Path) -> None:
+    assert read_tokens(write_tokens(tmp_path / "tokens.yaml")) == ()
+
+
+@pytest.mark.parametrize(
+    ("lines", "error"),
+    [
+        ([{"name": "a", "sha256": "short", "role": "watch"}], "tokens.0.sha256: String should match pattern"),
+        (
+            [{"name": "a", "sha256": SUM, "role": "own"}],
+            "tokens.0.role: Input should be 'watch' or 'operate'",
+        ),
+        ([{"name": "a", "sha256": SUM}], "tokens.0.role: Field required"),
+        ([{"name": "a", "sha256": SUM, "role": "watch", "view": "c0"}], "tokens.0.view: unknown key"),
+        (
+            [{"name": "a", "sha256": SUM, "role": "watch", 9000 * "9": 1}],
+            f"tokens.0.{40 * '9'}…: unknown key",
+        ),
+        ([{"name": "a", "sha256": SUM, "role": "watch", "object": 3}], "tokens.0: made: is missing"),
+        (
+            [{"name": "a", "sha256": SUM, "role": "operate", "camera": "c0"}],
+            "tokens.0: role: who operates sees",
+        ),
+        (
+            [{"name": "a", "sha256": SUM, "role": "watch", "object": 3, "camera": "c0", "made": LATER}],
+            "tokens.0: object, camera: a token is for one",
+        ),
+        ([{"name": "a", "sha256": SUM, "role": "watch"}] * 2, "tokens.0 and tokens.1: have the same name, a"),
+        (["a"], "tokens.0: Input should be a valid dictionary"),
+        (
+            [{"name": "a", "sha256": SUM, "role": "watch", "made": "2026-11-22"}],
+            "tokens.0.made: Input should",
+        ),
+        ([{"name": "a\tb", "sha256": SUM, "role": "watch"}], "tokens.0.name: String should match pattern"),
+        ([{"name": "a\nb", "sha256": SUM, "role": "watch"}], "tokens.0.name: is more than a line"),
+    ],
+)
+def test_what_is_wrong_in_the_file_is_said_in_one_line(tmp_path: Path, lines: list[Any], error: str) -> None:
+    path = write_tokens(tmp_path / "tokens.yaml", *lines)
+    with pytest.raises(UserError) as raised:
+        read_tokens(path)
+    assert str(raised.value).startswith(f"{path}: {error}")
+    assert "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "[]",
+        "tokens: 3",
+        "{tokens: [], more: 1}",
+        "a: {",
+        "\x00",
+        "2026-99-99",
+        "[" * 5000,
+        "tokens: &a [*a]",
+        "tokens: !!int x",
+        "tokens: [{1: 2}]",
+    ],
+)
+def test_what_is_no_file_of_tokens_is_said_in_one_line(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "tokens.yaml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(UserError) as raised:
+        read_tokens(path)
+    assert str(raised.value).startswith(f"{path}: ")
+    assert "\n" not in str(raised.value)
+
+
+def test_a_file_that_is_not_there_is_said_in_one_line(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match=r"none\.yaml: cannot read the tokens: No such file or directory"):
+        read_tokens(tmp_path / "none.yaml")
+
+
+@pytest.mark.parametrize(
+    ("options", "limits"),
+    [
+        ([], ("watch", None, None)),
+        (["--operate"], ("operate", None, None)),
+        (["--object", "3"], ("watch", 3, None)),
+        (["--camera", "door"], ("watch", None, "door")),
+    ],
+)
+def test_a_new_token_comes_with_the_line_that_lets_it_in(
+    myview: Run, tmp_path: Path, options: list[str], limits: tuple[Any, ...]
+) -> None:
+    done = myview("token", "Ann's parents", *options)
+    assert done.code == 0
+    lines = done.out.splitlines()
+    token, line = lines[1].strip(), lines[-1]
+    assert len(token) == 43
+    assert token not in line
+    path = tmp_path / "tokens.yaml"
+    path.write_text(f"tokens:\n{line}\n", encoding="utf-8")
+    [read] = read_tokens(path)
+    assert (read.name, read.sha256) == ("Ann's parents", token_digest(token))
+    assert (read.role, read.object, read.camera) == limits
+    assert myview("token", "a").out.splitlines()[1].strip() != token
+
+
+@pytest.mark.parametrize("options", [["--object", "3", "--camera", "c0"], ["--operate", "--object", "3"]])
+def test_what_makes_no_sense_is_refused(myview: Run, options: list[str]) -> None:
+    assert "token: " in refusal(myview("token", "a", *options))

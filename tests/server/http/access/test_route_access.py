@@ -1,0 +1,194 @@
+"""Every address of the server, and who may have its answer: a new one without a decision fails here."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import pytest
+from aiohttp import ClientTimeout, web
+from aiohttp.test_utils import TestClient, TestServer
+
+from fakes.cameras import LARGE, SMALL
+from fakes.site import A, B, Hall, see
+from fakes.tokens import EVERYBODY, bearer, locked
+from server.http.access.access_control import ACCESS, Access, only_who_may
+from server.http.access.csrf import CHANGES
+from server.http.app import make_app
+
+ALL = frozenset(EVERYBODY)
+NOBODY = "nobody"
+ANYBODY = ALL | {NOBODY}
+WATCHERS = frozenset({"lead", "desk"})
+FAMILY = WATCHERS | {"family"}
+"""Of object 1 alone."""
+DOOR = WATCHERS | {"door"}
+"""Of camera c0 alone."""
+
+WHO = {
+    "/": ANYBODY,
+    "/operator": ANYBODY,
+    "/page/{file}": ANYBODY,
+    "/api": ANYBODY,
+    "/api/openapi.json": ANYBODY,
+    "/healthz": ANYBODY,
+    "/readyz": ANYBODY,
+    "/metrics": WATCHERS,
+    "/api/session": ALL,
+    "/api/site": ALL,
+    "/api/objects": ALL,
+    "/api/cameras": ALL,
+    "/api/events": ALL,
+    "/api/flags": ALL,
+    "/api/past": ALL,
+    "/api/objects/{object}/choice": FAMILY,
+    "/api/objects/{object}/past": FAMILY,
+    "/api/cameras/{camera}/past": DOOR,
+    **{
+        f"/objects/{{object}}/{it}": FAMILY
+        for it in (
+            "best.mp4",
+            "best.ts",
+            "best.webm",
+            "best.mjpeg",
+            "best.jpg",
+            "thumb.jpg",
+            "hls/index.m3u8",
+            "hls/init.mp4",
+            "hls/{segment}.m4s",
+            "hls/{segment}.{part}.m4s",
+        )
+    },
+    **{
+        f"/cameras/{{camera}}/{it}": DOOR
+        for it in (
+            "live.mp4",
+            "live.ts",
+            "live.webm",
+            "live.mjpeg",
+            "live.jpg",
+            "hls/index.m3u8",
+            "hls/init.mp4",
+            "hls/{segment}.m4s",
+            "hls/{segment}.{part}.m4s",
+        )
+    },
+}
+"""Who may GET what; all that is below /api/operator/ is the operator's."""
+REFUSED = {401, 403}
+
+
+def who_may(method: str, path: str) -> frozenset[str]:
+    if path.startswith("/api/operator/"):
+        return frozenset({"lead"})
+    if path == "/api/session" and method not in {"GET", "HEAD"}:
+        return frozenset(ANYBODY)
+    return frozenset(WHO[path])
+
+
+@pytest.fixture
+async def site(tmp_path: Path) -> AsyncIterator[Hall]:
+    async with locked(tmp_path) as hall:
+        see(hall)
+        yield hall
+
+
+def all_routes(hall: Hall) -> list[tuple[str, str]]:
+    found = {
+        (route.method, route.resource.canonical)
+        for route in make_app(hall.service).router.routes()
+        if route.resource is not None
+    }
+    return sorted(found)
+
+
+def filled(path: str, number: int = 1, camera: str = A) -> str:
+    for name, value in {
+        "object": number,
+        "camera": camera,
+        "segment": 0,
+        "part": 0,
+        "file": "main.js",
+    }.items():
+        path = path.replace(f"{{{name}}}", str(value))
+    return path
+
+
+async def status(hall: Hall, method: str, path: str, who: str) -> int:
+    """Ask for an answer and do not wait for its body, which may have no end."""
+    heads = {CHANGES: "1", **({} if who == NOBODY else bearer(who))}
+    async with hall.session.request(
+        method,
+        path,
+        headers=heads,
+        data=b"" if method in {"POST", "PUT"} else None,
+        timeout=ClientTimeout(20),
+    ) as answer:
+        answer.close()
+        return answer.status
+
+
+async def test_every_route_lets_in_whom_it_should_and_nobody_else(site: Hall) -> None:
+    routes = all_routes(site)
+    assert len(routes) > 60
+    wrong = []
+    for method, path in routes:
+        for who in sorted(ANYBODY):
+            if who in who_may(method, path) and method == "GET" and path.endswith((".mjpeg", ".jpg")):
+                continue  # a picture takes a process that draws it; HEAD asks the same
+            code = await status(site, method, filled(path), who)
+            may = who in who_may(method, path)
+            if (code in REFUSED) == may or (who == NOBODY and not may and code != 401):
+                wrong.append(f"{who}: {method} {path}: {code}")
+    assert wrong == []
+
+
+async def test_what_is_limited_is_limited_to_one_person_or_one_camera(site: Hall) -> None:
+    for method, path in all_routes(site):
+        if "{object}" in path:
+            assert await status(site, method, filled(path, number=2), "family") == 403, path
+        if "{camera}" in path:
+            assert await status(site, method, filled(path, camera=B), "door") == 403, path
+
+
+async def test_who_is_not_there_is_not_told_apart_from_who_may_not_be_seen(site: Hall) -> None:
+    assert await status(site, "GET", "/objects/99/best.mp4", "family") == 403
+    assert await status(site, "GET", "/cameras/none/live.mp4", "door") == 403
+
+
+async def test_a_view_that_is_held_shows_the_camera_and_so_is_not_for_who_may_see_one_person(
+    site: Hall,
+) -> None:
+    assert await status(site, "GET", "/objects/1/best.mp4?camera=c0", "family") == 403
+    assert await status(site, "GET", "/objects/1/best.mp4?camera=c0", "desk") == 200
+    assert await status(site, "GET", "/objects/1/best.mp4?prefer=c0", "family") == 200
+
+
+async def test_who_may_see_a_person_may_see_whom_they_turned_out_to_be(site: Hall) -> None:
+    assert await status(site, "GET", "/objects/2/best.mp4", "family") == 403
+    site.service.decider.people.merge(2, 1)
+    site.service.feed(3, {A: {1: SMALL, 2: SMALL}, B: {1: LARGE}})
+    assert await status(site, "GET", "/objects/2/best.mp4", "family") == 200
+    assert await status(site, "GET", "/objects/1/best.mp4", "family") == 200
+
+
+async def test_health_asks_nobody_who_they_are_and_has_nobody_wait(site: Hall) -> None:
+    wrong = {"Authorization": "Bearer nothing-that-was-given"}
+    for _ in range(100):
+        async with site.session.get("/api/site", headers=wrong) as answer:
+            if answer.status == 429:  # too many wrong ones
+                break
+    assert answer.status == 429
+    async with site.session.get("/healthz", headers=wrong) as answer:
+        assert answer.status == 200
+
+
+async def test_a_route_that_nobody_has_decided_about_is_closed() -> None:
+    async def handler(_: web.Request) -> web.Response:
+        return web.Response()
+
+    app = web.Application(middlewares=[only_who_may])
+    app[ACCESS] = Access(None, lambda it: it)
+    app.router.add_get("/api/new", handler)
+    async with TestClient(TestServer(app)) as client, client.get("/api/new") as answer:
+        assert answer.status == 403

@@ -1,0 +1,181 @@
+"""Who may see one person, or one camera, is told of nobody and nothing else."""
+
+from __future__ import annotations
+
+import json
+import logging
+from collections.abc import AsyncIterator
+from pathlib import Path
+from typing import Any
+
+import aiohttp
+import pytest
+
+from fakes.cameras import LARGE, SMALL, tracks, word
+from fakes.site import A, B, Hall, see
+from fakes.tokens import bearer, locked, token_of
+from server.messaging.operator_messages import RiskEvent
+
+
+@pytest.fixture
+async def site(tmp_path: Path) -> AsyncIterator[Hall]:
+    async with locked(tmp_path) as hall:
+        see(hall)
+        yield hall
+
+
+async def get(hall: Hall, path: str, who: str) -> Any:
+    async with hall.session.get(path, headers=bearer(who)) as answer:
+        assert answer.status == 200
+        text = await answer.text()
+        return (
+            [json.loads(it) for it in text.splitlines()]
+            if "ndjson" in answer.content_type
+            else json.loads(text)
+        )
+
+
+async def events(answer: aiohttp.ClientResponse, last: int) -> list[tuple[str, Any]]:
+    """Read events up to the GOP that begins at a pulse."""
+    told: list[tuple[str, Any]] = []
+    name = ""
+    while not told or told[-1][0] != "gop" or told[-1][1]["first"] < last:
+        line = (await answer.content.readline()).decode().rstrip("\n")
+        if line.startswith("event: "):
+            name = line.removeprefix("event: ")
+        elif line.startswith("data: "):
+            told.append((name, json.loads(line.removeprefix("data: "))))
+    return told
+
+
+def people_in(gop: dict[str, Any]) -> set[int]:
+    """Give everybody of whom a GOP says anything."""
+    boxes = {box[0] for frames in gop["boxes"].values() for frame in frames for box in frame}
+    told = {it[key] for it in gop["merged"] + gop["split"] for key in ("kept",)}
+    return boxes | {int(it) for it in gop["choices"]} | {it["object"] for it in gop["cuts"]} | told
+
+
+async def test_one_person_alone_is_listed(site: Hall) -> None:
+    assert [it["object"] for it in (await get(site, "/api/objects", "desk"))["objects"]] == [1, 2]
+    assert [it["object"] for it in (await get(site, "/api/objects", "family"))["objects"]] == [1]
+    assert (await get(site, "/api/objects", "door"))["objects"] == []
+
+
+async def test_one_camera_alone_is_listed_and_what_is_wrong_with_others_is_not_told(site: Hall) -> None:
+    site.service.intake.states[B].refused = "its parameters are not those of camera c0"
+    everything = (await get(site, "/api/cameras", "desk"))["cameras"]
+    assert [it["camera"] for it in everything] == [A, B]
+    assert "its parameters" in repr(everything)
+    assert [it["camera"] for it in (await get(site, "/api/cameras", "door"))["cameras"]] == [A]
+    theirs = (await get(site, "/api/cameras", "family"))["cameras"]
+    assert [it["camera"] for it in theirs] == [A, B]
+    assert "its parameters" not in repr(theirs)
+    assert (await get(site, "/api/site", "door"))["cameras"] == [A]
+    assert (await get(site, "/api/site", "family"))["cameras"] == [A, B]
+
+
+async def test_events_are_of_one_person_alone_from_the_first_to_the_next(site: Hall) -> None:
+    async with (
+        site.session.get("/api/events", headers=bearer("family")) as theirs,
+        site.session.get("/api/events", headers=bearer("desk")) as all_of_it,
+    ):
+        site.service.feed(3, {A: {1: LARGE, 2: SMALL}, B: {1: None}})
+        last = site.service.board.end - 5
+        told = await events(theirs, last)
+        assert [name for name, _ in told[:3]] == ["site", "objects", "cameras"]
+        gops = [content for name, content in told if name == "gop"]
+        assert len(gops) > 2
+        assert {it for gop in gops for it in people_in(gop)} == {1}
+        every = [content for name, content in await events(all_of_it, last) if name == "gop"]
+        assert {it for gop in every for it in people_in(gop)} == {1, 2}
+        assert [it["first"] for it in gops] == [it["first"] for it in every]
+        assert [it["choices"]["1"] for it in gops] == [it["choices"]["1"] for it in every]
+
+
+async def test_events_are_of_one_camera_alone(site: Hall) -> None:
+    async with site.session.get("/api/events", headers=bearer("door")) as answer:
+        gops = [content for name, content in await events(answer, 0) if name == "gop"]
+    assert all(set(gop["boxes"]) == {A} for gop in gops)
+    assert not any(gop["choices"] or gop["cuts"] for gop in gops)
+
+
+async def test_flags_are_of_who_may_be_seen_alone(site: Hall, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(
+        "server.service.operator_assist.flag_budget._ONE_S", -1.0
+    )  # both have a flag, though they are of one
+    troubles = [
+        RiskEvent(reason="alike", tracks=[1, 2], pulse=19, margin=0.5, risk=0.5),
+        RiskEvent(reason="fading", tracks=[2], pulse=19, margin=0.5, risk=0.5),
+    ]
+    said = word(A, 3, {1: SMALL, 2: SMALL}, troubles=troubles)
+    async with site.session.get("/api/events", headers=bearer("family")) as theirs:
+        site.service.intake.tracks(tracks(said))
+        site.service.intake.tracks(tracks(word(B, 3, {1: LARGE})))
+        site.service.decide()
+        everything = (await get(site, "/api/flags", "desk"))["flags"]
+        assert [(it["objects"], it["cameras"], it["state"]) for it in everything] == [
+            ([1, 2], [A], "raised"),
+            ([2], [A], "raised"),
+        ]
+        flag = {**everything[0], "objects": [1]}
+        assert (await get(site, "/api/flags", "family"))["flags"] == [flag]
+        site.service.feed(4, {A: {1: LARGE, 2: SMALL}, B: {1: None}})
+        told = await events(theirs, site.service.board.end - 5)
+        assert [content for name, content in told if name == "flag"] == [flag]
+    assert len((await get(site, "/api/flags", "door"))["flags"]) == 2
+    async with site.session.get("/api/events", headers=bearer("family")) as later:
+        names = [name for name, _ in await events(later, 0)]
+        assert names.index("flag") < names.index("gop"), "who comes is told what is open"
+
+
+async def test_the_past_is_of_one_person_alone(site: Hall) -> None:
+    everything = await get(site, "/api/past?from=p0", "desk")
+    theirs = await get(site, "/api/past?from=p0", "family")
+    assert {it for gop in everything for it in people_in({"merged": [], "split": [], **gop})} == {1, 2}
+    assert {it for gop in theirs for it in people_in({"merged": [], "split": [], **gop})} == {1}
+    assert [it["first"] for it in theirs] == [it["first"] for it in everything]
+
+
+async def test_whoever_is_gone_leaves_nothing_behind(site: Hall) -> None:
+    for who in ("family", "door", "desk"):
+        async with site.session.get("/api/events", headers=bearer(who)) as answer:
+            await events(answer, 0)
+
+
+async def test_a_playlist_names_its_segments_with_the_token_it_was_asked_for_with(site: Hall) -> None:
+    for epoch in range(3, 12):
+        site.service.feed(epoch, {A: {1: SMALL, 2: SMALL}, B: {1: LARGE}})
+    token = token_of("family")
+    for query in ({}, {"from": "p0", "to": "live"}):
+        async with site.session.get("/objects/1/hls/index.m3u8", params={**query, "token": token}) as answer:
+            assert answer.status == 200, await answer.text()
+            text = await answer.text()
+        lines = [it for it in text.splitlines() if it and (not it.startswith("#") or "URI=" in it)]
+        assert len(lines) > 1
+        assert all("token=what-family-was-given" in it for it in lines)
+        address = next(it for it in lines if not it.startswith("#"))
+        async with site.session.get(f"/objects/1/hls/{address}") as answer:
+            assert answer.status == 200
+            assert "public" not in answer.headers["Cache-Control"]
+    async with site.session.get("/objects/1/hls/index.m3u8", headers=bearer("family")) as answer:
+        assert "token=" not in await answer.text()
+
+
+async def test_no_token_is_ever_written_to_a_log(site: Hall, caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level(logging.DEBUG)
+    for token in (token_of("desk"), "a wrong one that is as long as a right one"):
+        for path in ("/api/objects", "/objects/1/best.mp4", "/api/nothing", "/objects/99/best.mp4"):
+            async with site.session.get(path, params={"token": token}) as answer:
+                assert token not in str(answer.headers)
+                if answer.status >= 400:
+                    assert token not in await answer.text()
+    site.service.shelves = {}  # a mistake of the server's own is logged, too
+    async with site.session.get("/api/cameras", params={"token": token_of("lead")}) as answer:
+        assert answer.status == 500
+    log = [
+        it.getMessage() + (it.exc_text or "")
+        for it in caplog.records
+        if it.name.startswith(("server", "aiohttp.server"))
+    ]
+    assert log
+    assert not any("given" in line or "wrong one" in line for line in log)

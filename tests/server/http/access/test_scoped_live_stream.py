@@ -1,0 +1,152 @@
+"""Who may see one person alone is shown no room without them: a held picture, and then grey."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fakes.cameras import CAMERAS, FPS, GOP, LARGE
+from fakes.departure import (
+    EPOCHS,
+    PATIENT,
+    begun,
+    chosen,
+    decoded,
+    equal,
+    expected,
+    fetched,
+    go_on,
+    is_grey,
+    left,
+    own,
+    to_the_end,
+)
+from fakes.media.audio import FRAMES as SOUNDING
+from fakes.media.audio import beeps, sends, write_flashes
+from fakes.media.browser_playback import PLAY, seen_in_chromium
+from fakes.programs import needs_chromium
+from fakes.site import Hall
+from fakes.tokens import token_of
+from server.service.streaming.broadcaster import Chunk
+
+HLS = {**PATIENT, "hls_segment_s": 0.4, "hls_window_s": 8.0}
+"""Two GOPs in a segment, and all that there is in the playlist."""
+
+
+@pytest.mark.parametrize("form", ["mp4", "ts", "webm"])
+async def test_the_picture_stands_and_then_is_grey_and_comes_back_with_the_person(
+    tmp_path: Path, form: str
+) -> None:
+    codec = "vp8" if form == "webm" else "h264"
+    async with left(tmp_path, encode={"codec": codec}) as hall:
+        told = go_on(hall, range(3))
+        theirs, all_of_it = [await begun(hall, f"/objects/1/best.{form}", who) for who in ("family", "desk")]
+        told += go_on(hall, range(3, EPOCHS))
+        narrow, full = map(decoded, await to_the_end(hall, theirs, all_of_it))
+    right = expected(told, codec)
+    if form == "ts":  # which begins at some time of its own
+        narrow, full = (
+            {pulse - max(it) + max(right): shown for pulse, shown in it.items()} for it in (narrow, full)
+        )
+    equal(narrow, right)
+    equal(full, chosen(told, codec))
+    grey = [pulse for pulse in narrow if is_grey(narrow[pulse])]
+    assert grey == list(range(grey[0], grey[-1] + 1))
+    assert len(grey) > 3 * GOP
+    assert np.array_equal(narrow[grey[0] - 1], narrow[grey[0] - 2]), "before it is grey, it stands"
+    assert grey[-1] < max(narrow), "who comes back is shown again"
+
+
+async def test_who_comes_while_the_person_is_away_begins_with_grey(tmp_path: Path) -> None:
+    async with left(tmp_path) as hall:
+        told = go_on(hall, range(14))
+        theirs = await begun(hall, "/objects/1/best.mp4", "family")
+        told += go_on(hall, range(14, EPOCHS))
+        shown = decoded((await to_the_end(hall, theirs))[0])
+    assert is_grey(shown[min(shown)])
+    equal(shown, expected(told))
+
+
+async def test_a_camera_that_is_preferred_is_grey_without_the_person_too(tmp_path: Path) -> None:
+    async with left(tmp_path) as hall:
+        told = go_on(hall, range(3))
+        theirs = await begun(hall, "/objects/1/best.mp4?prefer=c0", "family")
+        told += go_on(hall, range(3, EPOCHS))
+        shown = decoded((await to_the_end(hall, theirs))[0])
+    is_as_expected = {pulse: is_grey(picture) for pulse, picture in expected(told).items() if pulse in shown}
+    assert {pulse: is_grey(picture) for pulse, picture in shown.items()} == is_as_expected
+    np.testing.assert_array_equal(shown[max(shown)], own("c0")[max(shown)])
+
+
+async def listed(hall: Hall, pattern: str, who: str) -> bytes:
+    """Fetch what a playlist names, behind what a player needs first."""
+    text = (await fetched(hall, "/objects/1/hls/index.m3u8", who)).decode()
+    names = ["init.mp4", *re.findall(pattern, text, re.MULTILINE)]
+    return b"".join([await fetched(hall, f"/objects/1/hls/{name}", who) for name in names])
+
+
+@pytest.mark.parametrize("pattern", [r"^[0-9]+\.m4s$", r'PART:.*URI="([0-9.]+\.m4s)"'])
+async def test_segments_and_their_parts_are_grey_too_and_everybody_elses_are_not(
+    tmp_path: Path, pattern: str
+) -> None:
+    async with left(tmp_path, http=HLS) as hall:
+        told = go_on(hall, range(EPOCHS - 5))
+        narrow, full = [decoded(await listed(hall, pattern, who)) for who in ("family", "desk")]
+    until = max(full) + 1
+    right = expected(told)
+    for pulse in range(min(narrow), until):  # what stands all segment long lasts
+        standing = narrow[max(it for it in narrow if it <= pulse)]
+        np.testing.assert_array_equal(standing, right[pulse], str(pulse))
+    equal(full, {pulse: picture for pulse, picture in chosen(told).items() if pulse < until})
+    assert any(map(is_grey, narrow.values()))
+
+
+async def test_the_room_is_not_heard_without_the_person(tmp_path: Path) -> None:
+    recording = write_flashes(tmp_path / "flashes.mp4", SOUNDING)
+    async with left(tmp_path, sound={"source": str(recording)}) as hall:
+        sends(hall.service, recording)
+        go_on(hall, range(3))
+        answers = [await begun(hall, "/objects/1/best.mp4", who) for who in ("family", "desk")]
+        go_on(hall, range(3, EPOCHS))
+        narrow, full = await to_the_end(hall, *answers)
+    assert [round(it * FPS) for it in beeps(full)] == [20, 40, 60, 80, 100]
+    assert [round(it * FPS) for it in beeps(narrow)] == [20, 80, 100]
+
+
+@needs_chromium
+@pytest.mark.parametrize("form", ["mp4", "webm"])
+async def test_a_browser_plays_on_through_what_stands_and_what_is_grey(tmp_path: Path, form: str) -> None:
+    codec = "vp8" if form == "webm" else "h264"
+    async with left(tmp_path, encode={"codec": codec}) as hall:
+        go_on(hall, range(3))
+        kind = f'video/{form}; codecs="{hall.service.agreement.codec}"'
+        path = f"/objects/1/best.{form}?token={token_of('family')}"
+        told = await seen_in_chromium(
+            *(hall.port, hall.service.splicer, EPOCHS - 2, lambda gop: go_on(hall, range(gop + 2, gop + 3))),
+            *(PLAY, path, kind, 4),
+        )
+    assert told["error"] == ""
+    assert told["ranges"] == 1
+    assert told["range"][1] == pytest.approx((EPOCHS - 1) * GOP / FPS, abs=1e-3)
+
+
+async def test_grey_is_written_once_for_all_who_are_shown_it(tmp_path: Path) -> None:
+    async with left(tmp_path) as hall:
+        for epoch in range(2):
+            hall.service.feed(epoch, {camera: {1: LARGE, 2: LARGE} for camera in CAMERAS})
+        for epoch in range(2, 14):
+            hall.service.feed(epoch, {camera: {1: None, 2: None} for camera in CAMERAS})
+        viewers = [hall.service.splicer.scoped[number].join() for number in (1, 2)]
+        pieces: list[Chunk] = [viewer._queue[-1] for viewer in viewers]
+    assert pieces[0] is pieces[1]
+    assert pieces[0].start
+
+
+async def test_a_site_without_tokens_has_no_such_streams(tmp_path: Path) -> None:
+    async with left(tmp_path, access={"tokens": None}) as hall:
+        told = go_on(hall, range(14))
+        assert told[-1].choices[1]
+        assert not hall.service.splicer.scoped

@@ -1,0 +1,85 @@
+"""Stills, multipart JPEG and drawn boxes show nobody but whom a token may see, drawn by real processes."""
+
+from __future__ import annotations
+
+import io
+from contextlib import aclosing
+from pathlib import Path
+
+import av
+import cv2
+import numpy as np
+import pytest
+
+from fakes.cameras import GOP
+from fakes.departure import GREY, begun, fetched, go_on, left
+from fakes.drawn_site import Drawn, Image, drawn_room, parts, read_film
+from fakes.tokens import bearer, line_of, write_tokens
+
+NEARLY = 3
+"""Levels that a picture may be off when it was encoded."""
+
+
+def is_nearly_grey(image: Image) -> bool:
+    return bool(np.abs(image.astype(np.int16) - GREY).max() <= NEARLY)
+
+
+def picture_of(jpeg: bytes) -> Image:
+    return np.asarray(cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR), np.uint8)
+
+
+@pytest.mark.parametrize("query", ["", "?overlay=1"])
+async def test_pictures_are_grey_without_the_person(tmp_path: Path, query: str) -> None:
+    async with left(tmp_path) as hall:
+        go_on(hall, range(12))
+        theirs = picture_of(await fetched(hall, f"/objects/1/best.jpg{query}", "family"))
+        everything = picture_of(await fetched(hall, f"/objects/1/best.jpg{query}", "desk"))
+        async with (
+            await begun(hall, f"/objects/1/best.mjpeg{query}", "family") as series,
+            aclosing(parts(series)) as shown,
+        ):
+            go_on(hall, range(12, 14))
+            several = [picture_of((await anext(shown)).jpeg) for _ in range(2)]
+    assert is_nearly_grey(theirs)
+    assert not is_nearly_grey(everything)
+    assert all(map(is_nearly_grey, several))
+
+
+async def test_a_film_with_boxes_is_grey_without_the_person(tmp_path: Path) -> None:
+    async with left(tmp_path) as hall:
+        go_on(hall, range(12))
+        async with await begun(hall, "/objects/1/best.mp4?overlay=1", "family") as film:
+            go_on(hall, range(12, 15))
+            data = await read_film(film, 3 * GOP)
+    with av.open(io.BytesIO(data), "r") as stream:
+        pictures = [it.to_ndarray(format="bgr24") for it in stream.decode(video=0)]
+    assert len(pictures) >= 3 * GOP
+    assert all(map(is_nearly_grey, pictures))
+
+
+async def test_no_box_is_drawn_but_that_of_whom_a_token_may_see(tmp_path: Path) -> None:
+    path = write_tokens(tmp_path / "tokens.yaml", line_of("family"), line_of("desk"))
+    async with aclosing(drawn_room(access={"tokens": str(path)})) as rooms:
+        room = await anext(rooms)
+        told = room.told[max(room.told)]
+        boxes = told.boxes[told.choices[1]][-1]
+        plain = await still(room, "", "desk")
+        theirs, all_of_it = [await still(room, "?overlay=1", who) for who in ("family", "desk")]
+    assert len(boxes) > 1, "somebody else is in the picture"
+    for number, *box in boxes:
+        assert has_box(all_of_it, plain, box)
+        assert has_box(theirs, plain, box) == (number == 1)
+
+
+async def still(room: Drawn, query: str, who: str) -> Image:
+    async with room.session.get(f"/objects/1/best.jpg{query}", headers=bearer(who)) as answer:
+        assert answer.status == 200
+        return picture_of(await answer.read())
+
+
+def has_box(image: Image, plain: Image, box: list[float]) -> bool:
+    """Tell whether a picture differs from the plain one along most of a box's left and right edges."""
+    left, top, right, bottom = (round(edge) for edge in box)
+    changed = np.abs(image.astype(np.int16) - plain).max(axis=2) > 30
+    sides = [changed[max(0, top) : bottom, max(0, x - 1) : x + 2].any(axis=1) for x in (left, right - 1)]
+    return bool(np.concatenate(sides).mean() > 0.5)

@@ -1,0 +1,346 @@
+"""Who may operate without tokens, and signing in with one: what a page of another site can do is nothing."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import aclosing
+from gzip import compress
+from json import loads
+from pathlib import Path
+
+import pytest
+from aiohttp import ClientSession, CookieJar, web
+from aiohttp.test_utils import make_mocked_request
+
+from fakes.site import Hall, opened
+from fakes.tokens import bearer, line_of, locked, token_of, write_tokens
+from server.config.tokens_file import token_digest
+from server.http.access.access_control import COOKIE, Access, Holder
+from server.http.access.csrf import CHANGES
+from server.http.access.local_requests import is_from_here
+from server.http.access.login_failures import Failures
+from server.http.access.sessions import Sessions
+
+SESSION = "/api/session"
+CAMERAS = "/api/operator/cameras"
+MINE = {CHANGES: "1"}
+HEADS_OF_PROXIES = (
+    *("X-Forwarded-Proto", "x-forwarded-proto", "X-Forwarded-Host", "X-Forwarded-Port", "X-Forwarded-Server"),
+    *("X-Forwarded-Prefix", "X-Forwarded-Ssl", "X-Forwarded-Scheme", "X-Forwarded", "Forwarded-For"),
+    *("X-Original-Forwarded-For", "X-Original-Host", "X-Client-IP", "Client-IP", "True-Client-IP"),
+    *(
+        "CF-Connecting-IP",
+        "CF-Ray",
+        "Fastly-Client-IP",
+        "X-Cluster-Client-IP",
+        "X-Azure-ClientIP",
+        "CDN-Loop",
+    ),
+    *("X-Envoy-External-Address", "Front-End-Https", "X-Amzn-Trace-Id", "X-Scheme", "WL-Proxy-Client-IP"),
+)
+"""What one proxy or another sends as the only sign of itself; docs/how-to/secure.md asks for the first."""
+
+
+@pytest.fixture
+async def site(tmp_path: Path) -> AsyncIterator[Hall]:
+    """Serve a site that takes a token."""
+    async with locked(tmp_path) as it:
+        yield it
+
+
+async def asked(
+    hall: Hall, path: str = SESSION, method: str = "GET", json: object = None, **headers: str
+) -> tuple[int, str]:
+    """Give the status and the error; heads are given with _ for -."""
+    heads = {name.replace("_", "-"): value for name, value in headers.items()}
+    async with hall.session.request(method, path, headers=heads, json=json) as answer:
+        assert "Access-Control-Allow-Origin" not in answer.headers
+        return answer.status, (await answer.json()).get("error", "")
+
+
+async def test_without_tokens_anybody_may_watch_and_this_machine_may_operate(hall: Hall) -> None:
+    session = await hall.get_json(SESSION)
+    assert session == {"by_token": False, "name": None, "role": "operate", "object": None, "camera": None}
+    assert await asked(hall, CAMERAS, Host=f"localhost:{hall.port}") == (200, "")
+    async with hall.session.get(SESSION, headers={"X-Forwarded-For": "10.0.0.7"}) as answer:
+        assert (await answer.json())["role"] == "watch"
+
+
+@pytest.mark.parametrize(
+    ("head", "value"),
+    [
+        ("X-Forwarded-For", "127.0.0.1"),
+        ("X-Real-IP", "127.0.0.1"),
+        ("Forwarded", "for=127.0.0.1"),
+        ("Via", "1.1 proxy"),
+        *((head, "https") for head in HEADS_OF_PROXIES),
+        ("Host", "cameras.example"),  # a name that somebody made lead to this machine
+        ("Origin", "https://cameras.example"),
+        ("Referer", "https://cameras.example/operator"),
+    ],
+)
+async def test_without_tokens_nobody_else_may_operate_and_one_line_says_what_to_set(
+    hall: Hall, head: str, value: str
+) -> None:
+    status, error = await asked(hall, CAMERAS, **{head.replace("-", "_"): value})
+    assert status == 403
+    assert "access.tokens" in error
+    assert "\n" not in error
+
+
+def test_what_browsers_and_programs_send_by_themselves_is_no_proxy() -> None:
+    heads = {
+        "Host": "localhost",
+        "User-Agent": "Mozilla/5.0",
+        "Accept": "*/*",
+        "Accept-Language": "en",
+        "Accept-Encoding": "gzip",
+        "Connection": "keep-alive",
+        "Cookie": "myview=1",
+        "Cache-Control": "no-cache",
+        "Sec-Fetch-Site": "same-origin",
+        "Sec-CH-UA": '"x"',
+        "Priority": "u=1",
+        "DNT": "1",
+        "Range": "bytes=0-",
+        "Upgrade-Insecure-Requests": "1",
+        "Origin": "http://localhost",
+        "Referer": "http://localhost/",
+        "Last-Event-ID": "4",
+        "Icy-MetaData": "1",
+        "Content-Type": "application/json",
+        CHANGES: "1",
+    }
+    assert is_from_here(make_mocked_request("GET", CAMERAS, headers=heads).clone(remote="127.0.0.1"))
+
+
+@pytest.mark.parametrize(
+    ("address", "here"),
+    [
+        ("127.0.0.1", True),
+        ("127.8.0.1", True),
+        ("::1", True),
+        ("::ffff:127.0.0.1", True),
+        ("192.168.1.4", False),
+        ("::ffff:192.168.1.4", False),
+        ("fe80::1%eth0", False),
+        ("", False),
+        ("localhost", False),
+    ],
+)
+def test_which_addresses_are_this_machine(address: str, here: bool) -> None:
+    request = make_mocked_request("GET", CAMERAS, headers={"Host": "localhost"})
+    assert is_from_here(request.clone(remote=address)) == here
+
+
+@pytest.mark.parametrize("path", [SESSION, "/api/operator/choosing"])
+@pytest.mark.parametrize("site", ["cross-site", "same-site"])
+async def test_no_page_of_another_site_learns_or_changes_anything(hall: Hall, site: str, path: str) -> None:
+    assert (await asked(hall, path, Sec_Fetch_Site=site))[0] == 403
+    assert (await asked(hall, path, method="DELETE", Sec_Fetch_Site=site))[0] == 403
+    for method in ("PUT", "POST", "DELETE"):
+        status, error = await asked(hall, path, method=method, json={})
+        assert status == 403
+        assert CHANGES in error
+    asks = {"Origin": "https://evil.example", "Access_Control_Request_Method": "DELETE"}
+    assert (await asked(hall, path, method="OPTIONS", **asks))[0] == 403
+
+
+async def test_a_token_is_needed_where_there_are_some_and_nobody_is_told_of_them(site: Hall) -> None:
+    for path in (SESSION, CAMERAS, "/api/objects"):
+        async with site.session.get(path) as answer:
+            assert answer.status == 401
+            assert answer.headers["WWW-Authenticate"] == "Bearer"
+    async with site.session.get(CAMERAS, headers={"Authorization": "Bearer wrong"}) as answer:
+        assert answer.status == 401
+        assert answer.headers["WWW-Authenticate"] == "Bearer"
+    assert (await asked(site, Authorization="Basic d3Jvbmc="))[0] == 401
+    for more in ({}, {"X_Forwarded_For": "10.0.0.7"}):
+        assert await asked(site, CAMERAS, **bearer("lead"), **more) == (200, "")
+    async with site.session.get("/api/operator/config", headers=bearer("lead")) as answer:
+        told = await answer.text()
+    assert not any(line_of(name)["sha256"] in told for name in ("lead", "desk"))
+
+
+async def test_a_token_is_told_what_it_is_for(site: Hall) -> None:
+    async with site.session.get(SESSION, headers=bearer("family")) as answer:
+        assert await answer.json() == {
+            "by_token": True,
+            "name": "family",
+            "role": "watch",
+            "object": 1,
+            "camera": None,
+        }
+    status, error = await asked(site, CAMERAS, **bearer("desk"))
+    assert (status, error) == (403, "the token 'desk' is for watching, and for nothing else")
+
+
+async def test_players_name_the_token_in_the_address(site: Hall) -> None:
+    async with site.session.get("/api/objects", params={"token": token_of("desk")}) as answer:
+        assert answer.status == 200
+    async with site.session.get("/api/objects", params={"token": "wrong"}) as answer:
+        assert answer.status == 401
+
+
+async def sign_in(hall: Hall, name: str) -> str:
+    """Give the cookie, as a browser sends it."""
+    async with hall.session.post(SESSION, headers=MINE, json={"token": token_of(name)}) as answer:
+        assert answer.status == 200
+        [cookie] = answer.cookies.values()
+    hall.session.cookie_jar.clear()
+    return f"{cookie.key}={cookie.value}"
+
+
+async def test_who_signs_in_has_a_cookie_that_no_script_reads_and_signs_out(site: Hall) -> None:
+    async with site.session.post(SESSION, headers=MINE, json={"token": token_of("lead")}) as answer:
+        assert answer.status == 200
+        [cookie] = answer.cookies.values()
+    assert cookie["httponly"]
+    assert cookie["samesite"] == "Strict"
+    assert not cookie["secure"]
+    assert token_of("lead") not in cookie.value
+    kept = f"{cookie.key}={cookie.value}"
+    assert await asked(site, CAMERAS, Cookie=kept) == (200, "")
+    async with site.session.delete(SESSION, headers={**MINE, "Cookie": kept}) as answer:
+        assert answer.status == 204
+    assert (await asked(site, CAMERAS, Cookie=kept))[0] == 401  # not only forgotten by the browser
+
+
+async def test_behind_a_proxy_that_encrypts_the_cookie_is_never_sent_in_the_open(site: Hall) -> None:
+    heads = {**MINE, "X-Forwarded-Proto": "https"}
+    async with site.session.post(SESSION, headers=heads, json={"token": token_of("desk")}) as answer:
+        [cookie] = answer.cookies.values()
+    assert cookie["secure"]
+
+
+async def test_a_token_that_is_named_goes_before_the_sign_in(site: Hall) -> None:
+    kept = await sign_in(site, "desk")
+    assert (await asked(site, CAMERAS, Cookie=kept))[0] == 403
+    assert (await asked(site, CAMERAS, Cookie=kept, **bearer("lead")))[0] == 200
+
+
+async def test_who_signs_in_to_another_service_of_the_machine_stays_signed_in_here(
+    site: Hall, tmp_path: Path
+) -> None:
+    url = f"http://127.0.0.1:{site.port}{SESSION}"
+    tokens = write_tokens(tmp_path / "yard.yaml", line_of("lead"))
+    other = {"site": {"name": "yard"}, "access": {"tokens": str(tokens)}}
+    async with (
+        aclosing(opened(**other)) as halls,
+        ClientSession(cookie_jar=CookieJar(unsafe=True)) as browser,
+    ):
+        for address in (url, f"http://127.0.0.1:{(await anext(halls)).port}{SESSION}", url):
+            async with browser.get(address) as answer:
+                known = answer.status == 200
+            if not known:
+                async with browser.post(address, headers=MINE, json={"token": token_of("lead")}) as answer:
+                    assert answer.status == 200
+    assert known
+
+
+def test_a_session_ends_and_so_does_the_oldest_of_very_many_of_one_token() -> None:
+    now = [0.0]
+    sessions = Sessions(lambda: now[0])
+    keys = [token_digest(sessions.open("a")) for _ in range(1024)]
+    other = token_digest(sessions.open("b"))
+    assert [sessions.token(it) for it in (keys[0], keys[-1], other)] == ["a", "a", "b"]
+    now[0] = 1.0
+    new = token_digest(sessions.open("a"))
+    assert [sessions.token(it) for it in (keys[0], keys[1], new, other)] == [None, "a", "a", "b"]
+    now[0] = 12 * 3600.0
+    assert [sessions.token(it) for it in (keys[1], new)] == [None, "a"]
+    assert sessions.token("") is None
+
+
+@pytest.mark.parametrize(
+    "head", [b"Authorization: Bearer \xff\xfe", f"Cookie: {COOKIE}_hall_0=".encode() + b"\xff"]
+)
+async def test_bytes_that_are_no_text_are_no_token_and_no_sign_in(site: Hall, head: bytes) -> None:
+    reader, writer = await asyncio.open_connection("127.0.0.1", site.port)
+    writer.write(f"GET {SESSION} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n".encode() + head)
+    writer.write(b"\r\n\r\n")
+    assert (await reader.readline()).split()[1] == b"401"
+    writer.close()
+    await writer.wait_closed()
+
+
+async def test_wrong_tokens_are_limited_in_rate_and_a_right_one_waits_too_unless_it_was_here_before(
+    site: Hall,
+) -> None:
+    assert (await asked(site, **bearer("desk")))[0] == 200
+    codes = [(await asked(site, Authorization=f"Bearer {it}"))[0] for it in range(7)]
+    assert codes == 5 * [401] + 2 * [429]
+    async with site.session.post(SESSION, headers=MINE, json={"token": token_of("lead")}) as answer:
+        assert answer.status == 429
+        seconds = int(answer.headers["Retry-After"])
+        assert 1 <= seconds <= 12
+        assert (await answer.json())["error"] == f"too many wrong tokens; try again in {seconds} s"
+    assert (await asked(site, **bearer("desk")))[0] == 200, "behind one address there may be others"
+    async with site.session.get("/metrics", headers=bearer("desk")) as answer:
+        assert "myview_wrong_tokens_total 5.0" in (await answer.text()).splitlines()
+
+
+def test_nobody_is_told_to_wait_for_no_time(tmp_path: Path) -> None:
+    now = [0.0]
+    tokens = write_tokens(tmp_path / "tokens.yaml", line_of("desk"))
+    access = Access(tokens, lambda it: it, now=lambda: now[0])
+    request = make_mocked_request("GET", "/")
+    for _ in range(5):
+        access.known(request, "wrong")
+    now[0] = 12 - 0.1
+    answer = access.known(request, token_of("desk"))
+    assert isinstance(answer, web.Response)
+    assert loads(answer.text or "")["error"].endswith("try again in 1 s")
+    now[0] = 12.0
+    assert access.known(request, token_of("desk")) == Holder(token_digest(token_of("desk")))
+
+
+async def test_a_cookie_that_has_run_out_is_no_wrong_token(site: Hall) -> None:
+    codes = [(await asked(site, Cookie=f"{COOKIE}_hall_0={it}"))[0] for it in range(9)]
+    assert codes == 9 * [401]
+
+
+def test_failures_are_forgotten_one_by_one_and_each_address_has_its_own() -> None:
+    now = [0.0]
+    failures = Failures(lambda: now[0])
+    for _ in range(6):
+        failures.add("10.0.0.7")
+    assert failures.wait("10.0.0.7") == pytest.approx(24.0)
+    assert failures.wait("10.0.0.8") == 0
+    now[0] = 24.0
+    assert failures.wait("10.0.0.7") == 0
+    failures.add("10.0.0.7")
+    assert failures.wait("10.0.0.7") == pytest.approx(12.0)
+    for other in range(3000):
+        failures.add(str(other))
+    assert len(failures._until) <= 1024
+
+
+@pytest.mark.parametrize("body", ["", "no JSON", "[]", '{"token": 7}', '{"token": "x", "more": 1}'])
+async def test_what_is_no_sign_in_is_said_in_one_line(site: Hall, body: str) -> None:
+    async with site.session.post(SESSION, headers=MINE, data=body) as answer:
+        assert answer.status == 400
+        error = (await answer.json())["error"]
+    assert error.startswith("the request's JSON: ")
+    assert "\n" not in error
+
+
+@pytest.mark.parametrize("packing", ["gzip", "deflate"])
+async def test_nothing_is_unpacked_for_who_has_not_shown_a_token(site: Hall, packing: str) -> None:
+    heads = {**MINE, "Content-Encoding": packing}
+    packed = compress(b'{"token": "x"}') if packing == "gzip" else b"nothing packed"
+    async with site.session.post(SESSION, headers=heads, data=packed) as answer:
+        assert answer.status == 400
+
+
+async def test_there_is_nothing_to_sign_in_to_without_tokens(hall: Hall) -> None:
+    assert (await asked(hall, method="POST", json={"token": "x"}, **{CHANGES: "1"}))[0] == 400
+
+
+async def test_the_page_itself_is_for_everybody_and_tells_nothing(site: Hall) -> None:
+    for path in ("/", "/operator"):
+        async with site.session.get(path, headers={"X-Forwarded-For": "10.0.0.7"}) as answer:
+            assert answer.status == 200
+            assert "default-src 'self'" in answer.headers["Content-Security-Policy"]
+            assert "frame-ancestors 'none'" in answer.headers["Content-Security-Policy"]

@@ -1,0 +1,100 @@
+"""Signing in on the viewer's page, in a browser: what it then shows is what the token is for."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+import pytest
+import pytest_asyncio
+from playwright.async_api import Browser, Page, expect
+
+from benchmarks.browser import chromium
+from fakes.paths import AXE
+from fakes.programs import needs_chromium
+from fakes.site import Hall, see
+from fakes.timeouts import PATIENCE_MS
+from fakes.tokens import line_of, locked, token_of, write_tokens
+
+pytestmark = [
+    needs_chromium,
+    pytest.mark.asyncio(loop_scope="module"),
+]
+
+
+@pytest_asyncio.fixture(scope="module", loop_scope="module")
+async def browser() -> AsyncIterator[Browser]:
+    expect.set_options(timeout=PATIENCE_MS)
+    async with chromium() as running:
+        yield running
+
+
+@asynccontextmanager
+async def watching(
+    browser: Browser, folder: Path, address: str = ""
+) -> AsyncIterator[tuple[Hall, Page, list[str]]]:
+    """Open the page of a site that takes tokens and has two people; give what was asked of it, too."""
+    async with locked(folder) as hall:
+        see(hall)
+        page = await browser.new_page(viewport={"width": 1000, "height": 800})
+        page.set_default_timeout(PATIENCE_MS)
+        await page.add_init_script(AXE.read_text(encoding="utf-8") if AXE.exists() else "")
+        complaints: list[str] = []
+        addresses: list[str] = []
+        page.on("pageerror", lambda error: complaints.append(str(error)))
+        page.on("request", lambda request: addresses.append(request.url))
+        await page.goto(f"http://127.0.0.1:{hall.port}/{address}")
+        yield hall, page, addresses
+        await page.close()
+        assert complaints == []
+
+
+async def test_who_signs_in_watches_until_they_sign_out(browser: Browser, tmp_path: Path) -> None:
+    async with watching(browser, tmp_path) as (_, page, _):
+        field = page.get_by_label("Watching needs a token")
+        await field.fill("wrong")
+        await page.get_by_role("button", name="Sign in").click()
+        await expect(page.locator("#sign-in-trouble")).to_have_text("there is no such token, or not any more")
+        await expect(page.locator("#stage")).to_be_hidden()
+        await field.fill(token_of("desk"))
+        await page.keyboard.press("Enter")
+        await expect(page.locator("#people li")).to_have_count(2)
+        await expect(field).to_be_hidden()
+        assert await page.evaluate("document.cookie") == ""
+        await page.locator("#more summary").click()
+        await page.get_by_role("button", name="Sign out").click()
+        await expect(field).to_be_visible()
+        await expect(page.locator("#people li")).to_have_count(0)
+
+
+async def test_a_link_with_a_token_opens_on_one_person_and_tells_it_to_nobody(
+    browser: Browser, tmp_path: Path
+) -> None:
+    token = token_of("family")
+    async with watching(browser, tmp_path, f"?object=1#token={token}") as (_, page, addresses):
+        await expect(page.locator("#people li")).to_have_count(1)
+        await expect(page.get_by_label("Watching needs a token")).to_be_hidden()
+        assert "token" not in await page.evaluate("location.href")
+        asked = [it for it in addresses if "#" not in it]
+        assert any("best.mp4" in it for it in asked)
+        assert not any(token in it for it in asked)
+
+
+async def test_who_is_not_let_in_any_more_is_asked_for_a_token(browser: Browser, tmp_path: Path) -> None:
+    async with watching(browser, tmp_path) as (_, page, _):
+        field = page.get_by_label("Watching needs a token")
+        await field.fill(token_of("desk"))
+        await page.keyboard.press("Enter")
+        await expect(page.locator("#people li")).to_have_count(2)
+        write_tokens(tmp_path / "tokens.yaml", line_of("lead"))
+        await expect(field).to_be_visible()
+
+
+async def test_axe_finds_no_fault_in_signing_in(browser: Browser, tmp_path: Path) -> None:
+    if not AXE.exists():
+        pytest.skip("axe-core is not there: make node_modules/.installed")
+    async with watching(browser, tmp_path) as (_, page, _):
+        await expect(page.get_by_label("Watching needs a token")).to_be_visible()
+        found = await page.evaluate("axe.run()")
+        assert [it["id"] for it in found["violations"]] == []

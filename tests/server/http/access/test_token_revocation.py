@@ -1,0 +1,257 @@
+"""A token that is taken away holds nothing open, and takes no restart."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import os
+import threading
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import aiohttp
+import msgspec
+import pytest
+
+from fakes.cameras import CAMERAS, SMALL
+from fakes.site import A, B, Hall
+from fakes.tokens import LATER, bearer, line_of, locked, token_of, write_tokens
+from server.config.tokens_file import token_digest
+from server.http.access.csrf import CHANGES
+from server.http.access.token_file import TokenFile
+from server.messaging.inbox import Message
+from server.messaging.messages import ZenohKeys
+from server.messaging.retained_state import IdentitySnapshot
+
+
+@pytest.fixture(autouse=True)
+def _looks_often(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("server.http.access.access_control._LOOK_EVERY_S", 0.02)
+
+
+@pytest.fixture
+async def site(tmp_path: Path) -> AsyncIterator[Hall]:
+    async with locked(tmp_path) as hall:
+        hall.service.come(*CAMERAS)
+        for epoch in range(3):
+            hall.service.feed(epoch, {A: {1: SMALL}, B: {}})
+        yield hall
+
+
+async def stream(hall: Hall, path: str, **heads: str) -> aiohttp.ClientResponse:
+    """Open a stream and read its beginning."""
+    answer = await hall.session.get(path, headers=heads)
+    assert answer.status == 200
+    assert await answer.content.read(16)
+    return answer
+
+
+async def ended(answer: aiohttp.ClientResponse) -> None:
+    """Read until the server ends the stream."""
+    with contextlib.suppress(aiohttp.ClientError):  # torn off, or with an end that says so
+        while await answer.content.readany():
+            pass
+    answer.close()
+
+
+@pytest.mark.parametrize("path", ["/objects/1/best.mp4", "/cameras/c0/live.mp4", "/api/events"])
+async def test_streams_of_a_token_that_is_taken_away_end_and_others_go_on(
+    site: Hall, tmp_path: Path, path: str
+) -> None:
+    by_head = await stream(site, path, **bearer("desk"))
+    by_address = await stream(site, f"{path}?token={token_of('desk')}")
+    other = await stream(site, path, **bearer("lead"))
+    write_tokens(tmp_path / "tokens.yaml", line_of("lead"))
+    await ended(by_head)
+    await ended(by_address)
+    async with site.session.get("/api/objects", headers=bearer("desk")) as answer:
+        assert answer.status == 401
+    site.service.feed(3, {A: {1: SMALL}, B: {}})
+    assert await other.content.readany()
+    other.close()
+
+
+async def test_so_do_those_of_a_sign_in_by_it_and_of_who_signs_out(site: Hall, tmp_path: Path) -> None:
+    kept = []
+    for name in ("desk", "desk", "lead"):
+        async with site.session.post(
+            "/api/session", headers={CHANGES: "1"}, json={"token": token_of(name)}
+        ) as answer:
+            [cookie] = answer.cookies.values()
+        site.session.cookie_jar.clear()
+        kept.append(f"{cookie.key}={cookie.value}")
+    signed_out, revoked, other = [await stream(site, "/api/events", Cookie=it) for it in kept]
+    async with site.session.delete("/api/session", headers={CHANGES: "1", "Cookie": kept[0]}):
+        await ended(signed_out)
+    write_tokens(tmp_path / "tokens.yaml", line_of("lead"))
+    await ended(revoked)
+    assert await other.content.readany()
+    other.close()
+
+
+@pytest.mark.parametrize("path", ["/cameras/c0/live.mp4", "/api/events"])
+@pytest.mark.parametrize("less", [{"camera": "c1"}, {"object": 9, "made": LATER}])
+async def test_what_a_token_may_no_longer_see_ends_too(
+    site: Hall, tmp_path: Path, path: str, less: dict[str, object]
+) -> None:
+    answer = await stream(site, path, **bearer("desk"))
+    write_tokens(tmp_path / "tokens.yaml", line_of("desk", role="watch", **less))
+    await ended(answer)
+
+
+@pytest.mark.parametrize("path", ["/objects/1/best.mp4", "/objects/1/best.mjpeg"])
+async def test_a_persons_stream_ends_when_its_token_becomes_one_for_that_person_alone(
+    site: Hall, tmp_path: Path, path: str
+) -> None:
+    """It would go on with the room when the person has left."""
+    answer = await stream(site, path, **bearer("desk"))
+    write_tokens(tmp_path / "tokens.yaml", line_of("desk", role="watch", object=1, made=LATER))
+    await ended(answer)
+
+
+async def test_what_it_may_see_as_before_goes_on(site: Hall, tmp_path: Path) -> None:
+    camera = await stream(site, "/cameras/c0/live.mp4", **bearer("desk"))
+    events = await stream(site, "/api/events", **bearer("desk"))
+    write_tokens(tmp_path / "tokens.yaml", line_of("desk", role="watch", camera="c0"))
+    await ended(events)
+    site.service.feed(3, {A: {1: SMALL}, B: {}})
+    assert await camera.content.readany()
+    camera.close()
+
+
+async def test_a_disk_that_hangs_keeps_no_token_in_force(site: Hall, tmp_path: Path) -> None:
+    """All threads for recordings wait for it; the file of tokens is on another one."""
+    answer = await stream(site, "/api/events", **bearer("desk"))
+    hangs = threading.Event()
+    waiting = [asyncio.create_task(asyncio.to_thread(hangs.wait, 30.0)) for _ in range(64)]
+    await asyncio.sleep(0)
+    write_tokens(tmp_path / "tokens.yaml", line_of("lead"))
+    try:
+        await asyncio.wait_for(ended(answer), 10.0)
+    finally:
+        hangs.set()
+        await asyncio.gather(*waiting)
+
+
+async def test_a_sign_in_ends_in_time_though_the_disk_with_the_tokens_hangs(
+    site: Hall, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    looked, hangs = threading.Event(), threading.Event()
+
+    def look(_: TokenFile) -> None:
+        looked.set()
+        hangs.wait(30.0)
+
+    sessions = {CHANGES: "1"}
+    async with site.session.post("/api/session", headers=sessions, json={"token": token_of("desk")}) as done:
+        [cookie] = done.cookies.values()
+    answer = await stream(site, "/api/events", Cookie=f"{cookie.key}={cookie.value}")
+    monkeypatch.setattr(TokenFile, "look", look)
+    try:
+        await asyncio.to_thread(looked.wait, 10.0)
+        monkeypatch.setattr(
+            "server.http.access.sessions.Sessions.token", lambda *_: None
+        )  # 12 hours are over
+        await asyncio.wait_for(ended(answer), 10.0)
+    finally:
+        hangs.set()
+
+
+async def test_a_new_token_lets_in_without_a_restart(site: Hall, tmp_path: Path) -> None:
+    old = await stream(site, "/api/events", **bearer("desk"))
+    write_tokens(tmp_path / "tokens.yaml", line_of("guest", role="watch"))
+    await ended(old)
+    async with site.session.get("/api/site", headers=bearer("guest")) as answer:
+        assert answer.status == 200
+
+
+@pytest.mark.parametrize(("remembered", "then"), [(None, 403), (4e9, 403), (1000.0, 404)])
+async def test_a_person_s_token_is_void_when_people_were_numbered_anew_since(
+    tmp_path: Path, remembered: float | None, then: int
+) -> None:
+    """Object 1 may be somebody else; where the cameras remember who it is the token goes on."""
+    async with locked(tmp_path) as hall:
+        write_tokens(
+            tmp_path / "tokens.yaml",
+            line_of("family", role="watch", object=1, made="2026-01-01T00:00:00Z"),
+            line_of("guest", role="watch"),
+        )
+        hall.service.come(*CAMERAS)
+        if remembered is not None:
+            said = IdentitySnapshot(pulse=0, boot=1, next=9, since=remembered, people=[])
+            key = ZenohKeys("hall").camera("c0", "remembered")
+            hall.service.remembering.heard(Message(key, msgspec.json.encode(said), b""))
+        while True:  # the file of tokens is looked at now and then
+            await asyncio.sleep(0.1)
+            async with hall.session.get("/api/site", headers=bearer("guest")) as answer:
+                if answer.status == 200:
+                    break
+        async with hall.session.get("/objects/1/best.mp4", headers=bearer("family")) as answer:
+            assert answer.status == 503, "nobody can tell yet"
+        hall.service.feed(0, {camera: {} for camera in CAMERAS})
+        async with hall.session.get("/objects/1/best.mp4", headers=bearer("family")) as answer:
+            assert answer.status == then
+            if then == 403:
+                error = (await answer.json())["error"]
+                assert error.startswith("people have been numbered anew since the token 'family' was made")
+
+
+class Looked:
+    """A file of tokens that is looked at by hand."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.file = TokenFile(write_tokens(path, line_of("desk")))
+
+    def has(self, name: str) -> bool:
+        return self.file.find(token_digest(token_of(name))) is not None
+
+
+@pytest.fixture
+def looked(tmp_path: Path) -> Looked:
+    return Looked(tmp_path / "tokens.yaml")
+
+
+@pytest.mark.parametrize("text", ["tokens: [", "tokens:\n- {name: desk}\n", "", None])
+def test_a_file_that_makes_no_sense_leaves_the_old_one_in_force_and_says_so_once(
+    looked: Looked, text: str | None, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level(logging.INFO)
+    if text is None:
+        looked.path.unlink()
+    else:
+        looked.path.write_text(text, encoding="utf-8")
+    for _ in range(4):
+        looked.file.look()
+        assert looked.has("desk")
+    [line] = caplog.messages
+    assert line.endswith("the 1 tokens as they were stay in force")
+    assert "\n" not in line
+    write_tokens(looked.path, line_of("lead"))
+    for _ in range(2):
+        looked.file.look()
+    assert (looked.has("desk"), looked.has("lead")) == (False, True)
+
+
+def test_a_file_that_is_being_written_is_left_until_it_is_still(looked: Looked) -> None:
+    looked.file.look()
+    write_tokens(looked.path)  # as far as it has come: a list of nobody
+    looked.file.look()
+    assert looked.has("desk")
+    write_tokens(looked.path, line_of("desk"), line_of("lead"))
+    looked.file.look()
+    assert not looked.has("lead")
+    looked.file.look()
+    assert looked.has("desk")
+    assert looked.has("lead")
+
+
+def test_a_file_that_is_replaced_by_another_of_the_same_size_and_time_is_read(looked: Looked) -> None:
+    other = write_tokens(looked.path.with_name("new.yaml"), line_of("lead"))
+    before = looked.path.stat()
+    os.utime(other, ns=(before.st_atime_ns, before.st_mtime_ns))
+    other.replace(looked.path)
+    for _ in range(2):
+        looked.file.look()
+    assert looked.has("lead")

@@ -1,0 +1,145 @@
+"""The API: who is there, which camera shows them, and why."""
+
+from __future__ import annotations
+
+import math
+import re
+
+import pytest
+
+from fakes.cameras import CAMERAS, FPS, GOP, HEIGHT, LARGE, SMALL, WIDTH, encoded, status, thumbnail, video
+from fakes.site import A, B, Hall
+from server.messaging.inbox import Inbox
+
+
+async def test_the_site_is_described(busy: Hall) -> None:
+    site = await busy.get_json("/api/site")
+    assert {key: site[key] for key in ("name", "fps", "width", "height", "gop", "lookahead_frames")} == {
+        "name": "hall",
+        "fps": FPS,
+        "width": WIDTH,
+        "height": HEIGHT,
+        "gop": GOP,
+        "lookahead_frames": 2 * GOP,
+    }
+    assert re.fullmatch(r"avc1\.[0-9A-F]{6}", site["codec"])
+    assert site["cameras"] == list(CAMERAS)
+    assert site["pulse0"] is None
+    assert abs(site["now"]) > 1e9
+
+
+async def test_before_the_first_picture_there_is_no_codec_and_no_stream_yet(hall: Hall) -> None:
+    assert (await hall.get_json("/api/site"))["codec"] is None
+    code, content = await hall.get("/cameras/c0/live.mp4")
+    assert code == 503
+    assert content == {"error": "no camera has delivered a picture yet"}
+    async with hall.session.get("/readyz") as answer:
+        assert answer.status == 503
+    async with hall.session.get("/healthz") as answer:
+        assert (answer.status, await answer.text()) == (200, "ok\n")
+
+
+async def test_health_is_answered_however_much_comes_from_the_cameras(hall: Hall) -> None:
+    """There is one more message for so long that nobody would wait for the last one."""
+    flood: Inbox[int] = Inbox(lambda left: flood.put(left - 1) if left else None, turn_s=0.0)
+    flood.put(100_000)
+    for _ in range(3):
+        async with hall.session.get("/healthz") as answer:
+            assert answer.status == 200
+    assert flood.waiting
+
+
+async def test_everybody_is_listed_with_who_shows_and_who_sees_them(busy: Hall) -> None:
+    one, two = (await busy.get_json("/api/objects"))["objects"]
+    assert one == {
+        "object": 1,
+        "name": None,
+        "also": [],
+        "first_seen": 0,
+        "last_seen": 14,
+        "visible": True,
+        "camera": B,
+        "cameras": [A, B],
+        "thumbnail": None,
+    }
+    assert (two["object"], two["camera"], two["cameras"]) == (2, A, [A])
+
+
+async def test_the_cameras_are_listed_with_how_they_are(busy: Hall) -> None:
+    busy.service.intake.status(status(A, fps=24.5, missed=3, shed=2, load_level=2))
+    c0, c1 = (await busy.get_json("/api/cameras"))["cameras"]
+    assert c0 == {
+        "camera": A,
+        "state": "live",
+        "pulse": 14,
+        "late": 0,
+        "fps": 24.5,
+        "missed": 3,
+        "shed": 2,
+        "load_level": 2,
+        "in_step": True,
+        "message": "",
+    }
+    assert c1["state"] == "live"
+    async with busy.session.get("/readyz") as answer:
+        assert (answer.status, await answer.text()) == (200, "2 of 2 cameras\n")
+
+
+async def test_a_refused_camera_says_why(busy: Hall) -> None:
+    busy.service.intake.video(video(A, encoded(5, crf=40)[0]))
+    c0 = (await busy.get_json("/api/cameras"))["cameras"][0]
+    assert c0["state"] == "refused"
+    assert "parameter sets differ" in c0["message"]
+
+
+async def test_a_choice_of_the_last_minute_is_explained_from_the_first_question_on(busy: Hall) -> None:
+    newest = await busy.get_json("/api/objects/1/choice")
+    busy.service.feed(3, {A: {1: SMALL}, B: {1: LARGE}})
+    assert (await busy.get_json("/api/objects/1/choice"))["first"] == newest["first"] + GOP
+    for at in (f"p{newest['first']}", f"p{newest['first'] + GOP - 1}", f"-{GOP / FPS}"):
+        assert await busy.get_json(f"/api/objects/1/choice?at={at}") == newest
+    for asked, expected, words in (
+        ("1/choice?at=p0", 404, "nothing is kept"),
+        ("1/choice?at=p999999", 404, "nothing is kept"),
+        ("9/choice?at=-1", 404, "object 9"),
+        ("1/choice?at=soon", 400, "at: 'soon' is no moment"),
+    ):
+        code, content = await busy.get(f"/api/objects/{asked}")
+        assert code == expected
+        assert words in content["error"]
+
+
+async def test_a_choice_is_explained(busy: Hall) -> None:
+    choice = await busy.get_json("/api/objects/1/choice")
+    costs, quality, terms, weights = (choice.pop(it) for it in ("costs", "quality", "terms", "weights"))
+    assert 0 == costs[B] < costs[A] < 1
+    assert costs[A] == pytest.approx(1 - quality[A] / quality[B])
+    for camera, worth in quality.items():
+        assert worth == pytest.approx(math.prod(1 - weights[it] * (1 - terms[camera][it]) for it in weights))
+    assert choice.pop("stay") == 0.0
+    assert choice.pop("cut") == pytest.approx((2 * GOP + 0.5 * FPS) * costs[A] + 1.0)
+    assert choice == {
+        "object": 1,
+        "first": GOP,
+        "frames": GOP,
+        "camera": B,
+        "since": 0,
+        "seen": {A: 1.0, B: 1.0},
+        "unfound": {A: 0.0, B: 0.0},
+        "unfound_quality": {A: None, B: None},
+        "before": B,
+        "lookahead": 2 * GOP,
+        "cut_to": A,
+        "switch_cost": 1.0,
+        "reason": "c1 sees this person best over the next frames.",
+    }
+
+
+async def test_a_thumbnail_is_the_chosen_cameras_and_its_address_changes_with_it(busy: Hall) -> None:
+    busy.service.intake.thumbnail(thumbnail(A, 1, b"\xff\xd8 of c0", pulse=14))
+    busy.service.intake.thumbnail(thumbnail(B, 1, b"\xff\xd8 of c1", pulse=10))
+    one = (await busy.get_json("/api/objects"))["objects"][0]
+    assert one["thumbnail"].endswith("objects/1/thumb.jpg?v=10")
+    async with busy.session.get("/objects/1/thumb.jpg?v=10") as answer:
+        assert answer.content_type == "image/jpeg"
+        assert await answer.read() == b"\xff\xd8 of c1"

@@ -1,0 +1,87 @@
+"""Server-sent events: all that a newcomer must know, then every GOP before its video."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from typing import Any
+
+import aiohttp
+
+from fakes.cameras import CAMERAS, GOP, LARGE, SMALL
+from fakes.site import A, B, Hall
+from fakes.timeouts import PATIENCE
+from server.http.access.grants import ALL
+from server.http.api.events import Events
+
+
+async def events(answer: aiohttp.ClientResponse, count: int) -> list[tuple[str, Any]]:
+    told: list[tuple[str, Any]] = []
+    name = ""
+    while len(told) < count:
+        line = (await answer.content.readline()).decode().rstrip("\n")
+        if line.startswith("event: "):
+            name = line.removeprefix("event: ")
+        elif line.startswith("data: "):
+            told.append((name, json.loads(line.removeprefix("data: "))))
+    return told
+
+
+async def test_events_begin_with_what_a_newcomer_must_know_and_go_on_with_every_gop(busy: Hall) -> None:
+    async with busy.session.get("/api/events") as answer:
+        assert answer.content_type == "text/event-stream"
+        told = await events(answer, 5)
+        assert [name for name, _ in told] == ["site", "objects", "cameras", "gop", "gop"]
+        assert [content["first"] for _, content in told[3:]] == [0, GOP]
+        assert told[1][1] == await busy.get_json("/api/objects")
+        busy.service.feed(3, {A: {1: LARGE, 2: SMALL}, B: {1: None}})
+        while (event := (await events(answer, 1))[0])[0] != "gop":
+            pass
+    gop = event[1]
+    assert gop["choices"] == {"1": B, "2": A}
+    assert gop["boxes"][B] == [[[1, *LARGE]]] * GOP
+    assert gop["cuts"] == []
+
+
+async def test_a_cut_is_told_with_both_cameras(busy: Hall) -> None:
+    for epoch in range(3, 6):
+        busy.service.feed(epoch, {A: {1: LARGE}, B: {}})
+    async with busy.session.get("/api/events") as answer:
+        told = await events(answer, 7)
+    cuts = [cut for name, content in told if name == "gop" for cut in content["cuts"]]
+    assert cuts == [{"object": 1, "pulse": 3 * GOP, "from": B, "to": A}]
+
+
+async def test_the_gop_is_told_before_its_video_is_sent(hall: Hall) -> None:
+    order: list[str] = []
+    hall.service.on_decision.append(lambda _: order.append("told"))
+    sent = hall.service.splicer.decision
+
+    def decision(it: Any) -> None:
+        order.append("sent")
+        sent(it)
+
+    hall.service.splicer.decision = decision  # type: ignore[method-assign,assignment]
+    hall.service.come(*CAMERAS)
+    for epoch in range(4):
+        hall.service.feed(epoch, {A: {1: SMALL}, B: {}})
+    assert order == ["told", "sent"] * 3
+
+
+async def test_who_fell_behind_is_told_again_what_goes_on_to_hold(busy: Hall) -> None:
+    told = Events(busy.service)
+    reader = told.join(ALL)
+    for epoch in range(3, 120):
+        busy.service.feed(epoch, {A: {1: LARGE, 2: SMALL}, B: {1: None}})
+    assert reader.lost, "some of what was told, maybe a list"
+    speaking = asyncio.create_task(told.run())
+    lists: set[str] = set()
+    try:
+        async with asyncio.timeout(PATIENCE):
+            async for data in reader:
+                name = data.partition(b"\n")[0].removeprefix(b"event: ").decode()
+                lists |= {name} & {"objects", "cameras", "site"}
+                if len(lists) == 3:
+                    break
+    finally:
+        speaking.cancel()

@@ -1,0 +1,340 @@
+"""Connections have places: whoever asks for nothing makes way and is cut off, and operators always get in."""
+
+from __future__ import annotations
+
+import asyncio
+from collections import Counter
+from collections.abc import AsyncIterator
+from contextlib import AsyncExitStack, ExitStack, aclosing, asynccontextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fakes.cameras import SMALL
+from fakes.certificates import make_certificate
+from fakes.programs import needs_openssl
+from fakes.site import A, B, Hall, opened, see
+from fakes.system.few_descriptors import MYVIEW, awaited, connected, running, written
+from fakes.tokens import bearer, locked
+from server.http.access.csrf import CHANGES
+from server.http.access.networks import network_of
+from server.http.connections.connection_pool import Bounds, Connection, Places
+
+Pair = tuple[asyncio.StreamReader, asyncio.StreamWriter]
+
+ELSEWHERE = {"X-Forwarded-For": "10.0.0.7"}
+"""Of somebody who does not sit at this machine, and so does not operate."""
+SOON = 0.2  # seconds
+GET = "GET {} HTTP/1.1\r\nHost: localhost\r\n{}\r\n"
+
+
+@asynccontextmanager
+async def small(**http: Any) -> AsyncIterator[Hall]:
+    """Serve a hall with people in it; nobody is cut off while a test is slow, but where it says so."""
+    async with aclosing(opened(http={"request_timeout_s": 60.0, **http})) as halls:
+        hall = await anext(halls)
+        see(hall)
+        yield hall
+
+
+async def silent(hall: Hall, begin: str = "") -> Pair:
+    """Connect, and say what is no whole request."""
+    reader, writer = await asyncio.open_connection("127.0.0.1", hall.port)
+    writer.write(begin.encode())
+    return reader, writer
+
+
+async def over(pair: Pair) -> bytes:
+    """Wait until the server ends a connection; give what it said."""
+    reader, writer = pair
+    try:
+        return await reader.read()
+    except ConnectionResetError:
+        return b""
+    finally:
+        writer.close()
+
+
+async def stream(hall: Hall, path: str = "/objects/1/best.ts", heads: str = "X-Forwarded-For: x\r\n") -> Pair:
+    """Watch; give the connection once the stream has begun."""
+    pair = await silent(hall, GET.format(path, heads))
+    assert (await pair[0].readuntil(b"\r\n\r\n")).startswith(b"HTTP/1.1 200")
+    return pair
+
+
+async def status(hall: Hall, path: str, **heads: str) -> int:
+    """Ask by a connection of its own."""
+    lines = "".join(f"{name}: {value}\r\n" for name, value in {**heads, "Connection": "close"}.items())
+    said = await over(await silent(hall, GET.format(path, lines)))
+    return int(said.split(maxsplit=2)[1]) if said else 0
+
+
+@pytest.mark.parametrize("begin", ["", "GET /api/site HTTP/1.1\r\nHost: ha", "\r\n\r\n", "\x16\x03\x01"])
+async def test_a_request_that_does_not_come_whole_is_not_waited_for(begin: str) -> None:
+    async with small(request_timeout_s=SOON) as hall:
+        assert b" 200 " not in await over(await silent(hall, begin))
+
+
+async def test_what_follows_a_head_is_not_waited_for_either(tmp_path: Path) -> None:
+    async with locked(tmp_path, http={"request_timeout_s": SOON}) as hall:
+        head = f"POST /api/session HTTP/1.1\r\nHost: hall\r\n{CHANGES}: 1\r\nContent-Length: 99\r\n\r\n{{"
+        assert await over(await silent(hall, head)) == b""
+
+
+async def test_what_nobody_reads_is_not_kept_either(tmp_path: Path) -> None:
+    async with locked(tmp_path) as hall:
+        body = b" " * 70_000
+        async with hall.session.post("/api/session", data=body, headers={CHANGES: "1"}) as answer:
+            assert answer.status == 413
+
+
+async def test_a_connection_that_asks_for_nothing_more_is_closed() -> None:
+    async with small(keepalive_timeout_s=SOON) as hall:
+        said = await over(await silent(hall, GET.format("/healthz", "")))
+        assert said.endswith(b"ok\n")
+
+
+@needs_openssl
+async def test_who_does_not_begin_https_is_not_waited_for(tmp_path: Path) -> None:
+    tls = make_certificate(tmp_path, "hall")
+    async with small(request_timeout_s=SOON, tls=tls.model_dump()) as hall:
+        for begin in ("", "GET / HTTP/1.1\r\n\r\n"):
+            await over(await silent(hall, begin))
+
+
+@pytest.mark.parametrize("path", ["/objects/1/best.ts", "/api/events"])
+async def test_an_endless_answer_is_no_connection_that_asks_for_nothing(path: str) -> None:
+    async with small(request_timeout_s=1.0, keepalive_timeout_s=SOON) as hall:
+        reader, writer = await stream(hall, path)
+        await over(await silent(hall))  # that one was as quiet, and came later
+        while len(await reader.read(1 << 20)) == 1 << 20:
+            pass  # what there is by now
+        hall.service.feed(3, {A: {1: SMALL, 2: SMALL}, B: {}})
+        assert await reader.read(1)
+        writer.close()
+
+
+async def test_where_places_are_taken_who_has_asked_for_nothing_longest_makes_way() -> None:
+    async with small(connections_max=3) as hall:
+        first, second, third = [await silent(hall) for _ in range(3)]
+        for _ in range(3):
+            assert await status(hall, "/api/site", **ELSEWHERE) == 200
+        await over(first)
+        second[1].write(GET.format("/healthz", "").encode())
+        assert (await second[0].readuntil(b"\r\n\r\n")).startswith(b"HTTP/1.1 200")
+        for _, writer in (second, third):
+            writer.close()
+
+
+async def test_where_all_are_busy_operators_get_in_and_others_are_told_to_come_again() -> None:
+    async with small(connections_max=2) as hall, AsyncExitStack() as stack:
+        for _ in range(2):
+            _, writer = await stream(hall)
+            stack.callback(writer.close)
+        assert await status(hall, "/api/site", **ELSEWHERE) == 503
+        assert await status(hall, "/objects/1/best.jpg", **ELSEWHERE) == 503
+        for open_to_all in ("/healthz", "/", "/operator"):
+            assert await status(hall, open_to_all, **ELSEWHERE) == 200
+        flood = [await silent(hall) for _ in range(100)]
+        assert await status(hall, "/api/operator/cameras") == 200
+        assert await status(hall, "/api/site", **ELSEWHERE) == 503
+        _, writer = await stream(hall, heads="")
+        stack.callback(writer.close)
+        for _, writer in flood:
+            writer.close()
+
+
+async def test_where_all_are_busy_who_operates_is_known_by_token_or_sign_in(tmp_path: Path) -> None:
+    async with locked(tmp_path, http={"connections_max": 1}) as hall:
+        see(hall)
+        async with hall.session.post(
+            "/api/session", json={"token": "what-lead-was-given"}, headers={CHANGES: "1"}
+        ) as answer:
+            [cookie] = answer.cookies.values()
+        desk, lead = bearer("desk"), bearer("lead")
+        _, writer = await stream(hall, heads=f"Authorization: {desk['Authorization']}\r\n")
+        assert await status(hall, "/api/site", **lead) == 200
+        assert await status(hall, "/api/site", Cookie=f"{cookie.key}={cookie.value}") == 200
+        assert await status(hall, "/api/site", **desk) == 503
+        assert await status(hall, "/api/site") == 503
+        writer.close()
+
+
+def test_a_service_keeps_what_it_needs_however_many_come(tmp_path: Path) -> None:
+    path, log = written(tmp_path, 1), tmp_path / "log"
+    port = int(path.read_text().partition("http:\n  port: ")[2].split()[0])
+    ask = b"GET /%s HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n"
+    with running(f"{MYVIEW} bestview {path}", log, descriptors=300), ExitStack() as flood:
+        connected(port).close()
+        for _ in range(500):
+            flood.enter_context(connected(port))
+        for what, said in ((b"healthz", b"ok\n"), (b"metrics", b"process_open_fds")):
+            with connected(port) as asking:
+                asking.settimeout(60)
+                asking.sendall(ask % what)
+                answer = b""
+                while some := asking.recv(1 << 16):
+                    answer += some
+            assert said in answer
+        (open_now,) = [it for it in answer.splitlines() if it.startswith(b"process_open_fds ")]
+        assert float(open_now.split()[1]) < 300 - 32
+        awaited(log, b"http.connections_max")
+    assert b"Traceback" not in log.read_bytes()
+    assert len(log.read_bytes().splitlines()) < 20
+
+
+class Fake:
+    """A connection's other end."""
+
+    def __init__(self) -> None:
+        self.ended = False
+        self.unsent = 0
+
+    def abort(self) -> None:
+        self.ended = True
+
+    def get_write_buffer_size(self) -> int:
+        return self.unsent
+
+
+class Clock:
+    """Seconds that pass when the test says so."""
+
+    now = 0.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+BOUNDS = Bounds(most=6, per_address=3, for_operators=2, request_s=10.0, keepalive_s=100.0)
+ADDRESSES = [
+    "127.0.0.1",
+    "10.0.0.1",
+    "::ffff:10.0.0.1",
+    "10.0.0.2",
+    "2001:db8::1",
+    "2001:db8::2",
+    "2001:db8:0:1::1",
+]
+ACTS = st.lists(
+    st.tuples(
+        st.sampled_from(["comes", "comes", "comes", "asks", "is sent", "rests", "waits", "leaves", "time"]),
+        st.sampled_from(ADDRESSES),
+        st.integers(0, 7),
+    ),
+    max_size=60,
+)
+
+
+@given(ACTS)
+def test_no_more_than_may_be_are_there_and_whoever_is_busy_stays(acts: list[tuple[str, str, int]]) -> None:
+    clock, there, busy = Clock(), list[Connection](), set[int]()
+    places = Places(BOUNDS, clock)
+    for act, address, which in acts:
+        it = there[which % len(there)] if there else None
+        if act == "comes":
+            new = places.admit(address, Fake())
+            if new is None:
+                beyond = [it for it in there if it.beyond]
+                assert len(beyond) == BOUNDS.for_operators
+                assert all(id(it) in busy for it in beyond)
+            else:
+                there.append(new)
+        elif act == "time":
+            clock.now += 5.0
+            places.cut_off_overdue()
+        elif it is not None and act in {"asks", "is sent"}:
+            places.asks(it)
+            busy.add(id(it))
+            if act == "is sent":
+                places.is_sent(it)
+        elif it is not None:
+            busy.discard(id(it))
+            {"rests": places.rests, "waits": places.waits, "leaves": places.left}[act](it)
+        assert not any(it.wire.ended for it in there if id(it) in busy)  # type: ignore[attr-defined]
+        there = [it for it in there if not it.gone]
+        assert places.taken == len(there)
+        assert len([it for it in there if not it.beyond]) <= BOUNDS.most
+        assert len([it for it in there if it.beyond]) <= BOUNDS.for_operators
+        placed = Counter(it.network for it in there if not it.beyond)
+        assert all(count <= BOUNDS.per_address for network, count in placed.items() if network != "127.0.0.1")
+    for it in there:
+        places.left(it)
+    assert places.taken == 0
+    assert not places._of
+    assert not any(places._quiet.values())
+    assert not places._sent
+
+
+def test_of_one_address_the_own_make_way_and_then_it_is_told_to_come_again() -> None:
+    places = Places(BOUNDS)
+    own = [places.admit("10.0.0.1", Fake()) for _ in range(3)]
+    assert all(it is not None for it in own)
+    fourth = places.admit("10.0.0.1", Fake())
+    assert [it.gone for it in own if it] == [True, False, False]
+    for it in [*own[1:], fourth]:
+        assert it is not None
+        places.asks(it)
+    fifth = places.admit("::ffff:10.0.0.1", Fake())
+    other = places.admit("10.0.0.2", Fake())
+    assert fifth is not None
+    assert other is not None
+    assert (fifth.beyond, other.beyond) == (True, False)
+
+
+def test_this_machine_and_a_proxy_on_it_are_bound_by_all_places_only() -> None:
+    places = Places(BOUNDS)
+    for _ in range(BOUNDS.most):
+        it = places.admit("127.0.0.1", Fake())
+        assert it is not None
+        assert not it.beyond
+        places.asks(it)
+
+
+def test_who_comes_in_great_numbers_takes_no_operators_place_from_another() -> None:
+    places = Places(BOUNDS)
+    for number in range(BOUNDS.most):
+        it = places.admit(f"10.0.1.{number}", Fake())
+        assert it is not None
+        places.asks(it)
+    places.admit("10.0.0.9", Fake())
+    operator = places.admit("10.0.0.1", Fake())
+    assert operator is not None
+    for _ in range(10):
+        assert places.admit("10.0.0.9", Fake()) is not None
+    assert not operator.gone
+
+
+def test_an_answer_that_nobody_takes_ends_and_one_that_is_taken_slowly_does_not() -> None:
+    clock = Clock()
+    places = Places(BOUNDS, clock)
+    wires = {name: Fake() for name in ("slow", "stalled")}
+    for wire in wires.values():
+        wire.unsent = 500_000
+        it = places.admit("10.0.0.1", wire)
+        assert it is not None
+        places.asks(it)
+        places.is_sent(it)
+    for _ in range(100):
+        clock.now += 1.0
+        wires["slow"].unsent -= 1000
+        places.cut_off_overdue()
+    assert {name: wire.ended for name, wire in wires.items()} == {"slow": False, "stalled": True}
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "same"),
+    [
+        ("10.0.0.1", "10.0.0.1", True),
+        ("10.0.0.1", "::ffff:10.0.0.1", True),
+        ("10.0.0.1", "10.0.0.2", False),
+        ("2001:db8::1", "2001:db8::ffff:2", True),
+        ("2001:db8::1", "2001:db8:0:1::1", False),
+        ("?", "?", True),
+    ],
+)
+def test_whose_addresses_are_one(one: str, other: str, same: bool) -> None:
+    assert (network_of(one) == network_of(other)) == same

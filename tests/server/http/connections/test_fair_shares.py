@@ -1,0 +1,187 @@
+"""Nobody takes everybody's streams away: whoever holds fewer gets a place of whoever holds the most."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import AsyncIterator
+from contextlib import AsyncExitStack, asynccontextmanager
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import aiohttp
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fakes.site import Hall, opened, see
+from fakes.tokens import bearer, locked
+from server.http.access.grants import ShareHolder
+from server.http.connections.fair_shares import Place, Shares
+
+DOOR = "/cameras/c0/hls/index.m3u8"
+"""What the smallest token may see."""
+
+
+class Viewer:
+    """Somebody who watches or is told, until somebody else gets the place."""
+
+    def __init__(self, answer: aiohttp.ClientResponse) -> None:
+        self._answer = answer
+
+    async def ends(self) -> None:
+        """Wait until it is ended from the other side."""
+        ended = False
+        while not ended:
+            try:
+                ended = not await self._answer.content.read(1 << 16)
+            except (aiohttp.ClientError, ConnectionResetError):
+                ended = True
+
+    @property
+    def goes_on(self) -> bool:
+        return not self._answer.content.at_eof() and self._answer.content.exception() is None
+
+
+@asynccontextmanager
+async def site(folder: Path, **http: Any) -> AsyncIterator[Hall]:
+    async with locked(folder, http={"hls_segment_s": 0.4, **http}) as hall:
+        see(hall)
+        for epoch in (3, 4):
+            hall.service.feed(epoch, {"c0": {}, "c1": {}})
+        yield hall
+
+
+async def fetched(hall: Hall, path: str, name: str, player: str) -> int:
+    async with hall.session.get(path, headers={**bearer(name), "User-Agent": player}) as answer:
+        return answer.status
+
+
+async def joined(stack: AsyncExitStack, hall: Hall, path: str, **heads: str) -> Viewer | int:
+    """Watch or listen until the stack is left; give the status where that is not let."""
+    session = await stack.enter_async_context(aiohttp.ClientSession(f"http://127.0.0.1:{hall.port}"))
+    answer = await session.get(path, headers=heads)
+    stack.callback(answer.close)
+    return Viewer(answer) if answer.status == 200 else answer.status
+
+
+async def test_one_token_with_many_players_leaves_others_their_streams(tmp_path: Path) -> None:
+    async with site(tmp_path, viewers_max=20) as hall:
+        flood = [await fetched(hall, DOOR, "door", f"player {it}") for it in range(40)]
+        assert flood == [200] * 20 + [503] * 20
+        for name in ("desk", "family", "lead"):
+            path = "/objects/1/hls/index.m3u8"
+            assert [await fetched(hall, path, name, f"{name} {it}") for it in range(3)] == [200] * 3, name
+        assert await fetched(hall, DOOR, "door", "player 0") == 200, "who came first stays"
+        assert await fetched(hall, DOOR, "door", "player 19") == 503, "who came last made way"
+        for name in ("desk", "family", "lead"):
+            assert await fetched(hall, "/objects/1/hls/index.m3u8", name, f"{name} 0") == 200, "and goes on"
+
+
+@pytest.mark.parametrize(
+    ("path", "bound"),
+    [
+        ("/cameras/c0/live.ts", "viewers_max"),
+        ("/cameras/c0/live.ts", "viewers_per_object"),
+        ("/cameras/c0/live.mp4?from=-1", "viewers_max"),
+        ("/api/events", "viewers_max"),
+    ],
+)
+async def test_one_token_with_many_connections_does_either(tmp_path: Path, path: str, bound: str) -> None:
+    async with site(tmp_path, **{bound: 3}) as hall, AsyncExitStack() as stack:
+        door, desk, lead = bearer("door"), bearer("desk"), bearer("lead")
+        flood = [await joined(stack, hall, path, **door) for _ in range(4)]
+        *held, newest, refused = flood
+        assert refused == 503
+        assert isinstance(newest, Viewer)
+        async with hall.session.head(path, headers=desk) as answer:
+            assert answer.status == 503, "who does not take the place does not take it away"
+        mine = await joined(stack, hall, path, **desk)
+        assert isinstance(mine, Viewer)
+        await newest.ends()
+        assert await joined(stack, hall, path, **desk) == 503, "that would be more than the others have"
+        assert await joined(stack, hall, path, **door) == 503
+        for _ in range(3):
+            assert isinstance(await joined(stack, hall, path, **lead), Viewer), "operators always get in"
+        assert await joined(stack, hall, path, **lead) == 503, "but not for each other's places"
+        for it in (*held, mine):
+            assert isinstance(it, Viewer)
+            await it.ends()
+
+
+async def test_a_stream_that_came_from_the_past_makes_way_in_the_present(tmp_path: Path) -> None:
+    async with site(tmp_path, viewers_per_object=2) as hall, AsyncExitStack() as stack:
+        flood = [
+            await joined(stack, hall, "/cameras/c0/live.mp4?from=-1", **bearer("door")) for _ in range(2)
+        ]
+        channel = hall.service.splicer.cameras["c0"]
+        while channel.viewers < 2:
+            await hall.get("/healthz", "HEAD")
+        assert isinstance(await joined(stack, hall, "/cameras/c0/live.ts", **bearer("desk")), Viewer)
+        assert isinstance(flood[1], Viewer)
+        await flood[1].ends()
+
+
+async def test_without_tokens_it_is_by_address_and_this_machine_operates() -> None:
+    async for hall in opened(http={"viewers_max": 2}):
+        see(hall)
+        async with AsyncExitStack() as stack:
+            elsewhere = {"X-Forwarded-For": "10.0.0.7"}
+            flood = [await joined(stack, hall, "/objects/1/best.ts", **elsewhere) for _ in range(3)]
+            assert flood[2] == 503
+            assert isinstance(await joined(stack, hall, "/objects/1/best.ts"), Viewer)
+            assert isinstance(flood[1], Viewer)
+            await flood[1].ends()
+            assert isinstance(flood[0], Viewer)
+            assert flood[0].goes_on
+
+
+HOLDERS = [ShareHolder("a"), ShareHolder("b"), ShareHolder("c"), ShareHolder("o", operates=True)]
+
+
+@given(st.lists(st.tuples(st.sampled_from(HOLDERS), st.sampled_from("xy"), st.integers(1, 2)), max_size=40))
+def test_shares_come_to_be_equal_and_stay_so(comes: list[tuple[ShareHolder, str, int]]) -> None:
+    shares, most, there = Shares(), 6, dict[Place, None]()
+
+    def ended(place: Place) -> None:
+        del there[place]
+        shares.give_up(place)
+
+    for holder, stream, weight in comes:
+        before = Counter({it.key: sum(p.weight for p in there if p.holder == it) for it in HOLDERS})
+
+        place = Place(holder, stream, lambda: None, weight)
+        place.end = partial(ended, place)
+        if shares.all >= most and not shares.make_room(holder):
+            others = {key: count for key, count in before.items() if key != holder.key}
+            watching = {key: count for key, count in others.items() if key != "o"}
+            if holder.operates:
+                assert not any(watching.values())
+            assert all(count <= before[holder.key] + 1 for count in watching.values())
+            continue
+        there[place] = None
+        shares.take(place)
+        after = Counter({it.key: sum(p.weight for p in there if p.holder == it) for it in HOLDERS})
+        lost = [key for key in before if after[key] < before[key]]
+        assert "o" not in lost
+        assert len(lost) <= 1
+        if lost and not holder.operates:
+            assert (
+                before[lost[0]]
+                == max(before[key] for key in "abc" if key != holder.key)
+                > before[holder.key] + 1
+            )
+    assert shares.all == sum(it.weight for it in there)
+    assert not shares.ending()
+
+
+def test_of_one_stream_only_its_own_places_are_taken() -> None:
+    shares = Shares()
+    ended: list[str] = []
+    for stream in "xxxyy":
+        shares.take(Place(HOLDERS[0], stream, lambda stream=stream: ended.append(stream)))  # type: ignore[misc]
+    assert shares.make_room(HOLDERS[1], ["y"])
+    assert (ended, shares.ending("y"), shares.ending("x"), shares.ending()) == (["y"], 1, 0, 1)
+    assert not shares.make_room(HOLDERS[1], ["y"])
+    assert shares.make_room(HOLDERS[1])
+    assert ended == ["y", "y"]

@@ -1,0 +1,142 @@
+"""HLS over HTTP, held against the rules of RFC 8216 and what players expect."""
+
+from __future__ import annotations
+
+import re
+from datetime import datetime
+from itertools import pairwise
+
+import pytest
+
+from fakes.cameras import CAMERAS, FPS, GOP, LARGE, SMALL
+from fakes.site import A, B, Hall, opened
+
+SEGMENT = "hls/index.m3u8"
+
+
+async def text_of(hall: Hall, path: str) -> str:
+    async with hall.session.get(path) as answer:
+        assert answer.status == 200, await answer.text()
+        assert answer.content_type == "application/vnd.apple.mpegurl"
+        assert answer.headers["Access-Control-Allow-Origin"] == "*"
+        return await answer.text()
+
+
+def tag(text: str, name: str) -> str:
+    (value,) = re.findall(rf"^#EXT-X-{name}:(.*)$", text, re.MULTILINE)
+    return str(value)
+
+
+def entries(text: str) -> list[tuple[float, str, datetime]]:
+    """Give each segment's seconds, address and time of day; whatever breaks a rule of RFC 8216 fails."""
+    assert text.startswith("#EXTM3U\n"), "4.3.1.1"
+    assert text.endswith("\n")
+    assert "\r" not in text
+    assert int(tag(text, "VERSION")) >= 7, "4.3.1.2, 7: fragmented MP4, and EXT-X-MAP"
+    assert text.count("#EXT-X-INDEPENDENT-SEGMENTS\n") == 1
+    assert text.index("#EXT-X-MEDIA-SEQUENCE") < text.index("#EXTINF"), "4.3.3.2"
+    assert text.index("#EXT-X-MAP") < text.index("#EXTINF"), "4.3.2.5"
+    assert not re.search(r"#EXT-X-(STREAM-INF|MEDIA:|PLAYLIST-TYPE)", text), "4.3.4: a media playlist, live"
+    whole = re.sub(r"^#EXT-X-PART:.*\n", "", text, flags=re.MULTILINE)
+    found = re.findall(r"^#EXT-X-PROGRAM-DATE-TIME:(\S+)\n#EXTINF:([\d.]+),\n(\S+)$", whole, re.MULTILINE)
+    assert len(found) == text.count("#EXTINF")
+    target = int(tag(text, "TARGETDURATION"))
+    listed = [(float(seconds), uri, datetime.fromisoformat(when)) for when, seconds, uri in found]
+    assert all(int(seconds + 0.5) <= target for seconds, _, _ in listed), "4.3.3.1"
+    for (seconds, _, when), (_, _, later) in pairwise(listed):
+        assert abs((later - when).total_seconds() - seconds) < 0.002, "4.3.2.6: clocks agree"
+    return listed
+
+
+def feed(hall: Hall, epochs: range) -> None:
+    """Feed a person who is larger in the other camera every other GOP: there are cuts."""
+    for epoch in epochs:
+        hall.service.feed(
+            epoch, {A: {1: SMALL}, B: {1: LARGE}} if epoch % 4 < 2 else {A: {1: LARGE}, B: {1: SMALL}}
+        )
+
+
+@pytest.mark.parametrize("path", ["/objects/1/hls/", "/cameras/c0/hls/"])
+async def test_playlists_change_only_as_the_rfc_allows(path: str) -> None:
+    async for hall in opened(http={"hls_segment_s": 0.2, "hls_window_s": 0.6}):
+        hall.service.pulse0 = 1_800_000_000.0
+        hall.service.come(*CAMERAS)
+        before: list[tuple[float, str, datetime]] = []
+        number, target = 0, ""
+        for epoch in range(8):
+            feed(hall, range(epoch, epoch + 1))
+            if epoch < 2:
+                continue
+            text = await text_of(hall, path + "index.m3u8")
+            listed, sequence = entries(text), int(tag(text, "MEDIA-SEQUENCE"))
+            assert 1 <= len(listed) <= 3
+            if before:
+                assert tag(text, "TARGETDURATION") == target, "4.3.3.1: it must not change"
+                assert sequence >= number
+                kept = before[sequence - number :]
+                assert listed[: len(kept)] == kept, "6.2.1: lines are only added, and removed from the top"
+            before, number, target = listed, sequence, tag(text, "TARGETDURATION")
+            assert [uri for _, uri, _ in listed] == [f"{sequence + n}.m4s" for n in range(len(listed))]
+            assert "ENDLIST" not in text
+        assert number > 0, "the window has moved"
+        hall.service.splicer.close()
+        assert (await text_of(hall, path + "index.m3u8")).endswith("#EXT-X-ENDLIST\n")
+
+
+async def test_the_time_of_day_is_that_of_the_pulses(busy: Hall) -> None:
+    busy.service.pulse0 = 1_800_000_000.25
+    busy.service.splicer.close()
+    text = await text_of(busy, "/objects/1/" + SEGMENT)
+    assert [when.timestamp() for _, _, when in entries(text)] == [1_800_000_000.25]
+
+
+async def test_a_segment_never_changes_and_says_so(busy: Hall) -> None:
+    feed(busy, range(3, 8))
+    listed = entries_without_time(await text_of(busy, "/objects/1/" + SEGMENT))
+    for uri in ["init.mp4", *listed]:
+        async with busy.session.get(f"/objects/1/hls/{uri}") as answer:
+            data = await answer.read()
+            assert answer.content_type == "video/mp4"
+            assert answer.headers["Cache-Control"].startswith("public, max-age=")
+            assert answer.headers["Cache-Control"].endswith("immutable")
+            assert int(answer.headers["Content-Length"]) == len(data) > 100
+        async with busy.session.head(f"/objects/1/hls/{uri}") as answer:
+            assert int(answer.headers["Content-Length"]) == len(data)
+        assert data[4:8] == (b"ftyp" if uri == "init.mp4" else b"moof")
+    async with busy.session.get("/objects/1/" + SEGMENT) as answer:
+        assert answer.headers["Cache-Control"] == "no-cache"
+
+
+def entries_without_time(text: str) -> list[str]:
+    assert "PROGRAM-DATE-TIME" not in text, "no pulse has come that would tell the time"
+    return [line for line in text.splitlines() if not line.startswith("#")]
+
+
+async def test_before_the_first_segment_players_are_told_to_come_again(busy: Hall) -> None:
+    async with busy.session.get("/objects/1/" + SEGMENT) as answer:
+        assert answer.status == 503
+        assert int(answer.headers["Retry-After"]) > 0
+    feed(busy, range(3, 7))  # a segment is 25 frames here
+    assert len(entries_without_time(await text_of(busy, "/objects/1/" + SEGMENT))) == 1
+
+
+@pytest.mark.parametrize(
+    ("path", "error"),
+    [
+        ("/objects/99/hls/index.m3u8", "there is no object 99"),
+        ("/objects/99/hls/init.mp4", "there is no object 99"),
+        ("/objects/99/hls/0.m4s", "there is no object 99"),
+        ("/cameras/c9/hls/index.m3u8", "there is no camera 'c9'; there are c0, c1"),
+        ("/cameras/c0/hls/999.m4s", "there is no segment 999 here, or not any more"),
+        ("/cameras/c0/hls/-1.m4s", "there is nothing at /cameras/c0/hls/-1.m4s"),
+        ("/cameras/c0/hls/1.ts", "there is nothing at /cameras/c0/hls/1.ts"),
+    ],
+)
+async def test_what_is_not_there_is_404(busy: Hall, path: str, error: str) -> None:
+    assert await busy.get(path) == (404, {"error": error})
+
+
+async def test_nobody_has_to_ask_first_for_there_to_be_segments(busy: Hall) -> None:
+    feed(busy, range(3, 8))
+    async with busy.session.get("/objects/1/hls/0.m4s") as answer:
+        assert (await answer.read()).count(b"moof") == FPS // GOP * GOP

@@ -1,0 +1,171 @@
+"""Who fetches a stream is counted: while an answer is awaited, for a while after, and against the limits."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import ExitStack
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fakes.cameras import CAMERAS, SMALL
+from fakes.site import A, B, Hall, opened
+from server.http.access.grants import ShareHolder
+from server.http.connections.fair_shares import Shares
+from server.http.hls.sessions import Reader, Readers
+
+KEPT_S = 6.0
+PATHS = ["init.mp4", "index.m3u8", "0.m4s", "0.0.m4s"]
+
+
+class Clock:
+    """Seconds that pass when the test says so."""
+
+    now = 0.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+def reader(stream: int, player: int = 0) -> Reader:
+    return Reader(f"object {stream}", ShareHolder("10.0.0.1"), "10.0.0.1", f"player {player}")
+
+
+ACTS = st.lists(
+    st.tuples(
+        st.sampled_from(["asks", "is answered", "waits"]),
+        st.integers(0, 1),  # stream
+        st.integers(0, 1),  # player
+        st.sampled_from([None, "playlist", "part"]),
+        st.integers(1, 4),  # seconds
+    ),
+    max_size=30,
+)
+
+
+@given(ACTS)
+def test_who_has_asked_lately_or_waits_is_counted(acts: list[tuple[str, int, int, str | None, int]]) -> None:
+    """Against a count from the beginning, over all that anybody has asked."""
+    clock = Clock()
+    shares = Shares()
+    readers = Readers(KEPT_S / 3, shares, clock)
+    asked: dict[Reader, float] = {}
+    open_ones: list[tuple[Reader, str | None, ExitStack]] = []
+
+    def least(it: Reader) -> int:
+        waiting = [kind for who, kind, _ in open_ones if who == it]
+        most = max((waiting.count(kind) for kind in ("playlist", "part")), default=0)
+        lately = clock.now - asked.get(it, -KEPT_S) < KEPT_S
+        return max(most, 1 if lately else 0)
+
+    for act, stream, player, kind, seconds in acts:
+        who = reader(stream, player)
+        if act == "asks":
+            before, one_more = readers.of(who.stream), readers.is_one_more(who, kind)
+            stack = ExitStack()
+            stack.enter_context(readers.asking(who, kind))
+            open_ones.append((who, kind, stack))
+            asked[who] = clock.now
+            assert readers.of(who.stream) - before == one_more
+        elif act == "is answered" and open_ones:
+            who, _, stack = open_ones.pop(0)
+            stack.close()
+            asked[who] = clock.now
+        else:
+            clock.now += seconds
+        # whoever waits for nothing in particular is answered at once: here they are kept as long as they wait
+        everybody = [reader(one, other) for one in (0, 1) for other in (0, 1)]
+        assert [readers.of(f"object {it}") for it in (0, 1)] == [
+            sum(least(who) for who in everybody if who.stream == f"object {it}") for it in (0, 1)
+        ]
+        assert readers.all == shares.all == sum(map(least, everybody))
+    for _, _, stack in open_ones:
+        stack.close()
+    clock.now += KEPT_S
+    assert readers.all == 0
+    assert not readers._readers
+    assert not readers._of
+    assert not shares._held
+
+
+@pytest.fixture
+async def hall() -> AsyncIterator[Hall]:
+    """Two viewers at most; two people, whose first segment is whole."""
+    async for hall in opened(http={"viewers_max": 2, "hls_segment_s": 0.4}):
+        hall.service.come(*CAMERAS)
+        for epoch in range(5):
+            hall.service.feed(epoch, {A: {1: SMALL, 2: SMALL}, B: {}})
+        yield hall
+
+
+async def status(hall: Hall, path: str, player: str) -> int:
+    async with hall.session.get(path, headers={"User-Agent": player}) as answer:
+        if answer.status == 503:
+            assert int(answer.headers["Retry-After"]) > 0
+            assert "viewers_max" in (await answer.json())["error"]
+        return answer.status
+
+
+async def viewers_in_metrics(hall: Hall) -> float:
+    async with hall.session.get("/metrics") as answer:
+        text = await answer.text()
+    return float(next(it for it in text.splitlines() if it.startswith("myview_viewers ")).split()[1])
+
+
+@pytest.mark.parametrize("path", PATHS)
+async def test_players_that_fetch_take_places_and_one_more_is_told_to_come_again(
+    hall: Hall, path: str
+) -> None:
+    for player in ("one", "two", "one", "two"):
+        assert await status(hall, f"/objects/1/hls/{path}", player) == 200
+    assert await viewers_in_metrics(hall) == 2
+    assert await status(hall, f"/objects/1/hls/{path}", "three") == 503
+    assert await status(hall, "/objects/2/hls/index.m3u8", "one") == 503, "another stream is another place"
+    async with hall.session.get("/objects/1/best.mp4") as answer:
+        assert answer.status == 503
+    for other in PATHS:
+        assert await status(hall, f"/objects/1/hls/{other}", "two") == 200, "who is there goes on"
+
+
+async def test_who_is_connected_leaves_fewer_places_to_who_fetches(hall: Hall) -> None:
+    async with hall.session.get("/objects/2/best.mp4"):
+        assert await status(hall, "/cameras/c0/hls/index.m3u8", "one") == 200
+        assert await status(hall, "/cameras/c0/hls/index.m3u8", "two") == 503
+        assert await viewers_in_metrics(hall) == 2
+
+
+async def test_head_takes_no_place(hall: Hall) -> None:
+    for path in PATHS:
+        async with hall.session.head(f"/objects/1/hls/{path}") as answer:
+            assert answer.status == 200
+    assert await viewers_in_metrics(hall) == 0
+
+
+async def test_players_of_one_address_and_name_are_told_apart_while_they_wait(hall: Hall) -> None:
+    coming = "/objects/1/hls/index.m3u8?_HLS_msn=3"
+    waiting = [asyncio.create_task(status(hall, coming, "same")) for _ in range(2)]
+    while await viewers_in_metrics(hall) < 2:  # noqa: ASYNC110 — they come one after the other
+        await asyncio.sleep(0.005)
+    assert await status(hall, coming, "same") == 503
+    assert await status(hall, "/objects/1/hls/index.m3u8", "other") == 503
+    assert not any(it.done() for it in waiting)
+    for epoch in range(5, 16):
+        hall.service.feed(epoch, {A: {1: SMALL, 2: SMALL}, B: {}})
+    assert await asyncio.gather(*waiting) == [200, 200]
+    assert await viewers_in_metrics(hall) == 1, "they cannot be told apart any more"
+
+
+async def test_no_more_of_one_stream_than_it_takes() -> None:
+    async for hall in opened(http={"viewers_per_object": 1, "hls_segment_s": 0.4}):
+        hall.service.come(*CAMERAS)
+        for epoch in range(5):
+            hall.service.feed(epoch, {A: {1: SMALL, 2: SMALL}, B: {}})
+        async with hall.session.get("/objects/1/best.ts"):
+            assert (await hall.get("/objects/1/hls/index.m3u8"))[0] == 503
+            async with hall.session.get("/objects/2/hls/index.m3u8") as answer:
+                assert answer.status == 200
+            async with hall.session.get("/objects/2/best.mp4") as answer:
+                assert answer.status == 503
+                assert "viewers_per_object" in (await answer.json())["error"]

@@ -1,0 +1,152 @@
+"""A list of a day would take the service a second, and be fetched every second: lists have bounds."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import AsyncIterator
+from datetime import datetime
+from pathlib import Path
+
+import pytest
+
+import server.http.hls.long_playlist as long_module
+from fakes.cameras import CAMERAS, FPS
+from fakes.hls_recording import GOPS, HTTP, LENGTH, forget, numbers, shows, text, until_written
+from fakes.recordings import PULSE0
+from fakes.site import Hall, opened
+from server.http.hls import time_shift_playlist
+from server.http.hls.long_playlist import MOST_GROWING, long_playlist, newest
+from server.service.streaming.hls_segmenter import segment_layout
+from server.service.time_shift.hls_time_shift import SegmentList
+
+PLAN = segment_layout(FPS, LENGTH, LENGTH / FPS, 1.0)
+
+
+@pytest.fixture
+async def hall(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Hall]:
+    """A site whose lists are short: eight segments that grow, twelve that do not, a time of day in four."""
+    for module in (long_module, time_shift_playlist):
+        monkeypatch.setattr(module, "MOST_GROWING", 8)
+        monkeypatch.setattr(module, "MOST", 12)
+    monkeypatch.setattr(long_module, "_STEP", 4)
+    async for hall in opened(record={"folder": str(tmp_path / "kept"), "segment_s": 1.0}, http=HTTP):
+        hall.service.past.open()
+        hall.service.come(*CAMERAS)
+        yield hall
+
+
+def dated(playlist: str) -> dict[int, datetime]:
+    """Give the segments before which the time of day stands."""
+    found = re.findall(r"^#EXT-X-PROGRAM-DATE-TIME:(.*)\n#EXTINF.*\n(\d+)\.m4s$", playlist, re.MULTILINE)
+    return {int(number): datetime.fromisoformat(when) for when, number in found}
+
+
+def entries(playlist: str) -> dict[int, str]:
+    """Give what is told of each segment."""
+    found = re.findall(r"((?:#EXT-X-P.*\n)?#EXTINF.*\n)(\d+)\.m4s$", playlist, re.MULTILINE)
+    return {int(number): told for told, number in found}
+
+
+async def test_a_list_that_goes_on_and_on_loses_its_oldest(hall: Hall) -> None:
+    path = "/objects/1/hls/index.m3u8?from=p10&to=live"
+    before: dict[int, str] = {}
+    shows(hall, range(7))
+    for gop in range(7, GOPS):
+        shows(hall, range(gop, gop + 1))
+        listed = await text(hall, path)
+        first = numbers(listed)[0]
+        assert len(numbers(listed)) <= 8
+        assert f"#EXT-X-MEDIA-SEQUENCE:{first}\n" in listed
+        kept = {number: told for number, told in before.items() if number >= first}
+        assert kept.items() <= entries(listed).items(), "what stays has not changed"
+        before = entries(listed)
+    assert list(before) == list(range(12, 20))
+
+
+async def test_no_playlist_promises_that_nothing_is_taken_from_it(hall: Hall) -> None:
+    shows(hall, range(16))
+    await until_written(hall, 16)
+    forget(hall)
+    run = hall.service.past.run
+    assert run is not None
+    for query in ("from=p10&to=live", "from=p10&to=p80"):
+        path = f"/objects/1/hls/index.m3u8?{query}"
+        before = await text(hall, path)
+        assert "PLAYLIST-TYPE" not in before
+        assert numbers(before)[0] == 1
+    run.drop(run.segments[:2])
+    for query in ("from=p10&to=live", "from=p10&to=p80"):
+        after = await text(hall, f"/objects/1/hls/index.m3u8?{query}")
+        assert numbers(after)[0] == 5
+        assert "#EXT-X-MEDIA-SEQUENCE:5\n" in after
+
+
+@pytest.mark.parametrize(
+    ("query", "names"),
+    [
+        ("from=-1.2", "from=p170&to=live"),
+        ("from=p170", "from=p170&to=live"),
+        ("from=p115", "from=p115&to=p200"),
+        ("from=p5", "from=p5&to=p120"),
+        ("from=-2&to=p220", "from=p150&to=p220"),
+        ("from=-2&to=live", "from=p150&to=live"),
+    ],
+)
+async def test_a_wish_without_an_end_is_given_a_list_that_there_can_be(
+    hall: Hall, query: str, names: str
+) -> None:
+    shows(hall, range(GOPS))
+    await until_written(hall, GOPS)
+    master = await text(hall, f"/objects/1/hls/index.m3u8?{query}")
+    assert master.splitlines()[-1] == f"index.m3u8?{names}"
+    listed = numbers(await text(hall, f"/objects/1/hls/{master.splitlines()[-1]}"))
+    assert 0 < len(listed) <= 12
+
+
+@pytest.mark.parametrize(
+    ("query", "error"),
+    [
+        ("from=p5&to=p121", "to: a list has 12 segments at most, here 5 s; say to=p120"),
+        ("from=-9&to=-1", "to: a list has 12 segments at most, here 5 s; say to=p120"),
+        (
+            "from=p170&to=p260",
+            "to: a list that grows has 8 segments at most, here 3 s; say to=live, or to=p250",
+        ),
+        (
+            "from=p170&to=p9999999999999",
+            "to: a list that grows has 8 segments at most, here 3 s; say to=live, or to=p250",
+        ),
+    ],
+)
+async def test_a_list_that_would_be_too_long_is_refused_with_what_would_do(
+    hall: Hall, query: str, error: str
+) -> None:
+    shows(hall, range(GOPS))
+    await until_written(hall, GOPS)
+    assert await hall.get(f"/objects/1/hls/index.m3u8?{query}") == (400, {"error": error})
+
+
+async def test_live_is_an_end_of_hls_alone(hall: Hall) -> None:
+    shows(hall, range(GOPS))
+    status, told = await hall.get("/objects/1/best.mp4?from=p5&to=live")
+    assert (status, told["error"][:22]) == (400, "to: 'live' is no momen")
+
+
+def test_the_time_of_day_is_told_of_the_first_and_of_some_others() -> None:
+    listing = SegmentList(range(100, 400), PLAN.frames, 1003, 3996)
+    listed = long_playlist(listing, PLAN, PULSE0, ended=True)
+    assert numbers(listed) == list(range(100, 400))
+    told = {number: when.timestamp() for number, when in dated(listed).items()}
+    pulses = {100: 1003} | {number: number * PLAN.frames for number in (128, 192, 256, 320, 384)}
+    assert told == pytest.approx({number: PULSE0 + pulse / FPS for number, pulse in pulses.items()})
+    lengths = [float(it) for it in re.findall(r"#EXTINF:([\d.]+),", listed)]
+    assert lengths == [7 / FPS, *[10 / FPS] * 298, 6 / FPS]
+
+
+@pytest.mark.parametrize("stop", range(MOST_GROWING + 100, MOST_GROWING + 300, 7))
+def test_what_is_first_after_others_have_gone_was_dated_before(stop: int) -> None:
+    whole = SegmentList(range(100, stop), PLAN.frames, 1000, stop * PLAN.frames)
+    left = newest(whole)
+    assert MOST_GROWING - 64 < len(left.numbers) <= MOST_GROWING
+    before, after = (entries(long_playlist(it, PLAN, PULSE0, ended=False)) for it in (whole, left))
+    assert after.items() <= before.items()

@@ -1,0 +1,304 @@
+"""Parts of segments, held against draft-pantos-hls-rfc8216bis: what players that know them rely on."""
+
+from __future__ import annotations
+
+import asyncio
+import io
+import re
+import subprocess
+from collections.abc import AsyncIterator
+from dataclasses import dataclass
+
+import aiohttp
+import av
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from fakes.cameras import CAMERAS, FPS, GOP, NO_REASON, encoded, video
+from fakes.programs import needs_ffmpeg
+from fakes.site import A, Hall, opened
+from fakes.timeouts import PATIENCE
+from server.http.hls.live_playlist import _newest
+from server.service.streaming.hls_segmenter import HlsSegmenter
+from server.service.view_selection.decider import GopDecision, ObjectChoice
+
+HTTP = {"hls_segment_s": 0.6, "hls_window_s": 6.0}
+PARTS = 3
+"""GOPs in a segment."""
+TARGET = GOP / FPS
+STREAM = "/objects/1/hls/"
+FRAMES = 250
+
+
+@pytest.fixture
+async def hall() -> AsyncIterator[Hall]:
+    """A site whose segments have three parts."""
+    async for hall in opened(http=HTTP):
+        hall.service.come(*CAMERAS)
+        yield hall
+
+
+def shows(hall: Hall, gops: range, nobody: frozenset[int] = frozenset()) -> None:
+    """Decide GOPs: person 1 is in either camera in turn; in some no pictures come."""
+    for gop in gops:
+        for seed, camera in enumerate(CAMERAS if gop not in nobody else ()):
+            for unit in encoded(seed, FRAMES)[gop * GOP : (gop + 1) * GOP]:
+                hall.service.intake.video(video(camera, unit))
+        choice = ObjectChoice(1, None if gop in nobody else CAMERAS[gop % 2], None, away=False)
+        hall.service.splicer.decision(GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
+
+
+async def text_of(hall: Hall, query: str = "") -> str:
+    async with hall.session.get(f"{STREAM}index.m3u8{query}") as answer:
+        assert answer.status == 200, await answer.text()
+        return await answer.text()
+
+
+async def data_of(hall: Hall, uri: str) -> bytes:
+    async with hall.session.get(STREAM + uri) as answer:
+        assert answer.status == 200, await answer.text()
+        assert answer.headers["Cache-Control"].endswith("immutable")
+        return await answer.read()
+
+
+@dataclass(frozen=True)
+class Part:
+    duration: float
+    uri: str
+    independent: bool
+
+
+@dataclass(frozen=True)
+class Read:
+    """A playlist as a player that knows parts reads it."""
+
+    sequence: int
+    whole: dict[int, float]
+    """Seconds of whole segments, by number."""
+    parts: dict[int, list[Part]]
+    hint: str | None
+
+
+def read(text: str) -> Read:
+    """Read a playlist; whatever breaks a rule of the draft fails."""
+    target = int(found(text, r"#EXT-X-TARGETDURATION:(\d+)"))
+    part_target = float(found(text, r"#EXT-X-PART-INF:PART-TARGET=([\d.]+)"))
+    control = found(text, r"#EXT-X-SERVER-CONTROL:(.*)")
+    assert "CAN-BLOCK-RELOAD=YES" in control, "4.4.3.8"
+    assert float(found(control, r"PART-HOLD-BACK=([\d.]+)")) >= 3 * part_target - 1e-9, "4.4.3.8"
+    assert text.index("#EXT-X-PART-INF") < text.index("#EXTINF"), "4.4.3.7"
+    number = sequence = int(found(text, r"#EXT-X-MEDIA-SEQUENCE:(\d+)"))
+    whole: dict[int, float] = {}
+    parts: dict[int, list[Part]] = {}
+    duration = 0.0
+    for line in text.splitlines():
+        if line.startswith("#EXT-X-PART:"):
+            told = re.fullmatch(r'#EXT-X-PART:DURATION=([\d.]+),URI="([^"]+)"(,INDEPENDENT=YES)?', line)
+            assert told, line
+            part = Part(float(told[1]), told[2], bool(told[3]))
+            parts.setdefault(number, []).append(part)
+            assert part.duration <= part_target, "4.4.4.9"
+        elif line.startswith("#EXTINF:"):
+            duration = float(line[8:-1])
+        elif line and not line.startswith("#"):
+            whole[number] = duration
+            number += 1
+    for segment, its in parts.items():
+        assert its[0].independent, "4.4.3.5: segments are, and so their beginnings"
+        assert all(it.duration >= 0.85 * part_target for it in its[:-1]), "4.4.4.9"
+        if segment in whole:
+            assert sum(it.duration for it in its) == pytest.approx(whole[segment], abs=1e-4), "4.4.4.9"
+    until = sum(whole.values()) + sum(it.duration for it in parts.get(number, []))
+    for segment in whole:
+        behind = until - sum(it for other, it in whole.items() if other <= segment)
+        assert (segment in parts) == (behind < 3 * target - 1e-6), "6.2.2: parts are near the end"
+    hint = re.search(r'^#EXT-X-PRELOAD-HINT:TYPE=PART,URI="([^"]+)"$', text, re.MULTILINE)
+    return Read(sequence, whole, parts, hint and hint[1])
+
+
+def found(text: str, pattern: str) -> str:
+    (it,) = re.findall(pattern, text)
+    return str(it)
+
+
+async def test_playlists_keep_to_the_draft_and_go_on_part_by_part(hall: Hall) -> None:
+    shows(hall, range(PARTS))
+    before = read(await text_of(hall))
+    for gop in range(PARTS, 45):
+        shows(hall, range(gop, gop + 1))
+        now = read(await text_of(hall))
+        newest = [it for its in now.parts.values() for it in its]
+        assert newest[-1].uri == before.hint, "what was hinted at is what came"
+        assert now.sequence >= before.sequence
+        for number, seconds in before.whole.items():
+            assert now.whole.get(number, seconds) == seconds
+        for number, its in before.parts.items():
+            assert now.parts.get(number, its)[: len(its)] == its, "6.2.1: nothing changes"
+        before = now
+    hall.service.splicer.close()
+    assert read(await text_of(hall)).hint is None
+
+
+async def test_a_playlist_is_written_once_for_all_who_ask_and_anew_for_the_next_part(hall: Hall) -> None:
+    shows(hall, range(PARTS))
+    reel = hall.service.splicer.reel(1)
+    assert reel is not None
+    texts = [_newest(reel, pulse0) for pulse0 in (None, None, 1_800_000_000.0)]
+    assert texts[0] is texts[1]
+    assert texts[1] != texts[2], "the time of day is known now"
+    shows(hall, range(PARTS, PARTS + 1))
+    assert _newest(reel, 1_800_000_000.0) not in texts
+    reel.end()
+    assert _newest(reel, 1_800_000_000.0).endswith("#EXT-X-ENDLIST\n")
+
+
+async def test_who_asks_for_a_part_is_answered_as_soon_as_it_is_there(hall: Hall) -> None:
+    shows(hall, range(PARTS + 1))
+    waiting = {
+        query: asyncio.create_task(text_of(hall, query))
+        for query in ("?_HLS_msn=1&_HLS_part=1", "?_HLS_msn=1", "?_HLS_msn=1&_HLS_part=3")
+    }
+    part = asyncio.create_task(data_of(hall, "1.1.m4s"))
+    at_once = read(await text_of(hall, "?_HLS_msn=1&_HLS_part=0"))
+    assert [it.uri for it in at_once.parts[1]] == ["1.0.m4s"]
+    assert not any(task.done() for task in (*waiting.values(), part))
+    shows(hall, range(PARTS + 1, PARTS + 2))
+    first = read(await waiting.pop("?_HLS_msn=1&_HLS_part=1"))
+    assert [it.uri for it in first.parts[1]] == ["1.0.m4s", "1.1.m4s"]
+    assert await part == await data_of(hall, "1.1.m4s")
+    shows(hall, range(PARTS + 2, PARTS + 3))
+    assert 1 in read(await waiting.pop("?_HLS_msn=1")).whole
+    (last,) = waiting.values()
+    await text_of(hall)
+    assert not last.done(), "a part beyond the last of a segment is the first of the next (6.2.5.2)"
+    shows(hall, range(PARTS + 3, PARTS + 4))
+    assert [it.uri for it in read(await last).parts[2]] == ["2.0.m4s"]
+
+
+async def test_the_end_is_an_answer_to_all_who_wait(hall: Hall) -> None:
+    shows(hall, range(2 * PARTS))
+    waiting = asyncio.create_task(text_of(hall, "?_HLS_msn=2&_HLS_part=0"))
+    part = asyncio.create_task(hall.get(STREAM + "2.0.m4s"))
+    await text_of(hall)
+    hall.service.splicer.close()
+    assert (await waiting).endswith("#EXT-X-ENDLIST\n")
+    assert (await part)[0] == 404
+
+
+@pytest.mark.parametrize(
+    ("query", "error"),
+    [
+        ("_HLS_part=1", "_HLS_part: needs _HLS_msn, the segment that it is a part of"),
+        ("_HLS_msn=x", "_HLS_msn=x: must be a whole number"),
+        ("_HLS_msn=1&_HLS_part=-1", "_HLS_part=-1: must be a whole number"),
+        ("_HLS_msn=99", "_HLS_msn=99: is too far ahead; the newest segment is 1"),
+    ],
+)
+async def test_what_cannot_be_asked_is_told_in_one_line(hall: Hall, query: str, error: str) -> None:
+    shows(hall, range(PARTS + 1))
+    assert await hall.get(f"{STREAM}index.m3u8?{query}") == (400, {"error": error})
+    assert (await hall.get(STREAM + "7.0.m4s"))[0] == 404
+
+
+async def test_what_never_comes_is_not_waited_for_for_ever(
+    hall: Hall, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shows(hall, range(PARTS + 1))
+    monkeypatch.setattr("server.http.hls.live_playlist._WAIT", 0.05)
+    async with hall.session.get(f"{STREAM}index.m3u8?_HLS_msn=2") as answer:
+        assert (answer.status, bool(answer.headers["Retry-After"])) == (503, True)
+
+
+def decoded(data: bytes) -> dict[int, NDArray[np.uint8]]:
+    """Decode: each pulse and the last picture in it."""
+    with av.open(io.BytesIO(data), "r") as container:
+        frames = list(container.decode(video=0))
+    return {round(float(it.time or 0) * FPS): it.to_ndarray(format="yuv420p") for it in frames}
+
+
+def at(shown: dict[int, NDArray[np.uint8]], pulse: int) -> NDArray[np.uint8]:
+    """Give the picture that is seen at a pulse: it may stand for longer."""
+    return shown[max(it for it in shown if it <= pulse)]
+
+
+def is_independent(reel: HlsSegmenter, gop: int) -> bool:
+    part = reel.part(gop // PARTS, gop % PARTS)
+    return part is not None and part.independent
+
+
+async def test_parts_show_what_their_segments_show_and_any_that_says_so_can_be_begun_with(
+    hall: Hall,
+) -> None:
+    gops = 8 * PARTS
+    shows(hall, range(gops), nobody=frozenset({5, 6, 7, 10, 13, 14, 15, 16}))
+    init = await data_of(hall, "init.mp4")
+    numbers = range(1, gops // PARTS)
+    segments = decoded(init + b"".join([await data_of(hall, f"{it}.m4s") for it in numbers]))
+    uris = [(f"{it}.{part}.m4s", it * PARTS + part) for it in numbers for part in range(PARTS)]
+    together = decoded(init + b"".join([await data_of(hall, uri) for uri, _ in uris]))
+    for pulse in range(PARTS * GOP, gops * GOP):
+        np.testing.assert_array_equal(at(together, pulse), at(segments, pulse), str(pulse))
+    reel = hall.service.splicer.reel(1)
+    assert reel is not None
+    alone = [
+        (uri, gop) for uri, gop in uris if (part := reel.part(gop // PARTS, gop % PARTS)) and part.independent
+    ]
+    assert len(alone) == len(uris) - 4, "what is bridged within a segment is not"
+    for uri, gop in alone:
+        for pulse, picture in decoded(init + await data_of(hall, uri)).items():
+            assert gop * GOP <= pulse < (gop + 1) * GOP
+            np.testing.assert_array_equal(picture, at(segments, pulse), uri)
+
+
+@needs_ffmpeg
+async def test_ffmpeg_which_does_not_know_parts_plays_on_without_a_word(hall: Hall) -> None:
+    shows(hall, range(4 * PARTS + 1))
+    url = f"http://127.0.0.1:{hall.port}{STREAM}index.m3u8"
+    command = ["ffmpeg", "-v", "error", "-live_start_index", "0", "-i", url, "-f", "framecrc", "-"]
+    playing = asyncio.create_task(
+        asyncio.to_thread(
+            subprocess.run, command, capture_output=True, text=True, timeout=PATIENCE, check=False
+        )
+    )
+    for gop in range(4 * PARTS + 1, 8 * PARTS):
+        shows(hall, range(gop, gop + 1))
+        await asyncio.sleep(0.02)
+    hall.service.splicer.close()
+    done = await playing
+    assert (done.returncode, done.stderr) == (0, "")
+    assert sum(not line.startswith("#") for line in done.stdout.splitlines()) == 8 * PARTS * GOP
+
+
+async def test_gops_that_are_too_short_are_no_parts_but_segments_can_be_waited_for() -> None:
+    async for hall in opened(http=HTTP, encode={"gop": 2}, view={"lookahead": 10}):
+        hall.service.come(*CAMERAS)
+        gops = 40
+        for camera in CAMERAS:
+            for unit in encoded(0, 100, gop=2)[: 2 * gops]:
+                hall.service.intake.video(video(camera, unit))
+        choice = ObjectChoice(1, A, None, away=False)
+        decisions = [GopDecision(2 * gop, 2, (choice,), {}, {}, (), NO_REASON) for gop in range(gops)]
+        for decision in decisions[: gops // 2]:
+            hall.service.splicer.decision(decision)
+        waiting = asyncio.create_task(text_of(hall, "?_HLS_msn=3"))
+        now = await text_of(hall)
+        assert "CAN-BLOCK-RELOAD=YES\n" in now
+        assert "PART" not in now
+        assert "3.m4s" not in now
+        for decision in decisions[gops // 2 :]:
+            hall.service.splicer.decision(decision)
+        assert "3.m4s" in await waiting
+        assert (await hall.get(STREAM + "5.0.m4s"))[0] == 404
+
+
+async def test_a_camera_has_parts_too(hall: Hall) -> None:
+    shows(hall, range(2 * PARTS + 1))
+    async with hall.session.get(f"/cameras/{A}/hls/index.m3u8") as answer:
+        assert [it.uri for it in read(await answer.text()).parts[2]] == ["2.0.m4s"]
+    async with hall.session.get(f"/cameras/{A}/hls/2.0.m4s") as answer:
+        assert (await answer.read())[4:8] == b"moof"
+    async with aiohttp.ClientSession() as other:
+        url = f"http://127.0.0.1:{hall.port}/cameras/{A}/hls/2.9.m4s"
+        async with other.get(url) as answer:
+            assert answer.status == 404

@@ -1,0 +1,211 @@
+"""The past as HLS: segments are found again at their addresses, and are what they were when they were new."""
+
+from __future__ import annotations
+
+import asyncio
+import io
+import re
+import subprocess
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+
+from benchmarks.browser import chromium
+from fakes.cameras import CAMERAS, FPS, GOP
+from fakes.hls_recording import FRAMES, GOPS, HTTP, LENGTH, fetch, forget, numbers, shows, text, until_written
+from fakes.media.audio import FRAMES as SOUNDING
+from fakes.media.audio import heard, sends, write_flashes
+from fakes.media.browser_playback import HLS_BY_ITSELF
+from fakes.programs import needs_chromium, needs_ffmpeg
+from fakes.recordings import Picture, own_pictures
+from fakes.site import A, B, Hall, opened
+from fakes.timeouts import PATIENCE
+
+NOTHING = "of camera c0 nothing is kept from p999 on; there is p0 to p104"
+
+
+@pytest.fixture
+async def hall(tmp_path: Path) -> AsyncIterator[Hall]:
+    """A site that keeps everything."""
+    async for hall in opened(record={"folder": str(tmp_path / "kept"), "segment_s": 1.0}, http=HTTP):
+        hall.service.past.open()
+        hall.service.come(*CAMERAS)
+        hall.service.remembering.begin(0)
+        yield hall
+
+
+async def played(hall: Hall, stream: str, listed: list[int]) -> list[tuple[int, Picture]]:
+    """Decode segments: each pulse and the last picture in it; what that is decoded by may come before."""
+    parts = [await fetch(hall, f"{stream}/hls/{it}") for it in ("init.mp4", *(f"{n}.m4s" for n in listed))]
+    with av.open(io.BytesIO(b"".join(parts)), "r") as container:
+        frames = list(container.decode(video=0))
+    shown = {round(float(it.time or 0) * FPS): it.to_ndarray(format="yuv420p") for it in frames}
+    return list(shown.items())
+
+
+async def test_a_part_of_the_past_is_a_list_of_all_its_segments_that_ends(hall: Hall) -> None:
+    shows(hall, range(GOPS))
+    await until_written(hall, GOPS)
+    forget(hall)
+    listed = await text(hall, "/objects/1/hls/index.m3u8?from=p13&to=p55")
+    assert numbers(listed) == [1, 2, 3, 4, 5], "whole segments, which hold these moments"
+    assert "#EXT-X-MEDIA-SEQUENCE:1\n" in listed
+    assert "#EXT-X-PLAYLIST-TYPE" not in listed, "that would promise that nothing is ever taken from it"
+    assert listed.endswith("#EXT-X-ENDLIST\n")
+    shown = await played(hall, "/objects/1", numbers(listed))
+    assert [pulse for pulse, _ in shown] == list(range(LENGTH, 6 * LENGTH))
+    for pulse, picture in shown:
+        np.testing.assert_array_equal(picture, own_pictures(CAMERAS[pulse // GOP % 2])[pulse])
+
+
+@pytest.mark.parametrize("stream", ["/objects/1", "/cameras/c0"])
+async def test_a_segment_has_the_bytes_that_it_had_when_it_was_new(hall: Hall, stream: str) -> None:
+    choices = {gop: A if gop % 7 < 3 else B if gop % 7 < 5 else None for gop in range(GOPS)}
+    new: dict[int, bytes] = {}
+    for gop in range(GOPS):
+        shows(hall, range(gop, gop + 1), choices)
+        if gop > 3:
+            for number in numbers(await text(hall, f"{stream}/hls/index.m3u8")):
+                new[number] = await fetch(hall, f"{stream}/hls/{number}.m4s")
+    await until_written(hall, GOPS)
+    forget(hall)
+    for reel in (hall.service.splicer.reel(1), hall.service.splicer.camera_reel("c0")):
+        assert reel is not None
+        reel._segments.clear()
+    assert len(new) > 15
+    for number, data in new.items():
+        assert await fetch(hall, f"{stream}/hls/{number}.m4s") == data, number
+
+
+async def test_without_an_end_it_grows_and_nothing_moves(hall: Hall) -> None:
+    shows(hall, range(21))
+    await until_written(hall, 21)
+    before = await text(hall, "/objects/1/hls/index.m3u8?from=p0&to=live")
+    assert numbers(before) == list(range(10)), "the eleventh is not whole"
+    assert "#EXT-X-ENDLIST" not in before
+    assert "#EXT-X-START:TIME-OFFSET=0\n" in before, "or players would begin near the end"
+    shows(hall, range(21, 30))
+    after = await text(hall, "/objects/1/hls/index.m3u8?from=p0&to=live")
+    assert numbers(after) == list(range(15))
+    assert after.startswith(before)
+
+
+async def test_an_end_that_is_yet_to_come_is_grown_towards(hall: Hall) -> None:
+    shows(hall, range(21))
+    before = await text(hall, "/objects/1/hls/index.m3u8?from=p0&to=p115")
+    assert numbers(before) == list(range(10))
+    shows(hall, range(21, 30))
+    after = await text(hall, "/objects/1/hls/index.m3u8?from=p0&to=p115")
+    assert numbers(after) == list(range(12))
+    assert after.startswith(before.replace("#EXT-X-START:TIME-OFFSET=0\n", ""))
+    assert after.endswith("#EXT-X-ENDLIST\n")
+
+
+async def test_moments_that_move_name_a_playlist_that_does_not(hall: Hall) -> None:
+    shows(hall, range(20))
+    head = await text(hall, "/objects/1/hls/index.m3u8?from=-2&to=-1")
+    assert head.splitlines()[-1] == "index.m3u8?from=p50&to=p75"
+    told = re.search(
+        r'^#EXT-X-STREAM-INF:BANDWIDTH=(\d+),CODECS="avc1\.\w+",RESOLUTION=64x48,FRAME-RATE=25\.000$',
+        head,
+        re.MULTILINE,
+    )
+    assert told
+    sizes = [len(await fetch(hall, f"/objects/1/hls/{number}.m4s")) for number in range(5, 8)]
+    assert int(told[1]) >= max(sizes) * 8 / (LENGTH / FPS)
+    assert numbers(await text(hall, "/objects/1/hls/index.m3u8?from=p50&to=p75")) == [5, 6, 7]
+
+
+async def test_where_nobody_is_shown_for_long_the_last_picture_stands_in_every_segment(hall: Hall) -> None:
+    choices = {gop: A if gop < 5 or gop >= 35 else None for gop in range(GOPS)}
+    shows(hall, range(GOPS), choices)
+    await until_written(hall, GOPS)
+    forget(hall)
+    listed = await text(hall, f"/objects/1/hls/index.m3u8?from=p0&to=p{FRAMES}")
+    assert numbers(listed) == list(range(GOPS // 2))
+    for number in (2, 9, 17):
+        shown = await played(hall, "/objects/1", [number])
+        for pulse, picture in shown:
+            expected = own_pictures(A)[24 if 25 <= pulse < 175 else pulse]
+            np.testing.assert_array_equal(picture, expected, str(pulse))
+
+
+async def test_the_memory_is_the_past_where_nothing_is_recorded() -> None:
+    async for hall in opened(http=HTTP):
+        hall.service.come(*CAMERAS)
+        shows(hall, range(20))
+        listed = await text(hall, "/objects/1/hls/index.m3u8?from=p20&to=live")
+        assert numbers(listed) == list(range(2, 10))
+        shown = await played(hall, "/objects/1", numbers(listed))
+        assert [pulse for pulse, _ in shown] == list(range(20, 100))
+
+
+async def test_what_was_somebodys_can_be_fetched_when_they_are_forgotten(hall: Hall) -> None:
+    shows(hall, range(21))
+    await until_written(hall, 21)
+    hall.service.splicer.forget([], [])
+    hall.service.splicer._people._gone.clear()
+    listed = await text(hall, "/objects/1/hls/index.m3u8?from=p0&to=live")
+    assert numbers(listed) == list(range(11))
+    assert listed.endswith("#EXT-X-ENDLIST\n")
+    assert re.findall(r"#EXTINF:([\d.]+),", listed)[-1] == "0.20000", "it ends with the last GOP"
+    shown = await played(hall, "/objects/1", numbers(listed))
+    assert [pulse for pulse, _ in shown] == list(range(21 * GOP))
+    assert (await hall.session.get("/objects/1/hls/index.m3u8")).status == 404
+
+
+@pytest.mark.parametrize(
+    ("path", "status", "error"),
+    [
+        ("/objects/9/hls/index.m3u8?from=-60", 404, "there is no object 9"),
+        ("/cameras/c9/hls/index.m3u8?from=-60", 404, "there is no camera 'c9'; there are c0, c1"),
+        ("/cameras/c0/hls/index.m3u8?from=p999", 416, NOTHING),
+        ("/objects/1/hls/index.m3u8?from=p9&to=p9", 400, "to: p9 is not after from, which is p9"),
+        ("/objects/1/hls/index.m3u8?from=p100", 503, "the first segment is not whole yet"),
+        ("/objects/1/hls/10.m4s", 404, "there is no segment 10 here, or not any more"),
+        ("/objects/1/hls/999999999999.m4s", 404, "there is no segment 999999999999 here, or not any more"),
+    ],
+)  # fmt: skip
+async def test_what_cannot_be_had_is_told_in_one_line(hall: Hall, path: str, status: int, error: str) -> None:
+    shows(hall, range(21))
+    assert await hall.get(path) == (status, {"error": error})
+
+
+@needs_ffmpeg
+async def test_ffmpeg_plays_the_past_with_its_sound_to_the_end(tmp_path: Path) -> None:
+    recording = write_flashes(tmp_path / "flashes.mp4", SOUNDING)
+    record = {"folder": str(tmp_path / "kept"), "segment_s": 1.0}
+    async for hall in opened(record=record, http=HTTP, sound={"source": str(recording)}):
+        hall.service.past.open()
+        hall.service.come(*CAMERAS)
+        sends(hall.service, recording)
+        gops = SOUNDING // GOP
+        shows(hall, range(gops))
+        await until_written(hall, gops)
+        out = tmp_path / "past.mp4"
+        url = f"http://127.0.0.1:{hall.port}/objects/1/hls/index.m3u8?from=p0&to=p{SOUNDING}"
+        command = ["ffmpeg", "-v", "warning", "-i", url, "-c", "copy", str(out)]
+        done = await asyncio.to_thread(
+            subprocess.run, command, capture_output=True, text=True, timeout=PATIENCE
+        )
+        assert (done.returncode, done.stderr) == (0, "")
+        times, _ = heard(out.read_bytes())
+        assert np.diff(times) == pytest.approx(1 / 48_000, abs=1e-4)
+        assert times[-1] == pytest.approx(SOUNDING / FPS, abs=0.03)
+        with av.open(str(out)) as container:
+            assert sum(1 for _ in container.decode(video=0)) == SOUNDING
+
+
+@needs_chromium
+async def test_chromium_plays_the_past_to_its_end(hall: Hall) -> None:
+    shows(hall, range(20))
+    async with chromium() as browser:
+        page = await browser.new_page(bypass_csp=True)
+        await page.goto(f"http://127.0.0.1:{hall.port}/healthz")
+        seen = await page.evaluate(HLS_BY_ITSELF, "/objects/1/hls/index.m3u8?from=-2.4&to=-0.4")
+    if seen is None:
+        pytest.skip("this Chromium plays no HLS by itself")
+    assert seen == {"end": "ended", "seconds": pytest.approx(2.0, abs=0.05)}

@@ -1,0 +1,202 @@
+"""What /metrics says of every stage, and whether /readyz means it."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+
+import msgspec
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from prometheus_client.parser import text_string_to_metric_families
+
+from fakes.cameras import CAMERAS, FPS, GOP, LARGE, SMALL, encoded, status, tracks, word
+from fakes.prometheus.monitoring_files import ALERTS
+from fakes.prometheus.promql_series import selectors
+from fakes.site import A, B, Hall, see
+from server.http.event_loop_lag import Lag
+from server.http.traffic import Sent
+from server.messaging.inbox import Message
+from server.messaging.messages import FrameHeader, SolverReport, ZenohKeys
+from server.service.metrics.histogram import Histogram
+from server.service.readiness import most_behind
+from server.service.streaming.broadcaster import BytesChunk, Subscriber
+
+
+async def samples(hall: Hall) -> dict[tuple[str, ...], float]:
+    """Give all samples of /metrics, by their name and the values of their labels, the bound last."""
+    async with hall.session.get("/metrics") as answer:
+        text = await answer.text()
+    found = {}
+    for sample in (it for family in text_string_to_metric_families(text) for it in family.samples):
+        labels = sorted(sample.labels.items(), key=lambda it: (it[0] == "le", it[0]))
+        found[sample.name, *(value for _, value in labels)] = sample.value
+    return found
+
+
+@given(st.lists(st.floats(-1.0, 20.0)), st.lists(st.floats(0.0, 10.0), min_size=1, unique=True).map(sorted))
+def test_a_histogram_counts_what_does_not_pass_each_bound(values: list[float], bounds: list[float]) -> None:
+    histogram = Histogram(bounds)
+    for value in values:
+        histogram.observe(value)
+    expected = [sum(value <= bound for value in values) for bound in [*bounds, float("inf")]]
+    assert [count for _, count in histogram.buckets] == expected
+    assert histogram.count == len(values)
+    assert histogram.sum == pytest.approx(sum(values))
+
+
+async def test_a_cameras_stages_are_measured_by_its_own_times(hall: Hall) -> None:
+    see(hall)
+    unit = encoded(0)[15]
+    head = FrameHeader(pulse=unit.pulse, key=unit.key, boot=1, due=100.0, taken=100.03, encoded=100.04)
+    hall.service.intake.video(
+        Message(ZenohKeys("hall").camera(A, "video"), unit.data, msgspec.json.encode(head))
+    )
+    solve = SolverReport(objective=-4.0, bound=-4.2, gap=0.2, integral=False, rounds=3)
+    said = word(A, 3, {1: SMALL}, solve=solve, search_s=0.02, solve_s=0.2, solved_at=100.5)
+    hall.service.intake.tracks(tracks(msgspec.structs.replace(said, first=11, last=15, final_to=15)))
+    hall.service.intake.tracks(tracks(said))
+    told = await samples(hall)
+    assert told["myview_stage_seconds_bucket", A, "take", "0.05"] == 16
+    assert told["myview_stage_seconds_bucket", A, "take", "0.025"] == 15  # what is fed by hand takes no time
+    assert told["myview_stage_seconds_sum", A, "encode"] == pytest.approx(0.01)
+    assert told["myview_stage_seconds_count", A, "search"] == 1
+    assert told["myview_stage_seconds_sum", A, "solve"] == pytest.approx(0.2)
+    assert told["myview_stage_seconds_count", B, "solve"] == 0
+    assert told["myview_camera_windows_total", A] == 1
+    assert told["myview_camera_certified_windows_total", A] == 0
+    assert told["myview_camera_gap_total", A] == pytest.approx(0.2)
+
+
+async def test_what_a_camera_says_of_itself_is_there_once_it_has_said_it(busy: Hall) -> None:
+    before = await samples(busy)
+    assert ("myview_camera_waiting_frames", A) not in before
+    busy.service.intake.status(status(A, waiting=7, fps=12.5, in_step=False))
+    told = await samples(busy)
+    assert told["myview_camera_waiting_frames", A] == 7
+    assert told["myview_camera_fps", A] == 12.5
+    assert told["myview_camera_in_step", A] == 0
+
+
+async def test_messages_that_were_not_understood_are_counted_whoever_heard_them(hall: Hall) -> None:
+    hall.service.intake.tracks(Message(ZenohKeys("hall").camera(A, "tracks"), b"{", b""))
+    hall.service.intake.status(status(B, bad_messages=3))
+    told = {key[1:]: value for key, value in (await samples(hall)).items() if key[0] == _BAD}
+    assert told == {(A, "sent"): 1, (B, "sent"): 0, (B, "heard"): 3}
+
+
+def test_the_alert_is_about_both() -> None:
+    [alert] = [it for it in ALERTS if it["alert"] == "MyViewMessagesBad"]
+    assert [it.name for it in selectors(alert["expr"])] == [_BAD]
+    assert "way" not in alert["expr"]
+
+
+_BAD = "myview_camera_bad_messages_total"
+
+
+async def test_deciding_and_sending_are_counted_by_epoch_and_by_gop(busy: Hall) -> None:
+    told = await samples(busy)
+    assert told["myview_decide_seconds_count",] == 3
+    assert told["myview_send_seconds_count",] == busy.service.board.end // GOP == 2
+    assert told["myview_delay_seconds_count",] == 0  # nobody knows when pulses were due
+    busy.service.pulse0 = time.time() - 100.0
+    busy.service.feed(3, {A: {1: SMALL}, B: {1: LARGE}})
+    told = await samples(busy)
+    assert told["myview_delay_seconds_count",] == 1
+    assert told["myview_delay_seconds_sum",] == pytest.approx(100.0 - 2 * GOP / FPS, abs=5.0)
+    assert told["myview_decided_pulse",] == 3 * GOP
+
+
+async def test_pictures_that_did_not_come_are_counted(hall: Hall) -> None:
+    hall.service.come(*CAMERAS)
+    shelf = hall.service.shelves[A]
+    for epoch in range(2):
+        hall.service.feed(epoch, {A: {1: SMALL}, B: {1: LARGE}})
+    del shelf._shelved[7]
+    hall.service.feed(2, {A: {1: SMALL}, B: {1: LARGE}})
+    told = await samples(hall)
+    assert told["myview_camera_lost_pictures_total", A] == 1
+    assert told["myview_camera_lost_pictures_total", B] == 0
+
+
+async def test_viewers_are_counted_by_kind_and_what_is_sent_to_them_in_bytes(busy: Hall) -> None:
+    before = await samples(busy)
+    async with (
+        busy.session.get("/objects/1/best.mp4") as best,
+        busy.session.get("/cameras/c0/live.mp4") as live,
+        busy.session.get("/api/events") as events,
+    ):
+        received = len(await best.content.readany())
+        received += len(await live.content.readany()) + len(await events.content.readany())
+        told = await samples(busy)
+        kinds = {it: told["myview_viewers_by_kind", it] for it in ("object", "camera", "events", "past")}
+        assert kinds == {"object": 1, "camera": 1, "events": 1, "past": 0}
+        assert told["myview_sent_bytes_total", "streams"] >= received > 0
+    size = len(await (await busy.session.get("/api/site")).read())
+    after = await samples(busy)
+    answers = after["myview_sent_bytes_total", "answers"] - before["myview_sent_bytes_total", "answers"]
+    assert answers >= size
+
+
+async def test_what_slow_viewers_lose_stays_counted_when_they_have_gone() -> None:
+    sent, slow = Sent(), Subscriber([], starts_max=2)
+    sent.join(slow)
+    for number in range(4):
+        slow.put(BytesChunk(b"gop", start=True))
+        assert sent.longest == (number % 2) + 1
+    assert sent.lost == 2
+    sent.leave(slow)
+    assert (sent.lost, sent.longest) == (2, 0)
+
+
+async def test_a_loop_that_is_held_up_is_late() -> None:
+    lag = Lag(every_s=0.001)
+    task = asyncio.create_task(lag.run())
+    await asyncio.sleep(0)
+    await asyncio.sleep(0)
+    time.sleep(0.06)  # noqa: ASYNC251 — what is measured
+    while not lag.histogram.count:  # noqa: ASYNC110 — it is due
+        await asyncio.sleep(0)
+    task.cancel()
+    assert lag.histogram.sum >= 0.05
+
+
+async def ready(hall: Hall) -> tuple[int, str]:
+    async with hall.session.get("/readyz") as answer:
+        words = await answer.text()
+    assert words.endswith("\n")
+    assert words.count("\n") == 1
+    return answer.status, words.strip()
+
+
+async def test_a_site_is_ready_when_pulses_and_frames_come_and_decisions_keep_up(hall: Hall) -> None:
+    code, words = await ready(hall)
+    assert code == 503
+    assert words.split("; ") == [
+        "no pulse has come from the pulse server",
+        "no camera delivers frames",
+        "nothing has been decided yet",
+    ]
+    see(hall)
+    assert await ready(hall) == (200, "2 of 2 cameras")
+    assert (await samples(hall))["myview_ready",] == 1
+
+
+async def test_a_site_whose_decisions_fall_behind_is_not_ready(busy: Hall) -> None:
+    allowed = most_behind(busy.service)
+    busy.service.pulse = busy.service.board.end - 1 + allowed
+    assert (await ready(busy))[0] == 200
+    busy.service.pulse += 1
+    code, words = await ready(busy)
+    assert (code, words) == (503, f"decisions are {(allowed + 1) / FPS:.1f} s behind the pulses")
+    assert (await samples(busy))["myview_ready",] == 0
+
+
+async def test_a_site_without_pulses_or_live_cameras_is_not_ready(busy: Hall) -> None:
+    busy.service._pulsed_at = time.monotonic() - 60.0
+    assert await ready(busy) == (503, "no pulse has come for 60 s")
+    busy.service._pulsed_at = time.monotonic()
+    for camera in CAMERAS:
+        busy.service.intake.alive(ZenohKeys("hall").camera(camera, "alive"), there=False)
+    assert await ready(busy) == (503, "no camera delivers frames")

@@ -1,0 +1,126 @@
+"""The files for Prometheus and Grafana ask for nothing that /metrics does not say."""
+
+from __future__ import annotations
+
+import pytest
+
+from fakes.cameras import CAMERAS, status, tracks, word
+from fakes.paths import CONFIGS
+from fakes.prometheus.monitoring_files import (
+    ALERTS,
+    ASKED,
+    DASHBOARD,
+    OF_PROMETHEUS,
+    SCRAPING,
+    VARIABLES,
+)
+from fakes.prometheus.promql_series import Printed, given, selectors
+from fakes.site import Hall
+
+SEVERITIES = {"critical", "warning", "info"}
+
+
+async def printed(hall: Hall) -> Printed:
+    """Read what /metrics prints of a site in which everything has happened."""
+    for camera in CAMERAS:
+        hall.service.intake.status(status(camera))
+        hall.service.intake.tracks(tracks(word(camera, 2, {}, solved_at=1.0)))
+    async with hall.session.get("/metrics") as answer:
+        assert answer.status == 200
+        return Printed.of(await answer.text())
+
+
+async def test_every_expression_gives_series_that_have_the_labels_it_shows(busy: Hall) -> None:
+    there = await printed(busy)
+    assert len(ASKED) > 50
+    for asked in ASKED:
+        if {it.name for it in selectors(asked.expression)} <= OF_PROMETHEUS:
+            continue
+        series = given(asked.expression, there)
+        assert series, asked.place
+        assert all(asked.shown <= dict(it).keys() for it in series), asked.place
+
+
+async def test_whatever_is_printed_can_be_looked_at(busy: Hall) -> None:
+    looked_at = {it.name for asked in ASKED for it in selectors(asked.expression)}
+    for name in (await printed(busy)).samples:
+        if name.startswith("myview_") and not name.endswith(("_created", "_sum", "_count")):
+            assert name in looked_at or name in _LOOKED_AT_OTHERWISE, name
+
+
+_LOOKED_AT_OTHERWISE = {
+    "myview_decided_pulse",  # by its difference to the pulse, which is the delay
+    "myview_recorded_gops_total",  # by its bytes
+    "myview_config_differs",  # on the operator's page
+}
+
+SAID = """# TYPE a_total counter
+a_total{camera="c0",of="video"} 1
+a_total{camera="c1",of="video"} 1
+# TYPE b gauge
+b{camera="c1"} 1
+b{camera="c2"} 1
+# TYPE h histogram
+h_bucket{camera="c0",le="1"} 1
+h_bucket{camera="c0",le="+Inf"} 1
+"""
+
+
+@pytest.mark.parametrize(
+    ("expression", "series"),
+    [
+        ('rate(a_total{job="x",camera="c0"}[5m])', [{"camera": "c0", "of": "video"}]),
+        ("2 * b > 1", [{"camera": "c1"}, {"camera": "c2"}]),
+        ("sum(b)", [{}]),
+        ("sum(c)", []),
+        ("c == 0", []),
+        ('b{camera="c7"}', []),
+        ("sum by (camera) (rate(a_total[5m])) / b", [{"camera": "c1"}]),
+        ("rate(a_total[5m]) / b", []),
+        ("histogram_quantile(0.5, sum by (le) (rate(h_bucket[5m])))", [{}]),
+        ("histogram_quantile(0.5, rate(h_bucket[5m]))", [{"camera": "c0"}]),
+    ],
+)
+def test_what_an_expression_gives_is_known(expression: str, series: list[dict[str, str]]) -> None:
+    assert given(expression, Printed.of(SAID)) == {frozenset(it.items()) for it in series}
+
+
+@pytest.mark.parametrize(
+    ("expression", "words"),
+    [
+        ("rate(b[5m])", "rate of b, which is a gauge"),
+        ("delta(a_total[5m])", "delta of a_total, which is a counter"),
+        ("sum by (object) (b)", "by labels that there are not"),
+        ("histogram_quantile(0.5, b)", "what has no buckets"),
+        ("rate(a_total[5m)", "."),
+    ],
+)
+def test_what_makes_no_sense_is_noticed(expression: str, words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        given(expression, Printed.of(SAID))
+
+
+def test_every_alert_says_how_bad_it_is_and_has_a_name_of_its_own() -> None:
+    names = [alert["alert"] for alert in ALERTS]
+    assert len(names) == len(set(names)) > 10
+    for alert in ALERTS:
+        assert alert["labels"]["severity"] in SEVERITIES
+        assert len(alert["annotations"]["summary"]) > 20
+
+
+def test_prometheus_reads_the_alerts_and_the_page_of_the_demo() -> None:
+    assert [(CONFIGS / "prometheus" / name).is_file() for name in SCRAPING["rule_files"]] == [True]
+    (job,) = SCRAPING["scrape_configs"]
+    assert job["job_name"] == VARIABLES[1]["current"]["value"] == "myview"
+    assert job["static_configs"] == [{"targets": ["127.0.0.1:8080"]}]
+
+
+def test_panels_have_their_own_places() -> None:
+    covered: set[tuple[int, int]] = set()
+    for panel in DASHBOARD["panels"]:
+        at = panel["gridPos"]
+        cells = {(at["x"] + x, at["y"] + y) for x in range(at["w"]) for y in range(at["h"])}
+        assert not cells & covered, panel["title"]
+        assert max(x for x, _ in cells) < 24
+        covered |= cells
+    assert len({panel["id"] for panel in DASHBOARD["panels"]}) == len(DASHBOARD["panels"])

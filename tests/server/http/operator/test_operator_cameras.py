@@ -1,0 +1,100 @@
+"""What the operator is told of the cameras and of the pulses."""
+
+from __future__ import annotations
+
+from contextlib import aclosing
+
+import pytest
+
+from camsync import Login, PulseClient, PulseServer
+from fakes.cameras import CAMERAS, status
+from fakes.site import A, B, Hall, opened
+from server.messaging.inbox import Message
+from server.messaging.messages import ZenohKeys
+
+
+async def test_every_camera_is_told_with_what_is_measured(busy: Hall) -> None:
+    busy.service.intake.status(status(A, missed=3, shed=2, clock_offset=0.25))
+    told = (await busy.get_json("/api/operator/cameras"))["cameras"]
+    plain = (await busy.get_json("/api/cameras"))["cameras"]
+    assert [it["camera"] for it in told] == [A, B]
+    for mine, everybodys in zip(told, plain, strict=True):
+        assert mine.items() >= everybodys.items()
+    first = told[0]
+    assert (first["clock_offset"], told[1]["clock_offset"]) == (0.25, None)
+    assert first["sync_error"] == {"median": 0.0, "worst": 0.0}
+    assert first["picture"] == {"width": 64, "height": 48, "scale": 1.0, "left": 0.0, "top": 0.0}
+    assert (first["certified"], first["windows"], first["last_trouble"]) == (None, 0, None)
+
+
+async def test_what_went_wrong_last_is_told_until_something_else_does(busy: Hall) -> None:
+    async def trouble() -> str:
+        camera = (await busy.get_json("/api/operator/cameras"))["cameras"][0]
+        return str(camera["last_trouble"]["text"])
+
+    intake = busy.service.intake
+    intake.status(Message(ZenohKeys("hall").camera(A, "status"), b"{}", b""))
+    assert "a message that cannot be used: " in await trouble()
+    intake.status(status(A, state="away"))
+    assert await trouble() == "its source gives no pictures; it is tried again"
+    intake.status(status(A, state="live"))
+    assert await trouble() == "its source gives no pictures; it is tried again"
+    intake.alive(ZenohKeys("hall").camera(A, "alive"), there=False)
+    assert await trouble() == "its process was gone"
+
+
+async def test_the_floor_has_the_calibrated_cameras_that_have_spoken() -> None:
+    plan = [[0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 1.0]]
+    cameras = [{"id": A, "source": "scene:room", "ground": plan}, B]
+    async with aclosing(opened(cameras=cameras)) as halls:
+        hall = await anext(halls)
+        assert await hall.get_json("/api/operator/floor") == {"cameras": [], "uncalibrated": [B]}
+        hall.service.come(*CAMERAS)
+        hall.service.feed(0, {A: {}, B: {}})
+        (camera,) = (await hall.get_json("/api/operator/floor"))["cameras"]
+    assert camera["camera"] == A
+    assert camera["homography"] == plan
+    corners = [round(side, 6) for corner in camera["outline"] for side in corner]
+    assert corners == [0.0, 4.8, 6.4, 4.8, 6.4, 0.0, 0.0, 0.0]
+
+
+async def test_the_pulse_servers_clients_are_told_and_who_is_missing() -> None:
+    async with (
+        PulseServer(25.0) as server,
+        PulseClient("127.0.0.1", server.port, A) as camera,
+        PulseClient("127.0.0.1", server.port, "stranger") as stranger,
+        aclosing(opened(sync={"port": server.port})) as halls,
+    ):
+        for client in (camera, stranger):
+            await anext(aiter(client))  # it is connected
+        told = await (await anext(halls)).get_json("/api/operator/pulses")
+        assert (told["server"], told["error"]) == (f"127.0.0.1:{server.port}", "")
+    assert {(it["name"], it["expected"], it["behind"]) for it in told["clients"]} == {
+        (A, True, 0),
+        ("stranger", False, 0),
+    }
+    assert told["missing"] == [B, "bestview"]
+
+
+async def test_a_closed_pulse_server_tells_it_to_the_service_whose_password_it_knows() -> None:
+    users = {A: "a" * 32, "bestview": "b" * 32}
+    async with (
+        PulseServer(25.0, users=users) as server,
+        PulseClient("127.0.0.1", server.port, A, login=Login(A, users[A])) as camera,
+        aclosing(opened(sync={"port": server.port})) as halls,
+    ):
+        await anext(aiter(camera))
+        hall = await anext(halls)
+        assert "asks for a password" in (await hall.get_json("/api/operator/pulses"))["error"]
+        hall.service.pulse_login = Login("bestview", users["bestview"])
+        told = await hall.get_json("/api/operator/pulses")
+    assert (told["error"], [it["name"] for it in told["clients"]]) == ("", [A])
+    assert told["missing"] == [B, "bestview"]
+
+
+@pytest.mark.parametrize("port", [1])
+async def test_a_pulse_server_that_is_away_is_said_in_one_line(port: int) -> None:
+    async with aclosing(opened(sync={"port": port})) as halls:
+        told = await (await anext(halls)).get_json("/api/operator/pulses")
+    assert told["error"].startswith(f"there is no pulse server at 127.0.0.1:{port}")
+    assert "\n" not in told["error"]

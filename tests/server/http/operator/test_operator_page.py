@@ -1,0 +1,452 @@
+"""The operator's page in a browser, on a served site: it signs in, and what it does the site does."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import re
+import time
+from collections.abc import AsyncIterator
+from contextlib import aclosing, asynccontextmanager
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import pytest_asyncio
+import yaml
+from playwright.async_api import Browser, Page, Route, expect
+
+from benchmarks.browser import chromium
+from bestview import IdentityRegistry
+from fakes.calibration_walk import SITE, curved, errors_on_floor, words
+from fakes.cameras import CAMERAS, FPS, LARGE, SMALL, small_config, status, tracks, word
+from fakes.paths import AXE
+from fakes.programs import needs_chromium
+from fakes.site import A, B, Hall, opened, see
+from fakes.timeouts import PATIENCE_MS
+from fakes.tokens import line_of, token_of, write_tokens
+from server.cli.calibrate.points_file import read_points
+from server.messaging.messages import ZenohKeys
+from server.messaging.operator_messages import RiskEvent
+
+SECTIONS = ["cameras", "floor", "known", "flagged", "downloads", "marks", "walk", "choosing", "configuration"]
+PLAN = [[0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 1.0]]
+"""Of a camera that looks straight down: ten pixels are one unit of the floor."""
+
+expect.set_options(timeout=PATIENCE_MS)
+
+pytestmark = [
+    needs_chromium,
+    pytest.mark.asyncio(loop_scope="module"),
+]
+
+
+@pytest_asyncio.fixture(scope="module", loop_scope="module")
+async def browser() -> AsyncIterator[Browser]:
+    async with chromium() as running:
+        yield running
+
+
+@asynccontextmanager
+async def operating(
+    browser: Browser, place: str = "", axe: str = "", *, patience: float = 60, **changes: Any
+) -> AsyncIterator[tuple[Hall, Page]]:
+    """Open the operator's page of a site; an exception or a refused resource in the page fails the test."""
+    complaints: list[str] = []
+    async with aclosing(opened(patience=patience, **changes)) as halls:
+        hall = await anext(halls)
+        page = await browser.new_page(viewport={"width": 1000, "height": 800})
+        await page.add_init_script(axe)  # where the site's policy does not hold
+        page.set_default_timeout(PATIENCE_MS)
+        page.on("pageerror", lambda error: complaints.append(str(error)))
+        page.on(
+            "console",
+            lambda it: complaints.append(it.text) if "Content Security" in it.text else None,
+        )
+        await page.goto(f"http://127.0.0.1:{hall.port}/operator{place}")
+        yield hall, page
+        await page.close()
+    assert complaints == []
+
+
+async def test_who_has_a_token_signs_in_and_out(browser: Browser, tmp_path: Path) -> None:
+    tokens = write_tokens(tmp_path / "tokens.yaml", line_of("lead"), line_of("desk"))
+    async with operating(browser, access={"tokens": str(tokens)}) as (_, page):
+        field = page.get_by_label("An operator's token")
+        await field.fill("wrong")
+        await page.get_by_role("button", name="Sign in").click()
+        await expect(page.locator("#trouble")).to_have_text("there is no such token, or not any more")
+        await page.keyboard.type(token_of("desk"))
+        await page.keyboard.press("Enter")
+        await expect(page.locator("#trouble")).to_have_text(
+            "the token 'desk' is for watching, and for nothing else"
+        )
+        await field.fill(token_of("lead"))
+        await page.keyboard.press("Enter")
+        await expect(field).to_be_hidden()
+        await expect(page.locator("#trouble")).to_be_empty()
+        assert await page.evaluate("document.cookie") == ""
+        await page.reload()
+        await expect(page.locator("#cameras")).to_be_visible()
+        await page.context.clear_cookies()  # as when the sign-in has run out
+        await expect(field).to_be_visible()
+        await expect(page.locator("#cameras")).to_be_hidden()
+        await field.fill(token_of("lead"))
+        await page.keyboard.press("Enter")
+        await expect(page.locator("#cameras")).to_be_visible()
+        await page.get_by_role("button", name="Sign out").click()
+        await expect(field).to_be_visible()
+
+
+async def test_without_a_token_there_is_nothing_to_sign_in_to(browser: Browser) -> None:
+    async with operating(browser) as (hall, page):
+        await expect(page.locator("#site")).to_have_text(hall.service.config.site.name)
+        await expect(page.get_by_label("An operator's token")).to_be_hidden()
+        await expect(page.get_by_role("button", name="Sign out")).to_be_hidden()
+
+
+async def test_every_camera_has_a_tile_that_says_how_it_is(browser: Browser) -> None:
+    async with operating(browser, "#cameras") as (hall, page):
+        await expect(page.locator(".camera-tile .state")).to_have_text(["Starting", "Starting"])
+        see(hall)
+        await expect(page.locator(".camera-tile .state")).to_have_text(["Live", "Live"])
+        picture = await page.get_by_alt_text(f"What {A} sees now").element_handle()
+        await page.wait_for_function("(it) => it.naturalWidth > 0", arg=picture)
+        tile = page.locator(".camera-tile").first
+        assert (
+            await tile.locator("dt").all_text_contents()
+            == await page.locator(".camera-tile >> nth=1 >> dt").all_text_contents()
+        )
+        hall.service.intake.status(status(A, missed=3, clock_offset=-0.25))
+        await expect(tile.get_by_text("-250 ms")).to_be_visible()
+        hall.service.intake.alive(ZenohKeys("hall").camera(A, "alive"), there=False)
+        await expect(tile.locator(".state")).to_have_text("Gone")
+        await expect(tile.locator(".last-trouble")).to_contain_text("its process was gone")
+        await expect(page.locator("#pulses")).to_contain_text("there is no pulse server at")
+
+
+async def test_the_floor_plan_has_cameras_and_people_where_they_stand(browser: Browser) -> None:
+    cameras = [{"id": it, "source": "scene:room", "ground": PLAN} for it in CAMERAS]
+    async with operating(browser, "#floor", cameras=cameras) as (hall, page):
+        await expect(page.locator("#floor-words")).to_have_text("No camera has said yet what it sees.")
+        see(hall)
+        await page.reload()
+        await expect(page.locator("#plan polygon")).to_have_count(2)
+        hall.service.feed(3, {A: {1: SMALL, 2: SMALL}, B: {1: SMALL}})
+        hall.service.feed(4, {A: {2: SMALL}, B: {1: SMALL}})
+        left, _, right, bottom = SMALL
+        stands = f"{(left + right) / 20:.2f}, {bottom / 10:.2f}"
+        await expect(page.locator("#places li").nth(1)).to_have_text(f"2 at {stands}, seen by {A}")
+        await expect(page.locator("#plan .walker")).to_have_count(2)
+        assert await page.locator("#plan .way").nth(1).get_attribute("points") is not None
+
+
+async def test_a_site_that_is_not_calibrated_says_what_to_do(browser: Browser) -> None:
+    async with operating(browser, "#floor") as (hall, page):
+        see(hall)
+        await expect(page.locator("#floor-words")).to_contain_text("No camera is calibrated")
+        await expect(page.locator("#plan")).to_be_hidden()
+
+
+async def test_people_are_named_merged_and_parted_and_the_viewers_page_says_so(browser: Browser) -> None:
+    async with operating(browser, "#known") as (hall, page):
+        people = hall.service.decider.people
+        people._registry = IdentityRegistry(hall.service.config.view.identity, dict.fromkeys(CAMERAS))
+        await expect(page.locator("#known-words")).to_have_text("Nobody is known yet.")
+        see(hall)
+        first, second, *_ = people.known
+        await page.get_by_label(f"Name of person {first}").fill("Ann")
+        await page.keyboard.press("Enter")
+        await expect(page.locator("#known-words")).to_have_text(f"{first} is called Ann.")
+        await expect(page.locator("#merge-kept option").first).to_have_text(f"{first} Ann")
+        await page.get_by_label("who is also").select_option(str(second))
+        await page.get_by_role("button", name="Merge").click()
+        await expect(page.locator("#known-words")).to_have_text(f"{second} is {first} from now on.")
+        assert people.roll.merged == {second: first}
+        hall.service.feed(3, {A: {1: SMALL, 2: SMALL}, B: {1: LARGE}})
+        await expect(page.locator(f'#known-people [data-object="{second}"]')).to_have_count(0)
+        shown = people.number(A, 1, 15)
+        await page.get_by_label("As whom").select_option(str(shown))
+        await page.get_by_label("Which camera").select_option(A)
+        await page.get_by_role("button", name="Is somebody new").click()
+        await expect(page.locator("#known-words")).to_have_text(re.compile(r"They are \d+ from now on\."))
+        assert people.number(A, 1, 19) != shown
+        await page.goto(f"http://127.0.0.1:{hall.port}/?object={first}")
+        await expect(page.locator("#people .number").first).to_have_text(f"{first} Ann")
+        await expect(page).to_have_title(f"Person {first}, Ann · MyView")
+
+
+async def test_flags_are_listed_with_what_has_become_of_them(browser: Browser) -> None:
+    async with operating(browser, "#flagged") as (hall, page):
+        await expect(page.locator("#flag-none")).to_have_text("None so far.")
+        see(hall)
+        hall.service.decider.people.roll.call(1, "Ann")
+        trouble = RiskEvent(reason="alike", tracks=[2, 1], pulse=29, margin=0.1, risk=0.5)
+        hall.service.intake.tracks(tracks(word(A, 3, {1: SMALL, 2: SMALL}, troubles=[trouble])))
+        hall.service.intake.tracks(tracks(word(B, 3, {1: LARGE})))
+        hall.service.pulse = 19
+        hall.service.decide()
+        line = page.locator("#flag-list li")
+        await expect(line).to_have_text(re.compile(r"2 and 1.*, cross .* \(c0\): waits to be answered"))
+        await expect(page.locator("#flag-none")).to_have_text("")
+        hall.service.assist.flags.step(29 + 8 * FPS + 1, [], int)
+        await expect(line).to_have_text(re.compile(r": was not answered"))
+        await page.reload()
+        await expect(line).to_have_text(re.compile(r": was not answered"))
+        # Another run of the service knows nothing of it; the page sees that its connection ends.
+        hall.service.assist.flags._ended.clear()
+        [events] = [tell.__self__ for tell in hall.service.assist.flags.on_flag]  # type: ignore[attr-defined]
+        lines, events._lines = events._lines, {}
+        for it in lines.values():
+            it.channel.close()
+        await expect(page.locator("#flag-none")).to_have_text("None so far.")
+
+
+async def test_a_span_of_the_past_is_downloaded(browser: Browser) -> None:
+    async with operating(browser, "#downloads") as (hall, page):
+        end = int(time.time())
+        hall.service.pulse0 = end - 0.2  # five frames before
+        see(hall)
+        for label, moment in (("From", end - 60), ("to", end)):
+            local = datetime.fromtimestamp(moment)  # noqa: DTZ006 — as the page shows it
+            await page.get_by_label(label, exact=True).fill(local.isoformat())
+        await expect(page.get_by_role("link", name="Person 1")).to_be_visible()
+        async with page.expect_download() as download:
+            await page.get_by_role("link", name="Tracks (CSV)").click()
+        tracks = (await (await download.value).path()).read_text(encoding="utf-8").splitlines()
+        assert len(tracks) == 1 + 3 * 5
+        assert (await download.value).suggested_filename.startswith("hall-tracks-p0-")
+        async with page.expect_download() as download:
+            await page.get_by_role("link", name=A, exact=True).click()
+        assert (await download.value).suggested_filename.endswith(".mp4")
+        assert b"moof" in (await (await download.value).path()).read_bytes()
+        await page.get_by_label("From").fill("2020-01-02T00:00:00")
+        await page.get_by_label("to", exact=True).fill("2020-01-01T00:00:00")
+        await expect(page.locator("#download-tables")).to_have_text("The end is not after the beginning.")
+
+
+async def test_the_picture_is_of_the_camera_that_is_marked_though_anothers_comes_late(
+    browser: Browser,
+) -> None:
+    async with operating(browser, "#configuration") as (hall, page):  # which asks for no picture
+        see(hall)
+        late = asyncio.Event()
+
+        async def answer(route: Route) -> None:
+            if f"/{A}/" in route.request.url:
+                await late.wait()
+            await route.continue_()
+
+        await page.route("**/live.jpg", answer)
+        async with page.expect_request(f"**/{A}/live.jpg"):
+            await page.locator("#sections").get_by_role("link", name="Marks").click()
+        await page.get_by_label("Camera", exact=True).select_option(B)
+        image = page.locator("#mark-image")
+        await expect(image).to_have_attribute("src", re.compile("^blob:"))
+        shown = await image.get_attribute("src")
+        async with page.expect_response(f"**/{A}/live.jpg") as response:
+            late.set()
+        await (await response.value).finished()
+        await page.evaluate("new Promise((seen) => setTimeout(seen, 100))")
+        assert await image.get_attribute("src") == shown
+
+
+async def test_areas_of_the_configuration_are_there_whatever_is_pressed_before_they_come(
+    browser: Browser,
+) -> None:
+    cameras = [A, {"id": B, "source": "scene:room", "ignore": [[[0.0, 0.0], [9.0, 0.0], [9.0, 9.0]]]}]
+    async with operating(browser, "#marks", cameras=cameras) as (hall, page):
+        see(hall)
+        pressed = asyncio.Event()
+
+        async def answer(route: Route) -> None:
+            await pressed.wait()
+            await route.continue_()
+
+        await page.route("**/api/operator/config", answer)
+        await page.reload()
+        await page.get_by_label("Camera", exact=True).select_option(B)
+        await page.get_by_role("button", name="Next area").click()
+        pressed.set()
+        await expect(page.get_by_label("What the marks become")).to_have_value(
+            f"cameras:\n  - id: {B}\n    ignore: [[[0, 0], [9, 0], [9, 9]]]\n"
+        )
+
+
+async def test_areas_to_ignore_become_lines_of_a_configuration(browser: Browser) -> None:
+    known = [[[0.0, 0.0], [9.0, 0.0], [9.0, 9.0]]]
+    cameras = [{"id": A, "source": "scene:room", "ignore": known}, B]
+    async with operating(browser, "#marks", cameras=cameras) as (hall, page):
+        see(hall)
+        await page.reload()
+        stage, lines = page.locator("#mark-stage"), page.get_by_label("What the marks become")
+        await expect(page.locator("#mark-drawing .area")).to_have_count(2)  # the known one, and one begun
+        box = await stage.bounding_box()
+        assert box is not None
+        for x, y in ((0.25, 0.25), (0.75, 0.25)):
+            await stage.click(position={"x": x * box["width"], "y": y * box["height"]})
+        await page.keyboard.press("Shift+ArrowDown")
+        await page.keyboard.press("ArrowLeft")
+        await page.keyboard.press("Enter")
+        await page.keyboard.press("Enter")
+        await page.keyboard.press("Backspace")
+        written = yaml.safe_load(await lines.input_value())["cameras"][0]
+        site = hall.service.config.site
+        mine = np.array(written["ignore"][1])
+        right, top = 0.75 * site.width, 0.25 * site.height
+        expected = [[0.25 * site.width, top], [right, top], [right - 1, top + 10]]
+        np.testing.assert_allclose(mine, expected, atol=0.2)
+        assert written["ignore"][0] == known[0]
+        small_config(cameras=[{**written, "source": "scene:room"}])
+        await page.get_by_role("button", name="Clear").click()
+        assert "ignore: []" in await lines.input_value()
+
+
+async def test_places_on_the_floor_become_a_file_that_calibrate_takes(
+    browser: Browser, tmp_path: Path
+) -> None:
+    async with operating(browser, "#marks") as (hall, page):
+        see(hall)
+        await page.reload()
+        await page.get_by_label("Camera", exact=True).select_option(B)
+        await page.get_by_role("button", name="Places on the floor").click()
+        stage = page.locator("#mark-stage")
+        box = await stage.bounding_box()
+        assert box is not None
+        for pair, (x, y) in enumerate(((0.1, 0.9), (0.9, 0.9), (0.9, 0.5), (0.1, 0.5)), 1):
+            await stage.click(position={"x": x * box["width"], "y": y * box["height"]})
+            await page.get_by_label(f"Pair {pair}, x on the floor").fill(str(10 * x))
+            if pair == 4:
+                await expect(page.locator("#mark-said")).to_contain_text("1 of 4 pairs have no place")
+            await page.get_by_label(f"Pair {pair}, y on the floor").fill(str(-10 * y))
+        await expect(page.locator("#mark-said")).to_be_empty()
+        async with page.expect_download() as download:
+            await page.get_by_role("button", name="Download the points").click()
+        await (await download.value).save_as(tmp_path / "points.json")
+    points = read_points(tmp_path / "points.json")
+    assert points.unit == "m"
+    [camera] = points.cameras
+    assert camera.camera == B
+    np.testing.assert_allclose(camera.image / (64, 48), np.abs(camera.floor) / 10, atol=0.01)
+
+
+async def test_a_walk_is_started_watched_and_finished_and_its_file_is_the_scenes_floor(
+    browser: Browser, tmp_path: Path
+) -> None:
+    async with operating(browser, "#walk", patience=280, **SITE) as (hall, page):
+        walking, state = hall.service.walking, page.locator("#walk-state")
+        await expect(state).to_have_text("Nobody walks.")
+        await expect(page.get_by_role("button", name="Finish")).to_be_disabled()
+        await page.get_by_role("button", name="Start the walk").click()
+        await expect(state).to_have_text("Walk now. 0:00 minutes so far.")
+        await expect(page.locator("#walk-lacking li")).to_have_count(len(CAMERAS))
+        for said in words(hall.service.config, curved(500)):
+            walking.take(said)
+        await expect(state).to_have_text("Walk now. 0:20 minutes so far.")
+        await expect(page.locator("#walk-pairs li")).to_have_text(re.compile(rf"{A} and {B}: \d+ s"))
+        await expect(page.locator("#walk-cameras tr")).to_have_text([re.compile(r"(\d+ %){3}")] * 2)
+        await page.get_by_role("button", name="Finish").click()
+        # A process of its own calibrates, with less right to the machine than all else has.
+        first = page.locator("#walk-lines li").first
+        await expect(first).to_contain_text("feet that two cameras see are", timeout=200_000)
+        plan = await page.locator("#walk-plan").element_handle()
+        await page.wait_for_function("(it) => it.naturalWidth > 0", arg=plan)
+        async with page.expect_download() as download:
+            await page.get_by_role("link", name="Download the ground file").click()
+        await (await download.value).save_as(tmp_path / "ground.json")
+        found = yaml.safe_load(await page.get_by_label("What names the ground file").input_value())
+        assert found["ground"] == (await download.value).suggested_filename == "ground.json"
+        await page.get_by_role("button", name="Forget it").click()
+        await expect(state).to_have_text("Nobody walks.")
+        await expect(page.locator("#walk-result")).to_be_hidden()
+    matrices = json.loads((tmp_path / "ground.json").read_text())["homography"]
+    assert np.median(errors_on_floor([np.array(matrices[it]) for it in CAMERAS])) < 0.15  # metres
+
+
+async def test_what_is_tried_out_holds_and_the_file_can_be_had_back(browser: Browser) -> None:
+    async with operating(browser, "#choosing") as (hall, page):
+        decider, lines = hall.service.decider, page.get_by_label("Lines for the configuration")
+        cost = page.get_by_label("Cut cost λ, s")
+        await expect(cost).to_have_value("0.04")
+        await cost.fill("2")
+        await page.get_by_label("Central").fill("0.5")
+        await page.keyboard.press("Enter")
+        await expect(page.locator("#choosing-state")).to_have_text("2 tried out, not as the file says.")
+        assert (decider.view.switch_cost_s, decider.view.quality.central) == (2.0, 0.5)
+        assert "switch_cost_s: 2.0" in await lines.input_value()
+        ahead = page.get_by_label("Look-ahead, frames")
+        await ahead.fill(str(hall.service.most_lookahead + 1))
+        await page.keyboard.press("Enter")
+        assert await ahead.evaluate("(it) => it.validity.rangeOverflow")
+        await ahead.fill("15")
+        await page.keyboard.press("Enter")
+        await expect(page.locator("#choosing-state")).to_have_text("3 tried out, not as the file says.")
+        assert decider.view.lookahead == 15
+        await page.get_by_label("Size").fill("0")  # the page lets it pass, the site does not: all are 0
+        for name in ("Whole", "Unhidden", "Central"):
+            await page.get_by_label(name).fill("0")
+        await page.get_by_role("button", name="Try it").click()
+        await expect(page.locator("#trouble")).to_contain_text("all weights are 0")
+        await page.get_by_role("button", name="Back to the file").click()
+        await expect(page.locator("#choosing-state")).to_have_text("As the file says.")
+        await expect(page.locator("#trouble")).to_be_empty()
+        assert decider.view == hall.service.config.view
+
+
+async def test_the_configuration_shows_what_differs_and_finds_the_rest(browser: Browser) -> None:
+    async with operating(browser, "#configuration") as (_, page):
+        rows = page.locator("#settings tr")
+        await expect(rows.filter(has_text="encode.gop")).to_have_text("encode.gop510")
+        await expect(rows.filter(has_text="http.jpeg_quality")).to_have_count(0)
+        await page.get_by_role("button", name="Only what differs").click()
+        await page.get_by_label("Find").fill("jpeg")
+        await expect(rows).to_have_text(["http.jpeg_quality80"])
+        await page.get_by_label("Find").fill("no such")
+        await expect(page.get_by_text("No setting is like that.")).to_be_visible()
+
+
+async def test_at_every_width_nothing_overflows_and_axe_finds_no_serious_fault(browser: Browser) -> None:
+    axe = AXE.read_text(encoding="utf-8") if AXE.exists() else ""
+    async with operating(browser, axe=axe) as (hall, page):
+        see(hall)
+        for width in (360, 800, 1600):
+            await page.set_viewport_size({"width": width, "height": 800})
+            for section in SECTIONS:
+                await page.evaluate("(it) => { location.hash = it; }", section)
+                await expect(page.locator(f"#{section}")).to_be_visible()
+                assert await page.evaluate("document.documentElement.scrollWidth") <= width, section
+                if width == 360:
+                    await large_enough_for_a_thumb(page)
+                if width == 800 and axe:
+                    assert await serious_faults(page) == []
+    if not axe:
+        pytest.skip("axe-core is not there: make node_modules/.installed")
+
+
+async def large_enough_for_a_thumb(page: Page) -> None:
+    for button in await page.locator("button:visible, select:visible, nav a").all():
+        box = await button.bounding_box()
+        assert box is not None
+        assert min(box["width"], box["height"]) >= 44, await button.text_content()
+
+
+async def serious_faults(page: Page) -> list[Any]:
+    found = await page.evaluate("axe.run()")
+    return [
+        (it["id"], [node["html"] for node in it["nodes"]])
+        for it in found["violations"]
+        if it["impact"] in {"serious", "critical"}
+    ]
+
+
+async def test_sections_are_reached_by_keyboard_and_kept_in_the_address(browser: Browser) -> None:
+    async with operating(browser) as (_, page):
+        await expect(page.locator("#cameras")).to_be_visible()
+        for section in SECTIONS[1:]:
+            await page.locator(f'nav a[href="#{section}"]').focus()
+            await page.keyboard.press("Enter")
+            await expect(page.locator(f"#{section}")).to_be_visible()
+            await expect(page.locator("main > section:visible")).to_have_count(1)
+            assert page.url.endswith(f"#{section}")

@@ -1,0 +1,126 @@
+"""What the operator says of people, as the API and the viewers then know it."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from contextlib import aclosing
+from typing import Any
+
+import pytest
+
+from bestview import IdentityRegistry
+from fakes.cameras import CAMERAS, LARGE, SMALL
+from fakes.site import A, B, Hall, opened
+from server.cli.watch import run_watch
+from server.http.access.csrf import CHANGES
+from server.service.view_selection.decider import homographies
+
+PEOPLE = "/api/operator/people"
+
+
+@pytest.fixture
+async def real() -> AsyncIterator[Hall]:
+    """Serve a site that works out itself who is who: one in both cameras, another in c0 alone."""
+    async with aclosing(opened()) as halls:
+        hall = await anext(halls)
+        config = hall.service.config
+        hall.service.decider.people._registry = IdentityRegistry(config.view.identity, homographies(config))
+        hall.service.come(*CAMERAS)
+        for epoch in range(3):
+            feed(hall, epoch)
+        yield hall
+
+
+def feed(hall: Hall, epoch: int) -> None:
+    hall.service.feed(epoch, {A: {1: SMALL, 2: SMALL}, B: {1: LARGE}})
+
+
+async def say(hall: Hall, **said: Any) -> tuple[int, Any]:
+    async with hall.session.post(PEOPLE, headers={CHANGES: "1"}, json=said) as answer:
+        return answer.status, await answer.json()
+
+
+async def objects(hall: Hall) -> dict[int, Any]:
+    return {it["object"]: it for it in (await hall.get_json("/api/objects"))["objects"]}
+
+
+async def test_a_name_goes_with_the_person_wherever_they_are_listed(busy: Hall) -> None:
+    assert (await say(busy, object=1, name=" Ann  Lee "))[0] == 200
+    assert (await objects(busy))[1]["name"] == "Ann Lee"
+    assert (await objects(busy))[2]["name"] is None
+    assert (await busy.get_json(PEOPLE))["names"] == {"1": "Ann Lee"}
+    await say(busy, object=1, name="")
+    assert (await objects(busy))[1]["name"] is None
+
+
+async def test_a_name_is_listed_as_it_is(busy: Hall, capsys: pytest.CaptureFixture[str]) -> None:
+    await say(busy, object=1, name="Ann [bold]")
+    await run_watch(f"http://127.0.0.1:{busy.port}", None, None, None, None, None)
+    lines = capsys.readouterr().out.splitlines()
+    assert any(it.split()[:3] == ["1", "Ann", "[bold]"] for it in lines)
+    assert any(it.split()[:2] == ["2", "yes"] for it in lines)
+
+
+async def test_two_that_are_one_are_one_to_everybody_from_the_next_gop_on(real: Hall) -> None:
+    people = await objects(real)
+    kept, lost = sorted(people)[:2]
+    told: list[Any] = []
+    real.service.on_decision.append(told.append)
+    status, answer = await say(real, object=kept, merge=lost)
+    assert (await say(real, object=lost, name="Bob"))[0] == 200, "at once, too, the lost number is theirs"
+    assert (status, answer["merged"]) == (200, {str(lost): kept})
+    for epoch in range(3, 8):
+        feed(real, epoch)
+    assert [(it.kept, it.lost) for gop in told for it in gop.merged] == [(kept, lost)]
+    people = await objects(real)
+    assert lost not in people
+    assert people[kept]["also"] == [lost]
+    assert people[kept]["name"] == "Bob"
+    assert (await real.get_json(f"/api/objects/{lost}/choice"))["object"] == kept
+    assert (await say(real, object=kept, merge=lost))[0] == 400
+
+
+async def test_whom_a_camera_shows_is_somebody_new_to_everybody(real: Hall) -> None:
+    who = real.service.decider.people.number(A, 1, 10)
+    assert who is not None
+    told: list[Any] = []
+    real.service.on_decision.append(told.append)
+    status, answer = await say(real, object=who, part=[A])
+    assert status == 200
+    new = answer["parted"]
+    for epoch in range(3, 8):
+        feed(real, epoch)
+    splits = [(it.kept, it.parted, it.camera) for gop in told for it in gop.split]
+    assert splits == [(who, new, A)]
+    assert A in (await objects(real))[new]["cameras"]
+    assert (await real.get_json(f"/api/objects/{new}/choice"))["camera"] is not None
+
+
+@pytest.mark.parametrize(
+    ("said", "status", "error"),
+    [
+        ({"object": 9, "name": "Ann"}, 404, "there is no object 9"),
+        ({"object": 1, "merge": 9}, 404, "there is no object 9"),
+        ({"object": 1, "merge": 1}, 400, "object 1 is object 1 already"),
+        ({"object": 1, "part": ["c9"]}, 404, "there is no camera 'c9'; there are c0, c1"),
+        ({"object": 1}, 400, "say one thing at a time: name, merge or part"),
+        ({"object": 1, "name": "Ann", "merge": 2}, 400, "say one thing at a time: name, merge or part"),
+        ({"object": 1, "name": 41 * "x"}, 400, "name: at most 40 letters that can be read"),
+        ({"object": 1, "name": "a\u202eb"}, 400, "name: at most 40 letters that can be read"),
+        ({"object": "1"}, 400, "the request's JSON: "),
+    ],
+)
+async def test_what_cannot_be_is_said_in_one_line(
+    busy: Hall, said: dict[str, Any], status: int, error: str
+) -> None:
+    told = await say(busy, **said)
+    assert told[0] == status
+    assert told[1]["error"].startswith(error)
+
+
+async def test_services_that_share_a_site_agree_who_is_who_by_themselves() -> None:
+    async with aclosing(opened(view={"share": {"of": 2}})) as halls:
+        hall = await anext(halls)
+        status, told = await say(hall, object=1, name="Ann")
+        assert status == 409
+        assert (await hall.get_json(PEOPLE))["cannot"] == told["error"]

@@ -1,0 +1,163 @@
+"""The configuration as the operator reads it, and what of the choice can be tried out."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from contextlib import aclosing
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from bestview.quality import QualitySettings
+from fakes.cameras import CAMERAS, LARGE, SMALL, TrackNumbers, epoch_of, small_config, word
+from fakes.site import A, B, Hall, opened
+from server.config.sections import ViewSettings
+from server.config.site_config import Config
+from server.http.access.csrf import CHANGES
+from server.http.operator.settings import settings_of
+from server.service.view_selection.decider import Decider
+
+CHOOSING = "/api/operator/choosing"
+MINE = {CHANGES: "1"}
+WIDE = {"site": {"width": 128, "height": 96}}
+
+
+async def put(hall: Hall, json: Any) -> tuple[int, Any]:
+    async with hall.session.put(CHOOSING, headers=MINE, json=json) as answer:
+        return answer.status, await answer.json()
+
+
+def decided(config: Config, tuned: ViewSettings | None = None, after: int = 0) -> list[Any]:
+    """Give what is decided of two people who are now large in one camera, now in the other."""
+    decider = Decider(config, dict.fromkeys(CAMERAS), lambda *_: True)
+    decider.people._registry = TrackNumbers()  # type: ignore[assignment]
+    decisions = []
+    for number in range(12):
+        if tuned is not None and number == after:
+            decider.choose_by(tuned)
+        one, other = (SMALL, LARGE) if number // 3 % 2 else (LARGE, SMALL)
+        words = [word(A, number, {1: one, 2: SMALL}), word(B, number, {1: other, 2: one})]
+        decisions += decider.step(epoch_of(number, *words))
+    return decisions
+
+
+TRIED = small_config(view={"switch_cost_s": 3.0, "quality": {"central": 0.7, "size": 0.0}}).view
+
+
+def test_tuned_from_the_beginning_is_configured_so() -> None:
+    config = small_config()
+    so = config.model_copy(update={"view": TRIED.model_copy(update={"identity": config.view.identity})})
+    assert decided(config, TRIED) == decided(so)
+    assert decided(config, TRIED) != decided(config)
+
+
+def test_tuned_meanwhile_holds_from_the_next_gop_on_and_what_was_said_is_weighed_anew() -> None:
+    config = small_config()
+    tuned, before = decided(config, TRIED, after=6), decided(config)
+    done = sum(it.first < 5 * 5 for it in tuned)
+    assert tuned[: done - 1] == before[: done - 1]
+    so = config.model_copy(update={"view": TRIED.model_copy(update={"identity": config.view.identity})})
+    for mine, theirs in zip(tuned[done:], decided(so)[done:], strict=True):
+        for person in (1, 2):
+            seen, meant = mine.why.of(person), theirs.why.of(person)
+            assert seen.weights == meant.weights
+            assert seen.switch_cost == meant.switch_cost
+            for camera in CAMERAS:
+                assert seen.views[camera].quality == pytest.approx(meant.views[camera].quality)
+                assert seen.views[camera].terms == pytest.approx(meant.views[camera].terms)
+
+
+def test_tuned_back_goes_on_as_ever() -> None:
+    config = small_config()
+    decider = Decider(config, dict.fromkeys(CAMERAS), lambda *_: True)
+    decider.choose_by(TRIED)
+    assert decider.view.lookahead == config.view.lookahead
+    assert decider.view.identity == config.view.identity
+    decider.choose_by(config.view)
+    assert decider.view == config.view
+    assert np.isclose(decider.switch_cost, 1.0)
+
+
+async def test_what_is_tried_out_is_in_force_at_once_with_its_lines(busy: Hall) -> None:
+    at_first = await busy.get_json(CHOOSING)
+    assert at_first["values"] == at_first["file"]
+    status, tried = await put(busy, {"switch_cost_s": 2, "quality.facing": 0.5, "quality.relative": False})
+    assert status == 200
+    assert tried == await busy.get_json(CHOOSING)
+    assert tried["file"] == at_first["file"]
+    assert busy.service.decider.switch_cost == 50.0
+    assert yaml.safe_load(tried["lines"]) == {
+        "view": {"lookahead": 10, "switch_cost_s": 2.0, "quality": {"facing": 0.5, "relative": False}}
+    }
+    small_config(view=yaml.safe_load(tried["lines"])["view"])  # they are lines of a configuration
+    busy.service.feed(3, {A: {1: SMALL}, B: {1: LARGE}})
+    assert (await busy.get_json("/api/objects/1/choice"))["switch_cost"] == 50.0
+    async with busy.session.delete(CHOOSING, headers=MINE) as answer:
+        assert await answer.json() == at_first
+
+
+@pytest.mark.parametrize(
+    ("json", "error"),
+    [
+        ({"switch_cost_s": -1}, "to try out: view.switch_cost_s: "),
+        ({"switch_cost_s": 1e308}, "to try out: view.switch_cost_s: Input should be less than or equal to"),
+        ({"min_shot_s": 1e6}, "to try out: view.min_shot_s: Input should be less than or equal to 600"),
+        ({"quality.size": 2}, "to try out: view.quality: the weight size"),
+        ({"buffer_s": 30}, "view.buffer_s: cannot be changed here; what can is lookahead, switch_cost_s, "),
+        ({"switch_cost": 1}, "view.switch_cost: cannot be changed here"),
+        ({"switch_cost_s": "1"}, "the request's JSON: "),
+        ([], "the request's JSON: "),
+    ],
+)
+async def test_what_makes_no_sense_changes_nothing(busy: Hall, json: Any, error: str) -> None:
+    status, told = await put(busy, json)
+    assert status == 400
+    assert told["error"].startswith(error)
+    assert "\n" not in told["error"]
+    assert busy.service.decider.view == busy.service.config.view
+
+
+@pytest.fixture
+async def open_hall() -> AsyncIterator[Hall]:
+    cameras = [
+        {
+            "id": A,
+            "source": "rtsp://user:pa@ss@10.0.0.1/live?token=abc&size=1",
+            "options": {
+                "headers": "Cookie: 1",
+                "http_proxy": "http://me:hush@proxy",
+                "rtsp_transport": "tcp",
+            },
+        },
+        B,
+    ]
+    async with aclosing(opened(cameras=cameras)) as halls:
+        yield await anext(halls)
+
+
+async def test_the_configuration_says_what_differs_and_no_secret(open_hall: Hall) -> None:
+    settings = {it["key"]: it for it in (await open_hall.get_json("/api/operator/config"))["settings"]}
+    assert settings["encode.gop"] == {"key": "encode.gop", "value": "5", "default": "10", "differs": True}
+    assert settings["view.quality.whole"]["differs"] is False
+    assert settings["view.quality.whole"]["value"] == str(QualitySettings().whole)
+    source, options = settings[f"cameras.{A}.source"], settings[f"cameras.{A}.options"]
+    assert source["value"] == "rtsp://10.0.0.1/..."
+    assert (source["default"], source["differs"]) == (None, False)
+    names = ("headers", "http_proxy", "rtsp_transport")
+    assert options["value"] == f"{{{', '.join(f'{it}: (not shown)' for it in names)}}}"
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "rtsp://10.0.0.1/live?usr=admin&pwd=hush&size=1",
+        "http://10.0.0.1/video.cgi?loginuse=admin&loginpas=hush",
+        "rtsp://10.0.0.1:554/user=admin_password=hush_channel=1.sdp?real_stream",
+    ],
+)
+def test_a_password_is_not_shown_wherever_a_camera_has_it(source: str) -> None:
+    config = small_config(cameras=[{"id": A, "source": source}])
+    [shown] = [it.value for it in settings_of(config) if it.key == f"cameras.{A}.source"]
+    assert shown.strip("'") in {"rtsp://10.0.0.1/...", "http://10.0.0.1/...", "rtsp://10.0.0.1:554/..."}

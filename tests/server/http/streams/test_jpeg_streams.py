@@ -1,0 +1,285 @@
+"""Pictures over HTTP, drawn by real processes: boxes on their own frames, the newest first."""
+
+from __future__ import annotations
+
+import asyncio
+import io
+import os
+import signal
+from collections.abc import AsyncIterator
+
+import av
+import cv2
+import numpy as np
+import pytest
+
+from fakes.drawn_site import CAMERAS, GOP, SIZE, Drawn, Image, decoded, drawn_room, parts, read_film
+from fakes.site import B, Hall
+from server.http.app_keys import PICTURES
+from server.service.rendering.render_pool import CameraView, PersonView, RenderPool
+from server.service.rendering.worker.box_overlay import CHOSEN_COLOR
+
+FPS = 25
+SOMEBODY = 1
+
+
+@pytest.fixture
+async def drawn() -> AsyncIterator[Drawn]:
+    async for it in drawn_room():
+        yield it
+
+
+def picture_of(jpeg: bytes) -> Image:
+    return np.asarray(cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR), np.uint8)
+
+
+def green(image: Image) -> Image:
+    """Tell which pixels have the colour of the chosen person's box."""
+    return (np.abs(image.astype(np.int16) - CHOSEN_COLOR).max(axis=2) < 40).astype(np.uint8)
+
+
+def difference(image: Image, other: Image) -> float:
+    return float(np.abs(image.astype(np.int16) - other).mean())
+
+
+async def test_boxes_are_on_the_very_frame_that_they_belong_to(drawn: Drawn) -> None:
+    async with drawn.session.get(f"/objects/{SOMEBODY}/best.mp4?overlay=1") as answer:
+        assert answer.status == 200
+        assert answer.content_type == "video/mp4"
+        drawn.go_on(3)
+        data = await read_film(answer, 4 * GOP)
+    with av.open(io.BytesIO(data), "r") as stream:
+        pictures = {
+            round(float(it.time or 0) * FPS): (it.to_ndarray(format="bgr24"), it.key_frame)
+            for it in stream.decode(video=0)
+        }
+    pulses = sorted(pictures)
+    assert pulses == list(range(pulses[0], pulses[0] + 4 * GOP))
+    assert [pulse for pulse in pulses if pictures[pulse][1]] == pulses[::GOP]
+    assert all(pulse % GOP == 0 for pulse in pulses[::GOP])
+    own = {camera: list(decoded(number, 40)) for number, camera in enumerate(CAMERAS)}
+    edges: list[list[float]] = []
+    for pulse in pulses[:-GOP]:
+        image = pictures[pulse][0]
+        told = drawn.told[pulse // GOP * GOP]
+        camera = told.choices[SOMEBODY]
+        near = {place: difference(image, own[camera][place]) for place in (pulse - 1, pulse, pulse + 1)}
+        assert min(near, key=lambda place: near[place]) == pulse
+        x, y, width, height = cv2.boundingRect(green(image))
+        edges.append([])
+        for place in (pulse - 2, pulse, pulse + 2):
+            (box,) = [
+                it for it in drawn.told[place // GOP * GOP].boxes[camera][place % GOP] if it[0] == SOMEBODY
+            ]
+            edges[-1].append(abs(box[1] - x) + abs(box[3] - x - width) + abs(box[4] - y - height))
+    before, at, after = np.mean(edges, axis=0)
+    assert at < 6, "left, right and lower edge together, of a line two pixels wide"
+    assert at < before - 1
+    assert at < after - 1
+
+
+async def test_a_still_is_the_newest_frame_and_is_kept_nowhere(drawn: Drawn) -> None:
+    async with drawn.session.get("/cameras/c0/live.jpg") as answer:
+        assert answer.status == 200
+        assert answer.content_type == "image/jpeg"
+        assert answer.headers["Cache-Control"] == "no-store"
+        assert answer.headers["X-MyView-Pulse"] == "19"
+        image = picture_of(await answer.read())
+    assert image.shape == (SIZE[1], SIZE[0], 3)
+    near = [difference(image, own) for own in decoded(0, 20)]
+    assert int(np.argmin(near)) == 19
+    drawn.go_on()
+    async with drawn.session.get(f"/objects/{SOMEBODY}/best.jpg?overlay=1") as answer:
+        last = max(drawn.told) + GOP - 1
+        assert answer.headers["X-MyView-Pulse"] == str(last)
+        assert green(picture_of(await answer.read())).sum() > 50
+    async with drawn.session.get(f"/objects/{SOMEBODY}/best.jpg") as answer:
+        assert green(picture_of(await answer.read())).sum() < 10
+
+
+async def test_a_cameras_boxes_belong_to_decided_frames(drawn: Drawn) -> None:
+    async with drawn.session.get("/cameras/c1/live.jpg?overlay=1") as answer:
+        assert answer.status == 200
+        pulse, image = int(answer.headers["X-MyView-Pulse"]), picture_of(await answer.read())
+    assert pulse == max(drawn.told) + GOP - 1
+    plain = list(decoded(1, pulse + 1))[pulse]
+    boxes = drawn.told[max(drawn.told)].boxes["c1"][-1]
+    assert boxes
+    changed = np.abs(image.astype(np.int16) - plain).max(axis=2) > 60
+    for _, left, top, right, bottom in boxes:
+        x, y = round((left + right) / 2), round((top + bottom) / 2)
+        for at in ((y, round(left)), (y, round(right) - 1), (round(bottom) - 1, x)):
+            beside = changed[max(0, at[0] - 1) : at[0] + 2, max(0, at[1] - 1) : at[1] + 2]
+            assert beside.any(), "a line where the edge of the box is"
+
+
+async def test_multipart_jpeg_goes_on_with_the_newest_picture(drawn: Drawn) -> None:
+    async with drawn.session.get("/cameras/c0/live.mjpeg") as answer:
+        assert answer.content_type == "multipart/x-mixed-replace"
+        pulses = []
+        async for part in parts(answer):
+            assert picture_of(part.jpeg).shape == (SIZE[1], SIZE[0], 3)
+            pulses.append(part.pulse)
+            if part.pulse >= 34:
+                break
+            if part.pulse % GOP == GOP - 1:
+                drawn.go_on()
+    assert pulses[0] == 19, "the newest there is comes at once"
+    assert pulses == sorted(set(pulses))
+
+
+async def test_pictures_of_a_person_are_shown_one_by_one_though_they_come_by_gops(drawn: Drawn) -> None:
+    loop = asyncio.get_running_loop()
+    came: dict[int, float] = {}
+    going = asyncio.create_task(drawn.keep_going(GOP / FPS))
+    async with drawn.session.get(f"/objects/{SOMEBODY}/best.mjpeg?overlay=1") as answer:
+        async for part in parts(answer):
+            came[part.pulse] = loop.time()
+            if len(came) > 4 * GOP:
+                break
+    going.cancel()
+    steps = np.diff(sorted(came))[GOP:]
+    assert (steps == 1).mean() > 0.8, "most pictures are shown, not only one of each GOP"
+    # A busy machine may hand over some GOPs in bursts; test_pictures_parts.py has a clock of its own.
+    gops = [[came[n] for n in range(first, first + GOP) if n in came] for first in range(0, max(came), GOP)]
+    assert max(max(gop) - min(gop) for gop in gops[1:] if gop) > 0.4 * GOP / FPS, "they do not come in bursts"
+
+
+async def test_fewer_pictures_are_given_when_fewer_are_wanted(drawn: Drawn) -> None:
+    async with drawn.session.get("/cameras/c0/live.mjpeg?fps=5") as answer:
+        reading = parts(answer)
+        first = await anext(reading)
+        drawn.go_on(4)
+        pulses = [(await anext(reading)).pulse]
+        await reading.aclose()
+    assert first.pulse == 19
+    assert all(pulse % 5 == 0 for pulse in pulses), "5 of 25 a second"
+    for rate in ("0", "-1", "many", "nan", "inf"):
+        code, content = await drawn.get(f"/cameras/c0/live.mjpeg?fps={rate}")
+        assert code == 400
+        assert content["error"].startswith(f"fps={rate}: must be")
+
+
+async def test_one_process_draws_for_all_who_watch_one_stream(drawn: Drawn) -> None:
+    pictures: RenderPool = drawn.app[PICTURES]
+    film = f"/objects/{SOMEBODY}/best.mp4?overlay=1"
+    async with drawn.session.get(film) as one, drawn.session.get(film) as other:
+        async with drawn.session.get(f"/objects/{SOMEBODY}/best.mjpeg") as third:
+            assert (await anext(parts(third))).pulse >= 0
+            assert set(pictures.sources) == {PersonView(SOMEBODY)}
+            assert pictures.viewers == 3
+        drawn.go_on(2)
+        first, second = await read_film(one, 2 * GOP), await read_film(other, 2 * GOP)
+    length = min(len(first), len(second))
+    assert first[:length] == second[:length]
+
+
+async def test_a_process_that_is_killed_is_replaced_and_the_streams_go_on(
+    drawn: Drawn, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("server.service.rendering.worker_process._ANSWER_S", 1000.0)  # nobody waits for that
+    pictures: RenderPool = drawn.app[PICTURES]
+    going = asyncio.create_task(drawn.keep_going(GOP / FPS))
+    async with (
+        drawn.session.get(f"/objects/{SOMEBODY}/best.mp4?overlay=1") as film,
+        drawn.session.get(f"/objects/{SOMEBODY}/best.mjpeg") as series,
+    ):
+        data = await read_film(film, 2 * GOP)
+        reading = parts(series)
+        await anext(reading)
+        source = pictures.sources[PersonView(SOMEBODY)]
+        assert source.pid is not None
+        os.kill(source.pid, signal.SIGKILL)
+        while source.restarts == 0:  # noqa: ASYNC110 — the service notices by itself
+            await asyncio.sleep(0.01)
+        data += await read_film(film, 2 * GOP)
+        await anext(reading)
+        await reading.aclose()
+    going.cancel()
+    with av.open(io.BytesIO(data), "r") as stream:
+        times = [round(float(it.time or 0) * FPS) for it in stream.decode(video=0)]
+    assert times == sorted(set(times))
+    assert len(times) >= 4 * GOP
+
+
+async def test_a_process_ends_some_time_after_its_last_viewer(drawn: Drawn) -> None:
+    pictures: RenderPool = drawn.app[PICTURES]
+    pictures._linger_s = 0.2
+    async with drawn.session.get("/cameras/c0/live.jpg") as answer:
+        await answer.read()
+    source = pictures.sources[CameraView("c0")]
+    pid = source.pid
+    assert pid is not None
+    os.kill(pid, 0)
+    while pictures.sources or source.pid is not None:  # noqa: ASYNC110 — it ends by itself
+        await asyncio.sleep(0.01)
+    with pytest.raises(ProcessLookupError):
+        os.kill(pid, 0)
+
+
+async def test_a_process_that_hangs_slows_nobody_down(drawn: Drawn) -> None:
+    pictures: RenderPool = drawn.app[PICTURES]
+    async with drawn.session.get("/cameras/c0/live.mjpeg") as answer:
+        await anext(parts(answer))
+        source = pictures.sources[CameraView("c0")]
+        assert source.pid is not None
+        os.kill(source.pid, signal.SIGSTOP)
+        async with drawn.session.get("/cameras/c0/live.mp4") as plain:
+            await read_film(plain, GOP)
+            for _ in range(4):
+                drawn.go_on(4)
+                await read_film(plain, 4 * GOP)
+        assert source.lost, "whole GOPs, and not a byte waits for the process in the service"
+        os.kill(source.pid, signal.SIGCONT)
+
+
+async def test_no_more_pictures_are_made_than_the_server_may() -> None:
+    async for drawn in drawn_room(http={"pictures_max": 1}):
+        async with drawn.session.get("/cameras/c0/live.mjpeg") as answer:
+            await anext(parts(answer))
+            async with drawn.session.get("/cameras/c1/live.jpg") as other:
+                assert other.status == 503
+                assert other.headers["Retry-After"] == "5"
+                assert "pictures_max" in (await other.json())["error"]
+            async with drawn.session.get("/cameras/c0/live.jpg") as same:
+                assert same.status == 200
+        while drawn.app[PICTURES].viewers:  # noqa: ASYNC110 — the server notices when the connection closes
+            await asyncio.sleep(0.01)
+        async with drawn.session.get("/cameras/c1/live.jpg") as other:
+            assert other.status == 200, "one that nobody watches any more makes place"
+
+
+async def test_pictures_count_among_all_that_is_watched() -> None:
+    async for drawn in drawn_room(http={"viewers_max": 2, "viewers_per_object": 1}):
+        async with drawn.session.get("/cameras/c0/live.mjpeg") as answer:  # and the process that draws it
+            await anext(parts(answer))
+            for path in ("/cameras/c1/live.mp4", "/cameras/c1/live.mjpeg"):
+                code, content = await drawn.get(path)
+                assert code == 503
+                assert "viewers_max" in content["error"]
+    async for drawn in drawn_room(http={"viewers_per_object": 1}):
+        async with drawn.session.get("/cameras/c0/live.mjpeg") as answer:
+            await anext(parts(answer))
+            code, content = await drawn.get("/cameras/c0/live.mjpeg")
+            assert code == 503
+            assert "viewers_per_object" in content["error"]
+
+
+async def test_who_cannot_be_shown_now_is_503(hall: Hall) -> None:
+    code, content = await hall.get("/cameras/c0/live.jpg")
+    assert (code, content) == (503, {"error": "there is no picture of camera c0 now"})
+    code, content = await hall.get(f"/cameras/{B}/live.mjpeg?overlay=1")
+    assert code == 503
+
+
+async def test_processes_end_with_the_service() -> None:
+    pids = []
+    async for drawn in drawn_room():
+        async with drawn.session.get("/cameras/c0/live.jpg") as answer:
+            await answer.read()
+        pids = [source.pid for source in drawn.app[PICTURES].sources.values()]
+        assert pids
+    for pid in pids:
+        assert pid is not None
+        with pytest.raises(ProcessLookupError):
+            os.kill(pid, 0)

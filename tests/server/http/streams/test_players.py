@@ -1,0 +1,216 @@
+"""Players that people use: nothing to complain of, and pixel for pixel the cameras' own pictures."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import re
+import tempfile
+from collections.abc import AsyncIterator, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from benchmarks.browser import chromium
+from fakes.cameras import CAMERAS, FPS, HEIGHT, LARGE, SMALL, STRIDE, WIDTH, encoded, tracks, video, word
+from fakes.media.browser_playback import HLS_BY_ITSELF
+from fakes.programs import needs_chromium, needs_ffmpeg, needs_mpv, needs_vlc
+from fakes.site import A, B, Hall, opened
+from fakes.timeouts import PATIENCE
+from server.messaging.epochs import end_of_epoch
+
+EPOCHS = 48
+PATHS = ("/objects/1/best.mp4", "/objects/1/best.ts", "/cameras/c0/live.ts", "/objects/1/hls/index.m3u8")
+STREAMS = len(PATHS) - 1
+# ffmpeg reads the init segment again with each playlist, of its own live HLS too, and wonders about it.
+OF_EVERY_PLAYLIST = re.compile(
+    r"(\[.*\] Found duplicated MOOV Atom. Skipped it|    Last message repeated .*)\n"
+)
+NEVER = re.compile(r"$^")
+# VLC wonders about its sound, its settings and the graphics card as well, where there are none.
+OF_A_STREAM = re.compile(
+    r"^.* (?:access|stream|demux|packetizer|input|adaptive\S*) (?:warning|error): .*$", re.MULTILINE
+)
+# In fragmented MP4 the table of pictures is empty, in VLC's eyes a thing to mention.
+OF_EVERY_FRAGMENT = re.compile(r"no chunk defined|STTS table of 0 entries")
+
+
+def feed(hall: Hall, epoch: int) -> None:
+    """Send an epoch; the person is larger in the other camera every other GOP, so there are cuts."""
+    sizes = {A: SMALL, B: LARGE} if epoch % 4 < 2 else {A: LARGE, B: SMALL}
+    for seed, camera in enumerate(CAMERAS):
+        for unit in encoded(seed, EPOCHS * STRIDE)[epoch * STRIDE : (epoch + 1) * STRIDE]:
+            hall.service.intake.video(video(camera, unit))
+        hall.service.intake.tracks(tracks(word(camera, epoch, {1: sizes[camera]})))
+    hall.service.pulse = end_of_epoch(epoch, STRIDE)
+    hall.service.pulse0 = 1_800_000_000.0
+    hall.service.decide()
+
+
+@pytest.fixture
+async def live() -> AsyncIterator[Hall]:
+    """A site that runs at five times its rate, too fast for a window of HLS, and ends."""
+    async for hall in opened(http={"hls_segment_s": 0.4, "hls_window_s": 60.0, "viewer_queue_gops": 100}):
+        hall.service.come(*CAMERAS)
+        for epoch in range(20):
+            feed(hall, epoch)
+        yield hall
+
+
+@dataclass(frozen=True)
+class Played:
+    """What a player gave."""
+
+    code: int | None
+    output: bytes
+    complaints: str
+
+
+async def played(hall: Hall, *commands: Sequence[str], user: str | None = None) -> list[Played]:
+    """Run players, one for each of the paths, while the site goes on and ends."""
+    pipe = asyncio.subprocess.PIPE
+    players = [
+        await asyncio.create_subprocess_exec(*it, stdout=pipe, stderr=pipe, user=user) for it in commands
+    ]
+    ends = [asyncio.create_task(player.communicate()) for player in players]
+    try:
+        while hall.service.splicer.viewers < STREAMS:
+            assert not any(end.done() for end in ends), await asyncio.wait(ends)
+            await asyncio.sleep(0.01)
+        for epoch in range(20, EPOCHS):
+            await asyncio.sleep(STRIDE / FPS / 5)
+            feed(hall, epoch)
+        hall.service.splicer.close()
+        said = await asyncio.gather(*ends)
+    finally:
+        for player in players:
+            if player.returncode is None:
+                player.kill()
+        await asyncio.gather(*ends, return_exceptions=True)
+    return [
+        Played(player.returncode, output, complaints.decode())
+        for player, (output, complaints) in zip(players, said, strict=True)
+    ]
+
+
+def own(camera: int) -> list[NDArray[np.uint8]]:
+    decoder = av.CodecContext.create("h264", "r")
+    packets = [*(av.Packet(unit.data) for unit in encoded(camera, EPOCHS * STRIDE)), None]
+    return [it.to_ndarray(format="yuv420p") for packet in packets for it in decoder.decode(packet)]
+
+
+def check_pictures(hall: Hall, path: str, output: bytes) -> None:
+    """Find each picture that was shown, none left out, up to the last, in one of the cameras."""
+    alone = np.array([own(camera) for camera in range(2)])
+    pictures = np.frombuffer(output, np.uint8).reshape(-1, HEIGHT * 3 // 2, WIDTH)
+    last = end_of(hall, path)
+    first = last - len(pictures)
+    assert first <= 20 * STRIDE, f"{path}: from where the player came, to the end"
+    cameras = [int(np.array_equal(picture, alone[1, first + n])) for n, picture in enumerate(pictures)]
+    for n, picture in enumerate(pictures):
+        np.testing.assert_array_equal(picture, alone[cameras[n], first + n], f"{path}: pulse {first + n}")
+    cuts = int(np.abs(np.diff(cameras)).sum())
+    assert cuts == 0 if "cameras" in path else cuts >= 10, path
+
+
+def end_of(hall: Hall, path: str) -> int:
+    """Give the first pulse that a stream does not show."""
+    return EPOCHS * STRIDE if "cameras" in path else hall.service.decider._next_gop or 0
+
+
+@needs_ffmpeg
+async def test_ffmpeg_plays_across_cuts_and_reloads_without_a_warning(live: Hall) -> None:
+    command = "ffmpeg -nostdin -v warning {} -i {} -f rawvideo -pix_fmt yuv420p -fps_mode passthrough pipe:1"
+    urls = [f"http://127.0.0.1:{live.port}{path}" for path in PATHS]
+    starts = ["-live_start_index 0" if "m3u8" in path else "" for path in PATHS]
+    seen = await played(live, *(command.format(*it).split() for it in zip(starts, urls, strict=True)))
+    for path, it in zip(PATHS, seen, strict=True):
+        own_doing = OF_EVERY_PLAYLIST if "m3u8" in path else NEVER
+        assert (it.code, own_doing.sub("", it.complaints)) == (0, ""), path
+        check_pictures(live, path, it.output)
+
+
+@needs_mpv
+async def test_mpv_plays_to_the_end_without_a_warning(live: Hall) -> None:
+    command = "mpv --no-config --vo=null --no-audio --untimed --msg-level=all=warn --no-terminal"
+    urls = [f"http://127.0.0.1:{live.port}{path}" for path in PATHS]
+    seen = await played(live, *([*command.split(), url] for url in urls))
+    for path, it in zip(PATHS, seen, strict=True):
+        assert (it.code, it.output + it.complaints.encode()) == (0, b""), path
+
+
+@pytest.fixture
+def shared() -> Iterator[Path]:
+    """A folder that everybody may write to: VLC does not run as root."""
+    with tempfile.TemporaryDirectory() as folder:
+        Path(folder).chmod(0o777)
+        yield Path(folder)
+
+
+VLC = (
+    "cvlc --no-audio --no-drop-late-frames --no-skip-frames --no-osd --play-and-exit "
+    "--no-video-title-show --verbose 1 --vout yuv --yuv-file={} {} vlc://quit"
+)
+
+
+def check_order(hall: Hall, path: str, pictures: list[bytes]) -> None:
+    """Find each picture in a camera; who keeps time may hold one, or leave one out, but not go back."""
+    known = {it.tobytes(): (pulse, camera) for camera in range(2) for pulse, it in enumerate(own(camera))}
+    assert len(known) == 2 * EPOCHS * STRIDE, "no picture is like another"
+    shown = [known[it] for it in pictures]
+    pulses = [pulse for pulse, _ in shown]
+    assert all(before <= after for before, after in pairwise(pulses)), path
+    assert pulses[0] <= 20 * STRIDE, path
+    assert pulses[-1] >= end_of(hall, path) - STRIDE, path
+    assert len(set(pulses)) > 0.8 * (pulses[-1] - pulses[0]), path
+    cuts = sum(before != after for (_, before), (_, after) in pairwise(shown))
+    assert cuts == 0 if "cameras" in path else cuts >= 10, path
+
+
+def pictures_of(film: bytes) -> list[bytes]:
+    """Take the pictures out of a YUV4MPEG2, which has a line before all of them and one before each."""
+    _, _, rest = film.partition(b"\n")
+    mark = b"FRAME\n"
+    whole = len(mark) + WIDTH * HEIGHT * 3 // 2
+    pieces = [rest[at : at + whole] for at in range(0, len(rest), whole)]
+    assert all(it.startswith(mark) and len(it) == whole for it in pieces)
+    return [it.removeprefix(mark) for it in pieces]
+
+
+@needs_vlc
+@pytest.mark.slow  # it plays at its own rate: at a higher one it loses pictures when the machine is busy
+async def test_vlc_plays_across_cuts_without_a_warning(live: Hall, shared: Path) -> None:
+    files = [shared / f"{number}.yuv" for number in range(len(PATHS))]
+    urls = [f"http://127.0.0.1:{live.port}{path}" for path in PATHS]
+    user = "nobody" if os.geteuid() == 0 else None
+    commands = [VLC.format(shown, url).split() for shown, url in zip(files, urls, strict=True)]
+    seen = await played(live, *commands, user=user)
+    for path, it, shown in zip(PATHS, seen, files, strict=True):
+        complaints = [
+            line for line in OF_A_STREAM.findall(it.complaints) if not OF_EVERY_FRAGMENT.search(line)
+        ]
+        assert (it.code, complaints) == (0, []), path
+        check_order(live, path, pictures_of(shown.read_bytes()))
+
+
+@needs_chromium
+async def test_chromium_plays_hls_by_itself_up_to_the_end(live: Hall) -> None:
+    async with chromium() as browser:
+        page = await browser.new_page(bypass_csp=True)
+        await page.goto(f"http://127.0.0.1:{live.port}/healthz")
+        playing = asyncio.create_task(page.evaluate(HLS_BY_ITSELF, "/objects/1/hls/index.m3u8"))
+        async with asyncio.timeout(PATIENCE):
+            for epoch in range(20, EPOCHS):
+                await asyncio.sleep(STRIDE / FPS / 5)
+                feed(live, epoch)
+            live.service.splicer.close()
+            seen = await playing
+    if seen is None:
+        pytest.skip("this Chromium plays no HLS by itself")
+    assert seen["end"] == "ended"
+    assert seen["seconds"] > 2, "players begin some segments before the end"

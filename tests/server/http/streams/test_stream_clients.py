@@ -1,0 +1,168 @@
+"""Streams behave towards all who ask: old clients, players with ranges, other origins, the slow."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+import struct
+
+import pytest
+
+from fakes.cameras import CAMERAS, GOP, SMALL
+from fakes.site import A, B, Hall, opened
+from server.service.streaming.broadcaster import BytesChunk
+
+STREAMS = {
+    "/objects/1/best.mp4": "video/mp4",
+    "/cameras/c0/live.mp4": "video/mp4",
+    "/objects/1/best.ts": "video/mp2t",
+    "/cameras/c0/live.ts": "video/mp2t",
+}
+NOT_HERE = {"Host": "hall"}
+"""Of somebody who is no operator: it is no name of this machine."""
+GET = "GET {} HTTP/1.1\r\nHost: hall\r\n\r\n"
+
+
+async def asked(hall: Hall, request: str) -> tuple[asyncio.StreamReader, asyncio.StreamWriter, str]:
+    """Ask by hand; give the connection and the answer's head, in small letters."""
+    reader, writer = await asyncio.open_connection("127.0.0.1", hall.port)
+    writer.write(request.encode())
+    return reader, writer, (await reader.readuntil(b"\r\n\r\n")).decode().lower()
+
+
+async def deserted(hall: Hall) -> None:
+    """Wait until nobody watches any more."""
+    while hall.service.splicer.viewers:  # noqa: ASYNC110 — the server notices when the connection closes
+        await asyncio.sleep(0.005)
+
+
+@pytest.mark.parametrize("path", STREAMS)
+async def test_head_takes_no_place_and_leaves_the_connection_of_use(busy: Hall, path: str) -> None:
+    reader, writer, head = await asked(busy, GET.format(path).replace("GET", "HEAD"))
+    for _ in range(2):
+        assert head.startswith("http/1.1 200")
+        assert f"content-type: {STREAMS[path]}\r\n" in head
+        assert "access-control-allow-origin: *" in head
+        assert busy.service.splicer.viewers == 0
+        writer.write(b"HEAD /healthz HTTP/1.1\r\nHost: hall\r\n\r\n")
+        assert (await reader.readuntil(b"\r\n\r\n")).startswith(b"HTTP/1.1 200"), "no body came before"
+        writer.write(GET.format(path).replace("GET", "HEAD").encode())
+        head = (await reader.readuntil(b"\r\n\r\n")).decode().lower()
+    writer.close()
+
+
+@pytest.mark.parametrize("path", STREAMS)
+async def test_an_old_client_gets_a_plain_stream_that_ends_with_the_connection(busy: Hall, path: str) -> None:
+    reader, writer, head = await asked(busy, f"GET {path} HTTP/1.0\r\n\r\n")
+    assert head.startswith("http/1.0 200")
+    assert "chunked" not in head
+    assert "content-length" not in head
+    begin = await reader.readexactly(8)
+    assert begin[4:] == b"ftyp" if path.endswith(".mp4") else begin[0] == 0x47
+    busy.service.splicer.close()
+    rest = await reader.read()
+    assert len(begin + rest) % 188 == 0 or path.endswith(".mp4"), "whole packets"
+    writer.close()
+
+
+@pytest.mark.parametrize("path", STREAMS)
+async def test_a_player_that_asks_for_ranges_gets_the_stream_and_no_promise(busy: Hall, path: str) -> None:
+    for ranges in ("bytes=0-", "bytes=0-1", "bytes=1000000-"):
+        async with busy.session.get(path, headers={"Range": ranges}) as answer:
+            assert answer.status == 200
+            assert not {"Accept-Ranges", "Content-Range", "Content-Length"} & set(answer.headers)
+
+
+@pytest.mark.parametrize("path", [*STREAMS, "/objects/1/hls/index.m3u8", "/api/objects", "/api/events"])
+async def test_pages_of_other_origins_may_ask(busy: Hall, path: str) -> None:
+    asking = {"Origin": "http://elsewhere", "Access-Control-Request-Method": "GET"}
+    async with busy.session.options(path, headers=asking) as answer:
+        assert answer.status == 204
+        assert answer.headers["Access-Control-Allow-Origin"] == "*"
+        assert "GET" in answer.headers["Access-Control-Allow-Methods"]
+        assert answer.headers["Access-Control-Allow-Headers"] == "*, Authorization"
+    assert busy.service.splicer.viewers == 0
+    async with busy.session.options("/nothing", headers=asking) as answer:
+        assert answer.status == 404
+
+
+@pytest.mark.parametrize("path", STREAMS)
+async def test_a_connection_that_is_torn_off_frees_its_place(busy: Hall, path: str) -> None:
+    _, writer, _ = await asked(busy, GET.format(path))
+    assert busy.service.splicer.viewers == 1
+    writer.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+    writer.transport.abort()
+    await deserted(busy)
+
+
+@pytest.mark.parametrize("limit", ["viewers_max", "viewers_per_object"])
+async def test_beyond_the_limit_a_viewer_is_told_when_to_come_again(limit: str) -> None:
+    async for hall in opened(http={limit: 2}):
+        hall.service.come(*CAMERAS)
+        for epoch in range(3):
+            hall.service.feed(epoch, {A: {1: SMALL, 2: SMALL}, B: {}})
+        _, first, _ = await asked(hall, GET.format("/objects/1/best.mp4"))
+        _, second, _ = await asked(hall, GET.format("/objects/1/best.ts"))
+        async with hall.session.get("/objects/1/best.mp4", headers=NOT_HERE) as answer:
+            assert answer.status == 503
+            assert int(answer.headers["Retry-After"]) > 0
+            assert limit in (await answer.json())["error"]
+        async with hall.session.get("/objects/2/best.mp4", headers=NOT_HERE) as answer:
+            assert answer.status == (503 if limit == "viewers_max" else 200)
+        for writer in (first, second):
+            writer.close()
+        await deserted(hall)
+        async with hall.session.get("/objects/1/best.ts") as answer:
+            assert answer.status == 200, "there is room again"
+
+
+async def test_a_viewer_that_does_not_read_loses_whole_gops_and_harms_nobody(busy: Hall) -> None:
+    channel = busy.service.splicer.objects[1]
+    stalled = socket.socket()
+    stalled.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    stalled.connect(("127.0.0.1", busy.port))
+    stalled.sendall(b"GET /objects/1/best.mp4 HTTP/1.0\r\n\r\n")
+    reader, writer, _ = await asked(busy, "GET /objects/1/best.mp4 HTTP/1.0\r\n\r\n")
+    while channel.viewers < 2:  # noqa: ASYNC110 — both have come
+        await asyncio.sleep(0.005)
+    await reader.readuntil(b"mdat")
+    gops = [b"<GOP %05d" % number + bytes([65 + number % 26]) * 100_000 + b">" for number in range(150)]
+    for gop in gops:
+        channel.publish(BytesChunk(gop, start=True))
+        await reader.readuntil(gop)
+    slow = next(viewer for viewer in channel._viewers if viewer.lost)
+    assert len(slow._queue) <= busy.service.config.http.viewer_queue_gops
+    assert sum(viewer.lost for viewer in channel._viewers) == slow.lost, "only who does not read loses"
+    if hasattr(socket, "TCP_NOTSENT_LOWAT"):
+        assert slow.lost > len(gops) - 50, "the system keeps little: what waits there would be shown late"
+    channel.close()
+    loop, got = asyncio.get_running_loop(), b""
+    stalled.setblocking(False)  # noqa: FBT003 — the name of the method says it
+    while data := await loop.sock_recv(stalled, 1 << 20):
+        got += data
+    kept = [gop for gop in gops if gop in got]
+    assert got.endswith(gops[-1]), "it goes on with the newest"
+    assert got.count(b"<GOP") == len(kept) == len(gops) - slow.lost, "and not one is cut"
+    stalled.close()
+    writer.close()
+
+
+async def test_a_viewer_who_is_gone_while_the_server_waits_for_it_is_forgotten(busy: Hall) -> None:
+    channel = busy.service.splicer.objects[1]
+    _, writer, _ = await asked(busy, "GET /objects/1/best.mp4 HTTP/1.0\r\n\r\n")
+    for _ in range(100):
+        channel.publish(BytesChunk(bytes(100_000), start=True))
+        await asyncio.sleep(0)
+    writer.transport.abort()
+    await deserted(busy)
+
+
+async def test_a_transport_stream_is_packed_only_when_somebody_watches_one(busy: Hall) -> None:
+    kept = busy.service.splicer.objects[1]._kept
+    assert not any("ts" in vars(piece) for piece in kept)
+    async with busy.session.get("/objects/1/best.ts") as one, busy.session.get("/objects/1/best.ts") as two:
+        data = await one.content.readexactly(188 * 16)
+        assert await two.content.readexactly(188 * 16) == data
+        assert data[0] == data[188] == 0x47
+    assert all("ts" in vars(piece) for piece in kept)
+    assert len(kept[0].pictures) == GOP  # type: ignore[attr-defined]

@@ -1,0 +1,207 @@
+"""A site of VP8: players have nothing to complain of, and whatever it does not have is refused in a line."""
+
+from __future__ import annotations
+
+import asyncio
+
+import av
+import cv2
+import numpy as np
+import pytest
+
+from benchmarks.browser import chromium
+from fakes.cameras import (
+    CAMERAS,
+    FPS,
+    GOP,
+    HEIGHT,
+    LARGE,
+    NO_REASON,
+    SMALL,
+    STRIDE,
+    WIDTH,
+    encoded,
+    tracks,
+    video,
+    word,
+)
+from fakes.media.browser_playback import PLAY, seen_in_chromium
+from fakes.programs import needs_chromium, needs_ffmpeg, needs_mpv
+from fakes.site import A, B, Hall
+from fakes.timeouts import PATIENCE_MS
+from fakes.vp8_site import EPOCHS, feed, own
+from server.messaging.epochs import end_of_epoch
+from server.service.view_selection.decider import GopDecision, ObjectChoice
+
+PATHS = ("/objects/1/best.webm", "/cameras/c1/live.webm")
+
+
+async def played(hall: Hall, command: str) -> list[tuple[int | None, bytes, str]]:
+    """Run a player on each of the paths while the site goes on and ends: code, output, complaints."""
+    pipe = asyncio.subprocess.PIPE
+    urls = [f"http://127.0.0.1:{hall.port}{path}" for path in PATHS]
+    players = [
+        await asyncio.create_subprocess_exec(*command.format(url).split(), stdout=pipe, stderr=pipe)
+        for url in urls
+    ]
+    ends = [asyncio.create_task(player.communicate()) for player in players]
+    while hall.service.splicer.viewers < len(PATHS):
+        assert not any(end.done() for end in ends), await asyncio.wait(ends)
+        await asyncio.sleep(0.01)
+    for epoch in range(3, EPOCHS):
+        feed(hall, epoch)
+        await asyncio.sleep(0.02)
+    hall.service.splicer.close()
+    said = await asyncio.gather(*ends)
+    return [
+        (player.returncode, output, complaints.decode())
+        for player, (output, complaints) in zip(players, said, strict=True)
+    ]
+
+
+@needs_ffmpeg
+async def test_ffmpeg_plays_across_cuts_without_a_warning(free: Hall) -> None:
+    command = "ffmpeg -nostdin -v warning -i {} -f rawvideo -pix_fmt yuv420p -fps_mode passthrough pipe:1"
+    alone = np.array([own(camera) for camera in range(2)])
+    best, live = await played(free, command)
+    for path, it in zip(PATHS, (best, live), strict=True):
+        assert (it[0], it[2]) == (0, ""), path
+    camera = np.frombuffer(live[1], np.uint8).reshape(-1, HEIGHT * 3 // 2, WIDTH)
+    np.testing.assert_array_equal(camera, alone[1, -len(camera) :])
+    shown = np.frombuffer(best[1], np.uint8).reshape(-1, HEIGHT * 3 // 2, WIDTH)
+    end = free.service.decider._next_gop or 0
+    whose = [int(np.array_equal(it, alone[1, end - len(shown) + n])) for n, it in enumerate(shown)]
+    for n, it in enumerate(shown):
+        np.testing.assert_array_equal(it, alone[whose[n], end - len(shown) + n], f"frame {n} of {len(shown)}")
+    assert np.abs(np.diff(whose)).sum() >= 2, "there are cuts"
+
+
+@needs_mpv
+async def test_mpv_plays_to_the_end_without_a_warning(free: Hall) -> None:
+    command = "mpv --no-config --vo=null --no-audio --untimed --msg-level=all=warn --no-terminal {}"
+    for path, it in zip(PATHS, await played(free, command), strict=True):
+        assert it == (0, b"", ""), path
+
+
+GOPS = 8
+SILENT = (2, 3, 6)
+"""GOPs of which nothing comes, as if no camera could be shown."""
+LOST = 22
+"""A pulse whose picture is lost, in a GOP of which the others have come."""
+
+
+@needs_chromium
+async def test_chromium_plays_over_cuts_and_what_is_missing_to_the_end(free: Hall) -> None:
+    splicer, shelves = free.service.splicer, free.service.shelves
+    splicer.forget([], [])  # begin with somebody new
+    for seed, camera in enumerate((A, B)):
+        for unit in encoded(seed, codec="vp8"):
+            if unit.pulse // GOP not in SILENT and unit.pulse != LOST:
+                shelves[camera].put(unit.pulse, 1, unit.data, key=unit.key)
+            elif shelves[camera].has(unit.pulse):
+                del shelves[camera]._shelved[unit.pulse]
+
+    def show(gop: int) -> None:
+        camera = (A, B)[gop % 2]
+        choice = ObjectChoice(7, camera if shelves[camera].has(gop * GOP) else None, None, away=False)
+        splicer.decision(GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
+
+    show(0)
+    seen = await seen_in_chromium(
+        *(free.port, splicer, GOPS, show), *(PLAY, "/objects/7/best.webm", 'video/webm; codecs="vp8"', 1)
+    )
+    assert (seen["error"], seen["ranges"]) == ("", 1)
+    assert seen["range"] == [0, pytest.approx(GOPS * GOP / FPS)]
+    pulses = [time * FPS for time in seen["shown"]]
+    assert pulses == pytest.approx([round(pulse) for pulse in pulses], abs=0.03), "frames are at their pulses"
+    assert pulses[-1] > GOPS * GOP - 3
+
+
+async def go_on(hall: Hall) -> None:
+    """Send epochs at the site's rate: two people, each larger in the other camera every second."""
+    frames = 25 * FPS
+    for epoch in range(3, frames // STRIDE):
+        sizes = (SMALL, LARGE) if epoch // 5 % 2 else (LARGE, SMALL)
+        for seed, camera in enumerate(CAMERAS):
+            for unit in encoded(seed, frames, codec="vp8")[epoch * STRIDE : (epoch + 1) * STRIDE]:
+                hall.service.intake.video(video(camera, unit))
+            boxes = {1: sizes[seed], 2: sizes[1 - seed]}
+            hall.service.intake.tracks(tracks(word(camera, epoch, boxes)))
+        hall.service.pulse = end_of_epoch(epoch, STRIDE)
+        hall.service.decide()
+        await asyncio.sleep(STRIDE / FPS)
+
+
+@needs_chromium
+@pytest.mark.slow
+async def test_the_page_plays_across_cuts_and_from_one_person_to_another(free: Hall) -> None:
+    errors: list[str] = []
+    async with chromium() as browser:
+        page = await browser.new_page(bypass_csp=True)
+        page.on("pageerror", lambda error: errors.append(str(error)))
+        page.set_default_timeout(PATIENCE_MS)
+        going_on = asyncio.create_task(go_on(free))
+        await page.goto(f"http://127.0.0.1:{free.port}/?object=1")
+        await page.wait_for_function("myview.state === 'playing' && myview.cuts.length > 1")
+        await page.evaluate("document.querySelector('video').dataset.same = 'yes'")
+        await page.locator("#people button.person[aria-current=false]").first.click()
+        await page.wait_for_function("myview.object === 2 && myview.switches.at(-1).shownAt !== null")
+        pulse = await page.evaluate("myview.pulse")
+        await page.wait_for_function(f"myview.pulse > {pulse} + {FPS}")
+        assert await page.evaluate("document.querySelector('video').dataset.same") == "yes", "one player"
+        await page.goto(f"http://127.0.0.1:{free.port}/?object=1&camera=c1")
+        await page.wait_for_function("myview.state === 'playing' && myview.camera === 'c1'")
+        await page.keyboard.press(",")
+        said = await page.locator("#notice").text_content()
+        assert said == "Nothing is kept of that: this is live."
+        going_on.cancel()
+    assert errors == []
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        *("/objects/1/best.mp4", "/objects/1/best.ts"),
+        *("/objects/1/best.mp4?overlay=1", "/objects/1/best.mp4?from=-5", "/objects/1/hls/index.m3u8"),
+        *("/cameras/c0/live.mp4", "/cameras/c0/live.ts", "/cameras/c0/hls/init.mp4"),
+        *("/api/objects/1/past", "/api/cameras/c0/past"),
+    ],
+)
+async def test_what_there_is_not_is_refused_in_a_line(free: Hall, path: str) -> None:
+    code, content = await free.get(path)
+    assert code == 404
+    assert "VP8 (encode.codec): there is best.webm" in content["error"]
+
+
+async def test_jpeg_is_made_of_it_with_boxes_and_without(free: Hall) -> None:
+    pictures = {}
+    for path in ("/objects/1/best.jpg", "/objects/1/best.jpg?overlay=1", "/cameras/c1/live.jpg"):
+        async with free.session.get(path) as answer:
+            assert (answer.status, answer.content_type) == (200, "image/jpeg"), path
+            jpeg, pulse = await answer.read(), int(answer.headers["X-MyView-Pulse"])
+        pictures[path] = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR), pulse
+    alone = [av.VideoFrame.from_ndarray(it, format="yuv420p").to_ndarray(format="bgr24") for it in own(1)]
+    for path in ("/objects/1/best.jpg", "/cameras/c1/live.jpg"):
+        picture, pulse = pictures[path]
+        off = [np.abs(picture.astype(float) - it).mean() for it in alone]
+        assert int(np.argmin(off)) == pulse, "the picture of its own pulse, of the camera that is chosen"
+    plain, boxed = (pictures[f"/objects/1/best.jpg{it}"][0] for it in ("", "?overlay=1"))
+    assert np.abs(plain.astype(float) - boxed).max() > 50, "there are boxes in it"
+
+
+async def test_whom_nobody_knows_and_another_sites_webm_are_refused_in_a_line(free: Hall, busy: Hall) -> None:
+    assert await free.get("/objects/9/best.webm") == (404, {"error": "there is no object 9"})
+    code, content = await free.get("/cameras/c9/live.webm")
+    assert (code, content["error"]) == (404, "there is no camera 'c9'; there are c0, c1")
+    code, content = await free.get("/objects/1/best.webm?from=-5")
+    assert code == 400
+    code, content = await busy.get("/objects/1/best.webm")
+    assert code == 404
+    assert "H.264 (encode.codec): there is best.mp4" in content["error"]
+
+
+async def test_the_site_says_what_its_streams_are(free: Hall, busy: Hall) -> None:
+    site = await free.get_json("/api/site")
+    assert (site["codec"], site["container"]) == ("vp8", "webm")
+    site = await busy.get_json("/api/site")
+    assert (site["codec"][:5], site["container"]) == ("avc1.", "mp4")

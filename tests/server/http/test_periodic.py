@@ -1,0 +1,114 @@
+"""What the server does again and again outlives what goes wrong once, and it is told."""
+
+from __future__ import annotations
+
+import asyncio
+import ssl
+from pathlib import Path
+
+import pytest
+
+from fakes.cameras import FedService, small_config
+from fakes.tokens import line_of, write_tokens
+from server.http.access.access_control import Access
+from server.http.api.events import Events
+from server.http.periodic import again_and_again
+from server.http.tls import Certificate
+
+
+class Failing:
+    """Something that fails so many times, and is then done; each time counts."""
+
+    def __init__(self, *errors: Exception) -> None:
+        self._errors, self.times = list(errors), 0
+        self.done = asyncio.Event()
+
+    def __call__(self, *_: object) -> None:
+        self.times += 1
+        if self._errors:
+            raise self._errors.pop(0)
+        self.done.set()
+
+
+async def test_a_turn_that_fails_is_told_once_and_the_next_is_taken(caplog: pytest.LogCaptureFixture) -> None:
+    failing = Failing(ValueError("one"), ValueError("one"), KeyError("other"))
+
+    async def turn() -> None:
+        failing()
+
+    task = asyncio.create_task(again_and_again(0.0, turn, "counting"))
+    await failing.done.wait()
+    task.cancel()
+    assert failing.times >= 4
+    assert [str(it.exc_info and it.exc_info[1]) for it in caplog.records] == ["one", "'other'"]
+    assert caplog.messages[0].startswith("counting failed")
+
+
+async def runs_on(task: asyncio.Task[None], failing: Failing) -> bool:
+    """Tell whether what failed is done again."""
+    await asyncio.wait([task, asyncio.create_task(failing.done.wait())], return_when="FIRST_COMPLETED")
+    ended = task.done()
+    task.cancel()
+    await asyncio.gather(task, return_exceptions=True)
+    return not ended and failing.times > 1
+
+
+async def test_what_people_and_cameras_are_is_told_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("server.http.api.events._LIST_EVERY_S", 0.001)
+    service, failing = FedService(small_config()), Failing(RuntimeError("nobody has thought of this"))
+    events = Events(service)
+    events._lines = {None: None}  # type: ignore[dict-item]
+    monkeypatch.setattr(events, "_tell", failing)
+    assert await runs_on(asyncio.create_task(events.run()), failing)
+    service.close()
+
+
+async def test_tokens_are_looked_at_on_and_what_is_over_ends_meanwhile(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("server.http.access.access_control._LOOK_EVERY_S", 0.001)
+    failing, over = Failing(RuntimeError("nobody has thought of this")), Failing()
+    access = Access(write_tokens(tmp_path / "tokens.yaml", line_of("desk")), lambda number: number, "hall")
+    monkeypatch.setattr(access._file, "look", failing)
+    monkeypatch.setattr(access, "end_what_is_over", over)
+    assert await runs_on(asyncio.create_task(access.run()), failing)
+    assert over.times >= failing.times > 1
+
+
+async def test_the_certificate_is_looked_at_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("server.http.tls._LOOK_EVERY_S", 0.001)
+    certificate, failing = Certificate.__new__(Certificate), Failing(RuntimeError("not thought of"))
+    monkeypatch.setattr(certificate, "look", failing)
+    assert await runs_on(asyncio.create_task(certificate.run()), failing)
+
+
+def test_a_renewal_that_is_seen_half_done_is_read_when_it_is_done(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    class Context:
+        """One that reads whatever there is."""
+
+        sni_callback: object = None
+
+        def load_cert_chain(self, certificate: Path, key: Path, password: object) -> None:
+            del key, password
+            if gone:
+                raise FileNotFoundError(2, "No such file or directory", str(certificate))
+
+    gone: list[bool] = []
+    monkeypatch.setattr(ssl, "create_default_context", lambda _: Context())
+    files = [tmp_path / "c.pem", tmp_path / "k.pem"]
+    for file in files:
+        file.write_text("old", encoding="utf-8")
+    certificate = Certificate(*files)
+    before = certificate._newest
+    files[0].write_text("newer", encoding="utf-8")
+    gone.append(True)  # after it was read, before it was loaded
+    certificate.look()
+    certificate.look()
+    assert certificate._newest is before
+    assert [it for it in caplog.messages if "stays in force" in it] == caplog.messages[:1]
+    assert "No such file or directory" in caplog.messages[0]
+    gone.clear()
+    certificate.look()
+    assert certificate._newest is not before, "though nothing has changed since"

@@ -1,0 +1,227 @@
+"""What every address answers: errors in one line, HEAD, the page, the description, metrics."""
+
+from __future__ import annotations
+
+import asyncio
+import re
+from collections.abc import AsyncIterator
+from types import SimpleNamespace
+
+import pytest
+
+from fakes.cameras import status, tracks, word
+from fakes.site import A, B, Hall
+from server.http.api import openapi
+from server.http.app import make_app
+from server.service.streaming.broadcaster import Subscriber
+
+
+@pytest.mark.parametrize(
+    ("path", "error"),
+    [
+        ("/api/objects/99/choice", "there is no object 99"),
+        ("/objects/99/best.mp4", "there is no object 99"),
+        ("/objects/99/best.mp4?overlay=1", "there is no object 99"),
+        ("/objects/99/best.mjpeg", "there is no object 99"),
+        ("/objects/99/best.jpg", "there is no object 99"),
+        ("/cameras/c9/live.mjpeg", "there is no camera 'c9'; there are c0, c1"),
+        ("/cameras/c9/live.jpg?overlay=1", "there is no camera 'c9'; there are c0, c1"),
+        ("/objects/99/thumb.jpg", "there is no picture of object 99"),
+        ("/cameras/c9/live.mp4", "there is no camera 'c9'; there are c0, c1"),
+        ("/api/nothing", "there is nothing at /api/nothing"),
+        ("/objects/one/best.mp4", "there is nothing at /objects/one/best.mp4"),
+        ("/objects/99999999999/best.mp4", "there is nothing at /objects/99999999999/best.mp4"),
+        ("/page/none.js", "there is nothing at /page/none.js"),
+    ],
+)
+async def test_what_is_not_there_is_404_and_one_line_of_json(busy: Hall, path: str, error: str) -> None:
+    assert await busy.get(path) == (404, {"error": error})
+
+
+@pytest.mark.parametrize(
+    ("path", "error"),
+    [
+        ("/objects/1/best.mp4?overlay=yes", "overlay=yes: must be 0 or 1"),
+        ("/objects/1/best.jpg?overlay=", "overlay=: must be 0 or 1"),
+        ("/objects/1/best.ts?overlay=1", "overlay: boxes are burnt into a person's best.mp4"),
+        ("/cameras/c0/live.mp4?overlay=1", "overlay: boxes are burnt into a person's best.mp4"),
+        ("/objects/1/best.jpg?from=-5", "from: only .mp4, .ts and HLS can begin in the past"),
+        ("/objects/1/hls/0.m4s?from=-5", "from: only .mp4, .ts and HLS can begin in the past"),
+        ("/cameras/c0/live.mjpeg?to=-5", "to: only .mp4, .ts and HLS can begin in the past"),
+    ],
+)
+async def test_what_a_stream_does_not_have_is_refused_and_not_left_out(
+    busy: Hall, path: str, error: str
+) -> None:
+    code, content = await busy.get(path)
+    assert code == 400
+    assert content["error"].startswith(error)
+    assert "\n" not in content["error"]
+
+
+async def test_boxes_and_the_past_are_described_where_they_are(busy: Hall) -> None:
+    described = await busy.get_json("/api/openapi.json")
+    for path, item in described["paths"].items():
+        queries = {it["name"] for it in item["get"]["parameters"] if it["in"] == "query"}
+        if path.startswith(("/objects/", "/cameras/")):
+            asked = (
+                path.replace("{object}", "1")
+                .replace("{camera}", A)
+                .replace("{segment}", "0")
+                .replace("{part}", "0")
+            )
+            for query in ("overlay=1", "from=p0", "camera=c0"):
+                async with busy.session.head(f"{asked}?{query}") as answer:
+                    assert (answer.status == 400) == (query.split("=")[0] not in queries), asked
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "/page/../app.py",
+        "/page/%2e%2e/__init__.py",
+        "/page/..%2f__init__.py",
+        "/page/%2e%2e%2f%2e%2e%2fpyproject.toml",
+        "/page//etc/passwd",
+        "/page/%2fetc%2fpasswd",
+        "/page/%00",
+        f"/page/{'a' * 5000}",
+        "/page/.",
+    ],
+)
+async def test_nothing_outside_the_page_is_given_away(hall: Hall, path: str) -> None:
+    # By hand: a client library would tidy the path up before sending it.
+    reader, writer = await asyncio.open_connection("127.0.0.1", hall.port)
+    writer.write(f"GET {path} HTTP/1.0\r\n\r\n".encode())
+    answer = await reader.read()
+    assert answer.startswith(b"HTTP/1.0 404")
+    assert b'{"error":' in answer
+    writer.close()
+    await writer.wait_closed()
+
+
+async def test_a_method_that_is_not_possible_is_405_and_says_what_is(hall: Hall) -> None:
+    async with hall.session.post("/api/objects") as answer:
+        assert answer.status == 405
+        assert answer.headers["Allow"] == "GET,HEAD"
+        assert await answer.json() == {"error": "POST is not possible here"}
+
+
+async def test_a_mistake_of_the_servers_own_is_500_without_a_traceback(
+    hall: Hall, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(hall.service, "shelves", {})
+    assert await hall.get("/api/cameras") == (500, {"error": "the server made a mistake; its log says more"})
+
+
+@pytest.mark.parametrize("version", ["1.0", "1.1"])
+async def test_a_mistake_in_the_middle_of_an_answer_breaks_it_off(
+    busy: Hall, monkeypatch: pytest.MonkeyPatch, version: str
+) -> None:
+    """By an end that looks like one a part of a film would be taken for all of it."""
+
+    async def some(_: Subscriber) -> AsyncIterator[SimpleNamespace]:
+        yield SimpleNamespace(data=b"some of it")
+        raise PermissionError(13, "the disk is gone")
+
+    monkeypatch.setattr(Subscriber, "pieces", some)
+    reader, writer = await asyncio.open_connection("127.0.0.1", busy.port)
+    writer.write(f"GET /objects/1/best.mp4 HTTP/{version}\r\nHost: 127.0.0.1\r\n\r\n".encode())
+    head = await reader.readuntil(b"\r\n\r\n")
+    assert b" 200 OK" in head
+    with pytest.raises(ConnectionResetError):
+        await reader.read()
+    writer.close()
+
+
+@pytest.mark.parametrize(
+    ("path", "kind"),
+    [
+        ("/api/site", "application/json"),
+        ("/objects/1/best.mp4", "video/mp4"),
+        ("/cameras/c0/live.mp4", "video/mp4"),
+        ("/objects/1/best.mp4?overlay=1", "video/mp4"),
+        ("/objects/1/best.mjpeg", "multipart/x-mixed-replace"),
+        ("/cameras/c0/live.mjpeg?overlay=1", "multipart/x-mixed-replace"),
+        ("/objects/1/best.jpg", "image/jpeg"),
+        ("/cameras/c0/live.jpg", "image/jpeg"),
+        ("/api/events", "text/event-stream"),
+        ("/", "text/html"),
+    ],
+)
+async def test_head_gives_the_headers_and_ends(busy: Hall, path: str, kind: str) -> None:
+    for _ in range(2):  # on one connection, which must stay of use
+        async with busy.session.head(path) as answer:
+            assert answer.status == 200
+            assert answer.content_type == kind
+            assert await answer.read() == b""
+    assert busy.service.splicer.viewers == 0
+
+
+async def test_the_description_has_every_route_that_is_not_the_page(busy: Hall) -> None:
+    app = make_app(busy.service)
+    routes = {route.resource.canonical for route in app.router.routes() if route.resource is not None}
+    described = await busy.get_json("/api/openapi.json")
+    assert set(described["paths"]) == routes - {"/", "/operator", "/page/{file}", "/api", "/api/openapi.json"}
+    for path, item in described["paths"].items():
+        assert item["get"]["summary"], path
+        inside = {it["name"] for it in item["get"]["parameters"] if it["in"] == "path"}
+        assert inside == set(re.findall(r"\{(\w+)\}", path))
+    asked = {it["name"]: it["required"] for it in described["paths"]["/api/past"]["get"]["parameters"]}
+    assert asked == {"from": True, "to": False}
+
+
+async def test_who_asks_for_the_description_again_makes_no_work(
+    busy: Hall, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first = await busy.get_json("/api/openapi.json")
+    monkeypatch.setattr(openapi, "describe", None)
+    assert await busy.get_json("/api/openapi.json") == first
+    async with busy.session.get("/api") as answer:
+        assert answer.status == 200
+
+
+async def test_every_answer_is_as_the_description_says(busy: Hall) -> None:
+    described = await busy.get_json("/api/openapi.json")
+    schemas = described["components"]["schemas"]
+    for path, item in described["paths"].items():
+        content = item["get"]["responses"]["200"]["content"]
+        if "application/json" not in content:
+            continue
+        answer = await busy.get_json(path.replace("{object}", "1").replace("{camera}", A))
+        schema = schemas[content["application/json"]["schema"]["$ref"].rsplit("/", 1)[1]]
+        assert set(schema["required"]) == set(answer) == set(schema["properties"])
+
+
+async def test_people_can_read_the_description(hall: Hall) -> None:
+    async with hall.session.get("/api") as answer:
+        text = await answer.text()
+    assert answer.content_type == "text/html"
+    assert "/objects/{object}/best.mp4" in text
+
+
+async def test_the_page_and_its_files_are_served(hall: Hall) -> None:
+    async with hall.session.get("/?object=1") as answer:
+        page = await answer.text()
+        assert "default-src 'self'" in answer.headers["Content-Security-Policy"]
+    for file in re.findall(r'(?:src|href)="(/?page/[^"]+)"', page):
+        async with hall.session.get("/" + file.lstrip("/")) as answer:
+            assert answer.status == 200
+            assert answer.headers["X-Content-Type-Options"] == "nosniff"
+
+
+async def test_metrics_count_what_happens(busy: Hall) -> None:
+    busy.service.intake.status(status(A, missed=3, shed=2, clock_offset=0.25))
+    busy.service.intake.tracks(tracks(word(A, 3, {}, alone=[15, 17])))
+    busy.service.intake.tracks(tracks(word(B, 3, {})))
+    busy.service.decide()
+    async with busy.session.get("/metrics") as answer:
+        lines = (await answer.text()).splitlines()
+    assert "myview_pulse 14.0" in lines
+    assert "myview_objects 2.0" in lines
+    assert 'myview_camera_frames_total{camera="c0"} 15.0' in lines
+    assert 'myview_camera_missed_total{camera="c0"} 3.0' in lines
+    assert 'myview_camera_live{camera="c1"} 1.0' in lines
+    assert 'myview_camera_unheard_total{camera="c0"} 2.0' in lines
+    assert 'myview_camera_unheard_total{camera="c1"} 0.0' in lines
+    assert 'myview_camera_clock_offset_seconds{camera="c0"} 0.25' in lines

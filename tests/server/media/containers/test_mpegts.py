@@ -1,0 +1,113 @@
+"""Transport streams: legal packets, any GOP after any other, the cameras' own pixels at the pulses' times."""
+
+from __future__ import annotations
+
+import io
+from itertools import pairwise
+from pathlib import Path
+
+import av
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fakes.cameras import CAMERAS, FPS, GOP, encoded
+from fakes.media.ffprobe import probed
+from fakes.media.mpegts import check_counters, taken_apart
+from fakes.programs import needs_ffprobe
+from server.media.containers.fmp4 import Sample, fragment, ticks
+from server.media.containers.mpegts import Counters, pack, packets
+from server.media.picture import Picture
+from server.media.stream_format import Agreement
+from server.service.streaming.frame_buffer import FrameBuffer
+
+CLOCK = 1 << 33
+
+
+def picture(pulse: int, size: int, *, key: bool = False, lasts: int = 1, fps: float = FPS) -> Picture:
+    data = (size + 1).to_bytes(4, "big") + bytes([0x65 if key else 0x41]) + b"\x80" * size
+    return Picture(pulse, key, fragment([Sample(data, key, lasts)], pulse, fps), 1, lasts)
+
+
+sizes = st.lists(st.one_of(st.integers(1, 600), st.integers(1, 70_000)), min_size=1, max_size=12)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(sizes, min_size=1, max_size=4), st.integers(0, 10**8), st.booleans())
+def test_packets_are_legal_and_hold_just_what_was_packed(
+    gops: list[list[int]], pulse: int, live: bool
+) -> None:
+    data, sent, tables, video = b"", [], 0, 0
+    for gop in gops:
+        pictures = [picture(pulse + n, size, key=n == 0) for n, size in enumerate(gop)]
+        counters = Counters(tables, video, whole=not live)
+        data += pack(pictures, FPS, counters)
+        pulse, tables = pulse + len(gop), tables + 1
+        video += sum(packets(it) for it in pictures) if live else 0
+        sent += pictures
+    found = taken_apart(data)
+    check_counters(found)
+    assert {packet.pid for packet in found[:2]} == {0, 0x1000}, "tables first"
+    contents: list[bytes] = []
+    for packet in [it for it in found if it.pid == 0x100]:
+        contents[len(contents) :] = [b""] if packet.begins else []
+        contents[-1] += packet.payload
+    assert len(contents) == len(sent)
+    for content, it in zip(contents, sent, strict=True):
+        assert content[:4] == b"\x00\x00\x01\xe0"
+        assert int.from_bytes(content[4:6], "big") in (len(content) - 6, 0)
+        stamp = content[9:14]
+        pts = (
+            (stamp[0] >> 1 & 7) << 30 | (stamp[1] << 7 | stamp[2] >> 1) << 15 | stamp[3] << 7 | stamp[4] >> 1
+        )
+        assert pts == ticks(it.pulse, FPS) % CLOCK
+        assert stamp[0] & 1 == stamp[2] & 1 == stamp[4] & 1 == 1, "marker bits"
+        assert content[14:20] == b"\x00\x00\x00\x01\x09\xf0"
+        assert content[20:] == b"\x00\x00\x00\x01" + it.sample[4:]
+    for packet in found:
+        assert not packet.key or packet.begins
+
+
+@given(st.integers(0, 2**34 // 3600), st.sampled_from([4, 7.5, 25, 59.94]))
+def test_the_time_reference_comes_often_and_before_its_picture(pulse: int, fps: float) -> None:
+    pictures = [picture(pulse, 50, key=True, fps=fps), picture(pulse + 1, 30, lasts=40, fps=fps)]
+    found = taken_apart(pack(pictures, fps, Counters()))
+    times = [it.pcr // 300 for it in found if it.pcr is not None]
+    assert all(0 < (later - earlier) % CLOCK <= 9000 for earlier, later in pairwise(times))
+    assert 0 < (ticks(pulse, fps) - times[0]) % CLOCK <= 90_000
+    check_counters(found)
+
+
+def spliced(cameras: list[int]) -> tuple[bytes, list[tuple[int, int]]]:
+    """Give a stream of GOPs of these cameras, and which camera and pulse each picture is."""
+    agreement, data, frames = Agreement(), b"", []
+    shelves = [FrameBuffer(FPS, 40, agreement) for _ in CAMERAS]
+    for seed, shelf in enumerate(shelves):
+        for unit in encoded(seed):
+            shelf.put(unit.pulse, 1, unit.data, key=unit.key)
+    for place, camera in enumerate(cameras):
+        data += pack(shelves[camera].pictures(place * GOP, GOP), FPS, Counters(place))
+        frames += [(camera, pulse) for pulse in range(place * GOP, (place + 1) * GOP)]
+    return data, frames
+
+
+def own_pictures(camera: int) -> list[np.ndarray[tuple[int, ...], np.dtype[np.uint8]]]:
+    decoder = av.CodecContext.create("h264", "r")
+    packets = [*(av.Packet(unit.data) for unit in encoded(camera)), None]
+    return [it.to_ndarray(format="yuv420p") for packet in packets for it in decoder.decode(packet)]
+
+
+def test_a_decoder_shows_the_cameras_own_pixels_across_cuts() -> None:
+    data, frames = spliced([0, 1, 1, 0, 1, 0, 0, 1])
+    own = [own_pictures(camera) for camera in range(2)]
+    with av.open(io.BytesIO(data), format="mpegts") as container:
+        pictures = list(container.decode(video=0))
+    assert [round(float(it.time or 0) * FPS) for it in pictures] == [pulse for _, pulse in frames]
+    for it, (camera, pulse) in zip(pictures, frames, strict=True):
+        np.testing.assert_array_equal(it.to_ndarray(format="yuv420p"), own[camera][pulse])
+
+
+@needs_ffprobe
+def test_ffprobe_has_nothing_to_say(tmp_path: Path) -> None:
+    (tmp_path / "best.ts").write_bytes(spliced([0, 1, 1, 0])[0])
+    assert probed(tmp_path / "best.ts", "nb_read_frames,r_frame_rate") == [["25/1", f"{4 * GOP}"]]

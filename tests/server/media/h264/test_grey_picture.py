@@ -1,0 +1,153 @@
+"""A grey picture written by hand is grey in every format, and streams go on before and behind it."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+from typing import Any
+
+import av
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from fakes.cameras import FPS, GOP, HEIGHT, WIDTH
+from fakes.media.h264 import PRESETS, decoded, encoded, how
+from fakes.parameter_sets import MAKES, sent
+from server.camera.encoding.encoder import Encoder
+from server.config.sections import EncodeSettings, SiteSettings
+from server.media.containers.fmp4 import init_segment
+from server.media.h264.annexb import ParameterSets, nal_units, parameter_sets, sample
+from server.media.h264.bitstream import BitWriter, unit_of
+from server.media.h264.grey_picture import grey_picture
+from server.media.h264.repeat_picture import UnfitError
+from server.media.picture import Picture
+from server.media.stream_format import Agreement, OwnParameters
+from server.media.vp8.grey_frame import grey_frame
+from server.media.vp8.stream_format import Vp8Agreement
+from server.service.streaming.frame_buffer import FrameBuffer
+
+Sizes = st.tuples(st.integers(1, 40), st.integers(1, 24))
+"""In macroblocks."""
+
+
+def is_grey(picture: NDArray[np.uint8]) -> bool:
+    return bool((picture == 128).all())
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.sampled_from(PRESETS), Sizes)
+def test_it_is_grey_and_what_is_before_and_behind_it_is_as_it_was(
+    preset: str, blocks: tuple[int, int]
+) -> None:
+    units = encoded((16 * blocks[0], 16 * blocks[1] + 2), preset, 3)
+    samples = [sample(nal_units(it.data)) for it in units]
+    found, writer = parameter_sets(nal_units(units[0].data)), how(units[0])
+    assert found is not None
+    grey = [grey_picture(found, 0), writer.repeat(1, reference=True), grey_picture(found, 1)]
+    shown, alone = decoded([*samples, *grey, *samples]), decoded(samples)
+    assert len(shown) == 9
+    assert all(map(is_grey, shown[3:6]))
+    for place, picture in enumerate(shown[:3] + shown[6:]):
+        np.testing.assert_array_equal(picture, alone[place % 3])
+
+
+@settings(max_examples=10, deadline=None)
+@given(Sizes)
+def test_so_it_is_in_vp8(blocks: tuple[int, int]) -> None:
+    width, height = 16 * blocks[0], 16 * blocks[1] + 2
+    encoder = Encoder(SiteSettings(width=width, height=height, fps=FPS), EncodeSettings(gop=GOP, codec="vp8"))
+    noise = np.random.default_rng(0).integers(0, 255, (3, height, width, 3), dtype=np.uint8)
+    units = [encoder.encode(pulse, picture).data for pulse, picture in enumerate(noise)]
+
+    def seen(frames: list[bytes]) -> list[NDArray[np.uint8]]:
+        decoder = av.VideoCodecContext.create("vp8", "r")
+        return [
+            it.to_ndarray(format="yuv420p") for frame in frames for it in decoder.decode(av.Packet(frame))
+        ]
+
+    shown, alone = seen([*units, grey_frame(width, height), *units]), seen(units)
+    assert is_grey(shown[3])
+    for place, picture in enumerate(shown[:3] + shown[4:]):
+        np.testing.assert_array_equal(picture, alone[place % 3])
+
+
+@pytest.mark.parametrize("own", [False, True])
+def test_a_grey_gop_has_the_format_of_the_picture_before_it(*, own: bool) -> None:
+    agreement = OwnParameters() if own else Agreement()
+    cameras = list(MAKES) if own else list(MAKES)[:1] * 2
+    shelves = {camera: FrameBuffer(FPS, 99, agreement) for camera in cameras}
+    for camera, shelf in shelves.items():
+        for unit in sent(camera):
+            shelf.put(unit.pulse, 1, unit.data, key=unit.key)
+    shown: list[Picture] = agreement.blank(None, 0, GOP, FPS)
+    for gop, camera in enumerate([cameras[0], None, cameras[1], None, cameras[0]], start=1):
+        first = gop * GOP
+        newest = shown[-1]
+        shown += (
+            agreement.blank(newest, first, GOP, FPS)
+            if camera is None
+            else shelves[camera].pictures(first, GOP)
+        )
+        if camera is None:
+            assert shown[-1].parameters == newest.parameters
+    assert agreement.parameters is not None
+    data = b"".join([
+        init_segment(agreement.parameters, WIDTH, HEIGHT),
+        *(it.fragment for it in shown),
+    ])  # fmt: skip
+    with av.open(io.BytesIO(data), "r") as stream:
+        pictures = [it.to_ndarray(format="yuv420p") for it in stream.decode(video=0)]
+    assert len(pictures) == 6 * GOP
+    assert [is_grey(it) for it in pictures[::GOP]] == [True, False, True, False, True, False]
+    assert [is_grey(it) for it in pictures[GOP - 1 :: GOP]] == [True, False, True, False, True, False]
+
+
+def with_order_said(parameters: ParameterSets) -> ParameterSets:
+    """Change baseline parameter sets so that each picture says its place in the order of showing."""
+    sps = BitWriter()
+    sps.u(8, 66)
+    sps.u(16, int.from_bytes(parameters.sps[2:4], "big"))
+    for value in (0, 0, 0, 4, 1):  # id, frame_num of 4 bits, order by numbers of 8 bits, one reference
+        sps.ue(value)
+    sps.u(1, 0)
+    sps.ue(WIDTH // 16 - 1)
+    sps.ue(HEIGHT // 16 - 1)
+    sps.u(1, 1)
+    for value in (1, 0, 0):  # direct_8x8_inference, no cropping, nothing about how to show it
+        sps.u(1, value)
+    sps.u(1, 1)
+    sps.align(0)
+    return ParameterSets(unit_of(0x67, sps.done()), parameters.pps)
+
+
+def test_where_no_picture_can_be_repeated_one_grey_picture_lasts_for_all_of_it() -> None:
+    parameters = parameter_sets(nal_units(encoded((WIDTH, HEIGHT), "ultrafast", 1)[0].data))
+    assert parameters is not None
+    agreement = Agreement()
+    agreement.check(with_order_said(parameters))
+    [grey] = agreement.blank(None, 10, 5, FPS)
+    assert (grey.pulse, grey.until, grey.key) == (10, 15, True)
+    assert all(map(is_grey, decoded([grey.sample, agreement.blank(grey, 15, 5, FPS)[0].sample])))
+
+
+def test_in_a_format_that_cannot_be_written_there_is_none() -> None:
+    agreement = Agreement()
+    assert agreement.blank(None, 0, 5, FPS) == []
+    agreement.check(ParameterSets(b"\x67\x00\x00\x00", b"\x68"))
+    assert agreement.blank(None, 0, 5, FPS) == []
+
+
+@settings(deadline=None)  # some say that they are very large
+@given(st.binary(min_size=4, max_size=30), st.binary(min_size=1, max_size=10), st.integers(0, 1))
+def test_parameter_sets_of_any_bytes_are_written_for_or_unfit(sps: bytes, pps: bytes, number: int) -> None:
+    with contextlib.suppress(UnfitError):
+        assert grey_picture(ParameterSets(sps, pps), number)
+
+
+def test_a_grey_gop_of_vp8_has_no_hole() -> None:
+    agreement: Any = Vp8Agreement(WIDTH, HEIGHT)
+    pictures = agreement.blank(None, 10, 5, FPS)
+    assert [(it.pulse, it.until, it.key) for it in pictures] == [(n, n + 1, n == 10) for n in range(10, 15)]

@@ -1,0 +1,330 @@
+"""zenoh for asyncio: who comes first does not matter, routers may come and go, closing ends everything."""
+
+from __future__ import annotations
+
+import asyncio
+import subprocess
+import sys
+import threading
+from collections import deque
+
+import pytest
+import zenoh
+from pydantic import ValidationError
+
+from fakes.timeouts import PATIENCE
+from server.cli.generated_config import free_port
+from server.config.sections import ZenohSettings
+from server.messaging.bus import Bus
+from server.messaging.inbox import Inbox, Message
+from server.system.errors import UserError
+
+
+@pytest.fixture
+def settings() -> ZenohSettings:
+    address = f"tcp/127.0.0.1:{free_port()}"
+    return ZenohSettings(connect=address, listen=address)
+
+
+class Heard:
+    """What came, awaitable."""
+
+    def __init__(self) -> None:
+        self.queue: asyncio.Queue[Message] = asyncio.Queue()
+
+    async def next(self) -> Message:
+        async with asyncio.timeout(PATIENCE):
+            return await self.queue.get()
+
+
+class Presence:
+    """Who is there, awaitable."""
+
+    def __init__(self) -> None:
+        self.there: set[str] = set()
+        self._changed = asyncio.Event()
+
+    def note(self, key: str, there: bool) -> None:
+        (self.there.add if there else self.there.discard)(key)
+        self._changed.set()
+
+    async def until(self, *keys: str) -> None:
+        async with asyncio.timeout(PATIENCE):
+            while self.there != set(keys):
+                await self._changed.wait()
+                self._changed.clear()
+
+
+async def test_a_message_comes_with_its_key_and_attachment(settings: ZenohSettings) -> None:
+    router, client = Bus.router(settings), Bus.client(settings)
+    heard, there = Heard(), Presence()
+    router.subscribe("myview/hall/*/video", heard.queue.put_nowait)
+    client.watch_alive("myview/hall/bestview", there.note)
+    router.declare_alive("myview/hall/bestview")
+    await there.until("myview/hall/bestview")
+    client.publish("myview/hall/c0/video", b"picture", b"head")
+    assert await heard.next() == Message("myview/hall/c0/video", b"picture", b"head")
+    client.publish("myview/hall/c0/video", b"picture")
+    assert (await heard.next()).attachment == b""
+    client.close()
+    router.close()
+
+
+async def test_a_message_larger_than_any_is_dropped_and_all_others_come(settings: ZenohSettings) -> None:
+    router, client = Bus.router(settings), Bus.client(settings)
+    heard, there = Heard(), Presence()
+    router.subscribe("myview/hall/camera/*/video", heard.queue.put_nowait)
+    client.watch_alive("router", there.note)
+    router.declare_alive("router")
+    await there.until("router")
+    key, wait = "myview/hall/camera/c0/video", zenoh.CongestionControl.BLOCK  # whoever sends it may wait
+    for payload in (bytes(40_000_000), b"picture"):
+        await asyncio.to_thread(client._session.put, key, payload, congestion_control=wait)
+    assert (await heard.next()).payload == b"picture"
+    client.close()
+    router.close()
+
+
+async def test_messages_of_one_session_stay_in_order(settings: ZenohSettings) -> None:
+    router, client = Bus.router(settings), Bus.client(settings)
+    heard, there = Heard(), Presence()
+    router.subscribe("a/**", heard.queue.put_nowait)
+    client.watch_alive("router", there.note)
+    router.declare_alive("router")
+    await there.until("router")
+    for number in range(200):
+        client.publish(f"a/{'bc'[number % 2]}", str(number).encode() + bytes(1000 * (number % 7)))
+        await asyncio.sleep(0)
+    got = [int((await heard.next()).payload.split(b"\0")[0]) for _ in range(200)]
+    assert got == list(range(200))
+    client.close()
+    router.close()
+
+
+async def test_however_many_keys_there_were_few_are_kept_and_all_messages_come(
+    settings: ZenohSettings,
+) -> None:
+    router, client = Bus.router(settings), Bus.client(settings)
+    heard, there = Heard(), Presence()
+    router.subscribe("thumbs/**", heard.queue.put_nowait)
+    client.watch_alive("router", there.note)
+    router.declare_alive("router")
+    await there.until("router")
+    keys = [f"thumbs/{number}" for number in range(200)]
+    for key in keys:
+        client.publish(key, b"jpeg")
+        client.publish("thumbs/often", b"jpeg")
+        await asyncio.sleep(0)
+    got = [(await heard.next()).key for _ in range(400)]
+    assert [key for key in got if key != "thumbs/often"] == keys
+    assert len(client._publishers) <= 64
+    assert list(client._publishers)[-2:] == ["thumbs/199", "thumbs/often"]
+    client.close()
+    router.close()
+
+
+async def test_a_client_may_come_before_the_router_and_survives_its_restart(settings: ZenohSettings) -> None:
+    client = Bus.client(settings)
+    there = Presence()
+    client.watch_alive("router", there.note)
+    client.declare_alive("client")
+    for _ in range(2):
+        router = Bus.router(settings)
+        heard, clients = Heard(), Presence()
+        router.subscribe("word", heard.queue.put_nowait)
+        router.watch_alive("client", clients.note)
+        router.declare_alive("router")
+        await there.until("router")
+        await clients.until("client")
+        client.publish("word", b"hello")
+        assert (await heard.next()).payload == b"hello"
+        router.close()
+        await there.until()
+    client.close()
+
+
+async def test_two_that_hear_each_other_do_so_through_the_router_until_one_listens_no_more(
+    settings: ZenohSettings,
+) -> None:
+    router = Bus.router(settings)
+    one, two = Bus.hearing(settings), Bus.hearing(settings)
+    heard, ended, there = Heard(), Heard(), Presence()
+    two.subscribe("found/*", heard.queue.put_nowait)
+    end = two.listen("found/one", ended.queue.put_nowait)
+    one.watch_alive("ready", there.note)
+    two.declare_alive("ready")
+    await there.until("ready")
+    one.publish("found/one", b"first")
+    assert (await ended.next()).payload == b"first"
+    end()
+    end()
+    one.publish("found/one", b"second")
+    assert [(await heard.next()).payload for _ in range(2)] == [b"first", b"second"]
+    assert ended.queue.empty()
+    for bus in (one, two, router):
+        bus.close()
+
+
+async def test_who_wants_to_hear_the_others_needs_the_router(
+    settings: ZenohSettings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("server.messaging.bus._OPEN_WITHIN_MS", 100)
+    with pytest.raises(UserError, match=r"zenoh\.connect: nobody is at tcp/127"):
+        Bus.hearing(settings)
+
+
+async def test_who_closes_is_seen_to_be_gone_and_who_was_there_before_is_seen_to_be_there(
+    settings: ZenohSettings,
+) -> None:
+    router, client = Bus.router(settings), Bus.client(settings)
+    client.declare_alive("camera/c0")
+    first = Presence()
+    router.watch_alive("camera/*", first.note)
+    await first.until("camera/c0")
+    late = Presence()
+    router.watch_alive("camera/*", late.note)
+    await late.until("camera/c0")
+    client.close()
+    await first.until()
+    router.close()
+
+
+async def test_two_routers_of_one_address_cannot_be(settings: ZenohSettings) -> None:
+    router = Bus.router(settings)
+    with pytest.raises(UserError, match=r"zenoh\.listen: cannot listen on tcp/127") as caught:
+        Bus.router(settings)
+    assert "\n" not in str(caught.value)
+    router.close()
+
+
+async def test_an_address_that_is_none_is_refused() -> None:
+    for address in ("nonsense", "tcp/127.0.0.1", "127.0.0.1:7447", "tcp/a b:1", "tcp/a:65536", "tcp/a:0"):
+        with pytest.raises(ValidationError, match="is not an address such as tcp"):
+            ZenohSettings(connect=address)
+    with pytest.raises(UserError, match=r"zenoh\.connect: cannot use smoke/signal:1") as caught:
+        Bus.client(ZenohSettings(connect="smoke/signal:1"))
+    assert "\n" not in str(caught.value)
+
+
+SCRIPT = """
+import asyncio
+from server.messaging.bus import Bus
+from server.config.sections import Zenoh
+async def main():
+    address = "tcp/127.0.0.1:{port}"
+    settings = Zenoh(connect=address, listen=address)
+    buses = [Bus.router(settings), Bus.client(settings)]
+    for bus in buses:
+        bus.subscribe("a", print)
+        bus.watch_alive("b", print)
+        bus.declare_alive("b")
+        bus.publish("a", b"x")
+    for bus in reversed(buses):
+        bus.close()
+asyncio.run(main())
+"""
+
+
+def test_a_process_that_closes_its_sessions_exits() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", SCRIPT.format(port=free_port())], timeout=PATIENCE, check=False
+    )
+    assert done.returncode == 0
+
+
+async def test_what_comes_from_threads_is_handled_on_the_loop_in_order() -> None:
+    got: list[tuple[int, int]] = []
+    done = asyncio.Event()
+
+    def handle(number: int) -> None:
+        got.append((number, threading.get_ident()))
+        if number == 999:
+            done.set()
+
+    inbox = Inbox(handle)
+    thread = threading.Thread(target=lambda: deque(map(inbox.put, range(1000)), maxlen=0))
+    thread.start()
+    async with asyncio.timeout(PATIENCE):
+        await done.wait()
+    thread.join()
+    assert got == [(number, threading.get_ident()) for number in range(1000)]
+
+
+async def test_between_some_items_and_the_next_others_have_their_turn_and_the_order_stays() -> None:
+    got: list[int] = []
+    inbox = Inbox(got.append, turn_s=0.0)
+    for number in range(20):
+        inbox.put(number)
+    seen = []
+    while inbox.waiting:
+        await asyncio.sleep(0)
+        seen.append(len(got))
+    assert got == list(range(20))
+    assert seen == list(range(1, 21))
+
+
+async def test_a_flood_without_end_keeps_nobody_from_the_loop() -> None:
+    """Each item is followed by another before it is handled: there is always one more."""
+    most = 5_000_000  # some seconds of them
+    inbox: Inbox[int] = Inbox(lambda left: inbox.put(left - 1) if left else None)
+    inbox.put(most)
+    async with asyncio.timeout(PATIENCE):
+        for _ in range(10):
+            await asyncio.sleep(0)
+    assert inbox.waiting
+
+
+async def test_a_busy_loop_loses_the_oldest_and_counts_them() -> None:
+    got: list[int] = []
+    inbox = Inbox(got.append, pending_max=10, turn_s=PATIENCE)
+    for number in range(25):
+        inbox.put(number)
+    await asyncio.sleep(0)
+    assert got == list(range(15, 25))
+    assert inbox.lost == 15
+
+
+async def test_who_sends_very_much_takes_neither_the_places_nor_the_turns_of_others() -> None:
+    got: list[str] = []
+    inbox = Inbox(got.append, pending_max=10, turn_s=PATIENCE, whose=lambda it: it[:2])
+    for number in range(1000):
+        inbox.put(f"c0 {number}")
+        if number < 5:
+            inbox.put(f"c1 {number}")
+    await asyncio.sleep(0)
+    assert [it for it in got if it.startswith("c1")] == [f"c1 {number}" for number in range(5)]
+    assert [it for it in got if it.startswith("c0")] == [f"c0 {number}" for number in range(990, 1000)]
+    assert got[:4] == ["c0 990", "c1 0", "c0 991", "c1 1"]
+    assert (inbox.lost, inbox.waiting) == (990, 0)
+
+
+async def test_what_waits_of_one_sender_has_so_many_bytes_at_most() -> None:
+    got: list[bytes] = []
+    inbox = Inbox(got.append, turn_s=PATIENCE, size=lambda _: 1 << 24)
+    for number in range(10):
+        inbox.put(b"%d" % number)
+    await asyncio.sleep(0)
+    assert got == [b"6", b"7", b"8", b"9"]
+    assert inbox.lost == 6
+
+
+async def test_senders_without_end_are_taken_for_few() -> None:
+    got: list[int] = []
+    inbox = Inbox(got.append, pending_max=10, whose=str)
+    for number in range(5000):
+        inbox.put(number)
+    assert inbox.waiting <= 1024 + 10
+    while inbox.waiting:  # noqa: ASYNC110
+        await asyncio.sleep(0)
+    assert got[:3] == [0, 1, 2]
+
+
+async def test_one_item_that_cannot_be_handled_keeps_back_no_other(caplog: pytest.LogCaptureFixture) -> None:
+    got: list[float] = []
+    inbox: Inbox[int] = Inbox(lambda number: got.append(1 / number), turn_s=PATIENCE)
+    for number in (1, 0, 2, *[0] * 20):
+        inbox.put(number)
+    await asyncio.sleep(0)
+    assert got == [1.0, 0.5]
+    assert "ZeroDivisionError" in caplog.text
+    assert len(caplog.messages) == 1, "one mistake, however often it is made"

@@ -1,0 +1,265 @@
+"""The bus with users and encryption: strangers' words reach nobody, and no camera speaks for another."""
+
+from __future__ import annotations
+
+import asyncio
+import re
+import subprocess
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from fakes.paths import DOCS
+from fakes.programs import needs_openssl
+from fakes.timeouts import PATIENCE
+from server.cli.generated_config import free_port
+from server.config.password_file import password_of, read_users
+from server.config.sections import ZenohSettings, ZenohTlsSettings
+from server.messaging.bus import Bus
+from server.messaging.bus_access import SETTING, build_access_control
+from server.messaging.inbox import Message
+from server.messaging.messages import ZenohKeys
+from server.system.errors import UserError
+
+pytestmark = needs_openssl
+
+SITE = ZenohKeys("hall")
+SECURITY = (DOCS / "how-to" / "secure.md").read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Make certificates by the very lines of docs/how-to/secure.md."""
+    folder = tmp_path_factory.mktemp("bus")
+    found = re.search(r"```sh\n(openssl.*?)```", SECURITY, re.DOTALL)
+    assert found
+    lines = found[1].replace("10.0.0.5", "127.0.0.1")
+    subprocess.run(["bash", "-e", "-c", lines], cwd=folder, check=True, capture_output=True)
+    (folder / "zenoh.users").write_text("c0:zero\nc1:one\nbestview-1:other\nauditor:ear\n", encoding="utf-8")
+    return folder
+
+
+@pytest.fixture
+def settings(folder: Path) -> ZenohSettings:
+    address = f"tls/127.0.0.1:{free_port()}"
+    tls = ZenohTlsSettings(
+        authority=folder / "authority.pem", certificate=folder / "router.pem", key=folder / "router.key"
+    )
+    return ZenohSettings(connect=address, listen=address, users=folder / "zenoh.users", tls=tls)
+
+
+class Heard:
+    """What came, and waiting for it."""
+
+    def __init__(self) -> None:
+        self.texts: list[str] = []
+        self._new = asyncio.Event()
+
+    def __call__(self, message: Message) -> None:
+        self.texts.append(f"{message.key.rpartition('camera/')[2]} {message.payload.decode()}")
+        self._new.set()
+
+    async def until(self, text: str, again: Callable[[], None]) -> None:
+        """Wait for a text; it is sent again and again, as what is published to nobody is lost."""
+        async with asyncio.timeout(PATIENCE):
+            while text not in self.texts:
+                self._new.clear()
+                again()
+                try:
+                    async with asyncio.timeout(0.05):
+                        await self._new.wait()
+                except TimeoutError:
+                    continue
+
+
+@contextmanager
+def opened(*openings: Callable[[], Bus]) -> Iterator[list[Bus]]:
+    """Open sessions, and close them all."""
+    with ExitStack() as stack:
+        buses = []
+        for opening in openings:
+            bus = opening()
+            stack.callback(bus.close)
+            buses.append(bus)
+        yield buses
+
+
+def router(settings: ZenohSettings) -> Bus:
+    assert settings.users is not None
+    return Bus.router(
+        settings, build_access_control("hall", ["c0", "c1"], "c1", list(read_users(settings.users, SETTING)))
+    )
+
+
+async def test_a_camera_speaks_for_itself_alone(settings: ZenohSettings) -> None:
+    heard = Heard()
+    with opened(
+        lambda: router(settings), lambda: Bus.client(settings, "c0"), lambda: Bus.client(settings, "c1")
+    ) as (bestview, c0, c1):
+        bestview.subscribe(SITE.camera("*", "video"), heard)
+        await heard.until("c0/video own", lambda: c0.publish(SITE.camera("c0", "video"), b"own"))
+
+        def false_and_true() -> None:
+            c1.publish(SITE.camera("c0", "video"), b"false")
+            c1.publish(SITE.camera("c1", "video"), b"true")
+
+        await heard.until("c1/video true", false_and_true)
+        assert "c0/video false" not in heard.texts, "one session keeps its order: it would have come before"
+
+
+async def test_sound_is_sent_by_whose_it_is(settings: ZenohSettings) -> None:
+    heard = Heard()
+    with opened(
+        lambda: router(settings), lambda: Bus.client(settings, "c0"), lambda: Bus.client(settings, "c1")
+    ) as (bestview, c0, c1):
+        bestview.subscribe(SITE.sound, heard)
+        bestview.subscribe(SITE.camera("*", "status"), heard)
+        await heard.until(f"{SITE.sound} c1", lambda: c1.publish(SITE.sound, b"c1"))
+
+        def both() -> None:
+            c0.publish(SITE.sound, b"c0")
+            c0.publish(SITE.camera("c0", "status"), b"after")
+
+        await heard.until("c0/status after", both)
+        assert f"{SITE.sound} c0" not in heard.texts
+
+
+async def test_strangers_fail_to_publish_and_to_listen(
+    settings: ZenohSettings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("server.messaging.bus._OPEN_WITHIN_MS", 300)
+    strangers = [
+        settings.model_copy(update={"users": None}),
+        settings.model_copy(update={"users": _users(tmp_path, "c0:guessed\n")}),
+        settings.model_copy(update={"connect": settings.connect.replace("tls/", "tcp/")}),
+        settings.model_copy(update={"tls": ZenohTlsSettings()}),
+    ]
+    heard, overheard = Heard(), Heard()
+    with opened(
+        lambda: router(settings),
+        lambda: Bus.client(settings, "c1"),
+        *(partial(Bus.client, it, "c0") for it in strangers),
+    ) as (bestview, c1, *them):
+        bestview.subscribe(SITE.camera("*", "*"), heard)
+        alive: list[str] = []
+        bestview.watch_alive(SITE.camera("*", "alive"), lambda key, _: alive.append(key))
+        for it in them:
+            it.subscribe("**", overheard)
+            it.declare_alive(SITE.camera("c0", "alive"))
+        c1.declare_alive(SITE.camera("c1", "alive"))
+        for number in range(10):  # time enough for who would have been let in
+            await heard.until(f"c1/video {number}", partial(_all, [*them, c1], number))
+        assert not [it for it in heard.texts if it.startswith("c0")]
+        assert alive == [SITE.camera("c1", "alive")]
+        assert not [it for it in overheard.texts if it.startswith("c1")]  # they hear themselves
+        for it in strangers:
+            with pytest.raises(UserError, match=r"zenoh\.connect: nobody is at"):
+                await asyncio.to_thread(Bus.hearing, it, "c0")
+
+
+def _all(buses: Sequence[Bus], number: int) -> None:
+    *them, c1 = buses
+    for it in them:
+        it.publish(SITE.camera("c0", "video"), b"false")
+    c1.publish(SITE.camera("c1", "video"), str(number).encode())
+
+
+@pytest.mark.parametrize("what", ["pointing", "remember"])
+async def test_what_a_camera_is_told_is_said_by_the_best_view_and_heard_by_that_camera(
+    settings: ZenohSettings, what: str
+) -> None:
+    heard, overheard = Heard(), Heard()
+    with opened(
+        lambda: router(settings),
+        lambda: Bus.client(settings, "c0"),
+        lambda: Bus.client(settings, "c1"),
+        lambda: Bus.hearing(settings, "auditor"),
+    ) as (bestview, c0, c1, auditor):
+        c0.subscribe(SITE.camera("c0", what), heard)
+        c1.subscribe(SITE.camera("c0", what), overheard)
+        c1.subscribe(SITE.camera("c1", what), overheard)
+
+        def all_of_it() -> None:
+            c1.publish(SITE.camera("c0", what), b"false")
+            auditor.publish(SITE.camera("c0", what), b"false")
+            bestview.publish(SITE.camera("c0", what), b"there")
+            bestview.publish(SITE.camera("c1", what), b"here")
+
+        await heard.until(f"c0/{what} there", all_of_it)
+        await overheard.until(f"c1/{what} here", all_of_it)
+        for number in range(5):  # time enough for what would have come
+            await heard.until(f"c0/{what} {number}", partial(_tell, bestview, c1, what, number))
+        assert f"c0/{what} false" not in heard.texts
+        assert set(overheard.texts) - {f"c0/{what} false"} == {f"c1/{what} here"}, "but what it says itself"
+
+
+def _tell(bestview: Bus, other: Bus, what: str, number: int) -> None:
+    other.publish(SITE.camera("c0", what), b"false")
+    bestview.publish(SITE.camera("c0", what), str(number).encode())
+
+
+async def test_cameras_hear_what_others_found_and_not_what_they_see(settings: ZenohSettings) -> None:
+    heard = Heard()
+    with opened(
+        lambda: router(settings),
+        lambda: Bus.client(settings, "c0"),
+        lambda: Bus.hearing(settings, "c1"),
+        lambda: Bus.hearing(settings, "auditor"),
+    ) as (_, c0, c1, auditor):
+        for key in (SITE.camera("c0", "*"), SITE.camera("c0", "found"), SITE.camera("c1", "found")):
+            c1.subscribe(key, heard)
+        everything = Heard()
+        auditor.subscribe(SITE.camera("c0", "*"), everything)
+
+        def all_of_it() -> None:
+            c0.publish(SITE.camera("c0", "video"), b"seen")
+            auditor.publish(SITE.camera("c1", "found"), b"false")
+            c0.publish(SITE.camera("c0", "found"), b"found")
+
+        await heard.until("c0/found found", all_of_it)
+        await everything.until("c0/video seen", all_of_it)  # it may come in mid-round
+        await everything.until("c0/found found", all_of_it)
+        assert set(heard.texts) == {"c0/found found"}
+        assert set(everything.texts) == {"c0/video seen", "c0/found found"}, "who listens sends nothing"
+
+
+async def test_another_best_view_service_hears_and_says_all(settings: ZenohSettings) -> None:
+    heard, told = Heard(), Heard()
+    with opened(
+        lambda: router(settings),
+        lambda: Bus.client(settings, "c0"),
+        lambda: Bus.second(settings, "bestview-1"),
+    ) as (bestview, c0, second):
+        second.subscribe(SITE.camera("*", "tracks"), heard)
+        bestview.subscribe(SITE.bestview("choices", 1), told)
+        await heard.until("c0/tracks here", lambda: c0.publish(SITE.camera("c0", "tracks"), b"here"))
+        key = SITE.bestview("choices", 1)
+        await told.until(f"{key} chosen", lambda: second.publish(key, b"chosen"))
+
+
+def _users(folder: Path, text: str) -> Path:
+    path = folder / "users"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize("text", ["c0\n", "c0:\n", ":p\n", " c0:a\n", "c0:a\n\nc1:b\n"])
+def test_a_file_of_users_that_is_none_is_said_in_one_line(tmp_path: Path, text: str) -> None:
+    with pytest.raises(UserError, match=r"zenoh\.users: .*: line \d is no name:password"):
+        read_users(_users(tmp_path, text), SETTING)
+
+
+def test_a_user_with_two_lines_is_refused_with_both(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match=r"zenoh\.users: .*: lines 1 and 3 are for the same name") as refused:
+        read_users(_users(tmp_path, "c0:secret-1\nc1:b\nc0:secret-2\n"), SETTING)
+    assert "secret" not in str(refused.value)
+
+
+def test_who_has_no_line_is_told_so(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="has no line for 'c1', as which this process comes"):
+        password_of(_users(tmp_path, "c0:a\n"), "c1", SETTING)
+    with pytest.raises(UserError, match=r"zenoh\.users: cannot read .*none"):
+        password_of(tmp_path / "none", "c0", SETTING)

@@ -1,0 +1,226 @@
+"""The calibration walk at the operator's addresses: covered as it goes, calibrated from beside it all."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import AsyncIterator
+from contextlib import aclosing
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fakes.calibration_walk import HEIGHT, SITE, WIDTH, curved, errors_on_floor, walk_config, words
+from fakes.cameras import FPS, STRIDE
+from fakes.site import A, B, Hall, opened
+from server.config.loader import build_config
+from server.http.access.csrf import CHANGES
+from server.service.calibration import walk_session as walking_module
+from server.service.calibration.walk_session import WalkSession, WalkState
+from server.service.calibration.worker import CalibrationResult, CalibrationTask, CameraBoxes, run_calibration
+
+WALK = "/api/operator/walk"
+MINE = {CHANGES: "1"}
+
+
+@pytest.fixture
+async def wide() -> AsyncIterator[Hall]:
+    """Serve a site whose pictures are large enough to walk in."""
+    async with aclosing(opened(**SITE)) as halls:
+        yield await anext(halls)
+
+
+async def do(hall: Hall, **step: Any) -> tuple[int, Any]:
+    async with hall.session.post(WALK, headers=MINE, json=step) as answer:
+        return answer.status, await answer.json()
+
+
+async def finished(hall: Hall) -> Any:
+    assert hall.service.walking._task is not None
+    await hall.service.walking._task
+    return await hall.get_json(WALK)
+
+
+def walk(hall: Hall, frames: int, epoch: int = 0, **how: Any) -> None:
+    for said in words(hall.service.config, curved(frames, **how), epoch):
+        hall.service.walking.take(said)
+
+
+async def test_a_walk_becomes_homographies_that_are_the_scenes(wide: Hall, tmp_path: Path) -> None:
+    before = wide.service.config
+    assert (await wide.get_json(WALK))["state"] == "none"
+    status, told = await do(wide, do="start")
+    assert (status, told["state"], told["seconds"]) == (200, "walking", 0.0)
+    walk(wide, 500)
+    told = await wide.get_json(WALK)
+    assert told["seconds"] == 500 / FPS
+    [pair] = told["pairs"]
+    assert (pair["one"], pair["other"]) == (A, B)
+    assert 5 < pair["seconds"] <= 20
+    for camera in told["cameras"]:
+        assert sum(camera["thirds"]) == pytest.approx(1.0)
+        assert camera["feet"] == round(pair["seconds"] * FPS / 5)
+    status, told = await do(wide, do="finish")
+    assert (status, told["state"]) == (200, "working")
+    told = await finished(wide)
+    assert (told["state"], told["error"]) == ("done", "")
+    assert told["lines"][0].startswith("feet that two cameras see are ")
+    async with wide.session.get(f"{WALK}/ground.json") as answer:
+        assert answer.headers["Content-Disposition"] == 'attachment; filename="ground.json"'
+        (tmp_path / "ground.json").write_bytes(await answer.read())
+    async with wide.session.get(f"{WALK}/plan.png") as answer:
+        assert (await answer.read()).startswith(b"\x89PNG")
+    cameras = [{"id": name, "source": "scene:room"} for name in (A, B)]
+    assert told["configuration"].startswith("ground: ground.json\n")
+    config = build_config({"cameras": cameras, "ground": "ground.json"}, where="walk", folder=tmp_path)
+    errors = errors_on_floor([np.array(it.ground) for it in config.cameras])
+    assert np.median(errors) < 0.15  # metres
+    assert wide.service.config == before  # nothing in force has changed
+    async with wide.session.delete(WALK, headers=MINE) as answer:
+        assert (await answer.json())["state"] == "none"
+    assert await wide.get(f"{WALK}/ground.json") == (404, {"error": "nothing has come of a walk yet"})
+
+
+async def test_a_walk_that_says_too_little_says_so_and_can_be_gone_on_with(wide: Hall) -> None:
+    await do(wide, do="start")
+    walk(wide, 50, wide=0.0)
+    await do(wide, do="finish")
+    told = await finished(wide)
+    assert told["state"] == "done"
+    assert told["error"].startswith(f"{A} and {B}: ")
+    assert (told["lines"], told["configuration"]) == ([], "")
+    _, told = await do(wide, do="go_on")
+    assert (told["state"], told["seconds"], told["error"]) == ("walking", 2.0, "")
+    walk(wide, 50, epoch=10)
+    assert (await wide.get_json(WALK))["seconds"] == 4.0
+
+
+async def test_what_the_walk_lacks_is_said_while_it_goes_on(wide: Hall) -> None:
+    await do(wide, do="start")
+    assert len((await wide.get_json(WALK))["lacking"]) == 2  # nothing of either camera
+    walk(wide, 100, wide=0.01)
+    lacking = (await wide.get_json(WALK))["lacking"]
+    assert f"walk also nearer to camera {A}, and farther from it" in lacking
+
+
+@pytest.mark.parametrize(
+    ("step", "status", "error"),
+    [
+        ({"do": "finish"}, 409, "nobody walks: start the walk first"),
+        ({"do": "go_on"}, 409, "nobody walks: start the walk first"),
+        ({"do": "fly"}, 400, "the request's JSON: "),
+        ({"do": "start", "person": 0}, 400, "the request's JSON: "),
+        ({}, 400, "the request's JSON: "),
+    ],
+)
+async def test_steps_that_make_no_sense_are_refused(hall: Hall, step: Any, status: int, error: str) -> None:
+    code, told = await do(hall, **step)
+    assert code == status
+    assert told["error"].startswith(error)
+    assert hall.service.walking.state is WalkState.NONE
+
+
+async def told_to(work: list[CalibrationTask], config: Any, *parts: Any) -> CalibrationTask:
+    """Walk by hand; give what the process would be told."""
+
+    async def note(task: CalibrationTask) -> CalibrationResult:
+        work.append(task)
+        return CalibrationResult()
+
+    walking = WalkSession(config, note)
+    walking.start()
+    for part in parts:
+        part(walking)
+    walking.finish(1.7)
+    assert walking._task is not None
+    await walking._task
+    return work[-1]
+
+
+async def test_every_final_box_is_told_once_and_counts_from_the_start_of_the_walk() -> None:
+    config = walk_config()
+    places = curved(100)
+
+    def before_and_on(walking: WalkSession) -> None:
+        walking.stop()
+        for said in words(config, places[:50]):  # nobody has started yet
+            walking.take(said)
+        walking.start()
+        for said in words(config, places[50:], epoch=10):
+            walking.take(said)
+            walking.take(said)  # what was said before is not counted again
+
+    task = await told_to([], config, before_and_on)
+    assert task.person == 1.7
+    for seen in task.seen:
+        frames = np.frombuffer(seen.frames, dtype=np.int64)
+        assert len(set(frames.tolist())) == len(frames)
+        assert frames.min() >= 0
+        assert frames.max() <= 49
+        boxes = np.frombuffer(seen.boxes, dtype=np.float64).reshape(-1, 4)
+        assert len(boxes) == len(frames) == len(np.frombuffer(seen.who, dtype=np.int64))
+
+
+async def test_a_camera_that_comes_again_has_other_tracks() -> None:
+    config = walk_config()
+
+    def twice(walking: WalkSession) -> None:
+        for boot in (1, 2):
+            for said in words(config, curved(50), epoch=10 * (boot - 1), boot=boot):
+                walking.take(said)
+
+    task = await told_to([], config, twice)
+    who = np.frombuffer(task.seen[0].who, dtype=np.int64)
+    assert set(who.tolist()) == {0, 1}
+
+
+async def test_a_walk_that_is_started_before_any_camera_speaks_counts_from_the_first_word() -> None:
+    config = walk_config()
+
+    def late(walking: WalkSession) -> None:
+        for said in words(config, curved(50), epoch=10_000_000):
+            walking.take(said)
+
+    task = await told_to([], config, late)
+    frames = np.frombuffer(task.seen[0].frames, dtype=np.int64)
+    assert 0 <= frames.min() <= frames.max() <= 49
+
+
+async def test_offsets_of_recordings_are_told_and_of_live_cameras_none() -> None:
+    cameras = [{"id": "c0", "source": "c0.mp4", "offset": 7}, {"id": "c1", "source": "rtsp://10.0.0.1/a"}]
+    config = walk_config(cameras=cameras)
+    assert (await told_to([], config)).offsets == {"c0": 7}
+
+
+async def test_after_the_most_that_is_kept_nothing_more_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(walking_module, "MAX_WALK_S", 1.0)
+    config = walk_config()
+    walking = WalkSession(config)
+    walking.start()
+    for said in words(config, curved(100)):
+        walking.take(said)
+    assert walking.seconds == 1.0
+
+
+async def test_whose_process_dies_learns_of_it_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    nonsense = CameraBoxes("c0", (WIDTH, HEIGHT), b"123", b"", b"")
+    done = await run_calibration(CalibrationTask([nonsense], FPS, 0.0, 1.75, {}))
+    assert done.error == "the calibration went wrong; the server's log says more"
+    monkeypatch.setattr("sys.executable", "/nowhere/python")
+    done = await run_calibration(CalibrationTask([], FPS, 0.0, 1.75, {}))
+    assert done.error.startswith("the calibration cannot be started: ")
+
+
+async def test_who_forgets_the_walk_ends_its_calculation(wide: Hall) -> None:
+    await do(wide, do="start")
+    walk(wide, 20 * STRIDE)
+    await do(wide, do="finish")
+    task = wide.service.walking._task
+    async with wide.session.delete(WALK, headers=MINE) as answer:
+        assert json.loads(await answer.read())["state"] == "none"
+    assert task is not None
+    await asyncio.gather(task, return_exceptions=True)
+    assert task.cancelled()
+    assert wide.service.walking.done is None

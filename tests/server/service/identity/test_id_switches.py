@@ -1,0 +1,81 @@
+"""Which tracks have exchanged their people is seen by what is said of the same frames before and after."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from bestview import TrackKey
+from fakes.cameras import HEIGHT, WIDTH, word
+from server.media.letterbox import Letterbox
+from server.service.identity.camera_window import CameraWindow
+from server.service.identity.id_switches import Exchange, exchanged
+from server.service.ingest.window_history import Stretch
+
+FRAMES, FIRST = 20, 100
+PLACE = np.array([0.0, 0.0, 10.0, 30.0])
+
+
+def window(boxes: NDArray[np.float64], first: int) -> CameraWindow:
+    """Give a camera's word on some frames, of the boxes (T, F, 4)."""
+    tracks = range(1, len(boxes) + 1)
+    last = first + boxes.shape[1] - 1
+    message = word("c0", 0, dict.fromkeys(tracks, (1.0, 1.0, 2.0, 2.0)), first=first, last=last)
+    keys = tuple(TrackKey("c0", it) for it in tracks)
+    fit = Letterbox((WIDTH, HEIGHT), (WIDTH, HEIGHT))
+    return CameraWindow(message, keys, np.array(list(tracks)), fit, boxes, first)
+
+
+def paths(tracks: int) -> NDArray[np.float64]:
+    """Let everybody walk in a lane of their own, (T, FRAMES, 4)."""
+    step, lane = np.arange(FRAMES)[None, :, None], np.arange(tracks)[:, None, None]
+    return PLACE + step * np.array([1.0, 0.0, 1.0, 0.0]) + lane * np.array([0.0, 40.0, 0.0, 40.0])
+
+
+@given(
+    st.integers(2, 6),
+    st.permutations(range(6)),
+    st.integers(0, FRAMES - 4),
+    st.integers(0, 3),
+    st.integers(0, FRAMES - 6),
+)
+def test_two_who_are_in_each_others_place_from_a_frame_on_have_exchanged_their_people(
+    tracks: int, order: list[int], since: int, newer: int, forgotten: int
+) -> None:
+    one, two = sorted([it for it in order if it < tracks][:2])
+    old, now = paths(tracks), paths(tracks)
+    now[[one, two], since:] = now[[two, one], since:]
+    # Some of the newest frames are spoken of for the first time, and the oldest words may be forgotten.
+    known = FRAMES - 1 - newer
+    said = Stretch(window(old, FIRST), FIRST + forgotten, FIRST + known)
+    found = exchanged(window(now, FIRST), [said])
+    seen = known + 1 - max(since, forgotten)
+    if seen < 2:
+        assert found == []
+        return
+    frame = FIRST + (since if since > forgotten else 0)
+    assert found == [Exchange(TrackKey("c0", one + 1), TrackKey("c0", two + 1), frame)]
+
+
+def test_who_stays_who_is_hidden_and_who_goes_round_in_a_ring_has_exchanged_nothing() -> None:
+    old = paths(3)
+    assert exchanged(window(old, FIRST), [Stretch(window(old, FIRST), FIRST, FIRST + 9)]) == []
+    assert exchanged(window(old, FIRST), []) == []
+    ring = old.copy()
+    ring[:, 5:] = ring[[1, 2, 0], 5:]
+    assert exchanged(window(ring, FIRST), [Stretch(window(old, FIRST), FIRST, FIRST + 9)]) == []
+    hidden = old.copy()
+    hidden[0, 5:] = hidden[1, 5:]
+    hidden[1, 5:] = np.nan
+    assert exchanged(window(hidden, FIRST), [Stretch(window(old, FIRST), FIRST, FIRST + 9)]) == []
+
+
+def test_in_a_crowd_nobody_exchanges_with_two_at_once() -> None:
+    old = paths(3)
+    old[2] = old[1] + 2.0
+    now = old.copy()
+    now[[0, 1], 5:] = now[[1, 0], 5:]
+    found = exchanged(window(now, FIRST), [Stretch(window(old, FIRST), FIRST, FIRST + 12)])
+    assert found == [Exchange(TrackKey("c0", 1), TrackKey("c0", 2), FIRST + 5)]

@@ -1,0 +1,131 @@
+"""What is said of people by hand holds, whatever is worked out afterwards."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bestview import IdentityUpdate, Merge, Split
+from fakes.cameras import CAMERAS, LARGE, SMALL, STRIDE, epoch_of, word
+from fakes.people import Dictated, boxes, people, said
+from server.service.identity.manual_overrides import ByHand
+from server.service.identity.people import People
+
+numbers = st.integers(1, 6)
+
+
+@given(st.lists(st.tuples(st.booleans(), numbers, numbers), max_size=12))
+def test_whoever_is_said_to_be_one_stays_one(steps: list[tuple[bool, int, int]]) -> None:
+    it = ByHand()
+    one: list[set[int]] = [{number} for number in range(1, 7)]
+    for by_hand, first, second in steps:
+        kept, lost = it.now(first), it.now(second)
+        if kept == lost:
+            continue
+        if by_hand:
+            it.merge(kept, lost)
+        else:
+            read = it.read(said({}, Merge(first, second)))
+            gone = {merge.lost for merge in read.merged}
+            assert not gone & {it.now(number) for number in range(1, 7) if number not in gone}
+            if it.now(first) != it.now(second):
+                continue  # nobody's word was about the lost one: it is never heard of again
+        together = next(group for group in one if kept in group) | next(
+            group for group in one if lost in group
+        )
+        one = [group for group in one if not group & together] + [together]
+    for group in one:
+        assert len({it.now(number) for number in group}) == 1
+    for number in range(1, 7):
+        assert it.now(it.now(number)) == it.now(number)
+        assert number in it.worked_out(it.now(number))
+
+
+def dictated(*updates: IdentityUpdate) -> People:
+    it = people(gone_after=10)
+    it._registry = Dictated(*updates)  # type: ignore[assignment]
+    return it
+
+
+def seen(it: People, epoch: int) -> None:
+    it.update(epoch_of(epoch, word("c0", epoch, {1: SMALL}), word("c1", epoch, {1: LARGE})))
+
+
+TWO = said({("c0", 1): 1, ("c1", 1): 2})
+
+
+def test_a_merge_by_hand_holds_while_the_evidence_goes_on_saying_two() -> None:
+    it = dictated(TWO, TWO, replace(TWO, split=(Split(1, 2, "c1"),)), replace(TWO, merged=(Merge(2, 1),)))
+    seen(it, 0)
+    it.roll.call(2, "Ann")
+    it.merge(1, 2)
+    assert it.known == [1]
+    assert it.roll.names == {1: "Ann"}
+    assert (it.roll.first_seen, it.roll.last_seen) == ({1: 0}, {1: STRIDE - 1})
+    assert it.take_corrections() == (Merge(1, 2),)
+    for epoch in (1, 2, 3):
+        seen(it, epoch)
+        assert it.known == [1]
+        assert it.roll.merged == {2: 1}
+        assert boxes(it, "c0", epoch * STRIDE) == {1: SMALL}
+        assert boxes(it, "c1", epoch * STRIDE) == {1: LARGE}
+    assert it.take_corrections() == ()
+
+
+def test_who_is_said_to_be_somebody_is_whoever_that_turns_out_to_be() -> None:
+    three = said({("c0", 1): 1, ("c1", 1): 2, ("c1", 2): 3})
+    it = dictated(three, replace(three, merged=(Merge(3, 1),)), said({("c0", 2): 2}))
+    seen(it, 0)
+    it.merge(1, 2)
+    seen(it, 1)
+    it.update(epoch_of(2, word("c0", 2, {2: SMALL})))
+    assert it.roll.everybody == [3]
+    assert it.roll.merged == {1: 3, 2: 3}
+    assert boxes(it, "c0", 2 * STRIDE) == {3: SMALL}
+
+
+def test_who_is_two_to_the_evidence_is_away_when_both_are() -> None:
+    it = dictated(TWO, replace(TWO, gone=(1,)), replace(TWO, gone=(2,)), replace(TWO, returned=(2,)))
+    seen(it, 0)
+    it.merge(1, 2)
+    for epoch, away in ((1, set()), (2, {1}), (3, set())):
+        seen(it, epoch)
+        assert it.roll.away == away
+
+
+def test_a_name_that_both_have_is_the_one_that_is_kept() -> None:
+    it = dictated(TWO)
+    seen(it, 0)
+    it.roll.call(1, "Ann")
+    it.roll.call(2, "Bob")
+    it.merge(1, 2)
+    assert it.roll.names == {1: "Ann"}
+    it.roll.call(1, "")
+    assert it.roll.names == {}
+
+
+def test_whom_a_camera_shows_is_somebody_new_at_once_and_stays_it() -> None:
+    it = people()
+    for epoch in range(3):
+        it.update(epoch_of(epoch, word("c0", epoch, {1: SMALL, 2: LARGE}), word("c1", epoch, {1: SMALL})))
+    one = it.number("c0", 1, 14)
+    assert one is not None
+    other = it.number("c1", 1, 14)
+    assert other is not None
+    if other != one:
+        it.merge(one, other)
+        it.take_corrections()
+    assert it.part(one, ["c1"]) is not None
+    [split] = it.take_corrections()
+    assert isinstance(split, Split)
+    new = split.parted
+    assert (split.kept, split.camera) == (one, "c1")
+    assert new in it.known
+    for epoch in range(3, 12):
+        assert it.number("c1", 1, epoch * STRIDE - 1) == new
+        assert it.number("c0", 1, epoch * STRIDE - 1) == one
+        it.update(epoch_of(epoch, word("c0", epoch, {1: SMALL, 2: LARGE}), word("c1", epoch, {1: SMALL})))
+    assert it.part(one, ["c1"]) is None
+    assert it.part(99, CAMERAS) is None

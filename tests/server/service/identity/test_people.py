@@ -1,0 +1,245 @@
+"""Who was where: numbers that outlive a camera's restarts, merges, and forgetting."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bestview import EpisodeKey, IdentitySettings, IdentityUpdate, LocalTrack, Merge, Split, TrackKey
+from fakes.cameras import CAMERAS, HEIGHT, LARGE, SMALL, STRIDE, WIDTH, epoch_of, word
+from fakes.people import Dictated, boxes, people, said
+from server.service.identity.local_numbers import LocalNumbers
+from server.service.identity.people import People
+from server.service.ingest.window_history import History
+
+
+class Heard:
+    """An identity registry that notes what it is given."""
+
+    def __init__(self, heard: list[LocalTrack]) -> None:
+        self._heard = heard
+        self.pictures: dict[str, tuple[int, int]] = {}
+
+    def update(
+        self, tracks: list[LocalTrack], last_frame: int, pictures: Mapping[str, tuple[int, int]]
+    ) -> IdentityUpdate:
+        del last_frame
+        self._heard += tracks
+        self.pictures.update(pictures)
+        return said({})
+
+
+def dictated(*updates: IdentityUpdate) -> People:
+    it = people()
+    it._registry = Dictated(*updates)  # type: ignore[assignment]
+    return it
+
+
+@settings(deadline=None, max_examples=100)
+@given(st.lists(st.tuples(st.integers(0, 12), st.integers(-1, 6)), max_size=6), st.integers(0, 15))
+def test_the_newest_word_on_a_frame_counts(words: list[tuple[int, int]], old: int) -> None:
+    history, expected = History[int](), dict[int, int]()
+    for number, (first, more) in enumerate(words):
+        history.put(number, first, first + more)
+        expected |= dict.fromkeys(range(first, first + more + 1), number)
+    history.forget_before(old)
+    told = [(pulse, it.window) for it in history.over(2, 14) for pulse in range(it.first, it.last + 1)]
+    assert told == sorted((pulse, it) for pulse, it in expected.items() if max(old, 2) <= pulse <= 14)
+
+
+def test_a_restarted_cameras_first_track_is_not_its_former_first_track() -> None:
+    numbers = LocalNumbers()
+    assert numbers.of(word("c0", 0, {1: SMALL, 2: SMALL})) == (TrackKey("c0", 1), TrackKey("c0", 2))
+    assert numbers.of(word("c0", 1, {1: SMALL}, boot=2)) == (TrackKey("c0", 3),)
+    assert numbers.of(word("c1", 1, {1: SMALL})) == (TrackKey("c1", 1),)
+    assert numbers.known("c0", 1, 1) == TrackKey("c0", 1)
+    assert numbers.known("c0", 2, 1) == TrackKey("c0", 3)
+
+
+def test_a_forgotten_track_that_comes_back_has_a_new_number() -> None:
+    numbers = LocalNumbers()
+    numbers.of(word("c0", 0, {1: SMALL}))
+    numbers.forget(TrackKey("c0", 1))
+    assert numbers.known("c0", 1, 1) is None
+    assert numbers.of(word("c0", 5, {1: SMALL})) == (TrackKey("c0", 2),)
+
+
+def test_feet_that_the_lower_edge_cuts_off_do_not_say_where_somebody_stands() -> None:
+    it = people()
+    heard: list[LocalTrack] = []
+    it._registry = registry = Heard(heard)  # type: ignore[assignment]
+    it.update(epoch_of(0, word("c0", 0, {1: SMALL}, size=(WIDTH // 2, HEIGHT // 2)), word("c1", 0, {})))
+    assert registry.pictures == {"c0": (WIDTH // 2, HEIGHT // 2), "c1": (WIDTH, HEIGHT)}, "also who sees none"
+    [track] = heard
+    assert track.picture_height == HEIGHT // 2, "of the camera's own picture, as its boxes"
+    np.testing.assert_allclose(track.boxes, np.tile(np.array(SMALL) / 2, (STRIDE, 1)))
+
+
+def test_a_camera_that_could_not_see_anybody_is_not_asked_who_is_there() -> None:
+    it = People(IdentitySettings(), CAMERAS, dict.fromkeys(CAMERAS), (WIDTH, HEIGHT), lag=STRIDE)
+    asked = []
+    for epoch in range(8):
+        it._registry = registry = Heard([])  # type: ignore[assignment]
+        away = range(epoch * STRIDE + (epoch == 6), (epoch + 1) * STRIDE) if 3 <= epoch < 7 else ()
+        it.update(epoch_of(epoch, word("c0", epoch, {1: SMALL}), word("c1", epoch, {}, unsearched=[*away])))
+        asked.append("c1" in registry.pictures)
+    assert asked == [True, True, True, True, False, False, False, True], "a stride later, when it is final"
+
+
+def test_a_camera_whose_source_is_exchanged_has_boxes_in_its_new_picture() -> None:
+    it = people()
+    for epoch, size in enumerate([(WIDTH, HEIGHT), (WIDTH // 2, HEIGHT // 2)]):
+        heard: list[LocalTrack] = []
+        it._registry = Heard(heard)  # type: ignore[assignment]
+        it.update(epoch_of(epoch, word("c0", epoch, {1: SMALL}, size=size, boot=1 + epoch)))
+        [track] = heard
+        np.testing.assert_allclose(track.boxes, np.tile(np.array(SMALL) * size[0] / WIDTH, (STRIDE, 1)))
+
+
+def test_people_are_where_their_tracks_are() -> None:
+    it = people()
+    it.update(epoch_of(0, word("c0", 0, {1: SMALL, 2: LARGE}), word("c1", 0, {1: None})))
+    first, second = it.known
+    assert boxes(it, "c0", 4) == {first: SMALL, second: LARGE}
+    assert boxes(it, "c1", 4) == {}
+    assert it.whose("c0", 1, 2, 0) == second
+    assert it.whose("c0", 9, 2, 0) is None
+
+
+def test_first_and_last_seen_are_the_frames_with_a_box() -> None:
+    it = people()
+    for epoch in range(3):
+        it.update(epoch_of(epoch, word("c0", epoch, {1: SMALL if epoch < 2 else None})))
+    [number] = it.known
+    assert (it.roll.first_seen[number], it.roll.last_seen[number]) == (0, 2 * STRIDE - 1)
+
+
+def test_who_is_confirmed_late_was_there_from_their_first_box_on() -> None:
+    def since(*numbers: tuple[int, int]) -> IdentityUpdate:
+        return replace(said({}), numbers={EpisodeKey("c0", 1, first): number for first, number in numbers})
+
+    later = 3 * STRIDE
+    it = dictated(
+        said({}),
+        since((STRIDE, 0)),
+        since((STRIDE, 1)),
+        since((STRIDE, 1), (later, 0)),
+        since((STRIDE, 1), (later, 2)),
+    )
+    for epoch in range(5):
+        it.update(epoch_of(epoch, word("c0", epoch, {1: None if epoch == 0 else SMALL})))
+    assert it.roll.first_seen == {1: STRIDE, 2: later}
+    assert it.roll.last_seen == {1: later - 1, 2: 5 * STRIDE - 1}
+    numbers = it.numbers([TrackKey("c0", 1)], 0, 5 * STRIDE)[0].tolist()
+    assert numbers == [-1] * STRIDE + [1] * (later - STRIDE) + [2] * (2 * STRIDE)
+
+
+def test_frames_that_are_not_decided_yet_keep_their_people_when_the_registry_has_settled_them() -> None:
+    def since(*parts: tuple[int, int]) -> IdentityUpdate:
+        return replace(said({}), numbers={EpisodeKey("c0", 1, first): number for first, number in parts})
+
+    second, third = 2 * STRIDE, 4 * STRIDE
+    it = dictated(
+        since((0, 1)),
+        since((0, 1)),
+        since((0, 1), (second, 2)),
+        since((second, 2)),
+        since((third, 3)),
+        since((third, 3)),
+        replace(since((third, 4)), merged=(Merge(kept=4, lost=2),)),
+    )
+
+    def told() -> list[int]:
+        return [next(iter(boxes(it, "c0", first)), -1) for first in (0, second, third)]
+
+    for epoch in range(5):
+        it.update(epoch_of(epoch, word("c0", epoch, {1: SMALL})))
+    assert told() == [1, 2, 3]
+    it.forget_boxes_before(second)
+    it.update(epoch_of(5, word("c0", 5, {1: SMALL})))
+    assert told() == [-1, 2, 3]
+    assert len(it._parts[TrackKey("c0", 1)]) == 2, "what is not asked for any more is let go"
+    it.update(epoch_of(6, word("c0", 6, {1: SMALL})))
+    assert told() == [-1, 4, 4], "merges hold for what is settled, too"
+
+
+def test_a_restarted_cameras_people_do_not_inherit_the_boxes_of_others() -> None:
+    it = people()
+    it.update(epoch_of(0, word("c0", 0, {1: SMALL})))
+    it.update(epoch_of(1, word("c0", 1, {1: LARGE}, boot=2)))
+    [before], [after] = boxes(it, "c0", 0), boxes(it, "c0", STRIDE)
+    assert it.whose("c0", 1, 1, 0) == before
+    assert it.whose("c0", 2, 1, STRIDE) == after
+
+
+def test_of_merged_numbers_the_newest_are_remembered() -> None:
+    """Whoever stays all day has many short tracks merged into them."""
+    it = people(remember=5)
+    for lost in range(2, 40):
+        it.merge(1, lost)
+    assert it.roll.merged == dict.fromkeys(range(35, 40), 1)
+    assert it.roll.also(1) == [*range(35, 40)]
+
+
+def test_a_merged_number_lives_on_as_the_others_and_chains_are_followed() -> None:
+    it = dictated(
+        said({("c0", 1): 1, ("c0", 2): 2, ("c1", 1): 3}),
+        said({("c0", 1): 1, ("c0", 2): 2, ("c1", 1): 2}, Merge(kept=2, lost=3)),
+        said({("c0", 1): 1, ("c0", 2): 1, ("c1", 1): 1}, Merge(kept=1, lost=2)),
+    )
+    for epoch in range(3):
+        it.update(epoch_of(epoch, word("c0", epoch, {1: SMALL, 2: None}), word("c1", epoch, {1: LARGE})))
+    assert it.known == [1]
+    assert it.roll.merged == {3: 1, 2: 1}
+    assert boxes(it, "c1", 0) == {1: LARGE}, "in frames past, too"
+    assert it.roll.also(1) == [2, 3]
+
+
+def test_what_turned_out_is_taken_once_and_in_order() -> None:
+    merge, split = Merge(kept=1, lost=2), Split(kept=1, parted=4, camera="c0")
+    it = dictated(said({("c0", 1): 1}, merge), said({("c0", 1): 4}, split), said({("c0", 1): 4}))
+    for epoch in range(2):
+        it.update(epoch_of(epoch, word("c0", epoch, {1: SMALL})))
+    assert it.take_corrections() == (merge, split)
+    it.update(epoch_of(2, word("c0", 2, {1: SMALL})))
+    assert it.take_corrections() == ()
+
+
+def test_who_has_left_a_person_for_one_not_confirmed_yet_has_no_number() -> None:
+    it = dictated(said({("c0", 1): 1}), said({("c0", 1): 0}))
+    it.update(epoch_of(0, word("c0", 0, {1: SMALL})))
+    it.update(epoch_of(1, word("c0", 1, {1: SMALL})))
+    assert boxes(it, "c0", STRIDE) == {}
+    assert it.number("c0", 1, STRIDE) is None
+
+
+def test_two_tracks_of_one_person_in_one_picture_give_one_box() -> None:
+    it = dictated(said({("c0", 1): 1, ("c0", 2): 1}))
+    it.update(epoch_of(0, word("c0", 0, {1: SMALL, 2: LARGE})))
+    assert boxes(it, "c0", 0) == {1: SMALL}
+
+
+def test_people_who_were_gone_for_long_are_forgotten_with_all_that_is_known_of_them() -> None:
+    it = people(gone_after=STRIDE, forget_after=3 * STRIDE)
+    it.update(epoch_of(0, word("c0", 0, {1: SMALL})))
+    [number] = it.known
+    for epoch in range(1, 4):
+        it.update(epoch_of(epoch, word("c0", epoch, {})))
+    assert it.known == [number]
+    assert it.roll.away == {number}
+    it.update(epoch_of(9, word("c0", 9, {})))
+    assert it.known == []
+    assert it.roll.away == set()
+    assert it.whose("c0", 1, 1, 0) is None
+    assert not it._parts
+    assert not it._heard
+
+
+@pytest.mark.parametrize("pulse", [-1, 0, 4, 1000])
+def test_nothing_is_known_of_frames_that_nobody_spoke_of(pulse: int) -> None:
+    assert boxes(people(), "c0", pulse) == {}

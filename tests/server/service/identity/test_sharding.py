@@ -1,0 +1,232 @@
+"""Several best-view services of one site decide for all of its people, each for its own, and as one would."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Iterator, Sequence
+from typing import Any
+
+import aiohttp
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bestview import EpisodeKey, IdentityUpdate, LocalTrack, Merge
+from fakes.cameras import (
+    CAMERAS,
+    LARGE,
+    SMALL,
+    FedService,
+    TrackNumbers,
+    encoded,
+    epoch_of,
+    small_config,
+    tracks,
+    video,
+    word,
+)
+from fakes.timeouts import PATIENCE
+from server.cli.generated_config import free_port
+from server.config.sections import HttpSettings, ShareSettings
+from server.http.app import make_app, serving
+from server.messaging.bus import Bus
+from server.messaging.messages import Box, ZenohKeys
+from server.service.identity.sharding import index_of, served, server_of
+from server.service.service import BestViewService
+from server.service.view_selection.decider import Decider
+from server.system.errors import UserError
+
+
+def shared(index: int, of: int = 2, **more: Any) -> dict[str, Any]:
+    return {"view": {"share": {"of": of, "index": index, **more}}}
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(1, 4), st.integers(0, 2**32 - 1))
+def test_together_they_decide_what_one_alone_would(of: int, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    deciders = [
+        Decider(small_config(**shared(index, of)), dict.fromkeys(CAMERAS), lambda _camera, _pulse: True)
+        for index in range(of)
+    ]
+    alone = Decider(small_config(), dict.fromkeys(CAMERAS), lambda _camera, _pulse: True)
+    for it in [*deciders, alone]:
+        it.people._registry = TrackNumbers()  # type: ignore[assignment]
+    for number in range(6):
+        words = []
+        for camera in CAMERAS:
+            size = {track: float(rng.uniform(5, 40)) for track in range(1, 8) if rng.random() < 0.7}
+            boxes: dict[int, Box | None] = {it: (0.0, 0.0, s / 2, s) for it, s in size.items()}
+            words.append(word(camera, number, boxes))
+        epoch = epoch_of(number, *words)
+        answers = [decider.step(epoch) for decider in deciders]
+        for place, whole in enumerate(alone.step(epoch)):
+            parts = [answer[place] for answer in answers]
+            together = [choice for part in parts for choice in part.choices]
+            assert sorted(together, key=lambda it: it.number) == list(whole.choices)
+            assert all(part.boxes == whole.boxes for part in parts)
+            for index, part in enumerate(parts):
+                assert all(choice.number % of == index for choice in part.choices)
+
+
+def test_whoever_watches_an_old_number_stays_where_they_are() -> None:
+    share = ShareSettings(of=3, index=2)
+    assert served([1, 2, 4, 5], {}, share) == [2, 5]
+    assert served([1, 4], {5: 4}, share) == [4]
+    assert served([1, 2], {8: 7}, share) == [2]
+    assert [index_of(it, share) for it in (3, 4, 5)] == [0, 1, 2]
+
+
+def test_an_old_numbers_stream_goes_on_at_its_own_service() -> None:
+    class Merging:
+        """First two people, then one."""
+
+        next_number = 3
+
+        def begin_at(self, number: int) -> None:
+            """Nobody remembers more."""
+
+        def update(self, given: Sequence[LocalTrack], last_frame: int, _: object) -> IdentityUpdate:
+            if last_frame < 15:
+                return IdentityUpdate({EpisodeKey(*it.key, 0): it.local for it in given}, (), (), (), (), ())
+            merged = (Merge(1, 2),) if last_frame < 20 else ()
+            numbers = dict.fromkeys((EpisodeKey("c0", 1, 0), EpisodeKey("c0", 2, 0)), 1)
+            return IdentityUpdate(numbers, (), (), (), merged, ())
+
+    service = FedService(small_config(**shared(0)))
+    service.decider.people._registry = Merging()  # type: ignore[assignment]
+    service.come(*CAMERAS)
+    for epoch in range(6):
+        service.feed(epoch, {"c0": {1: SMALL, 2: LARGE}, "c1": {}})
+        if epoch == 2:
+            service.splicer.objects[2].join()
+    assert service.board.resolve(2) == 1
+    assert list(service.board.standings) == [1]
+    assert service.decider.people.elsewhere == []
+    assert set(service.splicer.objects) == {1, 2}
+    service.close()
+
+
+@pytest.mark.parametrize(
+    ("share", "why"),
+    [
+        ({"of": 2, "index": 2}, "index is 2, but of 2 services the last is 1"),
+        ({"of": 2, "servers": ["http://a/"]}, "servers names 1, but there are 2"),
+        ({"of": 1, "servers": ["nowhere"]}, "servers.0: is not an address"),
+        ({"of": 0}, "view.share.of"),
+    ],
+)
+def test_a_share_that_cannot_be_is_refused_in_one_line(share: dict[str, Any], why: str) -> None:
+    with pytest.raises(UserError, match="share") as refusal:
+        small_config(view={"share": share})
+    assert why in str(refusal.value)
+    assert "\n" not in str(refusal.value)
+
+
+def test_addresses_are_bases_however_they_are_written() -> None:
+    share = ShareSettings(of=2, servers=["http://a:1", "https://b/myview/"])
+    assert (server_of(2, share), server_of(3, share)) == ("http://a:1/", "https://b/myview/")
+    assert server_of(3, ShareSettings(of=2)) is None
+
+
+@pytest.fixture(params=[["http://one:1/", "http://two/x"], []])
+async def second(request: pytest.FixtureRequest) -> AsyncIterator[str]:
+    """Serve the second of two services, which are configured to know each other's address, or not."""
+    service = FedService(small_config(**shared(1, servers=request.param)))
+    service.decider.people._registry = TrackNumbers()  # type: ignore[assignment]
+    service.come(*CAMERAS)
+    for epoch in range(4):
+        service.feed(epoch, {"c0": {1: SMALL, 2: LARGE, 3: SMALL}, "c1": {1: LARGE}})
+    async with serving(make_app(service), HttpSettings(port=0)) as port:
+        yield f"http://127.0.0.1:{port}"
+    service.close()
+
+
+async def test_objects_of_another_service_are_named_and_asking_for_one_leads_there(
+    second: str, request: pytest.FixtureRequest
+) -> None:
+    told = bool(request.node.callspec.params["second"])
+    async with aiohttp.ClientSession() as session:
+
+        async def get(path: str) -> tuple[int, str | None, Any]:
+            async with session.get(second + path, allow_redirects=False) as answer:
+                content = await answer.json() if answer.content_type == "application/json" else None
+                return answer.status, answer.headers.get("Location"), content
+
+        _, _, objects = await get("/api/objects")
+        assert [it["object"] for it in objects["objects"]] == [1, 3]
+        assert objects["elsewhere"] == [{"object": 2, "server": "http://one:1/" if told else None}]
+        assert (await get("/api/objects/1/choice"))[0] == 200
+        for path in ("objects/2/best.mp4?a=b", "api/objects/2/choice", "objects/2/thumb.jpg"):
+            status, location, content = await get(f"/{path}")
+            if told:
+                assert (status, location) == (307, f"http://one:1/{path}")
+            else:
+                assert status == 404
+                assert "served by best-view service 0" in content["error"]
+        assert (await get("/api/cameras"))[0] == 200
+
+
+@pytest.fixture
+def pair() -> Iterator[list[BestViewService]]:
+    """Open two services of one site on a bus of their own."""
+    address = f"tcp/127.0.0.1:{free_port()}"
+    ways = {"zenoh": {"listen": address, "connect": address}}
+    services = [BestViewService(small_config(**shared(index), **ways)) for index in range(2)]
+    for service in services:
+        service.decider.people._registry = TrackNumbers()  # type: ignore[assignment]
+    yield services
+    for service in reversed(services):
+        service.close()
+
+
+async def test_both_hear_every_camera_and_tell_under_keys_of_their_own(pair: list[BestViewService]) -> None:
+    for service in pair:
+        service.open()
+    keys, camera = ZenohKeys("hall"), Bus.client(pair[0].config.zenoh)
+    alive, heard = Heard(), Heard()
+    try:
+        camera.watch_alive(keys.bestview("**/alive"), lambda key, _: alive.add(key))
+        camera.subscribe(keys.bestview("**/choices"), lambda message: heard.add(message.key))
+        await alive.all_of("myview/hall/bestview/alive", "myview/hall/bestview/1/alive")
+        camera.declare_alive(keys.camera("c0", "alive"))
+        camera.declare_alive(keys.camera("c1", "alive"))
+        sending = asyncio.create_task(send(camera, pair))
+        await heard.all_of("myview/hall/bestview/choices", "myview/hall/bestview/1/choices")
+        sending.cancel()
+        assert [list(service.board.standings) for service in pair] == [[2], [1]]
+    finally:
+        camera.close()
+
+
+async def send(camera: Bus, services: Sequence[BestViewService]) -> None:
+    """Send epoch after epoch: what comes before a subscription has arrived is lost."""
+    for epoch in range(1000):
+        for name in CAMERAS:
+            for unit in encoded(0)[5 * (epoch % 8) : 5 * (epoch % 8) + 5]:
+                message = video(name, unit)
+                camera.publish(message.key, message.payload, message.attachment)
+            said = tracks(word(name, epoch, {1: SMALL, 2: LARGE}))
+            camera.publish(said.key, said.payload)
+        await asyncio.sleep(0.02)
+        for service in services:
+            service.decide()
+
+
+class Heard:
+    """Keys that were heard of."""
+
+    def __init__(self) -> None:
+        self._keys: set[str] = set()
+        self._more = asyncio.Event()
+
+    def add(self, key: str) -> None:
+        self._keys.add(key)
+        self._more.set()
+
+    async def all_of(self, *keys: str) -> None:
+        async with asyncio.timeout(PATIENCE):
+            while not set(keys) <= self._keys:
+                self._more.clear()
+                await self._more.wait()

@@ -1,0 +1,471 @@
+"""A service that begins anew knows who is who, as far as cameras' tracks go on: the cameras remember it."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Iterable, Mapping
+
+import msgspec
+import pytest
+from aiohttp.test_utils import TestClient, TestServer
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fakes.cameras import CAMERAS, FPS, LARGE, SMALL, STRIDE, FedService, small_config, tracks, word
+from server.camera.retained_state import Keeping
+from server.http.app import make_app
+from server.messaging.epochs import end_of_epoch
+from server.messaging.inbox import Message
+from server.messaging.messages import Box, ZenohKeys
+from server.messaging.retained_state import (
+    PERSON_NUMBER_MAX,
+    SNAPSHOT_BYTES_MAX,
+    IdentitySnapshot,
+    PersonSnapshot,
+)
+from server.service.identity.state_recovery import ALONE_MOST, LONGEST_S, Returning, believed
+from server.service.identity.state_replication import PATIENCE_S, Remembering
+
+A, B = CAMERAS
+KEYS = ZenohKeys("hall")
+Seen = Mapping[str, Mapping[int, Box]]
+ALL: Seen = {A: {1: SMALL, 2: LARGE}, B: {3: LARGE}}
+"""By camera the tracks that are there."""
+
+
+class Site:
+    """Cameras that outlast the service, and run after run of it."""
+
+    def __init__(self, **changes: object) -> None:
+        self._changes = changes
+        self.cameras = {camera: Keeping(lambda said, it=camera: self._hear(it, said)) for camera in CAMERAS}
+        self.service = FedService(small_config())
+
+    def start(self, *, deaf: str | None = None) -> FedService:
+        """Start the service anew: the cameras hear of it, but for one."""
+        self.service = it = FedService(small_config(**self._changes))
+        it.remembering._send = self._tell
+        for camera in CAMERAS:
+            for part in (it.intake, it.remembering):
+                part.alive(KEYS.camera(camera, "alive"), there=True)
+            if camera != deaf:
+                self.cameras[camera].service(there=True)
+        return it
+
+    def tell(self, epochs: Iterable[int], seen: Seen = ALL, boot: int = 1) -> None:
+        """Tell of who is seen; pictures are of no matter here."""
+        for epoch in epochs:
+            for camera in CAMERAS:
+                self.service.intake.tracks(tracks(word(camera, epoch, seen[camera], boot=boot)))
+            self.service.pulse = end_of_epoch(epoch, STRIDE)
+            self.service.decide()
+
+    def whose(self, camera: str, track: int, epoch: int, boot: int = 1) -> int:
+        """Give who is behind a track."""
+        number = self.service.decider.people.whose(camera, boot, track, end_of_epoch(epoch, STRIDE))
+        assert number is not None
+        return number
+
+    def _tell(self, camera: str, payload: bytes) -> None:
+        self.cameras[camera].put(Message(KEYS.camera(camera, "remember"), payload, b""))
+
+    def _hear(self, camera: str, payload: bytes) -> None:
+        self.service._remembered(Message(KEYS.camera(camera, "remembered"), payload, b""))
+
+
+def told(*, merge: bool = False, **changes: object) -> Site:
+    """Run a service in which camera A's track 2 is Ann, and who is followed by its track 1, too, maybe."""
+    site = Site(**changes)
+    site.start()
+    site.tell(range(4))
+    people = site.service.decider.people
+    people.roll.call(site.whose(A, 2, 3), "Ann")
+    if merge:
+        people.merge(site.whose(A, 2, 3), site.whose(A, 1, 3))
+    site.tell(range(4, 6))
+    return site
+
+
+ONLY_LATE: Seen = {A: {9: SMALL, 2: LARGE}, B: {3: LARGE}}
+"""Of who was there A's track 1 is gone; somebody new has come, who is heard of first."""
+
+
+def test_who_is_followed_all_along_keeps_their_number_and_name_and_nobody_else_gets_it() -> None:
+    site = told()
+    before = [site.whose(A, 1, 5), site.whose(A, 2, 5), site.whose(B, 3, 5)]
+    site.start()
+    site.tell(range(7, 9), ONLY_LATE)
+    assert [site.whose(A, 2, 8), site.whose(B, 3, 8)] == before[1:]
+    assert site.whose(A, 9, 8) > max(before), "numbers are not used twice, not of those who have left either"
+    assert site.service.decider.people.roll.names == {before[1]: "Ann"}
+    assert site.service.decider.people.merged_by_hand == {}
+
+
+def test_the_same_goes_for_any_number_of_runs() -> None:
+    site = told()
+    before = [site.whose(A, 1, 5), site.whose(A, 2, 5), site.whose(B, 3, 5)]
+    for run in range(1, 4):
+        site.start()
+        site.tell(range(6 * run, 6 * run + 5))
+        last = 6 * run + 4
+        assert [site.whose(A, 1, last), site.whose(A, 2, last), site.whose(B, 3, last)] == before
+
+
+def test_who_was_said_to_be_one_is_one_again_under_the_same_number() -> None:
+    site = told(merge=True)
+    kept, (old,) = site.whose(A, 2, 5), site.service.decider.people.roll.merged
+    site.start()
+    site.tell(range(7, 8), {A: {2: LARGE}, B: {}})
+    site.tell(range(8, 12))  # the other track comes later
+    people = site.service.decider.people
+    assert site.whose(A, 1, 11) == site.whose(A, 2, 11) == kept
+    assert people.roll.merged[old] == kept, "an address with the old number goes on"
+    assert people.roll.names == {kept: "Ann"}
+
+
+def test_a_camera_whose_last_word_was_late_is_remembered_all_the_same() -> None:
+    site = told()
+    before = site.whose(B, 3, 5)
+    site.tell(range(6, 7), {A: {1: SMALL, 2: LARGE}, B: {}})
+    site.start()
+    site.tell(range(7, 9))
+    assert site.whose(B, 3, 8) == before
+
+
+def test_tracks_of_a_camera_that_was_started_anew_are_not_taken_for_those_of_before() -> None:
+    site = told()
+    site.tell(range(6, 7), {A: {2: SMALL}, B: {}}, boot=2)
+    before, used = site.whose(A, 2, 6, boot=2), site.service.decider.people.next_number
+    site.start()
+    site.tell(range(7, 9), {A: {1: SMALL, 2: LARGE}, B: {}}, boot=2)
+    assert site.whose(A, 2, 8, boot=2) == before
+    assert site.whose(A, 1, 8, boot=2) >= used
+
+
+def test_a_number_too_large_to_remember_keeps_nobody_else_from_being_remembered() -> None:
+    site = told()
+    ann = site.whose(A, 2, 5)
+    site.service.decider.people.roll.known_as(ann, [PERSON_NUMBER_MAX + 1])
+    site.tell(range(6, 7))
+    site.start()
+    site.tell(range(7, 9))
+    assert site.whose(A, 2, 8) == ann
+    assert site.service.decider.people.roll.names == {ann: "Ann"}
+
+
+def test_numbers_have_begun_with_the_first_that_is_given_however_late_a_camera_says_it_is_there() -> None:
+    site = Site()
+    service = site.service = FedService(small_config())  # no camera's token has come
+    assert service.remembering.numbers_since == 0, "nobody has a number"
+    before = time.time() - 60
+    site.tell(range(4))
+    assert site.whose(A, 1, 3)
+    assert service.remembering.numbers_since > before, "a token of before is for somebody else, maybe"
+
+
+def test_a_camera_that_remembers_nothing_learns_from_what_the_others_do() -> None:
+    site = told()
+    ann, other = site.whose(A, 2, 5), site.whose(B, 3, 5)
+    site.cameras[B] = Keeping(lambda said: site._hear(B, said))  # it was started anew, too
+    site.start()
+    site.tell(range(7, 9))
+    assert site.whose(A, 2, 8) == ann
+    assert site.whose(B, 3, 8) not in {ann, other}, "nobody knows who that is: it is a new number"
+
+
+LONG_AGO = 6 + int(LONGEST_S * FPS / STRIDE)
+
+
+@pytest.mark.parametrize(
+    ("epochs", "boot"),
+    [
+        (range(7, 9), 2),  # the camera began anew: its tracks are other people's
+        (range(LONG_AGO, LONG_AGO + 2), 1),  # too long ago
+        (range(2), 1),  # pulses began anew
+    ],
+)
+def test_nobody_is_given_a_number_or_name_that_may_be_anothers(epochs: range, boot: int) -> None:
+    site = told()
+    used = max(site.service.decider.people.roll.everybody)
+    site.start()
+    site.tell(epochs, boot=boot)
+    people = site.service.decider.people
+    assert people.known
+    assert min(people.known) > used
+    assert people.roll.names == {}
+
+
+def test_a_camera_that_says_late_what_it_remembers_keeps_numbers_from_being_used_twice() -> None:
+    site = told()
+    used = max(site.service.decider.people.roll.everybody)
+    site.cameras[A] = Keeping(lambda said: site._hear(A, said))
+    site.start(deaf=B)
+    site.tell(range(7, 8), {A: {}, B: {}})
+    site.cameras[B].service(there=True)
+    site.tell(range(8, 10))
+    assert min(site.service.decider.people.known) > used
+
+
+def test_a_camera_that_says_late_what_it_remembers_is_heard_all_the_same() -> None:
+    site = told()
+    ann, b = site.whose(A, 2, 5), site.whose(B, 3, 5)
+    site.start(deaf=B)
+    site.tell(range(7, 8), {A: {2: LARGE}, B: {}})
+    assert site.service.remembering.awaits(b), "camera B may still come"
+    site.cameras[B].service(there=True)
+    site.tell(range(8, 12), {A: {2: LARGE, 9: SMALL}, B: {3: LARGE}})
+    assert [site.whose(A, 2, 11), site.whose(B, 3, 11)] == [ann, b]
+
+
+def test_of_what_is_said_late_nothing_counts_that_may_be_anothers_by_now() -> None:
+    site = told()
+    before = [site.whose(A, 1, 5), site.whose(A, 2, 5), site.whose(B, 3, 5)]
+    site.cameras[A] = Keeping(lambda said: site._hear(A, said))
+    site.start(deaf=B)
+    site.tell(range(7, 8), {A: {1: SMALL, 2: LARGE}, B: {}})
+    assert site.whose(A, 1, 7) in before, "nobody had said that it was taken"
+    site.cameras[B].service(there=True)
+    site.tell(range(8, 12))
+    assert site.whose(B, 3, 11) > max(before)
+    assert site.service.decider.people.roll.names == {}
+
+
+def test_a_track_that_comes_late_is_whose_number_its_own_has_become_meanwhile() -> None:
+    site = Site()
+    site.start()
+    site.tell(range(4))
+    site.service.decider.people.merge(site.whose(A, 1, 3), site.whose(B, 3, 3))
+    site.tell(range(4, 6))
+    one, ann = site.whose(A, 1, 5), site.whose(A, 2, 5)
+    site.start()
+    site.tell(range(7, 9), {A: {1: SMALL, 2: LARGE}, B: {}})
+    site.tell(range(9, 11), {A: {2: LARGE}, B: {}})
+    site.service.decider.people.merge(ann, one)
+    site.tell(range(11, 14), {A: {2: LARGE}, B: {3: LARGE}})
+    assert site.whose(B, 3, 13) == ann
+
+
+def test_a_name_that_was_given_meanwhile_stays_and_one_that_was_taken_back_is_not_given_again() -> None:
+    site = told()
+    site.start()
+    site.tell(range(7, 9))
+    people = site.service.decider.people
+    people.roll.call(site.whose(A, 2, 8), "")
+    people.roll.call(site.whose(A, 1, 8), "Bob")
+    site.tell(range(9, 10))
+    site.start()
+    site.tell(range(10, 12))
+    assert site.service.decider.people.roll.names == {site.whose(A, 1, 11): "Bob"}
+
+
+def test_of_several_services_the_first_one_tells_and_all_begin_with_it() -> None:
+    site = told(view={"share": {"of": 2, "index": 1}})
+    assert site.service.decider.people.known
+    site.start()
+    site.tell(range(7, 9))
+    assert site.service.decider.people.roll.names == {}, "the second one told nobody"
+    first = told()
+    first._changes = {"view": {"share": {"of": 2, "index": 1}}}
+    ann = first.whose(A, 2, 5)
+    first.start()
+    first.tell(range(7, 9))
+    assert first.whose(A, 2, 8) == ann
+
+
+class Clock:
+    """A clock that a test sets."""
+
+    def __init__(self) -> None:
+        self.now = 100.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+def test_nothing_is_decided_before_every_camera_that_is_there_has_had_time_to_say_what_it_remembers() -> None:
+    clock, service = Clock(), FedService(small_config())
+    it = Remembering(service.decider.people, CAMERAS, FPS, lambda *_: None, clock=clock)
+    it.begin(4)
+    assert not it.waits, "nobody is there"
+    it.alive(KEYS.camera(A, "alive"), there=True)
+    it.alive(KEYS.camera("cellar", "alive"), there=True)
+    it.alive(KEYS.camera(B, "alive"), there=True)
+    assert it.waits
+    it.heard(Message(KEYS.camera(A, "remembered"), b"", b""))
+    assert it.waits
+    it.alive(KEYS.camera(A, "alive"), there=True)
+    it.alive(KEYS.camera(B, "alive"), there=False)
+    assert not it.waits, "a camera's token may come after its word"
+    it.alive(KEYS.camera(B, "alive"), there=True)
+    clock.now += PATIENCE_S
+    assert not it.waits, "one that is frozen keeps nobody waiting for longer"
+    it.begin(9)
+    it.alive(KEYS.camera(A, "alive"), there=True)
+    assert not it.waits, "only at the beginning"
+
+
+async def test_who_may_be_found_again_is_not_said_to_be_nobody() -> None:
+    site = told()
+    number = site.whose(A, 1, 5)
+    service = site.start()
+    async with TestClient(TestServer(make_app(service))) as client:
+        path = f"/objects/{number}/best.mp4"
+        for asked in (path, f"/objects/{number}/hls/index.m3u8", f"/api/objects/{number}/choice"):
+            answer = await client.get(asked)
+            assert answer.status == 503, asked
+            assert int(answer.headers["Retry-After"]) > 0
+        site.tell(range(7, 8), {A: {2: LARGE}, B: {}})
+        assert (await client.get(path)).status == 503
+        assert (await client.get("/objects/77/best.mp4")).status == 404
+        site.tell([LONG_AGO], {A: {2: LARGE}, B: {}})
+        assert (await client.get(path)).status == 404, "they are not waited for for ever"
+
+
+NESTED = b'{"more": ' + b"[" * 100_000 + b"]" * 100_000 + b"}"
+
+
+@pytest.mark.parametrize("damage", [b"\xff", b"[]", b'{"pulse": 1}', b"{" * 100_000, NESTED])
+def test_what_a_camera_says_that_is_none_is_counted(damage: bytes, caplog: pytest.LogCaptureFixture) -> None:
+    site = told()
+    site.cameras[B].put(Message("", damage, b""))
+    with caplog.at_level(logging.ERROR):
+        service = site.start()
+    assert service.intake.states[B].bad_messages == 1
+    assert caplog.messages == []
+    site.tell(range(7, 9))
+    assert site.service.decider.people.roll.names == {site.whose(A, 2, 8): "Ann"}
+
+
+def test_a_camera_keeps_no_more_than_it_can() -> None:
+    said: list[bytes] = []
+    it = Keeping(said.append)
+    it.put(Message("", b"one", b""))
+    it.put(Message("", b"2" * (SNAPSHOT_BYTES_MAX + 1), b""))
+    it.service(there=False)
+    it.service(there=True)
+    assert said == [b"one"]
+
+
+numbers = st.integers(1, 8)
+known = st.builds(
+    PersonSnapshot,
+    number=numbers,
+    tracks=st.lists(st.integers(0, 4), max_size=3),
+    also=st.lists(numbers, max_size=3),
+    name=st.sampled_from(["", "Ann", "Bob"]),
+    by_hand=st.booleans(),
+)
+remembered = st.builds(
+    IdentitySnapshot,
+    pulse=st.integers(0, 60),
+    boot=st.integers(1, 2),
+    next=st.integers(1, 12),
+    since=st.floats(0, 1e12),
+    people=st.lists(known, max_size=4),
+)
+
+
+@settings(max_examples=40)
+@given(remembered, remembered)
+def test_whatever_cameras_remember_two_tracks_seen_at_once_in_a_camera_are_two(
+    one: IdentitySnapshot, other: IdentitySnapshot
+) -> None:
+    site = Site()
+    for camera, it in zip(CAMERAS, (one, other), strict=True):
+        people = [msgspec.structs.replace(them, by_hand=False) for them in it.people]
+        said = msgspec.json.encode(msgspec.structs.replace(it, people=people))
+        site.cameras[camera].put(Message("", said, b""))
+    site.start()
+    site.tell(range(7, 12), {A: {1: SMALL, 2: LARGE}, B: {3: LARGE}})
+    assert site.whose(A, 1, 11) != site.whose(A, 2, 11)
+
+
+@settings(max_examples=40)
+@given(remembered, remembered)
+def test_whatever_cameras_remember_the_service_goes_on(
+    one: IdentitySnapshot, other: IdentitySnapshot
+) -> None:
+    site = Site()
+    for camera, it in zip(CAMERAS, (one, other), strict=True):
+        site.cameras[camera].put(Message("", msgspec.json.encode(it), b""))
+    site.start()
+    site.tell(range(7, 10))
+    people = site.service.decider.people
+    assert people.known
+    assert set(people.roll.merged).isdisjoint(people.roll.everybody)
+
+
+def lying(site: Site, camera: str, **changes: object) -> None:
+    """Let a camera remember something else than what it was told."""
+    said = msgspec.json.decode(site.cameras[camera]._kept, type=IdentitySnapshot)
+    site.cameras[camera].put(Message("", msgspec.json.encode(msgspec.structs.replace(said, **changes)), b""))
+
+
+@pytest.mark.parametrize(
+    "lie",
+    [
+        {"next": PERSON_NUMBER_MAX + 1},
+        {"people": [PersonSnapshot(number=PERSON_NUMBER_MAX, tracks=[3])]},
+        {"people": [PersonSnapshot(number=5, tracks=[3], also=[PERSON_NUMBER_MAX])]},
+    ],
+)
+@pytest.mark.parametrize("again", [False, True])
+def test_no_camera_alone_moves_everybodys_numbers_far_ahead(lie: dict[str, object], again: bool) -> None:
+    site = told()
+    ann = site.whose(A, 2, 5)
+    if not again:
+        lying(site, B, **lie)
+    site.start()
+    site.tell(range(7, 9))
+    lying(site, B, **lie)
+    for _ in range(3):
+        site.cameras[B].service(there=True)
+    site.tell(range(9, 12), {A: {1: SMALL, 2: LARGE, 9: SMALL}, B: {3: LARGE}})
+    people = site.service.decider.people
+    assert people.next_number <= ALONE_MOST + 10
+    assert site.whose(A, 2, 11) == ann
+    assert people.roll.names == {ann: "Ann"}
+
+
+def test_large_numbers_that_two_cameras_remember_go_on() -> None:
+    site = told()
+    for camera in CAMERAS:
+        lying(site, camera, next=50_000_000 + len(camera))
+    site.start()
+    site.tell(range(7, 9))
+    assert site.service.decider.people.next_number >= 50_000_000
+
+
+@given(st.lists(st.integers(1, PERSON_NUMBER_MAX), max_size=6), st.integers(1, PERSON_NUMBER_MAX))
+def test_whatever_one_camera_says_the_others_say_how_far_it_is_believed(others: list[int], lie: int) -> None:
+    most = max([believed(others), ALONE_MOST])
+    assert believed([*others, lie]) <= max(most, max(others, default=0) + 10_000)
+
+
+def remembers(since: float, pulse: int = 90) -> IdentitySnapshot:
+    return IdentitySnapshot(pulse=pulse, boot=1, next=5, since=since, people=[])
+
+
+@pytest.mark.parametrize("lie", [0.0, 1e12])
+def test_no_camera_alone_says_since_when_numbers_mean_what_they_do(lie: float) -> None:
+    said = {"c0": remembers(lie), "c1": remembers(1000.0), "c2": remembers(1000.0)}
+    assert Returning(said, 100, 50).since == 1000.0
+
+
+def test_of_two_words_on_when_numbers_began_the_later_counts() -> None:
+    assert Returning({"c0": remembers(900.0), "c1": remembers(1000.0)}, 100, 50).since == 1000.0
+    long_ago = {"c0": remembers(900.0, pulse=1), "c1": remembers(900.0, pulse=1)}
+    assert Returning({**long_ago, "c2": remembers(1000.0)}, 100, 50).since == 1000.0
+    assert Returning(long_ago, 100, 50).since == 900.0
+    assert Returning({}, 100, 50).since == float("inf")
+
+
+def test_a_camera_that_comes_and_goes_and_never_says_what_it_remembers_is_waited_for_once() -> None:
+    clock, service = Clock(), FedService(small_config())
+    it = Remembering(service.decider.people, CAMERAS, FPS, lambda *_: None, clock=clock)
+    for _ in range(4):
+        it.alive(KEYS.camera(B, "alive"), there=False)
+        it.alive(KEYS.camera(B, "alive"), there=True)
+        clock.now += PATIENCE_S / 2
+    assert not it.waits

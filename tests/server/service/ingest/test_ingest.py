@@ -1,0 +1,305 @@
+"""What cameras send is taken in, or counted and dropped: nothing from outside raises."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from typing import Any
+
+import msgspec
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bestview import IdentitySettings
+from fakes.cameras import (
+    CAMERAS,
+    FPS,
+    HEIGHT,
+    LARGE,
+    SMALL,
+    STRIDE,
+    WIDTH,
+    encoded,
+    status,
+    thumbnail,
+    tracks,
+    video,
+    word,
+)
+from server.media.stream_format import Agreement
+from server.messaging.inbox import Message
+from server.messaging.messages import ZenohKeys
+from server.service.identity.people import People
+from server.service.ingest.epoch_aligner import Aligner
+from server.service.ingest.ingest import Intake
+from server.service.streaming.frame_buffer import FrameBuffer, Shelved
+
+KEYS = ZenohKeys("hall")
+
+
+class Hall:
+    """An intake and what it fills."""
+
+    def __init__(self) -> None:
+        agreement = Agreement()
+        self.shelves = {camera: FrameBuffer(FPS, 50, agreement) for camera in CAMERAS}
+        self.aligner = Aligner(CAMERAS, STRIDE, grace=5)
+        self.frames: list[tuple[str, Shelved]] = []
+        self.intake = Intake(self.shelves, self.aligner, lambda *frame: self.frames.append(frame))
+        for camera in CAMERAS:
+            self.intake.alive(KEYS.camera(camera, "alive"), there=True)
+
+    def handle(self, what: str, message: Message) -> None:
+        handlers = {
+            "video": self.intake.video,
+            "tracks": self.intake.tracks,
+            "status": self.intake.status,
+            "thumbs": self.intake.thumbnail,
+        }
+        handlers[what](message)
+
+    def bad(self, camera: str = "c0") -> int:
+        return self.intake.states[camera].bad_messages
+
+
+KINDS = ["video", "tracks", "status", "thumbs"]
+
+
+@pytest.mark.parametrize("what", KINDS)
+def test_json_that_is_no_text_is_counted_and_dropped(what: str) -> None:
+    hall = Hall()
+    broken = b'{"camera": "\xff", "histogram": "\xc3\x28", "state": "\xed\xa0\x80", "\xff": "\xff"}'
+    hall.handle(what, Message(KEYS.camera("c0", what), broken, broken))
+    assert hall.bad() == 1
+
+
+@pytest.mark.parametrize("field", ["missed", "shed", "boot"])
+def test_a_count_that_no_metric_could_say_is_refused(field: str) -> None:
+    hall = Hall()
+    hall.handle("status", status("c0", **{field: 10**400}))
+    assert hall.bad() == 1
+    assert hall.intake.states["c0"].status is None
+
+
+@pytest.mark.parametrize("words", ["\x1b[2J", "searching\n", "x" * 201, "suchend: zu groß"])
+def test_what_is_left_out_is_told_in_words_that_a_terminal_can_show(words: str) -> None:
+    hall = Hall()
+    hall.handle("status", status("c0", load=words))
+    assert hall.bad() == 1
+    assert hall.intake.states["c0"].status is None
+
+
+def test_a_camera_that_leaves_frames_out_says_so_while_it_is_there() -> None:
+    hall = Hall()
+    words = "searching every 3rd frame: the machine is too busy"
+    state = hall.intake.states["c0"]
+    hall.handle("status", status("c0", load_level=2, load=words))
+    assert state.message == words
+    hall.handle("status", status("c0"))
+    assert state.message == ""
+    hall.handle("status", status("c0", load_level=2, load=words))
+    hall.intake.alive(KEYS.camera("c0", "alive"), there=False)
+    assert state.message == ""
+
+
+anything = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text(),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=5), inner, max_size=3),
+    max_leaves=8,
+)
+
+
+@settings(deadline=None, max_examples=200)
+@given(what=st.sampled_from(KINDS), payload=st.binary(max_size=100), attachment=st.binary(max_size=100))
+def test_any_bytes_are_counted_and_dropped(what: str, payload: bytes, attachment: bytes) -> None:
+    hall = Hall()
+    hall.handle(what, Message(KEYS.camera("c0", what), payload, attachment))
+    assert hall.bad() == 1
+    assert not hall.frames
+    assert hall.aligner.ready(now=100) == []
+
+
+@settings(deadline=None, max_examples=100)
+@given(what=st.sampled_from(KINDS), key=st.text(max_size=40))
+def test_any_key_is_ignored(what: str, key: str) -> None:
+    hall = Hall()
+    hall.handle(what, Message(key, b"", b""))
+    hall.intake.alive(key, there=True)
+    assert hall.bad() == 0
+
+
+GOOD: dict[str, Message] = {
+    "video": video("c0", encoded(0)[0]),
+    "tracks": tracks(word("c0", 0, {1: SMALL})),
+    "status": status("c0"),
+    "thumbs": thumbnail("c0", 1, b"jpeg"),
+}
+
+
+@settings(deadline=None, max_examples=80)
+@given(data=st.data(), what=st.sampled_from(KINDS))
+def test_one_wrong_field_raises_neither_here_nor_further_on(data: st.DataObject, what: str) -> None:
+    hall, good = Hall(), GOOD[what]
+    in_head = bool(good.attachment)
+    fields: dict[str, Any] = msgspec.json.decode(good.attachment if in_head else good.payload)
+    name = data.draw(st.sampled_from(sorted(fields)))
+    fields[name] = data.draw(anything | st.integers(-(2**70), 2**70))
+    changed = json.dumps(fields).encode()
+    hall.handle(
+        what, Message(good.key, good.payload, changed) if in_head else Message(good.key, changed, b"")
+    )
+    people = People(IdentitySettings(), CAMERAS, dict.fromkeys(CAMERAS), (WIDTH, HEIGHT), lag=0)
+    for epoch in hall.aligner.ready(now=1000):
+        people.update(epoch)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"last": 3},
+        {"last": 5},
+        {"first": 1},
+        {"first": 10, "last": 0},
+        {"first": 0, "last": 10**9, "tracks": []},
+        {"epoch": -1},
+        {"epoch": 10**30},
+        {"size": (0, 48)},
+        {"camera": "c1"},
+        {"tracks": word("c0", 0, {1: SMALL}).tracks * 2},
+    ],
+)
+def test_a_word_that_cannot_be_true_is_refused(changes: dict[str, Any]) -> None:
+    hall = Hall()
+    fields = {**msgspec.json.decode(GOOD["tracks"].payload), **msgspec.to_builtins(changes)}
+    payload = json.dumps(fields).encode()
+    hall.intake.tracks(Message(GOOD["tracks"].key, payload, b""))
+    assert hall.bad() == 1
+
+
+def test_cameras_that_nobody_configured_are_ignored(caplog: pytest.LogCaptureFixture) -> None:
+    hall = Hall()
+    hall.intake.video(video("cellar", encoded(0)[0]))
+    hall.intake.tracks(tracks(word("cellar", 0, {})))
+    for there in (True, False) * 5:
+        hall.intake.alive(KEYS.camera("cellar", "alive"), there=there)
+    assert len(caplog.messages) == 1
+    assert list(hall.intake.states) == list(CAMERAS)
+    assert not hall.frames
+
+
+def test_a_camera_of_other_parameters_is_refused_and_its_frames_reach_nobody() -> None:
+    hall = Hall()
+    hall.intake.video(video("c0", encoded(0)[0]))
+    for unit in encoded(1, crf=40)[:10]:
+        hall.intake.video(video("c1", unit))
+    state = hall.intake.states["c1"]
+    assert state.word == "refused"
+    assert "differ from the other cameras'" in state.refused
+    assert "same configuration?" in state.refused
+    assert "\n" not in state.refused
+    assert [camera for camera, _ in hall.frames] == ["c0"]
+    assert not any(hall.shelves["c1"].has(pulse) for pulse in range(10))
+
+
+def test_a_refused_camera_that_is_started_again_with_the_right_settings_is_welcome() -> None:
+    hall = Hall()
+    hall.intake.video(video("c0", encoded(0)[0]))
+    hall.intake.video(video("c1", encoded(1, crf=40)[0]))
+    hall.intake.alive(KEYS.camera("c1", "alive"), there=False)
+    hall.intake.alive(KEYS.camera("c1", "alive"), there=True)
+    hall.intake.video(video("c1", encoded(1)[5], boot=2))
+    assert hall.intake.states["c1"].word == "live"
+    assert hall.shelves["c1"].has(5)
+
+
+def test_a_cameras_state_follows_what_it_does() -> None:
+    hall = Hall()
+    state = hall.intake.states["c0"]
+    words = [state.word]
+    hall.intake.video(video("c0", encoded(0)[0]))
+    words.append(state.word)
+    hall.intake.alive(KEYS.camera("c0", "alive"), there=False)
+    words.append(state.word)
+    hall.intake.alive(KEYS.camera("c0", "alive"), there=True)
+    hall.intake.tracks(tracks(word("c0", 0, {}, ended=True)))
+    words.append(state.word)
+    hall.intake.alive(KEYS.camera("c0", "alive"), there=False)
+    words.append(state.word)
+    hall.intake.alive(KEYS.camera("c0", "alive"), there=True)
+    words.append(state.word)
+    assert words == ["starting", "live", "gone", "ended", "ended", "live"]
+
+
+def test_small_pictures_are_kept_by_run_and_track_until_they_are_old_or_the_camera_is_gone() -> None:
+    hall = Hall()
+    hall.intake.thumbnail(thumbnail("c0", 1, b"old", pulse=5))
+    hall.intake.thumbnail(thumbnail("c0", 2, b"new", pulse=50))
+    hall.intake.thumbnail(thumbnail("c1", 1, b"other", pulse=50))
+    hall.intake.forget_thumbnails_before(20)
+    assert [kept.jpeg for kept in hall.intake.thumbnails.values()] == [b"new", b"other"]
+    hall.intake.alive(KEYS.camera("c1", "alive"), there=False)
+    assert list(hall.intake.thumbnails) == [("c0", 1, 2)]
+
+
+def test_what_is_of_pulses_that_nobody_can_have_counted_to_is_counted_and_dropped() -> None:
+    hall = Hall()
+    hall.intake = Intake(hall.shelves, hall.aligner, lambda *_: None, now=lambda: 20, ahead=50)
+    far = 2**40
+    unit = dataclasses.replace(encoded(0)[0], pulse=far)
+    hall.handle("video", video("c0", unit))
+    hall.handle("tracks", tracks(word("c0", far // STRIDE, {})))
+    hall.handle("thumbs", thumbnail("c0", 1, b"jpeg", pulse=far))
+    assert hall.bad() == 3
+    assert hall.shelves["c0"].newest == -1
+    assert not hall.intake.thumbnails
+    hall.handle("tracks", tracks(word("c0", 0, {})))
+    hall.handle("tracks", tracks(word("c1", 0, {})))
+    assert [epoch.number for epoch in hall.aligner.ready(now=4)] == [0]
+
+
+def test_small_pictures_of_a_camera_are_so_many_at_most_and_take_no_other_cameras_place() -> None:
+    hall = Hall()
+    hall.intake.thumbnail(thumbnail("c1", 7, b"jpeg"))
+    for track in range(1200):
+        hall.intake.thumbnail(thumbnail("c0", track, b"jpeg"))
+    assert len(hall.intake.thumbnails) == 301
+    assert ("c0", 1, 1199) in hall.intake.thumbnails
+    assert ("c1", 1, 7) in hall.intake.thumbnails
+
+
+def test_a_small_picture_that_is_none_is_counted_and_dropped() -> None:
+    hall = Hall()
+    hall.intake.thumbnail(thumbnail("c0", 1, bytes(1 << 18)))
+    assert hall.bad() == 1
+    assert not hall.intake.thumbnails
+
+
+def test_a_camera_that_comes_and_goes_without_end_is_few_lines_of_the_log(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    caplog.set_level("INFO")
+    hall = Hall()
+    caplog.clear()
+    for there in (False, True) * 50:
+        hall.intake.alive(KEYS.camera("c0", "alive"), there=there)
+    assert caplog.messages == ["camera c0 is gone", "camera c0 is there"] * 4 + ["camera c0 is gone"]
+
+
+def test_a_status_is_kept() -> None:
+    hall = Hall()
+    hall.intake.status(status("c0", fps=24.5))
+    told = hall.intake.states["c0"].status
+    assert told is not None
+    assert told.fps == 24.5
+
+
+def test_frames_and_words_become_epochs() -> None:
+    hall = Hall()
+    for seed, camera in enumerate(CAMERAS):
+        for unit in encoded(seed)[:STRIDE]:
+            hall.intake.video(video(camera, unit))
+        hall.intake.tracks(tracks(word(camera, 0, {1: LARGE})))
+    [epoch] = hall.aligner.ready(now=4)
+    assert list(epoch.tracks) == list(CAMERAS)
+    assert len(hall.frames) == 2 * STRIDE

@@ -1,0 +1,40 @@
+"""Words that mend the past, and come too late for their own epochs, may come several at once."""
+
+from __future__ import annotations
+
+import msgspec
+import pytest
+
+from bestview import IdentitySettings
+from fakes.cameras import HEIGHT, STRIDE, WIDTH, epoch_of, word
+from server.messaging.epochs import end_of_epoch
+from server.messaging.messages import Box, CameraTracks
+from server.service.identity.people import People
+from server.service.ingest.epoch_aligner import Epoch
+
+LEFT: Box = (10.0, 20.0, 40.0, 110.0)
+RIGHT: Box = (100.0, 20.0, 130.0, 110.0)
+MENDED = STRIDE
+"""The first frame in which the camera had taken each for the other."""
+
+
+def mended(epoch: int) -> CameraTracks:
+    """Give a camera's word that the two were in each other's place since then."""
+    last = end_of_epoch(epoch, STRIDE)
+    said = word("c0", epoch, {1: RIGHT, 2: LEFT}, first=MENDED, mended_from=MENDED)
+    frames = last - MENDED + 1
+    tracks = [msgspec.structs.replace(it, boxes=it.boxes[:1] * frames) for it in said.tracks]
+    return msgspec.structs.replace(said, tracks=tracks)
+
+
+@pytest.mark.parametrize("late", [1, 2, 3])
+def test_tracks_exchange_their_names_once_however_many_words_say_so(late: int) -> None:
+    people = People(IdentitySettings(), ["c0"], {"c0": None}, (WIDTH, HEIGHT), 0)
+    for epoch in range(4):
+        [said] = people.update(epoch_of(epoch, word("c0", epoch, {1: LEFT, 2: RIGHT})))
+    left, right = said.keys
+    now = 4 + late
+    words = tuple(mended(epoch) for epoch in range(4, now))
+    newest = {"c0": word("c0", now, {1: RIGHT, 2: LEFT})}
+    for window in people.update(Epoch(now, end_of_epoch(now, STRIDE), newest, mended=words)):
+        assert window.keys == (right, left), "a name stays where it was: on the left, or on the right"

@@ -1,0 +1,68 @@
+"""Tracks that come too late again and again are one event of the log, and each of them is counted."""
+
+from __future__ import annotations
+
+import pytest
+
+from fakes.cameras import CAMERAS, FPS, STRIDE, epoch_of, word
+from server.media.stream_format import Agreement
+from server.service.ingest.epoch_aligner import Epoch
+from server.service.ingest.ingest import CameraState
+from server.service.ingest.loss_recorder import Lacking
+from server.service.streaming.frame_buffer import FrameBuffer
+
+A, B = CAMERAS
+
+
+class Told:
+    """What was lacking in some epochs, each at its time."""
+
+    def __init__(self) -> None:
+        self.now = 0.0
+        shelves = {camera: FrameBuffer(FPS, 50, Agreement()) for camera in CAMERAS}
+        states = {camera: CameraState() for camera in CAMERAS}
+        self.lacking = Lacking(shelves, states, STRIDE, lambda: self.now)
+
+    def epochs(self, numbers: range, late: str | None = None) -> None:
+        """Decide epochs, to which all have spoken but one."""
+        for number in numbers:
+            self.now = number * STRIDE / FPS
+            words = [word(camera, number, {}) for camera in CAMERAS if camera != late]
+            epoch = epoch_of(number, *words)
+            late_ones = () if late is None else (late,)
+            self.lacking.epoch(Epoch(epoch.number, epoch.last, epoch.tracks, late_ones))
+
+
+def test_a_spell_of_late_tracks_is_told_when_it_begins_and_when_it_is_over(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    caplog.set_level("INFO")
+    told, minute = Told(), round(60 * FPS / STRIDE)
+    for ten in range(0, 100, 10):  # some come in time in between
+        told.epochs(range(ten, ten + 4), late=B)
+        told.epochs(range(ten + 4, ten + 10))
+    told.epochs(range(100, 100 + minute))
+    [begun, over] = caplog.records
+    assert (begun.levelname, over.levelname) == ("WARNING", "INFO")
+    assert begun.getMessage() == f"camera {B}: its tracks for pulses up to {STRIDE - 1} came too late"
+    seconds = 93 * STRIDE / FPS
+    assert over.getMessage() == (
+        f"camera {B}: its tracks come in time again; those of 40 windows in {seconds:.0f} s did not"
+    )
+    assert told.lacking.late_epochs == 40
+
+
+def test_cameras_are_told_of_each_for_itself(caplog: pytest.LogCaptureFixture) -> None:
+    told = Told()
+    told.epochs(range(5), late=A)
+    told.epochs(range(5, 10), late=B)
+    assert [it.partition(":")[0] for it in caplog.messages] == [f"camera {A}", f"camera {B}"]
+
+
+def test_a_camera_that_has_gone_meanwhile_is_not_said_to_be_in_time(caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level("INFO")
+    told = Told()
+    told.epochs(range(3), late=B)
+    told.now += 1000.0
+    told.lacking.epoch(epoch_of(9, word(A, 9, {})))
+    assert len(caplog.messages) == 1

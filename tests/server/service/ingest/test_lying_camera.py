@@ -1,0 +1,249 @@
+"""A camera that lies harms its own pictures: whatever it says, the other's people and streams go on."""
+
+from __future__ import annotations
+
+import itertools
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import msgspec
+import pytest
+from prometheus_client import generate_latest
+
+from fakes.cameras import (
+    CAMERAS,
+    GOP,
+    LARGE,
+    SMALL,
+    STRIDE,
+    FedService,
+    encoded,
+    small_config,
+    status,
+    thumbnail,
+    tracks,
+    video,
+    word,
+)
+from server.http.app import make_app
+from server.http.app_keys import METRICS
+from server.http.operator.cameras import _camera
+from server.media.audio.audio_format import SoundFormat
+from server.messaging.epochs import end_of_epoch
+from server.messaging.inbox import Message
+from server.messaging.messages import (
+    AUDIO_FRAMES_MAX,
+    TRACKS_MAX,
+    AudioHeader,
+    CameraTracks,
+    GopChoices,
+    TrackMessage,
+    ZenohKeys,
+)
+from server.service.streaming.audio_buffer import AudioBuffer
+from server.service.streaming.media_chunk import MediaChunk
+
+KEYS = ZenohKeys("hall")
+LIAR, OTHER = CAMERAS
+EPOCHS = 8
+FAR = 500_000_000_000
+"""Half a million million: within what a pulse may be."""
+Lie = Callable[[int], Sequence[Message]]
+"""What the camera says at an epoch."""
+
+
+def frames(epoch: int, /, **changes: Any) -> list[Message]:
+    """Give an epoch's frames of the liar; their heads say something else."""
+    sent = [video(LIAR, unit) for unit in encoded(0)[epoch * STRIDE : (epoch + 1) * STRIDE]]
+    return [
+        Message(it.key, it.payload, json.dumps(msgspec.json.decode(it.attachment) | changes).encode())
+        for it in sent
+    ]
+
+
+def said(epoch: int, /, **changes: Any) -> list[Message]:
+    """Give its word on an epoch, as it is not."""
+    right = msgspec.to_builtins(word(LIAR, epoch, {1: SMALL}))
+    return [Message(KEYS.camera(LIAR, "tracks"), json.dumps(right | changes).encode(), b"")]
+
+
+def of_one(epoch: int, /, **changes: Any) -> list[Message]:
+    (track,) = msgspec.to_builtins(word(LIAR, epoch, {1: SMALL}))["tracks"]
+    return said(epoch, tracks=[track | changes])
+
+
+def very_many(epoch: int) -> list[Message]:
+    boxes = [SMALL] * STRIDE
+    many = [TrackMessage(id=it, boxes=[*boxes], confidence=1.0) for it in range(TRACKS_MAX + 1)]
+    return said(epoch, tracks=msgspec.to_builtins(many))
+
+
+SOLVED = {"objective": 1.0, "bound": 1.0, "gap": 0.0, "integral": True, "rounds": 1}
+REFUSED: dict[str, Lie] = {
+    "frames far ahead": lambda epoch: frames(epoch, pulse=FAR + epoch),
+    "frames of 2^53": lambda epoch: frames(epoch, pulse=2**53 + epoch),
+    "frames of 2^63": lambda epoch: frames(epoch, pulse=2**63 + epoch),
+    "decoded by frames that are none": lambda epoch: frames(epoch, after=2**63),
+    "taken at no time": lambda epoch: frames(epoch, due=-1e308, taken=1e308),
+    "windows far ahead": lambda epoch: said(
+        epoch, epoch=FAR, first=FAR * STRIDE, last=FAR * STRIDE - 1, final_to=FAR * STRIDE - 1, tracks=[]
+    ),
+    "final for ever": lambda epoch: said(epoch, final_to=FAR),
+    "final to 2^63": lambda epoch: said(epoch, final_to=2**63, mended_from=epoch * STRIDE),
+    "not searched for ever": lambda epoch: said(epoch, unsearched=list(range(FAR, FAR + 1000))),
+    "shed in times to come": lambda epoch: said(epoch, shed=[FAR]),
+    "alone in times to come": lambda epoch: said(epoch, alone=[FAR]),
+    "solved at no time": lambda epoch: said(epoch, solved_at=1e308),
+    "a gap without measure": lambda epoch: said(epoch, solve=SOLVED | {"gap": 1e308}),
+    "sure without measure": lambda epoch: of_one(epoch, confidence=1e308),
+    "more people than there is room for": very_many,
+    "a status that no metric can say": lambda _: [status(LIAR, fps=1e308)],
+    "a clock that no metric can say": lambda _: [status(LIAR, clock_offset=-1e308)],
+    "at pulse 10^18": lambda _: [status(LIAR, pulse=10**18)],
+    "in a state of a million letters": lambda _: [status(LIAR, state="x" * 10**6)],
+    "looks beyond all measure": lambda epoch: of_one(
+        epoch, looks=[{"first": epoch * STRIDE, "last": epoch * STRIDE, "histogram": [1e308] * 8}]
+    ),
+    "looks of very many colours": lambda epoch: of_one(
+        epoch, looks=[{"first": epoch * STRIDE, "last": epoch * STRIDE, "histogram": [0.1] * 10_000}]
+    ),
+    "small pictures far ahead": lambda _: [thumbnail(LIAR, 1, b"jpeg", pulse=FAR)],
+    "small pictures that are none": lambda _: [thumbnail(LIAR, 1, bytes(10**6))],
+}
+TAKEN: dict[str, Lie] = {
+    "nothing": lambda _: [],
+    "frames long past": lambda epoch: frames(epoch, pulse=epoch),
+    "frames a minute ahead": lambda epoch: frames(epoch, pulse=1400 + epoch),
+    "windows a minute ahead": lambda epoch: [it for ahead in range(40) for it in said_right(epoch + ahead)],
+    "another run each time": lambda epoch: [*frames(epoch, boot=epoch), *said(epoch, boot=epoch)],
+    "ended, again and again": lambda epoch: [*frames(epoch), *said(epoch, ended=True)],
+    "pictures of any size": lambda epoch: said(epoch, size=[1 + epoch * 997, 1 + epoch * 31]),
+    "boxes as far as can be": lambda epoch: of_one(epoch, boxes=[[-1e6, -1e6, 1e6, 1e6]] * STRIDE),
+    "boxes of nothing": lambda epoch: of_one(epoch, boxes=[[1e6, 1e6, -1e6, -1e6]] * STRIDE),
+    "looks of any length": lambda epoch: of_one(
+        epoch,
+        looks=[{"first": epoch * STRIDE, "last": epoch * STRIDE, "histogram": [1e6] * (8 + epoch)}],
+    ),
+    "tracks of any number": lambda epoch: of_one(epoch, id=2**62 - epoch),
+    "small pictures without end": lambda epoch: [
+        thumbnail(LIAR, epoch * 1000 + it, b"jpeg", pulse=epoch) for it in range(400)
+    ],
+}
+
+
+def said_right(epoch: int) -> list[Message]:
+    return [tracks(word(LIAR, epoch, {1: SMALL}))]
+
+
+def take(service: FedService, message: Message) -> None:
+    what = message.key.split("/")[4]
+    intake = service.intake
+    handlers = {"video": intake.video, "tracks": intake.tracks, "status": intake.status}
+    handlers.get(what, intake.thumbnail)(message)
+
+
+class Lived:
+    """Both cameras send for a while, one of them lies, and all of it is decided."""
+
+    def __init__(self, lie: Lie) -> None:
+        self.service = service = FedService(small_config())
+        self.decided: list[GopChoices] = []
+        service.on_decision.append(self.decided.append)
+        service.come(*CAMERAS)
+        self._viewer = service.splicer.decided[OTHER].join()
+        self.shown: list[MediaChunk] = []
+        """What those are sent who watch the other camera."""
+        service.pulse = 0
+        service.intake.video(video(OTHER, encoded(1)[0]))
+        for epoch in range(EPOCHS):
+            self._send(epoch)
+            for message in lie(epoch):
+                take(service, message)
+            self._pass(end_of_epoch(epoch, STRIDE))
+        self.last = end_of_epoch(EPOCHS - 2, STRIDE)
+        """The last pulse of which all that there is to look ahead to has come."""
+        # It may be waited for, but not for ever.
+        self._pass(service.pulse + service.aligner._grace + service.aligner._behind + 1)
+
+    def _send(self, epoch: int) -> None:
+        intake = self.service.intake
+        for unit in encoded(1)[epoch * STRIDE : (epoch + 1) * STRIDE]:
+            intake.video(video(OTHER, unit))
+        intake.tracks(tracks(word(OTHER, epoch, {7: LARGE})))
+        intake.status(status(OTHER))
+        intake.thumbnail(thumbnail(OTHER, 7, b"jpeg", pulse=end_of_epoch(epoch, STRIDE)))
+
+    def _pass(self, pulse: int) -> None:
+        while self.service.pulse < pulse:
+            self.service.pulse += 1
+            self.service.decide()
+            self.shown += [it for it in self._viewer._queue if isinstance(it, MediaChunk)]
+            self._viewer._queue.clear()
+
+
+def told(service: FedService) -> None:
+    """Ask for all that is told of cameras: numbers that are none would take it from everybody."""
+    for camera, state in service.intake.states.items():
+        json.loads(msgspec.json.encode(_camera(service, camera, state)), parse_constant=pytest.fail)
+    for line in generate_latest(make_app(service)[METRICS]).decode().splitlines():
+        assert line.startswith("#") or line.rpartition(" ")[2] not in {"NaN", "+Inf", "-Inf"}, line
+
+
+@pytest.mark.parametrize("name", [*REFUSED, *TAKEN])
+async def test_whatever_a_camera_says_the_other_one_goes_on(name: str) -> None:
+    lie = (REFUSED | TAKEN)[name]
+    lived = Lived(lie)
+    service, people = lived.service, lived.service.decider.people
+    number = people.whose(OTHER, 1, 7, lived.last)
+    assert number is not None, "its person is somebody"
+    assert number < 20
+    told_of = [it for it in lived.decided if STRIDE <= it.first <= lived.last]
+    assert [it.first for it in told_of] == list(range(STRIDE, lived.last, GOP)), (
+        "all is decided, and in order"
+    )
+    assert all(it.choices.get(number) in CAMERAS for it in told_of), "they are shown all the time"
+    sent = [picture.pulse for it in lived.shown for picture in it.pictures]
+    assert [it for it in sent if it <= lived.last] == list(range(lived.last + 1)), "and the stream goes on"
+    assert any(camera == OTHER for camera, *_ in service.intake.thumbnails)
+    states = service.intake.states
+    assert states[OTHER].bad_messages == 0
+    assert (states[LIAR].bad_messages > 0) == (name in REFUSED)
+    assert sum(map(len, people.unsearched._frames.values())) < 1000
+    told(service)
+
+
+def test_when_all_recordings_are_over_nothing_is_decided_of_pulses_that_nobody_has_had() -> None:
+    """Before the first pulse nobody can tell that a frame is far ahead."""
+    service = FedService(small_config())
+    service.come(*CAMERAS)
+    service.intake.video(video(LIAR, replace(encoded(0)[0], pulse=FAR)))
+    for seed, camera in enumerate(CAMERAS):
+        for unit in encoded(seed)[: 2 * STRIDE]:
+            service.intake.video(video(camera, unit))
+        service.intake.tracks(tracks(word(camera, 0, {1: LARGE})))
+        service.intake.tracks(tracks(word(camera, 1, {1: LARGE}, ended=True)))
+    service.pulse = 2 * STRIDE - 1
+    service.decide()
+    assert service.aligner.all_ended
+    left = list(itertools.islice(service.what_is_left(), 10))
+    assert left[-1].first + left[-1].frames == 2 * STRIDE
+
+
+def test_sound_of_more_frames_than_any_is_none_and_takes_no_time() -> None:
+    head = {"first": 2**62, "sizes": [1] * (AUDIO_FRAMES_MAX + 1)}
+    with pytest.raises(msgspec.ValidationError):
+        msgspec.json.decode(json.dumps(head).encode(), type=AudioHeader)
+    shelf = AudioBuffer(SoundFormat(48_000, 2), 25.0, 10.0)
+    for first in range(0, 20 * AUDIO_FRAMES_MAX, AUDIO_FRAMES_MAX):
+        shelf.put(AudioHeader(first=first, sizes=[1] * AUDIO_FRAMES_MAX), bytes(AUDIO_FRAMES_MAX))
+    assert len(shelf._frames) == 469
+
+
+def test_what_is_said_by_hand_here_is_what_cameras_say() -> None:
+    right = [video(LIAR, unit) for unit in encoded(0)[:STRIDE]]
+    assert [msgspec.json.decode(it.attachment) for it in frames(0)] == [
+        msgspec.json.decode(it.attachment) for it in right
+    ]
+    assert msgspec.json.decode(said(1)[0].payload, type=CameraTracks) == word(LIAR, 1, {1: SMALL})

@@ -1,0 +1,191 @@
+"""A service that the present has left behind goes on with the present, and so does all that hangs on it."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from fakes.cameras import (
+    CAMERAS,
+    FPS,
+    GOP,
+    LARGE,
+    SMALL,
+    STRIDE,
+    FedService,
+    encoded,
+    small_config,
+    tracks,
+    video,
+    word,
+)
+from fakes.decisions import noted
+from fakes.media.decoding import decodes_without_errors
+from fakes.recordings import everything_that_plays
+from server.media.audio.aac import SAMPLES
+from server.media.audio.audio_format import SoundFormat
+from server.messaging.epochs import end_of_epoch
+from server.service.streaming.audio_buffer import AudioBuffer, AudioFollower
+from server.service.streaming.media_chunk import MediaChunk
+
+HOUR = 3600 * FPS // STRIDE
+"""Epochs."""
+ENCODED = 40 // STRIDE
+"""Epochs after which pictures are repeated, which begin with a key picture."""
+BEFORE = 6
+
+
+def sent(service: FedService, epoch: int, *cameras: str) -> None:
+    """Send an epoch's frames and words of some cameras."""
+    for seed, camera in enumerate(CAMERAS):
+        if camera not in cameras:
+            continue
+        again = epoch % ENCODED
+        for unit in encoded(seed)[again * STRIDE : (again + 1) * STRIDE]:
+            service.intake.video(video(camera, replace(unit, pulse=unit.pulse + (epoch - again) * STRIDE)))
+        service.intake.tracks(tracks(word(camera, epoch, {1: LARGE if seed else SMALL})))
+
+
+def lived(service: FedService, epochs: range) -> None:
+    """Let all cameras send some epochs, and decide them."""
+    for epoch in epochs:
+        service.pulse = end_of_epoch(epoch, STRIDE)
+        sent(service, epoch, *CAMERAS)
+        service.decide()
+
+
+@pytest.fixture
+def service(tmp_path: Path) -> FedService:
+    """A service that records and writes decisions, and has lived for some epochs."""
+    it = FedService(small_config(record={"folder": str(tmp_path / "kept")}), out=tmp_path)
+    it._recorder = it.lacking.recorder = it._record(tmp_path)
+    it.past.open()
+    it.come(*CAMERAS)
+    return it
+
+
+@pytest.mark.parametrize("hours", [8, 24 * 365])
+def test_who_slept_decides_what_is_of_now_and_nothing_of_what_is_long_past(
+    service: FedService, tmp_path: Path, hours: int
+) -> None:
+    decided = noted(service)
+    lived(service, range(BEFORE))
+    before = decided[-1].first + GOP
+    then = hours * HOUR
+    lived(service, range(then, then + BEFORE))
+    firsts = [it.first for it in decided]
+    assert firsts == [*range(0, before, GOP), *range(then * STRIDE, (then + BEFORE - 1) * STRIDE, GOP)]
+    assert all(it.choices[0].camera == "c1" for it in decided[-3:]), "all is known of what is of now"
+    assert service.board.end == decided[-1].first + GOP
+    service.close()
+    rows = (tmp_path / "late.csv").read_text(encoding="utf-8").splitlines()[1:]
+    assert f"{before + 1},,not decided up to {then * STRIDE}" in rows
+    assert len(rows) < 50
+    assert service.past.writer is not None
+    assert (service.past.writer.written, service.past.writer.lost) == (len(decided), 0)
+    for path in everything_that_plays(tmp_path / "kept"):
+        decodes_without_errors(path)
+
+
+@pytest.mark.parametrize("minutes", [5, 8 * 60])
+def test_streams_go_on_after_a_leap_with_one_picture_that_bridges_it_or_with_a_hole(
+    service: FedService, minutes: int
+) -> None:
+    lived(service, range(BEFORE))
+    channels = [service.splicer.decided["c0"], *service.splicer.objects.values()]
+    viewers = [it.join() for it in channels]
+    until, then = service.board.end, minutes * HOUR // 60 // ENCODED * ENCODED
+    lived(service, range(then, then + BEFORE))
+    for viewer in viewers:
+        footage = [it for it in viewer._queue if isinstance(it, MediaChunk) and it.until > until]
+        first, *more = [(it.first, it.until) for it in footage]
+        expected = [(it, it + GOP) for it in range(then * STRIDE, service.board.end, GOP)]
+        if minutes < 60:
+            assert first == (until, then * STRIDE)
+            assert len(footage[0].pictures) == 1
+        else:
+            assert first == expected.pop(0)
+        assert more == expected
+    service.close()
+
+
+def test_what_is_a_minute_late_is_decided_epoch_by_epoch(service: FedService) -> None:
+    decided = noted(service)
+    lived(service, range(BEFORE))
+    then = HOUR // 60
+    lived(service, range(then, then + BEFORE))
+    assert [it.first for it in decided] == list(range(0, service.board.end, GOP)), "nothing is left out"
+    service.close()
+
+
+class Started(FedService):
+    """One that runs, and is told of pulses when the test says so."""
+
+    def __init__(self) -> None:
+        super().__init__(small_config())
+        self.come(*CAMERAS)
+        self.pulses: asyncio.Queue[int] = asyncio.Queue()
+
+    async def _follow_pulses(self) -> None:
+        while True:
+            self.pulse = await self.pulses.get()
+            self._changed.set()
+
+    async def says(self, epoch: int, *cameras: str) -> None:
+        """Let cameras speak of an epoch, and the service do what it does then."""
+        sent(self, epoch, *cameras)
+        self._changed.set()
+        await self.does()
+
+    async def does(self) -> None:
+        """Let it do what it does."""
+        for _ in range(50):
+            await asyncio.sleep(0)
+
+
+@pytest.mark.parametrize("other", [3, 3000 * HOUR], ids=["behind", "ahead"])
+async def test_who_is_heard_first_and_counts_alone_does_not_say_where_to_begin(other: int) -> None:
+    service, now = Started(), 720 * HOUR
+    decided = noted(service)
+    running = asyncio.create_task(service.run())
+    await service.does()
+    await service.says(other, "c0")
+    await service.says(now, "c1")
+    assert service.aligner._next is None, "nobody knows yet what is now"
+    service.pulses.put_nowait(end_of_epoch(now, STRIDE))
+    for epoch in range(now + 1, now + 4):
+        sent(service, other + epoch - now, "c0")
+        await service.says(epoch, "c1")
+        service.pulses.put_nowait(end_of_epoch(epoch, STRIDE))
+    await service.does()
+    running.cancel()
+    await asyncio.gather(running, return_exceptions=True)
+    assert [it.first for it in decided[:2]] == [now * STRIDE, now * STRIDE + GOP]
+    service.close()
+
+
+async def test_a_site_without_a_pulse_server_is_decided_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("server.service.service._FIRST_PULSE_S", 0.0)
+    service = Started()
+    decided = noted(service)
+    running = asyncio.create_task(service.run())
+    for epoch in range(4):
+        await service.says(epoch, *CAMERAS)
+    assert [it.first for it in decided] == [0, GOP, 2 * GOP]
+    running.cancel()
+    await asyncio.gather(running, return_exceptions=True)
+    service.close()
+
+
+def test_a_camera_that_slept_is_not_followed_by_hours_of_silence() -> None:
+    following = AudioFollower(AudioBuffer(SoundFormat(48_000, 2), FPS, 10.0))
+    following.beside(0, FPS)
+    hours = 8 * 3600 * FPS
+    heard = following.beside(hours, hours + FPS)
+    assert (heard.first, len(heard.frames)) == (
+        hours // FPS * 48_000 // SAMPLES,
+        pytest.approx(47 / 2, abs=1),
+    )

@@ -1,0 +1,337 @@
+"""What is recorded gets old by time that has certainly passed: a clock that jumps takes nothing away."""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+from pathlib import Path
+
+import pytest
+
+from fakes.cameras import CAMERAS, FPS, GOP, FedService, small_config
+from fakes.recordings import A, ClocksByHand, filled, head, piece
+from server.service.recording.recording_folder import RecordingFolder
+from server.service.recording.recording_session import InitSegments
+from server.service.recording.retention import RetentionLimits
+
+KEEP_S = 20.0
+BOUNDS = RetentionLimits(keep_s=KEEP_S, most_mb=1e6, segment_s=0.2)
+"""A segment for each GOP."""
+STEP_S = GOP / FPS
+TRIAL_S = 600.0
+YEAR_S = 365 * 86_400.0
+PARTLY = '{"id": "x", "seconds": -5}'
+ENDLESS = '{"id": "x", "seconds": 1e300, "boot": "", "steady": 0, "origin": null}'
+
+
+@pytest.fixture
+def clocks() -> ClocksByHand:
+    return ClocksByHand()
+
+
+def opened(folder: Path, clocks: ClocksByHand, bounds: RetentionLimits = BOUNDS) -> RecordingFolder:
+    store = RecordingFolder(folder, bounds, clocks.machine)
+    store.open()
+    return store
+
+
+def records(store: RecordingFolder, clocks: ClocksByHand, gops: range) -> None:
+    """Write GOPs in real time."""
+    for gop in gops:
+        store.write(piece(gop, {1: A}), head(clocks.wall), InitSegments(filled()[1]))
+        clocks.now += STEP_S
+
+
+def kept(folder: Path) -> list[int]:
+    """Say of which GOPs there are pictures on the disk."""
+    return sorted(int(it.stem) // GOP for it in folder.glob("*/cameras/c0/*.mp4"))
+
+
+def recorded(folder: Path, clocks: ClocksByHand, gops: int = 10) -> None:
+    """Let a service record some GOPs and end."""
+    store = opened(folder, clocks)
+    records(store, clocks, range(gops))
+    store.close()
+
+
+@pytest.mark.parametrize("seconds", [YEAR_S, -YEAR_S, 2 * KEEP_S, -2 * KEEP_S])
+@pytest.mark.parametrize("is_kept", [False, True])
+def test_a_clock_that_is_set_while_it_records_takes_nothing_away_and_keeps_nothing_too_long(
+    tmp_path: Path, clocks: ClocksByHand, seconds: float, is_kept: bool
+) -> None:
+    store = opened(tmp_path, clocks)
+    records(store, clocks, range(10))
+    clocks.jump(seconds)
+    clocks.is_kept = is_kept
+    records(store, clocks, range(10, 20))
+    assert kept(tmp_path) == list(range(20))
+    clocks.now += KEEP_S - 10.5 * STEP_S
+    records(store, clocks, range(20, 21))
+    assert kept(tmp_path) == list(range(10, 21)), "ten have had their time, whatever the clock says"
+    store.close()
+
+
+def test_a_clock_that_jumps_while_it_records_is_not_believed_later_either(
+    tmp_path: Path, clocks: ClocksByHand
+) -> None:
+    bounds = RetentionLimits(keep_s=3.5 * TRIAL_S, most_mb=1e6, segment_s=0.2)
+    store = opened(tmp_path, clocks, bounds)
+    records(store, clocks, range(2))
+    clocks.wall += YEAR_S  # and whoever keeps it says that it is right
+    records(store, clocks, range(2, 4))
+    clocks.now += TRIAL_S
+    store.close()
+    store = opened(tmp_path, clocks, bounds)
+    records(store, clocks, range(4, 6))
+    store.close()
+    clocks.off(TRIAL_S)
+    store = opened(tmp_path, clocks, bounds)
+    clocks.now += TRIAL_S
+    records(store, clocks, range(6, 7))
+    assert kept(tmp_path) == list(range(7))
+    clocks.now += 0.75 * TRIAL_S
+    records(store, clocks, range(7, 8))
+    assert kept(tmp_path) == [4, 5, 6, 7], "that it was off counts, that its clock jumped does not"
+    store.close()
+
+
+@pytest.mark.parametrize("seconds", [YEAR_S, 5 * KEEP_S])
+@pytest.mark.parametrize("reboots", [False, True])
+def test_a_clock_that_is_ahead_at_the_start_takes_nothing_away(
+    tmp_path: Path, clocks: ClocksByHand, caplog: pytest.LogCaptureFixture, seconds: float, reboots: bool
+) -> None:
+    recorded(tmp_path, clocks)
+    if reboots:
+        clocks.off(1.0)
+    clocks.jump(seconds)
+    store = opened(tmp_path, clocks)
+    assert kept(tmp_path) == list(range(10))
+    (told,) = [it for it in caplog.messages if "does not count" in it]
+    assert "nobody keeps the clock right (NTP)" in told
+    for gop in range(10, 18):
+        records(store, clocks, range(gop, gop + 1))
+        clocks.now += TRIAL_S / 1000
+    assert kept(tmp_path) == list(range(18)), "as long as nobody vouches for it"
+    clocks.now += KEEP_S
+    records(store, clocks, range(20, 21))
+    assert not set(range(8)) & set(kept(tmp_path)), "but it is not kept for ever"
+    store.close()
+
+
+def test_a_clock_that_somebody_sets_right_in_time_takes_nothing_away(
+    tmp_path: Path, clocks: ClocksByHand
+) -> None:
+    recorded(tmp_path, clocks)
+    clocks.off(5.0, wrong_by=YEAR_S)
+    bounds = RetentionLimits(keep_s=2 * TRIAL_S, most_mb=1e6, segment_s=0.2)
+    store = opened(tmp_path, clocks, bounds)
+    clocks.now += TRIAL_S / 2
+    records(store, clocks, range(10, 11))
+    clocks.jump(-YEAR_S)
+    clocks.is_kept = True
+    clocks.now += TRIAL_S
+    records(store, clocks, range(11, 12))
+    clocks.now += TRIAL_S / 4
+    records(store, clocks, range(12, 13))
+    assert kept(tmp_path) == list(range(13))
+    store.close()
+
+
+@pytest.mark.parametrize("trusted", [False, True])
+def test_after_a_week_off_what_is_too_old_goes_soon_after_the_start_if_the_clock_is_kept_right(
+    tmp_path: Path, clocks: ClocksByHand, caplog: pytest.LogCaptureFixture, trusted: bool
+) -> None:
+    caplog.set_level(logging.INFO)
+    bounds = RetentionLimits(keep_s=86_400.0, most_mb=1e6, segment_s=0.2, trust_clock=trusted)
+    clocks.is_kept = not trusted
+    store = opened(tmp_path, clocks, bounds)
+    records(store, clocks, range(30))
+    store.close()
+    clocks.off(7 * 86_400.0)
+    store = opened(tmp_path, clocks, bounds)
+    assert kept(tmp_path) == list(range(30)), "there is time to set a clock right that is wrong"
+    assert [it for it in caplog.messages if "was off for 7.0 days" in it and "UTC on that counts" in it]
+    clocks.now += TRIAL_S
+    gone = []
+    for gop in range(30, 34):
+        records(store, clocks, range(gop, gop + 1))
+        gone.append(30 - len([it for it in kept(tmp_path) if it < 30]))
+    assert gone == [10, 20, 30, 30], "in parts"
+    told = [it for it in caplog.messages if "took away" in it]
+    assert "10 older than record.keep_s (86400 s); 20 more are too old and go in the next passes" in told[0]
+    store.close()
+
+
+def test_days_off_add_up(tmp_path: Path, clocks: ClocksByHand) -> None:
+    bounds = RetentionLimits(keep_s=2.5 * 86_400.0, most_mb=1e6, segment_s=0.2)
+    for day in range(4):
+        store = opened(tmp_path, clocks, bounds)
+        clocks.now += TRIAL_S
+        records(store, clocks, range(day, day + 1))
+        store.close()
+        clocks.off(86_400.0)
+    store = opened(tmp_path, clocks, bounds)
+    clocks.now += TRIAL_S
+    records(store, clocks, range(4, 5))
+    assert kept(tmp_path) == [2, 3, 4]
+    store.close()
+
+
+def test_a_service_that_begins_again_counts_on_while_the_machine_goes_on(
+    tmp_path: Path, clocks: ClocksByHand
+) -> None:
+    recorded(tmp_path, clocks)
+    clocks.is_kept = False
+    clocks.now += KEEP_S - 4.5 * STEP_S
+    clocks.jump(-YEAR_S)
+    opened(tmp_path, clocks).close()
+    assert kept(tmp_path) == list(range(5, 10))
+
+
+def test_a_service_that_is_killed_counts_on_from_its_last_segment(
+    tmp_path: Path, clocks: ClocksByHand
+) -> None:
+    store = opened(tmp_path, clocks)
+    records(store, clocks, range(10))
+    (tmp_path / ".lock").unlink()  # as if its process had ended without a word
+    clocks.now += KEEP_S - 4.5 * STEP_S
+    opened(tmp_path, clocks).close()
+    assert kept(tmp_path) == list(range(5, 10))
+    assert store.run is not None
+
+
+def test_a_machine_without_a_clock_of_its_own_counts_when_the_network_has_told_it(
+    tmp_path: Path, clocks: ClocksByHand
+) -> None:
+    recorded(tmp_path, clocks)
+    clocks.off(7 * 86_400.0, wrong_by=-7 * 86_400.0)
+    clocks.is_kept = False
+    store = opened(tmp_path, clocks)
+    clocks.now += 15.0
+    records(store, clocks, range(10, 11))
+    assert kept(tmp_path) == list(range(11))
+    clocks.jump(7 * 86_400.0)
+    clocks.is_kept = True
+    bounds = RetentionLimits(keep_s=2 * TRIAL_S, most_mb=1e6, segment_s=0.2)
+    store.close()
+    store = opened(tmp_path, clocks, bounds)
+    clocks.now += TRIAL_S
+    records(store, clocks, range(11, 12))
+    assert kept(tmp_path) == [10, 11], "it was there for a week, as the clock says that is right now"
+    records(store, clocks, range(12, 14))
+    assert kept(tmp_path) == [10, 11, 12, 13], "but for what was recorded since the machine is on"
+    store.close()
+
+
+@pytest.mark.parametrize("restarts", [False, True])
+def test_what_was_recorded_before_the_clock_was_believed_is_no_older_for_it(
+    tmp_path: Path, clocks: ClocksByHand, restarts: bool
+) -> None:
+    bounds = RetentionLimits(keep_s=2 * TRIAL_S, most_mb=1e6, segment_s=0.2)
+    store = opened(tmp_path, clocks, bounds)
+    records(store, clocks, range(8))
+    store.close()
+    clocks.off(YEAR_S)
+    store = opened(tmp_path, clocks, bounds)
+    records(store, clocks, range(10, 12))
+    if restarts:
+        store.close()
+        store = opened(tmp_path, clocks, bounds)
+    clocks.now += TRIAL_S
+    records(store, clocks, range(12, 14))
+    assert kept(tmp_path) == [10, 11, 12, 13]
+    store.close()
+    opened(tmp_path, clocks, bounds).close()
+    assert kept(tmp_path) == [10, 11, 12, 13], "and so it is known later on"
+
+
+def test_what_takes_too_much_goes_by_age_though_the_clock_went_back(
+    tmp_path: Path, clocks: ClocksByHand
+) -> None:
+    clocks.wall += YEAR_S
+    recorded(tmp_path, clocks)
+    (late,) = [it.name for it in tmp_path.iterdir() if it.is_dir()]
+    clocks.jump(-YEAR_S)
+    store = opened(tmp_path, clocks)
+    records(store, clocks, range(10, 20))
+    store.close()
+    early = next(it.name for it in tmp_path.iterdir() if it.is_dir() and it.name != late)
+    assert early < late, "names are by the clock"
+    size = sum(run.size for run in (*store.earlier, store.run) if run is not None)
+    again = opened(tmp_path, clocks, RetentionLimits(KEEP_S, size / 1e6, 0.2))
+    gone = sorted(set(range(20)) - set(kept(tmp_path)))
+    assert gone
+    assert gone == list(range(len(gone)))
+    again.close()
+
+
+def test_recordings_of_an_earlier_version_are_dated_once(tmp_path: Path, clocks: ClocksByHand) -> None:
+    recorded(tmp_path, clocks)
+    (tmp_path / "clock.json").unlink()
+    (path,) = tmp_path.glob("*/run.json")
+    told = json.loads(path.read_bytes())
+    del told["clock0"], told["clock"]
+    path.write_text(json.dumps(told))
+    for index in path.parent.glob("index/*"):
+        os.utime(index, (clocks.wall, clocks.wall))
+    clocks.now += KEEP_S / 2
+    opened(tmp_path, clocks).close()
+    assert "clock0" in json.loads(path.read_bytes())
+    clocks.now += KEEP_S / 2 - 4.5 * STEP_S
+    opened(tmp_path, clocks).close()
+    assert kept(tmp_path) == list(range(5, 10)), "by when they were written"
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", PARTLY, ENDLESS])
+def test_a_damaged_ledger_takes_nothing_away(tmp_path: Path, clocks: ClocksByHand, text: str) -> None:
+    recorded(tmp_path, clocks)
+    (tmp_path / "clock.json").write_text(text)
+    store = opened(tmp_path, clocks)
+    assert kept(tmp_path) == list(range(10))
+    clocks.now += KEEP_S - 4.5 * STEP_S
+    records(store, clocks, range(10, 11))
+    assert kept(tmp_path) == list(range(5, 11)), "its end is new, and gets old"
+    store.close()
+
+
+@pytest.mark.parametrize("clock0", [1e9, -1e9])
+def test_a_run_of_another_clock_takes_no_other_one_away_and_is_not_kept_for_ever(
+    tmp_path: Path, clocks: ClocksByHand, clock0: float
+) -> None:
+    recorded(tmp_path, clocks, 5)
+    (path,) = tmp_path.glob("*/run.json")
+    path.write_text(json.dumps({**json.loads(path.read_bytes()), "clock": "another", "clock0": clock0}))
+    clocks.now += 1.0
+    store = opened(tmp_path, clocks)
+    records(store, clocks, range(10, 15))
+    store.close()
+    assert kept(tmp_path) == [*range(5), *range(10, 15)]
+    clocks.now += KEEP_S + 1.0
+    opened(tmp_path, clocks).close()
+    assert kept(tmp_path) == []
+
+
+def test_what_a_pass_takes_away_is_told_seldom_and_says_why(
+    tmp_path: Path, clocks: ClocksByHand, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level(logging.INFO)
+    store = opened(tmp_path, clocks, RetentionLimits(1.0, 1e6, 0.2))
+    records(store, clocks, range(20))
+    clocks.now += 3600
+    records(store, clocks, range(20, 21))
+    (first, second) = [it for it in caplog.messages if "took away" in it]
+    assert first.endswith("/0: 1 older than record.keep_s (1 s)")
+    assert second.endswith("/95: 19 older than record.keep_s (1 s)")
+    store.close()
+
+
+def test_a_service_records_by_the_machines_clocks(tmp_path: Path) -> None:
+    service = FedService(small_config(record={"folder": str(tmp_path / "kept"), "trust_clock": True}))
+    service.come(*CAMERAS)
+    service.past.open()
+    service.close()
+    ledger = json.loads((tmp_path / "kept" / "clock.json").read_bytes())
+    assert ledger["seconds"] >= 0
+    assert ledger["origin"] is not None
+    assert ledger["steady"] > 0

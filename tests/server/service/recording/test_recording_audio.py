@@ -1,0 +1,288 @@
+"""The site's sound is kept once, found again by number, and heard under every picture of the past."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Mapping
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fakes.cameras import CAMERAS, FPS, GOP, NO_REASON, FedService, video
+from fakes.media.audio import (
+    BEEPS,
+    FRAMES,
+    GOPS,
+    STEP,
+    beeps,
+    flashes,
+    flashing,
+    heard,
+    packets,
+    sends,
+    write_flashes,
+)
+from fakes.media.ffprobe import probed
+from fakes.media.mpegts import check_counters, taken_apart
+from fakes.programs import needs_ffprobe
+from fakes.recordings import AMPLE, PULSE0, ClocksByHand, head, piece
+from fakes.site import A, Hall, opened
+from server.media.audio.aac import SAMPLES as FRAME
+from server.media.audio.audio_chunk import Heard
+from server.media.audio.audio_format import SoundFormat
+from server.media.containers.mp4_audio import sound_fragment
+from server.messaging.messages import GopChoices
+from server.service.recording.audio_file import read_audio_frames
+from server.service.recording.recording_folder import GopRecord, RecordingFolder
+from server.service.recording.recording_session import InitSegments
+from server.service.recording.retention import RetentionLimits
+from server.service.view_selection.decider import GopDecision, ObjectChoice
+
+FORM = SoundFormat(48_000, 2)
+PATIENT = {"viewer_queue_gops": 100}  # with who reads slowly
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A recording that flashes and beeps."""
+    return write_flashes(tmp_path_factory.mktemp("sound") / "flashes.mp4", FRAMES)
+
+
+@pytest.fixture
+async def hall(recording: Path, tmp_path: Path) -> AsyncIterator[Hall]:
+    """A site with that sound, which records into segments of two GOPs."""
+    record = {"folder": str(tmp_path / "kept"), "segment_s": 0.4}
+    async for hall in opened(
+        sound={"source": str(recording)}, record=record, http={"viewer_queue_gops": 100}
+    ):
+        hall.service.past.open()
+        hall.service.come(*CAMERAS)
+        yield hall
+
+
+def shows(hall: Hall, recording: Path, gops: range, choices: Mapping[int, str | None] | None = None) -> None:
+    """Decide some GOPs of the recording's pictures: person 1 is in either camera in turn, or as told."""
+    service = hall.service
+    for gop in gops:
+        for camera in CAMERAS:
+            for unit in flashing(recording)[gop * GOP : (gop + 1) * GOP]:
+                service.intake.video(video(camera, unit))
+        camera = CAMERAS[gop % 2] if choices is None else choices[gop]
+        told = GopChoices(
+            first=gop * GOP, frames=GOP, choices={} if camera is None else {1: camera}, boxes={}, cuts=[]
+        )
+        service.past.put(told, PULSE0)
+        choice = ObjectChoice(1, camera, None, away=False)
+        service.splicer.decision(GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
+
+
+async def until_written(service: FedService, gops: int) -> None:
+    while service.past.writer is not None and service.past.writer.written < gops:  # noqa: ASYNC110
+        await asyncio.sleep(0.001)
+
+
+def forget(service: FedService) -> None:
+    """Let nothing be in memory any more, but the last GOPs' pictures and sound."""
+    assert service.sound is not None
+    service.past.recent._frames = GOP
+    for number in list(service.sound._frames)[:-20]:
+        del service.sound._frames[number]
+
+
+async def download(hall: Hall, path: str) -> bytes:
+    async with hall.session.get(path) as answer:
+        assert answer.status == 200, await answer.text()
+        return await answer.read()
+
+
+def unbroken(stream: bytes, kind: str | None = None) -> tuple[float, float]:
+    """Check that there is no hole in the sound; say from when to when it is heard."""
+    times, _ = heard(stream, kind)
+    assert np.diff(times) == pytest.approx(1 / 48_000, abs=1e-4)
+    return float(times[0]), float(times[-1])
+
+
+async def test_in_the_past_a_beep_is_with_its_flash_whatever_file_it_is_in(
+    hall: Hall, recording: Path
+) -> None:
+    own = sends(hall.service, recording)
+    shows(hall, recording, range(GOPS))
+    await until_written(hall.service, GOPS)
+    forget(hall.service)
+    data = await download(hall, f"/objects/1/best.mp4?from=p7&to=p{FRAMES - 2}")
+    assert flashes(data) == pytest.approx(BEEPS, abs=0.001)
+    assert beeps(data) == pytest.approx(BEEPS, abs=STEP)
+    assert unbroken(data) == (pytest.approx(GOP / FPS, abs=0.022), pytest.approx(FRAMES / FPS, abs=0.1))
+    begin = FORM.frame_at(GOP, FPS)
+    assert packets(data) == own[begin : begin + len(packets(data))], "byte for byte the recording's"
+    camera = await download(hall, f"/cameras/c1/live.mp4?from=p0&to=p{FRAMES}")
+    assert beeps(camera) == pytest.approx(BEEPS, abs=STEP)
+
+
+@pytest.mark.parametrize(
+    "path", ["/objects/1/best.mp4", "/cameras/c0/live.mp4", "/objects/1/best.ts", "/cameras/c0/live.ts"]
+)
+async def test_where_the_past_meets_the_present_the_sound_goes_on(
+    hall: Hall, recording: Path, path: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("server.service.time_shift.time_shift_stream._LEAD_S", 60.0)
+    service, half = hall.service, GOPS // 2
+    own = sends(service, recording)
+    shows(hall, recording, range(half))
+    await until_written(service, half)
+    async with hall.session.get(f"{path}?from=p0") as answer:
+        while not service.splicer.viewers:  # noqa: ASYNC110 — the past is sent first
+            await asyncio.sleep(0.001)
+        for gop in range(half, GOPS):
+            shows(hall, recording, range(gop, gop + 1))
+            await asyncio.sleep(0.005)
+        service.splicer.close()
+        data = await answer.read()
+    kind = "mpegts" if path.endswith("ts") else "mp4"
+    assert flashes(data, kind) == pytest.approx(BEEPS, abs=0.001)
+    assert beeps(data, kind) == pytest.approx(BEEPS, abs=STEP)
+    assert unbroken(data, kind)[1] == pytest.approx(FRAMES / FPS, abs=0.03)
+    if kind == "mpegts":
+        check_counters(taken_apart(data))
+    else:
+        assert packets(data) == own[: len(packets(data))]
+
+
+async def test_sound_goes_on_where_nobody_is_shown_for_long(hall: Hall, recording: Path) -> None:
+    sends(hall.service, recording)
+    choices = {gop: A if gop < 2 or gop >= GOPS - 2 else None for gop in range(GOPS)}
+    shows(hall, recording, range(GOPS), choices)
+    await until_written(hall.service, GOPS)
+    forget(hall.service)
+    data = await download(hall, f"/objects/1/best.mp4?from=p0&to=p{FRAMES}")
+    assert beeps(data) == pytest.approx(BEEPS, abs=STEP)
+    assert unbroken(data)[1] == pytest.approx(FRAMES / FPS, abs=0.03)
+
+
+async def test_what_retention_took_away_or_nobody_kept_is_silent(hall: Hall, recording: Path) -> None:
+    sends(hall.service, recording, silent=range(30, 60))
+    shows(hall, recording, range(GOPS))
+    await until_written(hall.service, GOPS)
+    forget(hall.service)
+    run = hall.service.past.run
+    assert run is not None
+    gone = run.segments[6].first
+    run.sound_file(gone).unlink()
+    data = await download(hall, f"/objects/1/best.mp4?from=p0&to=p{FRAMES}")
+    unbroken(data)
+    _, samples = heard(data)
+    assert not samples[31 * FRAME : 59 * FRAME].any()
+    assert not samples[(gone + 1) * 1920 + FRAME : (gone + 2 * GOP) * 1920 - 2 * FRAME].any()
+    silent = {*range(round(30 * FRAME / 1920), round(60 * FRAME / 1920)), *range(gone, gone + 2 * GOP)}
+    kept = [at for at in BEEPS if round(at * FPS) not in silent]
+    # The frame before what is gone has the beginning of a beep: frames of AAC overlap.
+    assert [it for it in beeps(data) if abs(it - gone / FPS) > STEP] == pytest.approx(kept, abs=STEP)
+
+
+async def test_the_sound_of_an_earlier_run_is_heard_after_a_restart(recording: Path, tmp_path: Path) -> None:
+    record = {"folder": str(tmp_path / "kept"), "segment_s": 0.4}
+    for gops in (range(GOPS - 1), range(GOPS - 1, GOPS)):
+        async for hall in opened(
+            sound={"source": str(recording)}, record=record, http={"viewer_queue_gops": 100}
+        ):
+            hall.service.pulse0 = PULSE0
+            hall.service.past.open()
+            hall.service.come(*CAMERAS)
+            if not gops.start:
+                sends(hall.service, recording)
+            shows(hall, recording, gops)
+            await until_written(hall.service, len(gops))
+            if gops.start:
+                data = await download(hall, f"/cameras/c0/live.mp4?from=p0&to=p{FRAMES}")
+                assert beeps(data) == pytest.approx([it for it in BEEPS if it < FRAMES / FPS - 0.2], abs=STEP)
+                unbroken(data)
+
+
+async def test_sound_goes_with_the_segments_it_is_of(tmp_path: Path) -> None:
+    clocks = ClocksByHand()
+    store = RecordingFolder(tmp_path, RetentionLimits(keep_s=2.0, most_mb=1e6, segment_s=0.4), clocks.machine)
+    store.open()
+    for gop in range(GOPS):
+        clocks.now = PULSE0 + gop * GOP / FPS
+        it = piece(gop, {1: A})
+        begin, end = (FORM.frame_at(pulse, FPS) for pulse in (gop * GOP, (gop + 1) * GOP))
+        heard = Heard(begin, tuple(bytes([number % 251]) * 9 for number in range(begin, end)), FORM)
+        store.write(GopRecord(it.choices, it.cameras, heard), head(), InitSegments(b"pictures", b"sound"))
+    run = store.run
+    assert run is not None
+    firsts = [it.first for it in run.segments]
+    assert firsts[0] > 0
+    assert sorted(int(it.stem) for it in (run.folder / "sound").glob("0*.mp4")) == firsts
+    assert run.sound.tape.all[0].first == firsts[0]
+    assert run.size == pytest.approx(
+        sum(it.stat().st_size for it in run.folder.rglob("*") if it.is_file()), abs=3000
+    )
+    store.close()
+    again = RecordingFolder(tmp_path, AMPLE)
+    again.open()
+    assert again.earlier[0].sound.tape.all == run.sound.tape.all
+
+
+@needs_ffprobe
+async def test_the_sound_plays_from_the_disk_by_itself(hall: Hall, recording: Path) -> None:
+    sends(hall.service, recording)
+    shows(hall, recording, range(GOPS))
+    await until_written(hall.service, GOPS)
+    run = hall.service.past.run
+    assert run is not None
+    for path in (run.sound.path, run.sound_file(0)):
+        ((codec, frames, *_),) = probed(path, "codec_name,nb_read_frames")
+        assert codec == "aac"
+        assert int(frames) >= 18
+
+
+async def test_a_site_without_sound_keeps_none(tmp_path: Path, recording: Path) -> None:
+    async for hall in opened(record={"folder": str(tmp_path / "kept"), "segment_s": 0.4}):
+        hall.service.past.open()
+        hall.service.come(*CAMERAS)
+        shows(hall, recording, range(4))
+        await until_written(hall.service, 4)
+        run = hall.service.past.run
+        assert run is not None
+        assert not (run.folder / "sound").exists()
+        assert not run.sound.path.exists()
+        assert b"soun" not in await download(hall, "/objects/1/best.mp4?from=p0&to=p20")
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.data())
+def test_a_damaged_file_gives_what_can_be_read_or_nothing(
+    tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
+) -> None:
+    path = tmp_path_factory.mktemp("damaged") / "sound.mp4"
+    content = bytearray(b"".join(sound_fragment(FORM, [b"abc", b"de"], 2 * number) for number in range(4)))
+    for _ in range(data.draw(st.integers(1, 5))):
+        content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))
+    path.write_bytes(content[: data.draw(st.integers(0, len(content)))])
+    found = read_audio_frames(path, 0, data.draw(st.integers(0, len(content))), 0, 8, FORM)
+    assert found.keys() <= set(range(8))
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.lists(st.lists(st.binary(min_size=1, max_size=40), max_size=6), min_size=1, max_size=8),
+    st.integers(0, 5),
+    st.data(),
+)
+def test_frames_are_found_by_their_numbers(
+    tmp_path_factory: pytest.TempPathFactory, written: list[list[bytes]], first: int, data: st.DataObject
+) -> None:
+    path = tmp_path_factory.mktemp("frames") / "sound.mp4"
+    content, number, all_of_them = b"junk", first, {}
+    for frames in written:
+        content += sound_fragment(FORM, frames, number) if frames else b""
+        all_of_them |= dict(enumerate(frames, start=number))
+        number += len(frames) + data.draw(st.integers(0, 2))
+    path.write_bytes(content + b"junk")
+    begin, end = (data.draw(st.integers(0, number + 2)) for _ in range(2))
+    assert read_audio_frames(path, 4, len(content) - 4, begin, end, FORM) == {
+        number: frame for number, frame in all_of_them.items() if begin <= number < end
+    }

@@ -1,0 +1,426 @@
+"""Recording goes on by itself wherever its folder went, and nobody is promised what is gone."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import shutil
+from collections.abc import AsyncIterator, Callable
+from pathlib import Path
+
+import pytest
+
+from fakes.cameras import CAMERAS, FPS, GOP, LARGE, SMALL
+from fakes.recordings import AMPLE, A, B, filled, head, pictures, piece
+from fakes.site import Hall, opened
+from fakes.system.full_disk import files_of_at_most
+from fakes.system.unprivileged import nobodys_folder
+from server.service.recording.recording_folder import RecordingFolder
+from server.service.recording.recording_session import InitSegments, RecordingSession
+from server.service.recording.retention import RetentionLimits
+
+NOTHING = "of object 1 nothing is kept from p0 on; there is nothing"
+Harm = Callable[[Path, Path], None]
+"""What somebody does to a folder, and the run in it."""
+
+
+def gone(name: str) -> Harm:
+    """Remove something below the folder: ``RUN`` stands for the run's."""
+
+    def harm(folder: Path, run: Path) -> None:
+        path = Path(str(folder / name).replace("RUN", run.name))
+        shutil.rmtree(path) if path.is_dir() else path.unlink()
+
+    return harm
+
+
+def made_a_file(name: str) -> Harm:
+    def harm(folder: Path, run: Path) -> None:
+        gone(name)(folder, run)
+        Path(str(folder / name).replace("RUN", run.name)).write_text("somebody's\n")
+
+    return harm
+
+
+def moved(name: str) -> Harm:
+    def harm(folder: Path, run: Path) -> None:
+        path = Path(str(folder / name).replace("RUN", run.name))
+        path.rename(folder.parent / "elsewhere")
+
+    return harm
+
+
+def made_anew(name: str) -> Harm:
+    """Remove a folder and make an empty one: so looks one whose disk was unmounted."""
+
+    def harm(folder: Path, run: Path) -> None:
+        gone(name)(folder, run)
+        Path(str(folder / name).replace("RUN", run.name)).mkdir()
+
+    return harm
+
+
+def cut_short(name: str) -> Harm:
+    def harm(folder: Path, run: Path) -> None:
+        Path(str(folder / name).replace("RUN", run.name)).write_bytes(b"")
+
+    return harm
+
+
+LEVELS = [".", "RUN", "RUN/cameras", "RUN/cameras/c0", "RUN/index", "RUN/objects"]
+FILES = [
+    "RUN/run.json",
+    "RUN/cameras/c0/000000000000.mp4",
+    "RUN/index/000000000000.jsonl",
+    "RUN/cameras/c0.m3u8",
+    "RUN/objects/1.m3u8",
+    ".lock",
+]
+
+
+def records(store: RecordingFolder, gops: range) -> None:
+    for gop in gops:
+        try:
+            store.write(piece(gop, {1: A, 2: B}), head(), InitSegments(filled()[1]))
+        except OSError:
+            store.abandon()  # as the writer does
+
+
+def nothing_is_orphaned(folder: Path) -> None:
+    """Check that whatever is on the disk is known to a service that begins, which takes it away some day."""
+    before = {it for it in folder.rglob("*") if it.is_file()}
+    store = RecordingFolder(folder, AMPLE)
+    store.open()
+    store.close()
+    assert {it for it in folder.rglob("*") if it.is_file()} == before, "nothing had to be tidied up"
+    named = {it for run in store.earlier for first in run.segments for it in run.files(first.first)}
+    lists = {it.path for run in store.earlier for it in (*run.cameras.values(), *run.objects.values())}
+    fixed = {
+        run.folder / it for run in store.earlier for it in ("run.json", "cameras/init.mp4", "sound/init.mp4")
+    }
+    strange = before - named - lists - fixed - {folder / ".lock", folder / "clock.json"}
+    assert {it for it in strange if it.read_bytes() != b"somebody's\n"} == set()
+
+
+def shown(folder: Path) -> list[int]:
+    """Play what is on the disk of camera c0: give its pulses."""
+    store = RecordingFolder(folder, AMPLE)
+    store.open()
+    store.close()
+    found = [run.cameras[A].path for run in store.earlier if run.cameras[A].path.exists()]
+    return [pulse for path in found for pulse, _ in pictures(path)]
+
+
+@pytest.mark.parametrize(
+    "harm",
+    [
+        *(pytest.param(gone(it), id=f"gone {it}") for it in [*LEVELS, *FILES]),
+        *(pytest.param(moved(it), id=f"moved {it}") for it in LEVELS),
+        *(pytest.param(made_anew(it), id=f"anew {it}") for it in LEVELS),
+        *(pytest.param(made_a_file(it), id=f"a file {it}") for it in LEVELS[1:]),
+        *(pytest.param(cut_short(it), id=f"short {it}") for it in ["RUN/cameras/c0.m3u8", "RUN/run.json"]),
+    ],
+)
+def test_it_goes_on_at_once_and_leaves_nothing_that_nobody_knows_of(tmp_path: Path, harm: Harm) -> None:
+    folder = tmp_path / "kept"
+    store = RecordingFolder(folder, AMPLE)
+    store.open()
+    records(store, range(3))
+    assert store.run is not None
+    harm(folder, store.run.folder)
+    records(store, range(3, 9))
+    store.close()
+    assert set(range(3 * GOP, 9 * GOP)) <= set(shown(folder)), "nothing is lost but what was taken away"
+    nothing_is_orphaned(folder)
+
+
+def test_while_a_file_has_the_folders_place_nothing_is_left_and_then_it_goes_on(tmp_path: Path) -> None:
+    folder = tmp_path / "kept"
+    store = RecordingFolder(folder, AMPLE)
+    store.open()
+    records(store, range(3))
+    shutil.rmtree(folder)
+    folder.write_text("somebody's\n")
+    records(store, range(3, 6))
+    assert sorted(tmp_path.iterdir()) == [folder]
+    folder.unlink()
+    records(store, range(6, 9))
+    store.close()
+    assert shown(folder) == list(range(6 * GOP, 9 * GOP))
+    nothing_is_orphaned(folder)
+
+
+def test_a_disk_that_comes_back_is_gone_on_with_and_its_runs_are_known(tmp_path: Path) -> None:
+    folder, away = tmp_path / "kept", tmp_path / "unmounted"
+    store = RecordingFolder(folder, AMPLE)
+    store.open()
+    records(store, range(3))
+    folder.rename(away)
+    records(store, range(3, 6))
+    assert store.run is not None
+    assert store.earlier == []
+    shutil.rmtree(folder)
+    away.rename(folder)
+    records(store, range(6, 9))
+    (earlier,) = store.earlier
+    assert [(it.first, it.end) for it in earlier.objects[1].tape.all] == [(0, 3 * GOP)]
+    store.close()
+    assert shown(folder) == [*range(3 * GOP), *range(6 * GOP, 9 * GOP)]
+    nothing_is_orphaned(folder)
+
+
+def test_who_took_the_folder_meanwhile_has_it(tmp_path: Path) -> None:
+    folder = tmp_path / "kept"
+    store, other = RecordingFolder(folder, AMPLE), RecordingFolder(folder, AMPLE)
+    store.open()
+    records(store, range(3))
+    shutil.rmtree(folder)
+    other.open()
+    records(other, range(3))
+    with pytest.raises(BlockingIOError, match="another process records there"):
+        store.write(piece(3, {1: A}), head(), InitSegments(filled()[1]))
+    store.abandon()
+    other.close()
+    records(store, range(4, 6))
+    store.close()
+    assert shown(folder) == [*range(3 * GOP), *range(4 * GOP, 6 * GOP)]
+
+
+@pytest.mark.parametrize("closed", [".", "RUN", "RUN/cameras", "RUN/cameras/c0", "RUN/index", "RUN/objects"])
+def test_where_it_may_not_write_nothing_is_left_and_when_it_may_it_goes_on(closed: str) -> None:
+    with nobodys_folder() as tmp_path:
+        folder = tmp_path / "kept"
+        store = RecordingFolder(folder, RetentionLimits(1e6, 1e6, 2 * GOP / FPS))
+        store.open()
+        records(store, range(3))
+        assert store.run is not None
+        path = Path(str(folder / closed).replace("RUN", store.run.folder.name))
+        path.chmod(0o500)
+        records(store, range(3, 8))
+        path.chmod(0o700)
+        records(store, range(8, 10))
+        store.close()
+        recorded = shown(folder)
+        assert set(recorded) >= {*range(3 * GOP), *range(8 * GOP, 10 * GOP)}
+        if closed != ".":
+            assert set(recorded) == set(range(10 * GOP)), "it went on in a new folder meanwhile"
+        nothing_is_orphaned(folder)
+
+
+def test_old_recordings_that_cannot_be_taken_away_keep_nobody_from_recording(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    with nobodys_folder() as tmp_path:
+        first = RecordingFolder(tmp_path, AMPLE)
+        first.open()
+        records(first, range(12))
+        first.close()
+        closed = [it for it in tmp_path.rglob("*") if it.is_dir()]
+        for it in closed:
+            it.chmod(0o500)
+        store = RecordingFolder(tmp_path, RetentionLimits(1e-9, 1e6, 1.0))
+        store.open()
+        records(store, range(20, 24))
+        for it in closed:
+            it.chmod(0o700)
+        assert store.run is not None
+        assert [(it.first, it.end) for it in store.run.cameras[A].tape.all] == [(100, 120)]
+        told = [it for it in caplog.messages if "cannot take away" in it]
+        assert len(told) == 1
+        assert "Permission denied" in told[0]
+        store.close()
+
+
+def test_a_full_disk_leaves_nothing_at_any_try_and_then_it_goes_on(tmp_path: Path) -> None:
+    store = RecordingFolder(tmp_path, AMPLE)
+    store.open()
+    records(store, range(3))
+    before = {it for it in tmp_path.rglob("*") if it.is_file()}
+    for size in (0, 100, len(filled()[1]) + 100):
+        with files_of_at_most(size):
+            records(store, range(5, 8))
+        assert {it for it in tmp_path.rglob("*") if it.is_file()} == before
+    records(store, range(8, 10))
+    store.close()
+    assert shown(tmp_path) == [*range(3 * GOP), *range(8 * GOP, 10 * GOP)]
+    nothing_is_orphaned(tmp_path)
+
+
+def test_what_is_left_of_runs_that_hardly_began_goes_and_media_without_a_head_are_told_of(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    RecordingSession.begin(tmp_path / "20260101T000000Z", head(), InitSegments(b"x"), 1.0)
+    (tmp_path / "20260101T000000Z" / "run.json").unlink()
+    media = tmp_path / "20260102T000000Z" / "cameras" / "c0" / "000000000000.mp4"
+    mine = tmp_path / "holiday" / "notes.txt"
+    for it in (media, mine):
+        it.parent.mkdir(parents=True)
+        it.write_bytes(b"")
+    store = RecordingFolder(tmp_path, AMPLE)
+    store.open()
+    store.close()
+    assert not (tmp_path / "20260101T000000Z").exists()
+    assert media.exists()
+    assert mine.exists()
+    assert "20260102T000000Z has no run.json" in caplog.text
+
+
+def test_what_is_lost_without_the_choices_is_kept_and_gets_old(tmp_path: Path) -> None:
+    store = RecordingFolder(tmp_path, AMPLE)
+    store.open()
+    records(store, range(12))
+    store.close()
+    assert store.run is not None
+    shutil.rmtree(store.run.folder / "index")
+    again = RecordingFolder(tmp_path, AMPLE)
+    again.open()
+    again.close()
+    assert [it.first for it in again.earlier[0].segments] == [0, 25, 50]
+    assert set(shown(tmp_path)) == set(range(12 * GOP))
+
+
+def test_that_a_new_folder_is_begun_is_one_line(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    store = RecordingFolder(tmp_path / "kept", AMPLE)
+    store.open()
+    for gop in range(20):
+        records(store, range(gop, gop + 1))
+        assert store.run is not None
+        shutil.rmtree(store.run.folder / "cameras" / "c0")
+    store.close()
+    lines = [it for it in caplog.records if it.levelno >= logging.WARNING]
+    assert len(lines) == 1
+    assert lines[0].getMessage().endswith(": No such file or directory; a new folder is begun")
+
+
+@pytest.fixture
+async def hall(tmp_path: Path) -> AsyncIterator[Hall]:
+    """Person 1 is in c0 for six GOPs, of which only the last is in memory."""
+    async for it in opened(record={"folder": str(tmp_path / "kept"), "segment_s": 0.4}):
+        await shows(it)
+        yield it
+
+
+async def shows(hall: Hall) -> None:
+    """Let six GOPs of person 1 be recorded."""
+    hall.service.past.recent._frames = GOP
+    hall.service.past.open()
+    hall.service.come(*CAMERAS)
+    hall.service.remembering.begin(0)
+    for epoch in range(7):
+        hall.service.feed(epoch, {A: {1: LARGE}, B: {1: SMALL}})
+    await until(lambda: written(hall) == 6)
+
+
+async def until(condition: Callable[[], bool]) -> None:
+    while not condition():  # noqa: ASYNC110 — of what another thread does
+        await asyncio.sleep(0.001)
+
+
+def written(hall: Hall) -> int:
+    assert hall.service.past.writer is not None
+    return hall.service.past.writer.written
+
+
+async def asked(hall: Hall, path: str) -> tuple[int, bytes]:
+    async with hall.session.get(path) as answer:
+        return answer.status, await answer.read()
+
+
+@pytest.mark.parametrize("harm", [gone("."), gone("RUN"), moved("."), made_anew("RUN"), made_a_file("RUN")])
+async def test_nobody_is_promised_what_is_gone(hall: Hall, harm: Harm) -> None:
+    store = hall.service.past.store
+    assert store is not None
+    assert store.run is not None
+    assert (await asked(hall, "/objects/1/best.mp4?from=p0&to=p10"))[0] == 200
+    harm(store.folder, store.run.folder)
+    for path in (
+        "/objects/1/best.mp4?from=p0&to=p10",
+        "/objects/1/best.ts?from=p0&to=p10",
+        "/cameras/c0/live.mp4?from=p0&to=p10",
+        "/objects/1/hls/index.m3u8?from=p0&to=p10",
+        "/cameras/c0/hls/index.m3u8?from=p0&to=p10",
+        "/api/past?from=p0&to=p10",
+    ):
+        status, body = await asked(hall, path)
+        assert status == 416, path
+        assert b"nothing is kept" in body
+        assert body.count(b"\n") == 0
+    for path in ("/api/objects/1/past", "/api/cameras/c0/past"):
+        spans = (await hall.get_json(path))["spans"]
+        assert [it["first"] for it in spans] == [spans[0]["first"]], "what is in memory"
+        assert spans[0]["first"] >= 4 * GOP, path
+
+
+@pytest.mark.parametrize(
+    ("path", "status", "error"),
+    [
+        ("/api/objects/1/past", 404, "nothing is kept of object 1"),
+        ("/objects/1/best.mp4?from=p0&to=p10", 404, "there is no object 1"),
+        ("/objects/1/hls/index.m3u8?from=p0&to=p10", 416, NOTHING),
+        ("/objects/1/hls/0.m4s", 404, "there is no segment 0 here, or not any more"),
+    ],
+)  # fmt: skip
+async def test_who_is_nowhere_else_is_gone_with_what_was_recorded(
+    hall: Hall, path: str, status: int, error: str
+) -> None:
+    store = hall.service.past.store
+    assert store is not None
+    hall.service.past.recent._choices.clear()
+    hall.service.splicer.forget([], [])
+    hall.service.splicer._people._gone.clear()
+    hall.service.decider.people.roll.first_seen.clear()
+    assert len((await hall.get_json("/api/objects/1/past"))["spans"]) == 1
+    shutil.rmtree(store.folder)
+    assert await hall.get(path) == (status, {"error": error})
+
+
+async def test_a_part_that_is_gone_is_a_hole(hall: Hall) -> None:
+    store = hall.service.past.store
+    assert store is not None
+    assert store.run is not None
+    store.run.camera_file(A, 0).unlink()
+    (store.run.camera_file(A, 2 * GOP)).write_bytes(b"cut short")
+    spans = (await hall.get_json("/api/cameras/c0/past"))["spans"]
+    assert [it["first"] for it in spans] == [4 * GOP]
+    assert [it["first"] for it in (await hall.get_json("/api/cameras/c1/past"))["spans"]] == [0]
+    status, body = await asked(hall, "/cameras/c0/live.mp4?from=p0&to=p30")
+    assert status == 200
+    assert len(body) > 1000
+
+
+async def test_what_may_not_be_read_is_told_in_one_line() -> None:
+    with nobodys_folder() as tmp_path:
+        async for hall in opened(record={"folder": str(tmp_path / "kept"), "segment_s": 0.4}):
+            await shows(hall)
+            store = hall.service.past.store
+            assert store is not None
+            assert store.run is not None
+            (store.run.folder / "cameras" / "c0").chmod(0)
+            error = {"error": "what is recorded cannot be read: Permission denied"}
+            assert await hall.get("/cameras/c0/live.mp4?from=p0&to=p10") == (503, error)
+            assert await hall.get("/api/cameras/c0/past") == (503, error)
+            (store.run.folder / "cameras" / "c0").chmod(0o700)
+            assert (await asked(hall, "/cameras/c0/live.mp4?from=p0&to=p10"))[0] == 200
+
+
+async def test_that_recording_stands_is_told_and_that_it_goes_on(hall: Hall) -> None:
+    store, writer = hall.service.past.store, hall.service.past.writer
+    assert store is not None
+    assert writer is not None
+    writer._retry_s = 0.0
+    shutil.rmtree(store.folder)
+    store.folder.write_text("somebody's\n")
+    hall.service.feed(7, {A: {1: LARGE}, B: {1: SMALL}})
+    await until(lambda: writer.lost == 1)
+    assert b"myview_recording 0.0" in (await asked(hall, "/metrics"))[1]
+    hall.service.pulse = hall.service.board.end
+    hall.service._pulsed_at = asyncio.get_running_loop().time()
+    assert await asked(hall, "/readyz") == (200, b"2 of 2 cameras; nothing is recorded: File exists\n")
+    store.folder.unlink()
+    hall.service.feed(8, {A: {1: LARGE}, B: {1: SMALL}})
+    await until(lambda: written(hall) == 7)
+    assert b"myview_recording 1.0" in (await asked(hall, "/metrics"))[1]
+    assert await asked(hall, "/readyz") == (200, b"2 of 2 cameras\n")
+    status, body = await asked(hall, f"/objects/1/best.mp4?from=p{7 * GOP}&to=p{8 * GOP}")
+    assert status == 200
+    assert body

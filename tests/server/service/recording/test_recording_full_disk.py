@@ -1,0 +1,186 @@
+"""On a full disk what is too old is taken away all the same: nothing that lies there is forgotten."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from fakes.cameras import CAMERAS, FPS, GOP, FedService, small_config
+from fakes.recordings import AMPLE, PULSE0, A, ClocksByHand, filled, head, pictures, piece
+from fakes.system.full_disk import files_of_at_most
+from server.service.recording.recording_folder import RecordingFolder
+from server.service.recording.recording_session import InitSegments, RecordingSession
+from server.service.recording.retention import RetentionLimits
+from server.service.recording.segment_index import IndexEntry
+
+BOUNDS = RetentionLimits(keep_s=3.0, most_mb=1e6, segment_s=1.0)
+SEGMENT = 25  # pulses
+
+
+@pytest.fixture
+def clock() -> ClocksByHand:
+    return ClocksByHand()
+
+
+def record(store: RecordingFolder, clock: ClocksByHand, gops: range) -> None:
+    """Write GOPs of person 1 in a camera, in real time."""
+    for gop in gops:
+        clock.now = PULSE0 + gop * GOP / FPS
+        store.write(piece(gop, {1: A}), head(), InitSegments(filled()[1]))
+
+
+def opened(folder: Path, clock: ClocksByHand, bounds: RetentionLimits = BOUNDS) -> RecordingFolder:
+    store = RecordingFolder(folder, bounds, clock.machine)
+    store.open()
+    return store
+
+
+def leave(store: RecordingFolder) -> None:
+    """End a service."""
+    store.close()
+
+
+def refused(store: RecordingFolder, clock: ClocksByHand, gop: int) -> None:
+    """Try to write a GOP on a disk that takes not a byte; it is given up, as the writer does."""
+    with files_of_at_most(0), pytest.raises(OSError, match="large"):
+        record(store, clock, range(gop, gop + 1))
+    store.abandon()
+
+
+def on_disk(folder: Path) -> list[int]:
+    """Say of which segments there are pictures, by their first pulse."""
+    return sorted({int(it.stem) for it in folder.glob("*/cameras/*/*.mp4")})
+
+
+def files_in(run: RecordingSession) -> set[int]:
+    """Give the files that the playlists in memory refer to."""
+    tapes = [it.tape for it in (*run.cameras.values(), *run.objects.values())]
+    return {stretch.file for tape in tapes for stretch in tape.all}
+
+
+def files_told(run: RecordingSession) -> set[int]:
+    """Give the files that the playlists on the disk refer to."""
+    told: set[int] = set()
+    for path in run.folder.rglob("*.m3u8"):
+        told |= {int(line[-16:-4]) for line in path.read_text().splitlines() if line[:1] not in ("#", "")}
+    return told
+
+
+def test_what_is_too_old_goes_from_a_disk_that_takes_nothing(tmp_path: Path, clock: ClocksByHand) -> None:
+    store = opened(tmp_path, clock)
+    record(store, clock, range(20))
+    assert on_disk(tmp_path) == [0, 25, 50, 75]
+    refused(store, clock, 27)
+    run = store.run
+    assert run is not None
+    assert on_disk(tmp_path) == [50, 75], "those before ended more than three seconds ago"
+    assert [it.first for it in run.segments if it.bytes] == [50, 75]
+    assert files_in(run) == {50, 75}
+    assert files_told(run) == {0, 25, 50, 75}, "the playlists could not be written"
+    record(store, clock, range(29, 30))
+    assert files_told(run) == {50, 75, 145}
+    played = [pulse for pulse, _ in pictures(run.objects[1].path)]
+    assert played == [*range(50, 100), *range(145, 150)]
+    store.close()
+
+
+def test_a_disk_that_is_full_at_the_start_is_taken_and_cleared(tmp_path: Path, clock: ClocksByHand) -> None:
+    store = opened(tmp_path, clock)
+    record(store, clock, range(20))
+    leave(store)
+    clock.now += 2.6
+    with files_of_at_most(0):
+        again = opened(tmp_path, clock)
+    assert on_disk(tmp_path) == [75]
+    (earlier,) = again.earlier
+    assert [it.first for it in earlier.segments] == [75]
+    assert files_in(earlier) == {75}
+    again.close()
+
+
+def test_what_gets_too_old_goes_before_a_run_begins(tmp_path: Path, clock: ClocksByHand) -> None:
+    store = opened(tmp_path, clock)
+    record(store, clock, range(20))
+    leave(store)
+    again = opened(tmp_path, clock)
+    assert on_disk(tmp_path) == [0, 25, 50, 75]
+    refused(again, clock, 27)
+    assert on_disk(tmp_path) == [50, 75]
+    assert again.run is None, "it could not begin"
+    again.close()
+
+
+def test_what_playlists_refer_to_in_vain_is_not_known_after_a_restart(
+    tmp_path: Path, clock: ClocksByHand
+) -> None:
+    store = opened(tmp_path, clock)
+    record(store, clock, range(20))
+    refused(store, clock, 27)
+    assert store.run is not None
+    with files_of_at_most(0):
+        leave(store)
+    assert files_told(store.run) == {0, 25, 50, 75}
+    again = opened(tmp_path, clock, AMPLE)
+    (earlier,) = again.earlier
+    assert files_in(earlier) == {50, 75} == files_told(earlier)
+    again.close()
+
+
+def test_what_cannot_be_taken_away_is_not_forgotten(
+    tmp_path: Path,
+    clock: ClocksByHand,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    store = opened(tmp_path, clock)
+    record(store, clock, range(20))
+    run, real = store.run, Path.unlink
+    assert run is not None
+
+    def unlink(path: Path, *, missing_ok: bool = False) -> None:
+        if path == run.camera_file(A, 0):
+            raise PermissionError(1, "Operation not permitted", str(path))
+        real(path, missing_ok=missing_ok)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "unlink", unlink)
+        record(store, clock, range(27, 28))
+    assert on_disk(tmp_path) == [0, 50, 75, 135], "and it is recorded all the same"
+    assert [it.first for it in run.segments] == [0, 50, 75, 135]
+    assert files_in(run) == {50, 75, 135}, "its pictures are not played any more"
+    assert f"{run.camera_file(A, 0)}: Operation not permitted" in caplog.text
+    record(store, clock, range(33, 34))
+    assert on_disk(tmp_path) == [75, 135, 165]
+    store.close()
+
+
+def test_a_full_disk_does_not_keep_the_service_from_its_start(tmp_path: Path, clock: ClocksByHand) -> None:
+    folder = tmp_path / "kept"
+    store = opened(folder, clock)
+    record(store, clock, range(20))
+    leave(store)
+    service = FedService(small_config(record={"folder": str(folder), "keep_s": 1.5}))
+    service.come(*CAMERAS)
+    with files_of_at_most(0):
+        service.past.open()
+        assert on_disk(folder) == [50, 75]
+        service.close()
+
+
+def test_a_playlist_that_could_not_be_written_tells_so_until_it_is(
+    tmp_path: Path, clock: ClocksByHand
+) -> None:
+    store = opened(tmp_path, clock)
+    record(store, clock, range(12))
+    assert store.run is not None
+    playlist = store.run.cameras[A]
+    playlist.drop({0})
+    with files_of_at_most(0), pytest.raises(OSError, match="large"):
+        playlist.tidy()
+    assert playlist.stale
+    playlist.append(IndexEntry(A, 50, 9_999, 10, 100, 5))
+    assert playlist.stale, "what was added stands behind what is gone"
+    playlist.tidy()
+    assert not playlist.stale
+    store.close()

@@ -1,0 +1,254 @@
+"""What is recorded plays from the disk by itself, goes in order, and takes no more than it may."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from fakes.cameras import FPS, GOP
+from fakes.media.decoding import decodes_without_errors
+from fakes.recordings import (
+    AMPLE,
+    PULSE0,
+    A,
+    B,
+    ClocksByHand,
+    everything_that_plays,
+    filled,
+    head,
+    own_pictures,
+    pictures,
+    piece,
+    written,
+)
+from fakes.system.full_disk import files_of_at_most
+from server.service.recording.media_files import MediaFile, read_gops
+from server.service.recording.recording_folder import RecordingFolder
+from server.service.recording.recording_session import InitSegments
+from server.service.recording.retention import RetentionLimits
+
+
+def only_run(folder: Path) -> Path:
+    (run,) = (it for it in folder.iterdir() if it.is_dir())
+    return run
+
+
+def test_a_persons_playlist_is_the_chosen_cameras_pictures_pixel_for_pixel_across_cuts(
+    tmp_path: Path,
+) -> None:
+    choices = [A, A, B, B, A, B, A, A, A, B, B, A]
+    store = written(
+        RecordingFolder(tmp_path, AMPLE), [piece(gop, {1: camera}) for gop, camera in enumerate(choices)]
+    )
+    during = list(pictures(only_run(tmp_path) / "objects" / "1.m3u8"))
+    store.close()
+    after = list(pictures(only_run(tmp_path) / "objects" / "1.m3u8"))
+    for played in (during, after):
+        assert [pulse for pulse, _ in played] == list(range(len(choices) * GOP))
+        for pulse, picture in played:
+            np.testing.assert_array_equal(picture, own_pictures(choices[pulse // GOP])[pulse])
+
+
+def test_a_camera_is_written_once_however_many_people_it_shows(tmp_path: Path) -> None:
+    few = written(RecordingFolder(tmp_path / "few", AMPLE), [piece(gop, {1: A}) for gop in range(4)])
+    many = written(
+        RecordingFolder(tmp_path / "many", AMPLE),
+        [piece(gop, dict.fromkeys(range(50), A)) for gop in range(4)],
+    )
+    few.close()
+    many.close()
+    sizes = [sum(it.stat().st_size for it in folder.rglob("*.mp4")) for folder in tmp_path.iterdir()]
+    assert sizes[0] == sizes[1]
+
+
+def test_every_file_and_playlist_decodes_without_errors_even_with_holes(tmp_path: Path) -> None:
+    pieces = [piece(gop, {1: A, 2: B} if gop % 4 else {1: A}) for gop in range(12) if gop != 7]
+    written(RecordingFolder(tmp_path, AMPLE), pieces).close()
+    files = everything_that_plays(tmp_path)
+    assert len(files) == 2 + 2 + 3 * 2, "two people, two cameras, three files each"
+    for path in files:
+        decodes_without_errors(path)
+
+
+def test_a_playlist_keeps_to_the_rules(tmp_path: Path) -> None:
+    written(
+        RecordingFolder(tmp_path, AMPLE),
+        [piece(gop, {1: B if gop == 3 else A}) for gop in range(7) if gop != 5],
+    )
+    text = (only_run(tmp_path) / "objects" / "1.m3u8").read_text()
+    lines = text.splitlines()
+    assert lines[0] == "#EXTM3U"
+    assert lines[-1] == "#EXT-X-ENDLIST"
+    assert text.count("#EXT-X-ENDLIST") == 1
+    target = next(int(it.partition(":")[2]) for it in lines if it.startswith("#EXT-X-TARGETDURATION"))
+    assert all(round(float(it[8:].split(",")[0])) <= target for it in lines if it.startswith("#EXTINF:"))
+    assert lines.count("#EXT-X-DISCONTINUITY") == 1, "where GOP 5 is missing"
+    assert "#EXT-X-PROGRAM-DATE-TIME:2025-11-21T04:40:00.000Z" in lines
+    for place, line in enumerate(lines):
+        if line.startswith("#EXT-X-BYTERANGE:"):
+            length, offset = map(int, line.partition(":")[2].split("@"))
+            data = (only_run(tmp_path) / "objects" / lines[place + 1]).read_bytes()[offset : offset + length]
+            assert data[4:8] == b"moof"
+            assert len(data) == length
+
+
+def test_the_index_says_who_was_where(tmp_path: Path) -> None:
+    written(RecordingFolder(tmp_path, AMPLE), [piece(gop, {1: A}) for gop in range(7)]).close()
+    first, second = sorted((only_run(tmp_path) / "index").iterdir())
+    lines = [json.loads(line) for path in (first, second) for line in path.read_text().splitlines()]
+    assert [line["first"] for line in lines] == [gop * GOP for gop in range(7)]
+    assert lines[0]["choices"] == {"1": A}
+    assert lines[0]["boxes"][B][0] == [[1, 1.0, 2.0, 3.0, 4.0]]
+
+
+def test_of_a_gop_that_did_not_come_whole_the_beginning_is_kept_and_shown_to_nobody(tmp_path: Path) -> None:
+    pieces = [piece(0, {1: A}), piece(1, {1: A}, frames=3), piece(2, {1: A})]
+    run = written(RecordingFolder(tmp_path, AMPLE), pieces).run
+    assert run is not None
+    assert [pulse for pulse, _ in pictures(run.cameras[A].path)] == [
+        0,
+        1,
+        2,
+        3,
+        4,
+        5,
+        6,
+        7,
+        10,
+        11,
+        12,
+        13,
+        14,
+    ]
+    assert [(it.first, it.end) for it in run.objects[1].tape.all] == [(0, 5), (10, 15)]
+
+
+def test_a_service_that_begins_again_goes_on_beside_what_is_there(tmp_path: Path) -> None:
+    written(RecordingFolder(tmp_path, AMPLE), [piece(gop, {1: A}) for gop in range(3)]).close()
+    second = written(RecordingFolder(tmp_path, AMPLE), [piece(gop, {1: B}) for gop in range(3)])
+    assert len([it for it in tmp_path.iterdir() if it.is_dir()]) == 2
+    (earlier,) = second.earlier
+    assert [(it.first, it.end) for it in earlier.objects[1].tape.all] == [(0, 15)]
+    for run, camera in ((earlier, A), (second.run, B)):
+        assert run is not None
+        for pulse, picture in pictures(run.objects[1].path):
+            np.testing.assert_array_equal(picture, own_pictures(camera)[pulse])
+
+
+def test_pulses_that_begin_anew_are_another_run(tmp_path: Path) -> None:
+    store = written(RecordingFolder(tmp_path, AMPLE), [piece(gop, {1: A}) for gop in (5, 6, 0, 1)])
+    assert store.run is not None
+    assert [(it.first, it.end) for it in store.run.objects[1].tape.all] == [(0, 10)]
+    assert [(it.first, it.end) for it in store.earlier[0].objects[1].tape.all] == [(25, 35)]
+
+
+def test_two_processes_do_not_record_into_one_folder(tmp_path: Path) -> None:
+    store = written(RecordingFolder(tmp_path, AMPLE), [])
+    with pytest.raises(BlockingIOError):
+        RecordingFolder(tmp_path, AMPLE).open()
+    store.close()
+    RecordingFolder(tmp_path, AMPLE).open()
+
+
+def test_what_is_too_old_goes_in_whole_segments_with_what_refers_to_it(tmp_path: Path) -> None:
+    clocks = ClocksByHand()
+    store = RecordingFolder(tmp_path, RetentionLimits(keep_s=3.0, most_mb=1e6, segment_s=1.0), clocks.machine)
+    store.open()
+    for gop in range(40):
+        clocks.now = PULSE0 + gop * GOP / FPS
+        store.write(piece(gop, {1: A, 2 if gop < 10 else 3: B}), head(), InitSegments(filled()[1]))
+    store.close()
+    run = store.run
+    assert run is not None
+    assert [it.first for it in run.segments] == [100, 125, 150, 175]
+    assert sorted(run.objects) == [1, 3]
+    assert not (run.folder / "objects" / "2.m3u8").exists()
+    kept = sorted(int(it.stem) for it in (run.folder / "cameras" / A).iterdir())
+    assert kept == [100, 125, 150, 175] == sorted(int(it.stem) for it in (run.folder / "index").iterdir())
+    assert [pulse for pulse, _ in pictures(run.objects[1].path)] == list(range(100, 200))
+
+
+@settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    st.lists(st.dictionaries(st.integers(1, 4), st.sampled_from([A, B])), min_size=1, max_size=40), st.data()
+)
+def test_the_disk_takes_no_more_than_it_may_and_what_is_found_again_is_what_was_known(
+    tmp_path_factory: pytest.TempPathFactory, shown: list[dict[int, str]], data: st.DataObject
+) -> None:
+    folder = tmp_path_factory.mktemp("bounded")
+    most_mb = data.draw(st.sampled_from([0.05, 0.1, 1.0]))
+    store = RecordingFolder(folder, RetentionLimits(keep_s=1e6, most_mb=most_mb, segment_s=0.4))
+    store.open()
+    slack = 2 * 8_000  # bytes: a GOP of both cameras, its line, its references
+    for gop, choices in enumerate(shown):
+        store.write(piece(gop, choices), head(), InitSegments(filled()[1]))
+        on_disk = sum(it.stat().st_size for it in folder.rglob("*") if it.is_file())
+        assert on_disk <= most_mb * 1e6 + slack
+    store.close()
+    again = RecordingFolder(folder, AMPLE)
+    again.open()
+    assert store.run is not None
+    found = {number: it.tape.all for run in again.earlier for number, it in run.objects.items()}
+    assert found == {number: it.tape.all for number, it in store.run.objects.items()}
+    for number, tape in found.items():
+        expected = [gop for gop, choices in enumerate(shown) if number in choices]
+        kept = [pulse // GOP for it in tape for pulse in range(it.first, it.end, GOP)]
+        assert kept == expected[len(expected) - len(kept) :], "the newest, without a hole of our own"
+        for it in tape:
+            path = again.earlier[0].camera_file(it.camera, it.file)
+            assert [gop.first for gop in read_gops(path, it.offset, it.length, FPS)] == list(
+                range(it.first, it.end, GOP)
+            )
+    again.close()
+
+
+def test_when_the_disk_is_full_what_is_there_plays_and_later_it_goes_on(tmp_path: Path) -> None:
+    store = written(RecordingFolder(tmp_path, AMPLE), [piece(gop, {1: A}) for gop in range(2)])
+    assert store.run is not None
+    size = store.run.camera_file(A, 0).stat().st_size
+    with files_of_at_most(size + 300), pytest.raises(OSError, match="large") as refused:
+        store.write(piece(2, {1: A}), head(), InitSegments(filled()[1]))
+    assert refused.value.errno == errno.EFBIG
+    store.abandon()
+    assert store.run.camera_file(A, 0).stat().st_size == size
+    with files_of_at_most(len(filled()[1]) + 300), pytest.raises(OSError, match="large"):
+        store.write(piece(3, {1: A}), head(), InitSegments(filled()[1]))
+    store.abandon()
+    store.write(piece(4, {1: A}), head(), InitSegments(filled()[1]))
+    store.close()
+    assert [pulse // GOP for pulse, _ in pictures(store.run.objects[1].path)][::GOP] == [0, 1, 4]
+    for path in everything_that_plays(tmp_path):
+        decodes_without_errors(path)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.001, 0.3, 0.9])
+def test_a_writer_killed_in_the_middle_of_a_gop_leaves_a_file_that_plays(
+    tmp_path: Path, share: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    gop_of = piece(0, {}).cameras[A], piece(1, {}).cameras[A]
+    path = tmp_path / "0.mp4"
+    file = MediaFile(path, filled()[1])
+    file.append(gop_of[0])
+
+    class KilledError(BaseException):
+        pass
+
+    real = os.pwrite
+
+    def killed(handle: int, data: bytes, offset: int) -> int:
+        real(handle, bytes(data)[: max(8, round(len(data) * share))], offset)
+        raise KilledError
+
+    monkeypatch.setattr(os, "pwrite", killed)
+    with pytest.raises(KilledError):
+        file.append(gop_of[1])
+    file.close()
+    decodes_without_errors(path)
+    assert [pulse for pulse, _ in pictures(path)] == list(range(GOP))

@@ -1,0 +1,213 @@
+"""A slow or full disk costs the recording GOPs, and nobody else anything."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from fakes.cameras import CAMERAS, GOP, SMALL, FedService, TrackNumbers, encoded, small_config, video
+from fakes.recordings import A, B, pictures, piece
+from fakes.timeouts import PATIENCE
+from server.service.recording.recording_folder import GopRecord
+from server.service.recording.writer_thread import WriterThread
+from server.system.errors import UserError
+
+
+class Disk:
+    """Takes pieces, when it is let."""
+
+    def __init__(self) -> None:
+        self.taken: list[int] = []
+        self.refuses = False
+        self.abandoned = 0
+        self.open = threading.Event()
+        self.open.set()
+        self.asked = threading.Semaphore(0)
+
+    def write(self, it: GopRecord) -> None:
+        self.asked.release()
+        assert self.open.wait(PATIENCE)
+        if self.refuses:
+            raise OSError(28, "No space left on device", "c0/000.mp4")
+        self.taken.append(it.choices.first)
+
+    def abandon(self) -> None:
+        self.abandoned += 1
+
+    def close(self) -> None:
+        self.taken.append(-1)
+
+
+def writer_on(disk: Disk, most: int = 4, retry_s: float = 0.0) -> WriterThread:
+    writer = WriterThread(disk.write, disk.abandon, disk.close, most, retry_s)
+    writer.start()
+    return writer
+
+
+def test_what_waits_is_written_before_the_end() -> None:
+    disk = Disk()
+    writer = writer_on(disk, most=100)
+    for gop in range(20):
+        writer.put(piece(gop, {1: A}))
+    writer.close()
+    assert disk.taken == [*range(0, 20 * GOP, GOP), -1]
+    assert (writer.written, writer.lost) == (20, 0)
+
+
+def test_a_slow_disk_is_not_waited_for_and_whole_gops_are_left_out() -> None:
+    disk = Disk()
+    disk.open.clear()
+    writer = writer_on(disk, most=4)
+    writer.put(piece(0, {1: A}))
+    assert disk.asked.acquire(timeout=PATIENCE), "the first one is being written"
+    for gop in range(1, 20):
+        writer.put(piece(gop, {1: A}))
+    assert writer.lost == 15
+    disk.open.set()
+    writer.close()
+    assert disk.taken == [0, 5, 10, 15, 20, -1]
+
+
+def test_a_full_disk_is_told_once_tried_again_and_counted(caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level(logging.INFO)
+    disk = Disk()
+    disk.refuses = True
+    writer = writer_on(disk, most=100)
+    for gop in range(3):
+        writer.put(piece(gop, {1: A}))
+        assert disk.asked.acquire(timeout=PATIENCE)
+    while writer.lost < 3:
+        threading.Event().wait(0.001)
+    assert writer.trouble == "No space left on device"
+    disk.refuses = False
+    writer.put(piece(3, {1: A}))
+    writer.close()
+    assert (disk.taken, disk.abandoned) == ([15, -1], 3)
+    assert (writer.written, writer.lost, writer.trouble) == (1, 3, "")
+    told, goes_on = (it.getMessage() for it in caplog.records)
+    assert told.startswith("recording: cannot write: No space left on device; nothing is recorded")
+    assert goes_on.startswith("recording: goes on, after ")
+
+
+def test_a_disk_that_is_full_again_and_again_is_not_told_of_each_time(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    caplog.set_level(logging.INFO)
+    disk = Disk()
+    writer = writer_on(disk, most=100)
+    for gop in range(0, 20, 2):
+        disk.refuses = True
+        writer.put(piece(gop, {1: A}))
+        until(lambda gop=gop: writer.lost == gop // 2 + 1)
+        disk.refuses = False
+        writer.put(piece(gop + 1, {1: A}))
+        until(lambda gop=gop: writer.written == gop // 2 + 1)
+    writer.close()
+    assert len(caplog.messages) == 2
+
+
+def until(condition: Callable[[], bool]) -> None:
+    """Wait for what the writer's thread does."""
+    while not condition():
+        threading.Event().wait(0.001)
+
+
+def test_a_disk_that_does_not_answer_is_told_of() -> None:
+    disk = Disk()
+    disk.open.clear()
+    writer = writer_on(disk)
+    writer.put(piece(0, {1: A}))
+    assert disk.asked.acquire(timeout=PATIENCE)
+    assert writer._since is not None
+    writer._since -= 1000.0
+    assert writer.stands.startswith("the disk has not answered for 10")
+    disk.open.set()
+    until(lambda: writer.written == 1)
+    until(lambda: not writer.stands)
+    writer.close()
+
+
+def test_a_mistake_does_not_end_the_recording(caplog: pytest.LogCaptureFixture) -> None:
+    class Mistaken(Disk):
+        def write(self, it: GopRecord) -> None:
+            if not self.taken:
+                self.taken.append(-2)
+                raise ValueError("a mistake")
+            super().write(it)
+
+    disk = Mistaken()
+    writer = writer_on(disk, most=100)
+    for gop in range(3):
+        writer.put(piece(gop, {1: A}))
+    writer.close()
+    assert disk.taken == [-2, 5, 10, -1]
+    assert (writer.written, writer.lost, writer.trouble) == (2, 1, "")
+    assert "a mistake in MyView" in caplog.text
+
+
+def test_a_full_disk_is_left_alone_for_a_while() -> None:
+    disk = Disk()
+    disk.refuses = True
+    writer = writer_on(disk, most=100, retry_s=1000.0)
+    for gop in range(10):
+        writer.put(piece(gop, {1: A}))
+    writer.close()
+    assert (disk.abandoned, writer.lost) == (1, 10)
+
+
+def fed(folder: Path) -> FedService:
+    service = FedService(small_config(record={"folder": str(folder), "segment_s": 1.0}))
+    service.decider.people._registry = TrackNumbers()  # type: ignore[assignment]
+    service.come(*CAMERAS)
+    return service
+
+
+def test_a_service_records_what_it_decides(tmp_path: Path) -> None:
+    service = fed(tmp_path / "kept")
+    service.past.open()
+    for epoch in range(7):
+        service.feed(epoch, {A: {1: SMALL}, B: {}})
+    service.close()
+    run = service.past.run
+    assert run is not None
+    assert [pulse for pulse, _ in pictures(run.objects[1].path)] == list(range(6 * GOP))
+    assert [pulse for pulse, _ in pictures(run.cameras[B].path)] == list(range(6 * GOP))
+
+
+def test_pictures_that_come_after_the_decision_are_recorded_too(tmp_path: Path) -> None:
+    service = fed(tmp_path / "kept")
+    service.past.open()
+    for epoch in range(7):
+        service.feed(epoch, {A: {1: SMALL}})
+    for unit in encoded(1)[: 7 * GOP]:
+        service.intake.video(video(B, unit))
+    service.feed(7, {A: {1: SMALL}})
+    service.close()
+    run = service.past.run
+    assert run is not None
+    decided = service.past.recent.end
+    assert decided >= 5 * GOP
+    for camera in CAMERAS:
+        assert [pulse for pulse, _ in pictures(run.cameras[camera].path)] == list(range(decided))
+
+
+def test_a_folder_that_cannot_be_used_is_told_in_one_line(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(UserError, match=r"record\.folder: .*file: cannot write there"):
+        fed(tmp_path / "file").past.open()
+    first = fed(tmp_path / "kept")
+    first.past.open()
+    with pytest.raises(UserError, match="another process records there"):
+        fed(tmp_path / "kept").past.open()
+    first.close()
+
+
+def test_nothing_is_written_where_no_folder_is_named() -> None:
+    service = FedService(small_config())
+    service.past.open()
+    assert service.past.run is None
+    service.close()

@@ -1,0 +1,68 @@
+"""The past of cameras with parameter sets of their own is what was live, holes included."""
+
+from __future__ import annotations
+
+import asyncio
+import io
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+
+from fakes.cameras import FPS, GOP
+from fakes.parameter_sets import GOPS, MISSING, OWN, decision, expected, put
+from fakes.recordings import PULSE0
+from fakes.site import Hall, opened
+from server.messaging.messages import GopChoices
+
+FRAMES = GOPS * GOP
+
+
+@pytest.fixture
+async def hall(tmp_path: Path) -> AsyncIterator[Hall]:
+    record = {"folder": str(tmp_path / "kept"), "segment_s": 1.0}
+    async for hall in opened(**OWN, record=record, http={"hls_segment_s": 0.4}):
+        service = hall.service
+        service.past.open()
+        put(service.shelves)
+        for gop in range(GOPS):
+            chosen = decision(gop)
+            choices = {it.number: it.camera for it in chosen.choices}
+            service.past.put(
+                GopChoices(first=gop * GOP, frames=GOP, choices=choices, boxes={}, cuts=[]), PULSE0
+            )
+            service.splicer.decision(chosen)
+        while service.past.writer is not None and service.past.writer.written < GOPS - 2:  # noqa: ASYNC110
+            await asyncio.sleep(0.001)
+        yield hall
+
+
+async def fetch(hall: Hall, *paths: str) -> bytes:
+    data = []
+    for path in paths:
+        async with hall.session.get(path) as answer:
+            assert answer.status == 200, await answer.text()
+            data.append(await answer.read())
+    return b"".join(data)
+
+
+@pytest.mark.parametrize("form", ["mp4", "ts", "hls"])
+async def test_the_past_is_what_was_live(hall: Hall, form: str) -> None:
+    reel = hall.service.splicer.reel(1)
+    assert reel is not None
+    reel._segments.clear()
+    if form == "hls":
+        names = ["init.mp4", *(f"{number}.m4s" for number in range(GOPS // 2))]
+        data = await fetch(hall, *(f"/objects/1/hls/{name}" for name in names))
+    else:
+        data = await fetch(hall, f"/objects/1/best.{form}?from=p0&to=p{FRAMES}")
+    with av.open(io.BytesIO(data), "r") as container:
+        frames = list(container.decode(video=0))
+    start = float(frames[0].time or 0) if form == "ts" else 0.0
+    seen = {round((float(it.time or 0) - start) * FPS): it.to_ndarray(format="yuv420p") for it in frames}
+    assert MISSING, "there are holes in it, which are bridged"
+    assert form == "hls" or list(seen) == list(range(FRAMES))
+    for pulse, right in enumerate(expected()):
+        np.testing.assert_array_equal(seen[max(it for it in seen if it <= pulse)], right, str(pulse))

@@ -1,0 +1,479 @@
+"""A stream that begins in the past: from the disk, then from memory, then live, without a hole."""
+
+from __future__ import annotations
+
+import asyncio
+import io
+import json
+from collections.abc import AsyncIterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import av
+import msgspec
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from fakes.cameras import CAMERAS, FPS, GOP, LARGE, SMALL
+from fakes.recordings import (
+    AMPLE,
+    PULSE0,
+    A,
+    B,
+    Picture,
+    filled,
+    fragments,
+    head,
+    own_pictures,
+    piece,
+    written,
+)
+from fakes.site import Hall, opened
+from server.media.containers.mpegts import Counters
+from server.media.picture import Picture as Shown
+from server.media.stream_format import Agreement
+from server.messaging.inbox import Message
+from server.messaging.messages import Box, ZenohKeys
+from server.messaging.retained_state import IdentitySnapshot
+from server.service.recording.media_files import pulse_of
+from server.service.recording.recording_folder import RecordingFolder
+from server.service.recording.recording_session import InitSegments
+from server.service.recording.segment_index import PulseRange
+from server.service.streaming.broadcaster import Broadcaster
+from server.service.streaming.gapless_timeline import GaplessTimeline
+from server.service.streaming.media_chunk import MediaChunk
+from server.service.time_shift import time_shift_stream as past_stream
+from server.service.time_shift.availability import available_ranges, end_of_available, first_available
+from server.service.time_shift.playback import CameraPlayback, PersonPlayback, SessionEntries
+from server.service.time_shift.time_reference import TimeReferenceError, parse_time_reference
+from server.service.time_shift.time_shift_stream import PlaybackRange, TimeShiftStream
+
+MOMENT = "say seconds back (-60), a pulse (p1250) or a time (2026-11-21T16:13:36Z)"
+IN_A: Mapping[str, Mapping[int, Box | None]] = {A: {1: LARGE}, B: {1: SMALL}}
+IN_B: Mapping[str, Mapping[int, Box | None]] = {A: {1: SMALL}, B: {1: LARGE}}
+
+
+@pytest.fixture
+async def recorded(tmp_path: Path) -> AsyncIterator[Hall]:
+    """Six GOPs of person 1, in c0, then in c1; all but the last two are on the disk alone."""
+    async for hall in opened(record={"folder": str(tmp_path / "kept"), "segment_s": 0.4}):
+        hall.service.past.recent._frames = GOP
+        hall.service.past.open()
+        hall.service.come(*CAMERAS)
+        for epoch in range(7):
+            hall.service.feed(epoch, IN_A if epoch < 3 else IN_B)
+        await until_written(hall, 6)
+        yield hall
+
+
+async def until_written(hall: Hall, gops: int) -> None:
+    while hall.service.past.writer is not None and hall.service.past.writer.written < gops:  # noqa: ASYNC110
+        await asyncio.sleep(0.001)
+
+
+def decoded(data: bytes) -> list[tuple[int, Picture]]:
+    with av.open(io.BytesIO(data), "r") as container:
+        return [
+            (round(float(frame.time or 0) * FPS), frame.to_ndarray(format="yuv420p"))
+            for frame in container.decode(video=0)
+        ]
+
+
+async def read(hall: Hall, path: str) -> list[tuple[int, Picture]]:
+    async with hall.session.get(path) as answer:
+        assert answer.status == 200, await answer.text()
+        assert answer.content_type == "video/mp4"
+        return decoded(await answer.read())
+
+
+async def read_up_to(hall: Hall, path: str, pulse: int, then: int) -> list[tuple[int, Picture]]:
+    """Read a stream; when a pulse has come, feed one more epoch, and read that too."""
+    data, fed = b"", False
+    async with hall.session.get(path) as answer:
+        while True:
+            data += await answer.content.readany()
+            newest = max((pulse_of(it, FPS) for it in fragments(data)), default=-1)
+            if not fed and newest >= pulse - 1:
+                hall.service.feed(then, IN_B)
+                fed = True
+            if newest >= pulse + GOP - 1:
+                return decoded(data)
+
+
+async def test_somebodys_past_goes_over_into_the_present_without_a_hole(recorded: Hall) -> None:
+    camera = {
+        pulse: choices.choices[1]
+        for choices in recorded.service.past.recent.choices(0)
+        for pulse in range(choices.first, choices.first + GOP)
+    }
+    assert min(camera) >= 4 * GOP, "the beginning is on the disk alone"
+    shown = await read_up_to(recorded, "/objects/1/best.mp4?from=p7", 6 * GOP, 7)
+    assert [pulse for pulse, _ in shown] == list(range(GOP, 7 * GOP))
+    used = set()
+    for pulse, picture in shown:
+        (equal,) = [it for it in CAMERAS if np.array_equal(picture, own_pictures(it)[pulse])]
+        assert camera.get(pulse, equal) == equal
+        used.add(equal)
+    assert used == {A, B}
+
+
+async def test_a_cameras_past_goes_over_into_the_present_without_a_hole(recorded: Hall) -> None:
+    shown = await read_up_to(recorded, "/cameras/c0/live.mp4?from=p0", 7 * GOP, 7)
+    assert [pulse for pulse, _ in shown] == list(range(8 * GOP))
+    for pulse, picture in shown:
+        np.testing.assert_array_equal(picture, own_pictures(A)[pulse])
+
+
+@pytest.mark.parametrize(
+    ("query", "pulses"),
+    [
+        ("from=p0&to=p13", range(13)),
+        ("from=p12&to=p24", range(10, 24)),
+        ("from=-0.4&to=p30", range(20, 30)),
+        ("from=2025-11-21T04:40:00.200Z&to=2025-11-21T05:40:00.8%2B01:00", range(5, 20)),
+    ],
+)
+async def test_with_an_end_it_is_a_download_of_these_frames(
+    recorded: Hall, query: str, pulses: range
+) -> None:
+    recorded.service.pulse0 = 1_763_700_000.0
+    shown = await read(recorded, f"/objects/1/best.mp4?{query}")
+    assert [pulse for pulse, _ in shown] == list(pulses)
+
+
+async def test_an_end_that_is_yet_to_come_is_waited_for(recorded: Hall) -> None:
+    reading = asyncio.create_task(read(recorded, "/objects/1/best.mp4?from=p20&to=p33"))
+    while not recorded.service.splicer.viewers:  # noqa: ASYNC110
+        await asyncio.sleep(0.001)
+    recorded.service.feed(7, IN_B)
+    assert [pulse for pulse, _ in await reading] == list(range(20, 33))
+
+
+async def test_without_a_recording_the_memory_is_the_past(busy: Hall) -> None:
+    for source in (PersonPlayback(busy.service.past, (1,)), CameraPlayback(busy.service.past, A)):
+        (span,) = available_ranges(source)
+        assert (first_available(source, 0), end_of_available(source)) == (span.first, span.end)
+        assert first_available(source, span.end) is None
+    assert [pulse for pulse, _ in await read(busy, "/objects/1/best.mp4?from=p0&to=p9")] == list(range(9))
+
+
+@pytest.mark.parametrize(
+    ("path", "status", "error"),
+    [
+        ("/objects/9/best.mp4?from=-60", 404, "there is no object 9"),
+        ("/cameras/c9/live.mp4?from=-60", 404, "there is no camera 'c9'; there are c0, c1"),
+        ("/objects/1/best.mp4?from=p99", 416, "of object 1 nothing is kept from p99 on; there is p0 to p29"),
+        (
+            "/cameras/c0/live.mp4?from=p99",
+            416,
+            "of camera c0 nothing is kept from p99 on; there is p0 to p34",
+        ),
+        (
+            "/objects/1/best.mp4?from=yesterday",
+            400,
+            f"from: 'yesterday' is no moment; {MOMENT}",
+        ),
+        ("/objects/1/best.mp4?from=p9&to=p9", 400, "to: p9 is not after from, which is p9"),
+        ("/objects/1/best.mp4?to=p9", 400, "from: is missing; it says from when on, such as ?from=-60"),
+        (
+            "/objects/1/best.mp4?from=2025-11-21",
+            400,
+            "from: the time of no pulse is known yet; say seconds back (-60) or a pulse (p1250)",
+        ),
+        ("/api/objects/9/past", 404, "nothing is kept of object 9"),
+        ("/api/objects/1/past?from=p9&to=p9", 400, "to: p9 is not after from, which is p9"),
+        ("/api/cameras/c0/past?to=yesterday", 400, f"to: 'yesterday' is no moment; {MOMENT}"),
+    ],
+)
+async def test_what_cannot_be_played_is_told_in_one_line(
+    recorded: Hall, path: str, status: int, error: str
+) -> None:
+    assert await recorded.get(path) == (status, {"error": error})
+
+
+async def test_it_is_said_what_there_is(recorded: Hall) -> None:
+    recorded.service.pulse0 = 1_763_700_000.0
+    span = {
+        "begins": "2025-11-21T04:40:00.000Z",
+        "ends": "2025-11-21T04:40:01.200Z",
+        "first": 0,
+        "frames": 30,
+    }
+    assert (await recorded.get_json("/api/objects/1/past"))["spans"] == [span]
+    assert (await recorded.get_json("/api/cameras/c1/past"))["spans"][0]["frames"] == 35
+
+
+async def test_it_is_said_by_which_cameras(recorded: Hall) -> None:
+    async with recorded.session.get("/api/past?from=p0") as answer:
+        told = [json.loads(line) async for line in answer.content]
+    chosen = {it["first"] + n: it["choices"]["1"] for it in told for n in range(it["frames"])}
+    views = (await recorded.get_json("/api/objects/1/past"))["views"]
+    assert {it["first"] + n: it["camera"] for it in views for n in range(it["frames"])} == chosen
+    assert [it["camera"] for it in views] == [A, B]
+    assert (await recorded.get_json("/api/cameras/c1/past"))["views"] == [
+        {"camera": B, "first": 0, "frames": 35}
+    ]
+
+
+@pytest.mark.parametrize(("query", "frames"), [("from=p7&to=p24", 17), ("from=p20", 10), ("to=p4", 4)])
+async def test_it_is_said_of_a_part_of_the_time(recorded: Hall, query: str, frames: int) -> None:
+    def cameras(views: list[dict[str, Any]]) -> dict[int, str]:
+        return {it["first"] + n: it["camera"] for it in views for n in range(it["frames"])}
+
+    whole = cameras((await recorded.get_json("/api/objects/1/past"))["views"])
+    part = await recorded.get_json(f"/api/objects/1/past?{query}")
+    begin = int(query.partition("from=p")[2].partition("&")[0] or 0)
+    assert [(it["first"], it["frames"]) for it in part["spans"]] == [(begin, frames)]
+    assert cameras(part["views"]) == {it: whole[it] for it in range(begin, begin + frames)}
+    span = (await recorded.get_json(f"/api/cameras/c1/past?{query}"))["spans"][0]
+    assert (span["first"], span["frames"]) == (begin, 15 if query == "from=p20" else frames)
+    nothing = await recorded.get_json("/api/objects/1/past?from=p900")
+    assert nothing == {"spans": [], "views": []}
+
+
+async def test_it_is_told_again_who_was_where(recorded: Hall) -> None:
+    async with recorded.session.get("/api/past?from=p7&to=p24") as answer:
+        assert answer.content_type == "application/x-ndjson"
+        lines = [json.loads(line) async for line in answer.content]
+    assert [line["first"] for line in lines] == [5, 10, 15, 20]
+    assert lines[0]["choices"] == {"1": A}
+    assert lines[0]["boxes"][A][0][0][0] == 1
+
+
+async def test_who_watches_the_past_is_a_viewer_like_others(
+    recorded: Hall, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(past_stream, "_LEAD_S", 0.2)
+    past = recorded.service.past
+    async with recorded.session.get("/objects/1/best.mp4?from=p0") as answer:
+        await answer.content.readany()
+        assert (past.viewers, recorded.service.splicer.viewers) == (1, 0)
+        async with recorded.session.get("/metrics") as metrics:
+            assert "myview_viewers 1.0" in (await metrics.text()).splitlines()
+        answer.close()
+    while past.viewers:  # noqa: ASYNC110
+        await asyncio.sleep(0.001)
+
+
+async def test_who_watches_the_past_takes_a_viewers_place_and_gives_it_back(recorded: Hall) -> None:
+    past = recorded.service.past
+    async with recorded.session.get("/objects/1/best.mp4?from=p0") as answer:
+        await answer.content.readany()
+        while not recorded.service.splicer.viewers:  # noqa: ASYNC110
+            await asyncio.sleep(0.001)
+        assert past.viewers == 0, "the channel counts from the present on"
+        answer.close()
+    while past.viewers or recorded.service.splicer.viewers:  # noqa: ASYNC110
+        await asyncio.sleep(0.001)
+    assert (await recorded.get("/objects/1/best.mp4?from=p0", "HEAD"))[0] == 200
+
+
+class OnDisk:
+    """A source with nothing in memory."""
+
+    presence = None
+
+    def __init__(self, *recorded: SessionEntries, end: int) -> None:
+        self.recorded, self.end = recorded, end
+
+    def recall(self, pulse: int) -> None:
+        del pulse
+
+    def recall_before(self, pulse: int) -> None:
+        del pulse
+
+
+def site_of(store: RecordingFolder) -> tuple[Agreement, bytes]:
+    del store
+    shelves, header = filled()
+    return shelves[A]._agreement, header
+
+
+@settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    st.lists(st.sampled_from([A, B, None]), min_size=1, max_size=20),
+    st.integers(0, 20 * GOP),
+    st.integers(1, 20 * GOP),
+)
+async def test_any_part_of_any_past_is_played_without_a_hole(
+    tmp_path_factory: pytest.TempPathFactory, shown: list[str | None], start: int, frames: int
+) -> None:
+    folder = tmp_path_factory.mktemp("part")
+    pieces = [piece(gop, {} if camera is None else {1: camera}) for gop, camera in enumerate(shown)]
+    store = written(RecordingFolder(folder, AMPLE), pieces)
+    assert store.run is not None
+    tapes = [SessionEntries(store.run, store.run.objects[1].tape)] if 1 in store.run.objects else []
+    source = OnDisk(*tapes, end=len(shown) * GOP)
+    agreement, header = site_of(store)
+    stream = TimeShiftStream(source, GaplessTimeline(agreement, FPS, GOP), FPS, lambda: None)
+    data = b"".join([it.data async for it in stream.send(PlaybackRange(start, start + frames))])
+    store.close()
+    there = available_ranges(source)
+    assert first_available(source, start) == next(
+        (max(it.first, start) for it in there if it.end > start), None
+    )
+    assert end_of_available(source) == (there[-1].end if there else 0)
+    kept = [gop for gop, camera in enumerate(shown) if camera is not None]
+    wanted = [gop for gop in kept if (gop + 1) * GOP > start and gop * GOP < start + frames]
+    if not wanted:
+        assert not data
+        return
+    last = min(start + frames, (wanted[-1] + 1) * GOP)
+    played = decoded(header + data)
+    assert [pulse for pulse, _ in played] == list(range(wanted[0] * GOP, last))
+    for pulse, picture in played:
+        camera = shown[pulse // GOP]
+        if camera is not None:
+            np.testing.assert_array_equal(picture, own_pictures(camera)[pulse])
+    assert all(any(it.first <= gop * GOP < it.end for it in available_ranges(source)) for gop in wanted)
+
+
+async def test_what_retention_takes_away_meanwhile_is_left_out(tmp_path: Path) -> None:
+    store = written(RecordingFolder(tmp_path, AMPLE), [piece(gop, {1: A}) for gop in range(12)])
+    assert store.run is not None
+    store.run.camera_file(A, 25).unlink()
+    source = OnDisk(SessionEntries(store.run, store.run.objects[1].tape), end=60)
+    agreement, header = site_of(store)
+    stream = TimeShiftStream(source, GaplessTimeline(agreement, FPS, GOP), FPS, lambda: None)
+    data = b"".join([it.data async for it in stream.send(PlaybackRange(0, 60))])
+    assert [pulse for pulse, _ in decoded(header + data)] == list(range(60)), "bridged, as live"
+    assert available_ranges(source) == [PulseRange(0, 60)]
+
+
+@pytest.mark.parametrize("end", [2 * GOP + 1, 10 * GOP])
+async def test_who_is_out_of_view_at_the_end_is_not_waited_for(tmp_path: Path, end: int) -> None:
+    now = 10 * GOP + FPS
+    store = written(
+        RecordingFolder(tmp_path, AMPLE), [piece(gop, {1: A} if gop < 2 else {}) for gop in range(now // GOP)]
+    )
+    assert store.run is not None
+    source = OnDisk(SessionEntries(store.run, store.run.objects[1].tape), end=now)
+    agreement, header = site_of(store)
+    stream = TimeShiftStream(
+        source, GaplessTimeline(agreement, FPS, GOP), FPS, Broadcaster
+    )  # in which nothing comes
+    data = b"".join([it.data async for it in stream.send(PlaybackRange(0, end))])
+    assert [pulse for pulse, _ in decoded(header + data)] == list(range(2 * GOP))
+
+
+async def test_who_comes_back_after_the_end_does_not_make_the_past_longer(tmp_path: Path) -> None:
+    store = written(
+        RecordingFolder(tmp_path, AMPLE), [piece(gop, {1: A} if gop < 2 else {}) for gop in range(4)]
+    )
+    assert store.run is not None
+    source = OnDisk(SessionEntries(store.run, store.run.objects[1].tape), end=4 * GOP)
+    agreement, header = site_of(store)
+    channel, back = Broadcaster(), piece(8, {1: A}).cameras[A]
+    came = [Shown(back.first + at, not at, it, boot=1) for at, it in enumerate(back.fragments)]
+    channel.publish(MediaChunk(came, FPS, Counters()))
+    stream = TimeShiftStream(source, GaplessTimeline(agreement, FPS, GOP), FPS, lambda: channel)
+    data = b"".join([it.data async for it in stream.send(PlaybackRange(0, 5 * GOP))])
+    assert [pulse for pulse, _ in decoded(header + data)] == list(range(2 * GOP))
+    assert len(fragments(data)) == 2 * GOP, "and nothing that lasts up to then"
+
+
+async def test_a_few_seconds_come_at_once_and_the_rest_in_real_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store = written(RecordingFolder(tmp_path, AMPLE), [piece(gop, {1: A}) for gop in range(40)])
+    assert store.run is not None
+    now, loop = [100.0], asyncio.get_running_loop()
+
+    async def slept(seconds: float) -> None:
+        now[0] += seconds
+
+    monkeypatch.setattr(loop, "time", lambda: now[0])
+    monkeypatch.setattr(asyncio, "sleep", slept)
+    agreement, _ = site_of(store)
+    source = OnDisk(SessionEntries(store.run, store.run.objects[1].tape), end=200)
+    stream = TimeShiftStream(source, GaplessTimeline(agreement, FPS, GOP), FPS, lambda: None)
+    arrived = [now[0] - 100.0 async for _ in stream.send(PlaybackRange(0))]
+    lead = 4.0
+    for gop, at in enumerate(arrived):
+        assert at == pytest.approx(max(0.0, gop * GOP / FPS - lead))
+    store.close()
+
+
+async def test_a_cameras_past_goes_back_beyond_a_restart_of_the_service(tmp_path: Path) -> None:
+    written(RecordingFolder(tmp_path / "kept", AMPLE), [piece(gop, {1: A}) for gop in range(4)]).close()
+    async for hall in opened(record={"folder": str(tmp_path / "kept"), "segment_s": 0.4}):
+        hall.service.pulse0 = PULSE0 + 0.01
+        hall.service.past.open()
+        hall.service.come(*CAMERAS)
+        for epoch in range(5, 8):
+            hall.service.feed(epoch, IN_A)
+        await until_written(hall, 1)
+        shown = await read(hall, "/cameras/c0/live.mp4?from=p7&to=p35")
+        assert [pulse for pulse, _ in shown] == list(range(GOP, 35))
+        for pulse, picture in shown:
+            if not 4 * GOP <= pulse < 5 * GOP:  # while the service was away the last picture is repeated
+                np.testing.assert_array_equal(picture, own_pictures(A)[pulse])
+        assert (await hall.get_json("/api/cameras/c0/past"))["spans"][0]["frames"] == 4 * GOP
+        assert (await hall.get_json("/api/objects/1/past"))["spans"][0]["first"] == 5 * GOP, (
+            "another person 1"
+        )
+        async with hall.session.get("/api/past?from=p7") as answer:
+            lines = [json.loads(line) async for line in answer.content]
+        assert [line["first"] for line in lines] == [5, 10, 15, 25, 30]
+        (earlier,) = hall.service.past.store.earlier
+        assert [line.get("run") for line in lines] == [earlier.folder.name] * 3 + [None] * 2
+    other = RecordingFolder(tmp_path / "kept", AMPLE)
+    other.open()
+    assert len(other.earlier) == 2
+
+
+async def test_somebodys_past_goes_back_beyond_a_restart_if_their_number_does(tmp_path: Path) -> None:
+    folder, since = tmp_path / "kept", PULSE0 - 9.0
+    store = RecordingFolder(folder, AMPLE)
+    written(store, [piece(gop, {}) for gop in range(1)])
+    for gop in range(1, 4):  # numbers began when the first camera came
+        store.write(piece(gop, {1: A}), head(numbers_since=since), InitSegments(filled()[1]))
+    store.close()
+    async for hall in opened(record={"folder": str(folder), "segment_s": 0.4}):
+        hall.service.pulse0 = PULSE0 + 0.01
+        hall.service.past.open()
+        hall.service.come(*CAMERAS)
+        said = IdentitySnapshot(pulse=19, boot=1, next=9, since=since, people=[])
+        key = ZenohKeys("hall").camera(A, "remembered")
+        hall.service.remembering.heard(Message(key, msgspec.json.encode(said), b""))
+        for epoch in range(5, 8):
+            hall.service.feed(epoch, IN_A)
+        await until_written(hall, 1)
+        shown = await read(hall, "/objects/1/best.mp4?from=p7&to=p35")
+        assert [pulse for pulse, _ in shown] == list(range(GOP, 35))
+        assert (await hall.get_json("/api/objects/1/past"))["spans"][0]["first"] == GOP
+        async with hall.session.get("/api/past?from=p7") as answer:
+            lines = [json.loads(line) async for line in answer.content]
+        assert [(line["first"], line.get("run")) for line in lines] == [
+            (first, None) for first in (5, 10, 15, 25, 30)
+        ]
+
+
+@pytest.mark.parametrize(
+    ("text", "pulse"),
+    [
+        ("-60", 3500),
+        ("-0.04", 4999),
+        ("-100000", 0),
+        ("p1250", 1250),
+        ("2025-11-21T04:40:10Z", 250),
+        ("2025-11-21T05:40:10+01:00", 250),
+        ("2025-11-21T05:40:10 01:00", 250),
+        ("2025-11-21T04:40:10.199", 254),
+        ("2025-11-21", 0),
+    ],
+)
+def test_moments(text: str, pulse: int) -> None:
+    assert parse_time_reference(text, now=5000, fps=FPS, pulse0=1_763_700_000.0) == pulse
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.text(max_size=30))
+def test_any_text_is_a_moment_or_told_in_one_line(text: str) -> None:
+    try:
+        pulse = parse_time_reference(text, now=5000, fps=FPS, pulse0=0.0)
+    except TimeReferenceError as error:
+        pulse = 1 - len(str(error).splitlines())
+    assert pulse >= 0

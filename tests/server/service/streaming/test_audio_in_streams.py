@@ -1,0 +1,284 @@
+"""One sound under every picture: unbroken under cuts and holes, in step to 40 ms, in every kind of stream."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import client
+from fakes.cameras import CAMERAS, FPS, GOP, NO_REASON, SMALL, FedService, encoded, small_config, video
+from fakes.media.audio import (
+    BEEPS,
+    FRAMES,
+    GOPS,
+    STEP,
+    beeps,
+    flashes,
+    flashing,
+    heard,
+    messages,
+    packets,
+    sends,
+    write_flashes,
+)
+from fakes.media.browser_playback import PLAY, seen_in_chromium
+from fakes.media.ffprobe import probed
+from fakes.media.mpegts import check_counters, taken_apart
+from fakes.programs import needs_chromium, needs_ffprobe
+from fakes.site import A, B, Hall, opened
+from server.camera.audio import RecordedSound
+from server.config.sections import SoundSettings
+from server.media.audio.aac import SAMPLES as FRAME
+from server.media.containers.fmp4 import init_segment
+from server.service.view_selection.decider import GopDecision, ObjectChoice
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A recording that flashes and beeps."""
+    return write_flashes(tmp_path_factory.mktemp("sound") / "flashes.mp4", FRAMES)
+
+
+@pytest.fixture
+async def loud(recording: Path) -> AsyncIterator[Hall]:
+    """A site that has that recording's sound."""
+    async for hall in opened(sound={"source": str(recording)}, http={"viewer_queue_gops": 100}):
+        yield hall
+
+
+def decide(service: FedService, gop: int, camera: str | None) -> None:
+    choice = ObjectChoice(1, camera, None, away=False)
+    service.splicer.decision(GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
+
+
+async def watched(
+    hall: Hall, recording: Path, ways: list[str], lost: frozenset[int] = frozenset()
+) -> list[bytes]:
+    """Show the recording's pictures as either camera in turn; give what is received on these ways."""
+    service = hall.service
+    service.come(*CAMERAS)
+    for camera in CAMERAS:
+        for unit in flashing(recording):
+            if unit.pulse not in lost:
+                service.intake.video(video(camera, unit))
+    decide(service, 0, A)
+    answers = [await hall.session.get(way) for way in ways]
+    for gop in range(1, GOPS):
+        decide(service, gop, CAMERAS[gop % 2])
+        await asyncio.sleep(0.005)
+    service.splicer.close()
+    return [await answer.read() for answer in answers]
+
+
+@pytest.mark.parametrize(("way", "kind"), [("best.mp4", "mp4"), ("best.ts", "mpegts")])
+async def test_after_every_cut_a_beep_is_with_its_flash(
+    loud: Hall, recording: Path, way: str, kind: str
+) -> None:
+    own = sends(loud.service, recording)
+    (data,) = await watched(loud, recording, [f"/objects/1/{way}"])
+    assert flashes(data, kind) == pytest.approx(BEEPS, abs=0.001)
+    assert beeps(data, kind) == pytest.approx(BEEPS, abs=STEP)
+    if kind == "mp4":
+        assert packets(data) == own[: len(packets(data))], "byte for byte the recording's"
+        assert len(packets(data)) == FRAMES * 48_000 // FPS // FRAME
+
+
+async def test_sound_has_no_hole_where_pictures_or_sound_are_missing(loud: Hall, recording: Path) -> None:
+    sends(loud.service, recording, silent=range(60, 80))
+    lost = frozenset({13, *range(30, 45), 71})
+    data, ts = await watched(loud, recording, ["/objects/1/best.mp4", "/objects/1/best.ts"], lost)
+    for stream, kind in ((data, "mp4"), (ts, "mpegts")):
+        times, samples = heard(stream, kind)
+        assert np.diff(times) == pytest.approx(1 / 48_000, abs=1e-4), "without a hole"
+        quiet = (times > 61 * FRAME / 48_000) & (times < 80 * FRAME / 48_000)
+        assert quiet.sum() > 18 * FRAME
+        assert not samples[quiet].any()
+    check_counters(taken_apart(ts))
+
+
+async def test_a_camera_has_the_sound_at_once_or_silence_a_little_later(loud: Hall, recording: Path) -> None:
+    service = loud.service
+    own = sends(service, recording, silent=range(60, 1000))
+    service.come(*CAMERAS)
+    units = flashing(recording)
+    service.intake.video(video(B, units[0]))
+    answers = [await loud.session.get(f"/cameras/c1/live.{kind}") for kind in ("mp4", "ts")]
+    for unit in units[1:]:
+        service.intake.video(video(B, unit))
+        await asyncio.sleep(0.002)
+    service.splicer.close()
+    data, ts = [await answer.read() for answer in answers]
+    got = packets(data)
+    assert got[:60] == own[:60]
+    assert {*got[60:]} == {service.config.sound.format.silence}  # type: ignore[union-attr]
+    assert 0 <= FRAMES * 1.92 / FRAME * 1000 - len(got) <= 0.5 * 48_000 / FRAME + 1, "half a second later"
+    assert beeps(data) == beeps(ts, "mpegts") == pytest.approx(BEEPS[:1], abs=STEP)
+    check_counters(taken_apart(ts))
+
+
+@pytest.mark.parametrize("parts", [0, 5])
+async def test_segments_and_their_parts_have_the_sound_of_their_pictures(
+    loud: Hall, recording: Path, parts: int
+) -> None:
+    sends(loud.service, recording)
+    await watched(loud, recording, [])
+    listed = await (await loud.session.get("/objects/1/hls/index.m3u8")).text()
+    numbers = [line.removesuffix(".m4s") for line in listed.splitlines() if line.endswith(".m4s")]
+    names = [f"{it}.{part}.m4s" for it in numbers for part in range(parts)] or [f"{it}.m4s" for it in numbers]
+    fetched = [
+        await (await loud.session.get(f"/objects/1/hls/{name}")).read() for name in ("init.mp4", *names)
+    ]
+    data = b"".join(fetched)
+    times, _ = heard(data)
+    assert np.diff(times) == pytest.approx(1 / 48_000, abs=1e-4)
+    began = int(numbers[0]) * 25 / FPS
+    assert times[0] == pytest.approx(began, abs=0.022)
+    assert flashes(data) == pytest.approx([it for it in BEEPS if it > began], abs=0.001)
+    assert beeps(data) == pytest.approx([it for it in BEEPS if it > began], abs=STEP)
+
+
+async def test_everybody_shares_the_bytes_of_sound(loud: Hall, recording: Path) -> None:
+    service = loud.service
+    sends(service, recording)
+    for camera in CAMERAS:
+        for unit in encoded(0):
+            service.intake.video(video(camera, unit))
+    both = (ObjectChoice(1, A, None, away=False), ObjectChoice(2, B, None, away=False))
+    service.splicer.decision(GopDecision(0, GOP, both, {}, {}, (), NO_REASON))
+    reels = [service.splicer.reel(number) for number in (1, 2)]
+    one, two = [reel._segments[0]._footage[0] for reel in reels if reel is not None]
+    assert one.heard is not None
+    assert one.heard is two.heard
+
+
+async def test_a_site_without_sound_is_as_it_always_was(hall: Hall) -> None:
+    service = hall.service
+    service.come(*CAMERAS)
+    for epoch in range(3):
+        service.feed(epoch, {A: {1: SMALL}, B: {}})
+    site = small_config().site
+    parameters = service.agreement.parameters
+    assert parameters is not None
+    answer = await hall.session.get("/objects/1/best.mp4")
+    head = await answer.content.readexactly(len(init_segment(parameters, site.width, site.height)))
+    assert head == init_segment(parameters, site.width, site.height)
+    assert b"soun" not in head
+    assert (await answer.content.readexactly(8))[4:] == b"moof"
+    assert (await hall.get_json("/api/site"))["sound"] is None
+    service.splicer.close()
+    assert b"soun" not in await answer.read()
+
+
+async def test_the_site_says_what_sound_it_has_and_passes_over_what_is_none(loud: Hall) -> None:
+    assert (await loud.get_json("/api/site"))["sound"] == "mp4a.40.2"
+    (good,) = messages(
+        RecordedSound(str(loud.service.config.sound.source), SoundSettings(source="x"), FPS, 0, "stop").until(
+            5
+        )
+    )
+    for bad in (
+        b"",
+        b"{}",
+        b'{"first":-1,"sizes":[1]}',
+        b'{"first":1,"sizes":[0]}',
+        b'{"first":1,"sizes":[7]}',
+    ):
+        loud.service.intake.sound(type(good)(good.key, good.payload, bad))
+    state = loud.service.intake.states[A]
+    assert state.bad_messages == 5, "of the camera whose process sends it"
+    assert state.gauge.last_trouble is not None
+    assert state.gauge.last_trouble.text.startswith("a message that cannot be used: sound: ")
+
+
+async def test_where_boxes_are_burnt_in_a_beep_is_with_its_flash(loud: Hall, recording: Path) -> None:
+    service = loud.service
+    own = sends(service, recording)
+    service.come(*CAMERAS)
+    for unit in flashing(recording):
+        service.intake.video(video(A, unit))
+    choice = ObjectChoice(1, A, None, away=False)
+    decisions = [GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON) for gop in range(GOPS)]
+    service.board.put(decisions[0])
+    service.splicer.decision(decisions[0])
+    answer = await loud.session.get("/objects/1/best.mp4?overlay=1")
+    assert answer.status == 200, await answer.text()
+    for decision in decisions[1:]:
+        service.splicer.decision(decision)
+        await asyncio.sleep(0.02)
+    service.splicer.close()
+    data = await answer.read()
+    times, _ = heard(data)
+    assert np.diff(times) == pytest.approx(1 / 48_000, abs=1e-4)
+    assert (times[0], times[-1]) == (pytest.approx(0, abs=0.001), pytest.approx(FRAMES / FPS, abs=0.03))
+    assert flashes(data) == pytest.approx(BEEPS, abs=0.001)
+    assert beeps(data) == pytest.approx(BEEPS, abs=STEP)
+    assert packets(data) == own[: len(packets(data))]
+
+
+@needs_ffprobe
+async def test_ffprobe_has_nothing_to_say(loud: Hall, recording: Path, tmp_path: Path) -> None:
+    sends(loud.service, recording)
+    ways = ["best.mp4", "best.ts"]
+    for way, data in zip(
+        ways, await watched(loud, recording, [f"/objects/1/{it}" for it in ways]), strict=True
+    ):
+        (tmp_path / way).write_bytes(data)
+        found = {it[0]: int(it[1]) for it in probed(tmp_path / way, "codec_name,nb_read_frames")}
+        assert found["h264"] == FRAMES
+        assert found["aac"] >= FRAMES * 48_000 // FPS // FRAME
+
+
+@needs_chromium
+async def test_chromium_plays_both_to_the_end_where_either_is_missing(loud: Hall, recording: Path) -> None:
+    sends(loud.service, recording, silent=range(100, 1000))
+    service = loud.service
+    service.come(*CAMERAS)
+    for camera in CAMERAS:
+        for unit in flashing(recording):
+            if unit.pulse not in range(30, 45):
+                service.intake.video(video(camera, unit))
+
+    def show(gop: int) -> None:
+        decide(service, gop, CAMERAS[gop % 2])
+
+    decide(service, 0, A)
+    parameters = service.agreement.parameters
+    assert parameters is not None
+    seen = await seen_in_chromium(
+        *(loud.port, service.splicer, GOPS, show),
+        *(PLAY, "/objects/1/best.mp4", f'video/mp4; codecs="{parameters.codec},mp4a.40.2"', 4),
+    )
+    assert (seen["error"], seen["ranges"], seen["tracks"]) == ("", 1, [True, True])
+    assert seen["range"] == [0, pytest.approx(FRAMES / FPS, abs=0.03)]
+
+
+async def test_a_recording_has_the_sound_from_its_first_picture_to_its_last(
+    loud: Hall, recording: Path, tmp_path: Path
+) -> None:
+    service, out = loud.service, tmp_path / "one.mp4"
+    sends(service, recording)
+    service.come(*CAMERAS)
+    for camera in CAMERAS:
+        for unit in flashing(recording):
+            service.intake.video(video(camera, unit))
+    decide(service, 0, A)
+    decide(service, 1, A)
+    recorded = asyncio.create_task(client.record(f"http://127.0.0.1:{loud.port}/", 1, out, seconds=3.3))
+    while not service.splicer.viewers:  # noqa: ASYNC110 — the client comes when it comes
+        await asyncio.sleep(0.01)
+    for gop in range(2, GOPS):
+        decide(service, gop, CAMERAS[gop % 2])
+        await asyncio.sleep(0.005)
+    done = await recorded
+    assert done.complete
+    data, begin = out.read_bytes(), GOP / FPS
+    expected = [moment - begin for moment in BEEPS if begin < moment < begin + 3.3]
+    assert flashes(data) == pytest.approx(expected, abs=0.001)
+    assert beeps(data) == pytest.approx(expected, abs=STEP)
+    times, _ = heard(data)
+    assert np.diff(times) == pytest.approx(1 / 48_000, abs=1e-4)
+    assert (times[0], times[-1]) == (pytest.approx(0, abs=0.025), pytest.approx(3.3, abs=0.025))

@@ -1,0 +1,52 @@
+"""A camera's newest frames, each made into a fragment once; frames of other parameters never get in."""
+
+from __future__ import annotations
+
+import pytest
+
+from fakes.cameras import FPS, encoded
+from server.camera.encoding.encoder import AccessUnit
+from server.media.stream_format import Agreement, ParameterMismatchError
+from server.service.streaming.frame_buffer import FrameBuffer
+
+
+def put(shelf: FrameBuffer, unit: AccessUnit) -> None:
+    shelf.put(unit.pulse, 1, unit.data, key=unit.key)
+
+
+def test_the_oldest_frames_make_room() -> None:
+    shelf = FrameBuffer(FPS, 10, Agreement())
+    for unit in encoded(0)[:25]:
+        put(shelf, unit)
+    assert [pulse for pulse in range(30) if shelf.has(pulse)] == list(range(15, 25))
+    assert shelf.newest == 24
+    assert shelf.get(3) is None
+
+
+def test_a_gop_is_the_fragments_of_its_frames_in_order() -> None:
+    shelf = FrameBuffer(FPS, 20, Agreement())
+    for unit in encoded(0)[:10]:
+        put(shelf, unit)
+    frames = [shelf.get(pulse) for pulse in range(5, 10)]
+    assert shelf.gop(5, 5) == b"".join(frame.fragment for frame in frames if frame is not None)
+    assert [frame.key for frame in frames if frame is not None] == [True, False, False, False, False]
+
+
+def test_other_parameters_are_refused_and_leave_no_trace() -> None:
+    agreement = Agreement()
+    first, second = FrameBuffer(FPS, 10, agreement), FrameBuffer(FPS, 10, agreement)
+    put(first, encoded(0)[0])
+    with pytest.raises(ParameterMismatchError, match="differ from the other cameras'"):
+        put(second, encoded(1, crf=40)[0])
+    assert not second.has(0)
+    assert second.newest == -1
+    put(second, encoded(1)[5])
+    assert second.has(5), "with the right parameters the same camera is welcome"
+
+
+@pytest.mark.parametrize("data", [b"", b"\x00\x00\x01", b"\x00\x00\x01\x67", b"no H.264 at all"])
+def test_a_key_frame_without_parameter_sets_is_refused(data: bytes) -> None:
+    shelf = FrameBuffer(FPS, 10, Agreement())
+    with pytest.raises(ParameterMismatchError, match="without parameter sets"):
+        shelf.put(0, 1, data, key=True)
+    assert not shelf.has(0)

@@ -1,0 +1,49 @@
+"""Chromium plays on where a camera has nothing to show: to Media Source Extensions there is no hole."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+
+import pytest
+
+from fakes.cameras import CAMERAS, FPS, GOP, NO_REASON, SMALL, encoded
+from fakes.media.browser_playback import PLAY, seen_in_chromium
+from fakes.programs import needs_chromium
+from fakes.site import A, Hall, opened
+from server.service.view_selection.decider import GopDecision, ObjectChoice
+
+GOPS = 12
+SILENT = (4, 5, 6, 9)
+LOST = 53
+"""A pulse whose picture is lost, in a GOP of which the others have come."""
+
+
+@pytest.fixture
+async def hall() -> AsyncIterator[Hall]:
+    """A site in which whoever watches may be as slow as they like."""
+    async for it in opened(http={"viewer_queue_gops": GOPS}):
+        yield it
+
+
+@needs_chromium
+async def test_media_source_extensions_play_over_what_is_missing_to_the_end(hall: Hall) -> None:
+    splicer, shelf = hall.service.splicer, hall.service.shelves[A]
+    hall.service.come(*CAMERAS)
+    hall.service.feed(0, {A: {1: SMALL}})
+    for unit in encoded(0, GOPS * GOP):
+        if unit.pulse // GOP not in SILENT and unit.pulse != LOST:
+            shelf.put(unit.pulse, 1, unit.data, key=unit.key)
+
+    def show(gop: int) -> None:
+        choice = ObjectChoice(1, A if shelf.has(gop * GOP) else None, None, away=False)
+        splicer.decision(GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
+
+    show(0)
+    parameters = hall.service.agreement.parameters
+    assert parameters is not None
+    seen = await seen_in_chromium(
+        *(hall.port, splicer, GOPS, show),
+        *(PLAY, "/objects/1/best.mp4", f'video/mp4; codecs="{parameters.codec}"', 4),
+    )
+    assert (seen["error"], seen["ranges"]) == ("", 1)
+    assert seen["range"] == [0, pytest.approx(GOPS * GOP / FPS)]

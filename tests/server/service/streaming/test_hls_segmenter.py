@@ -1,0 +1,189 @@
+"""Segments: whole GOPs, numbered by their pulses, each decodable by itself, holes or not."""
+
+from __future__ import annotations
+
+import io
+from itertools import pairwise
+
+import av
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from fakes.cameras import CAMERAS, FPS, GOP, HEIGHT, NO_REASON, WIDTH, encoded, small_config
+from server.media.containers.fmp4 import init_segment
+from server.media.stream_format import Agreement
+from server.service.streaming.frame_buffer import FrameBuffer
+from server.service.streaming.hls_segmenter import HlsSegment, HlsSegmenter, segment_layout
+from server.service.streaming.splicer import Splicer
+from server.service.view_selection.decider import GopDecision, ObjectChoice
+
+GOPS = 40
+
+
+class Site:
+    """A splicer whose decisions a test makes; cameras have all frames but those of the GOPs in ``silent``."""
+
+    def __init__(self, silent: frozenset[int] = frozenset(), begin: int = 0) -> None:
+        self.agreement = Agreement()
+        self.shelves = {camera: FrameBuffer(FPS, GOPS * GOP, self.agreement) for camera in CAMERAS}
+        self.splicer = Splicer(self.shelves, self.agreement, small_config(http={"hls_segment_s": 0.41}))
+        for seed, camera in enumerate(CAMERAS):
+            for unit in encoded(seed, GOPS * GOP):
+                if unit.pulse // GOP not in silent and unit.pulse // GOP >= begin:
+                    self.shelves[camera].put(unit.pulse, 1, unit.data, key=unit.key)
+
+    def show(self, gop: int, camera: str | None) -> None:
+        choice = ObjectChoice(1, camera, None, away=False)
+        self.splicer.decision(GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
+
+    @property
+    def reel(self) -> HlsSegmenter:
+        reel = self.splicer.reel(1)
+        assert reel is not None
+        return reel
+
+    def decoded(self, segments: list[HlsSegment]) -> list[tuple[float, float, NDArray[np.uint8]]]:
+        """Give when each picture is shown and until when, in pulses, and the picture."""
+        assert self.agreement.parameters is not None
+        head = init_segment(self.agreement.parameters, WIDTH, HEIGHT)
+        with av.open(io.BytesIO(head + b"".join(it.data for it in segments))) as container:
+            return [
+                (
+                    float(it.time or 0) * FPS,
+                    float(it.time or 0) * FPS + (it.duration or 0) * FPS / 90_000,
+                    it.to_ndarray(format="yuv420p"),
+                )
+                for it in container.decode(video=0)
+            ]
+
+
+def own(camera: int) -> list[NDArray[np.uint8]]:
+    decoder = av.CodecContext.create("h264", "r")
+    packets = [*(av.Packet(unit.data) for unit in encoded(camera, GOPS * GOP)), None]
+    return [it.to_ndarray(format="yuv420p") for packet in packets for it in decoder.decode(packet)]
+
+
+@pytest.mark.parametrize(
+    ("fps", "gop", "segment_s", "frames", "target"),
+    [
+        (25, 10, 1.0, 20, 1),
+        (25, 10, 2.0, 50, 2),
+        (25, 25, 1.0, 25, 1),
+        (25, 50, 1.0, 50, 2),
+        (30, 1, 0.5, 15, 1),
+    ],
+)
+def test_a_segment_is_as_many_whole_gops_as_fit(
+    fps: float, gop: int, segment_s: float, frames: int, target: int
+) -> None:
+    found = segment_layout(fps, gop, segment_s, 6.0)
+    assert (found.frames, found.target_s) == (frames, target)
+    assert found.listed >= 3, "RFC 8216, 6.2.2: a live playlist has three target durations"
+    assert round(frames / fps + 1e-9) <= target
+
+
+def test_segments_are_numbered_by_their_pulses_and_listed_when_they_are_whole() -> None:
+    site = Site()
+    for gop in range(9):
+        site.show(gop, CAMERAS[gop % 2])
+    assert [it.number for it in site.reel.listed] == [0, 1, 2, 3]
+    assert [it.until - it.first for it in site.reel.listed] == [2 * GOP] * 4
+    assert site.reel.get(4) is None, "it is not whole"
+    site.splicer.close()
+    assert [it.number for it in site.reel.listed] == [0, 1, 2, 3, 4]
+    assert site.reel.listed[-1].until - site.reel.listed[-1].first == GOP
+
+
+def test_a_service_that_starts_later_gives_the_same_segments() -> None:
+    early, late = Site(), Site(begin=7)
+    for gop in range(20):
+        early.show(gop, CAMERAS[gop % 3 % 2])
+        if gop >= 7:
+            late.show(gop, CAMERAS[gop % 3 % 2])
+    assert [it.number for it in late.reel.listed] == list(range(3, 10))
+    for segment in late.reel.listed[1:]:
+        other = early.reel.get(segment.number)
+        assert other is not None
+        assert segment.data == other.data
+
+
+def test_what_has_left_the_playlist_stays_for_as_long_as_it_was_in_it_and_no_longer() -> None:
+    site = Site()
+    listed = site.splicer.plan.listed
+    for gop in range(1000):
+        site.show(gop, CAMERAS[0])
+        numbers = [it.number for it in site.reel.listed]
+        assert len(site.reel._segments) <= 2 * listed + 1
+        if numbers and numbers[0] >= listed:
+            assert site.reel.get(numbers[0] - listed) is not None
+            assert site.reel.get(numbers[0] - listed - 2) is None
+
+
+def test_people_shown_by_one_camera_share_the_bytes_with_each_other_and_the_camera() -> None:
+    site = Site()
+    choices = tuple(ObjectChoice(number, CAMERAS[0], None, away=False) for number in (1, 2))
+    site.splicer.decision(GopDecision(0, GOP, choices, {}, {}, (), NO_REASON))
+    reels = [site.splicer.reel(1), site.splicer.reel(2), site.splicer.camera_reel(CAMERAS[0])]
+    held = {id(reel._segments[0]._footage[0]) for reel in reels if reel}
+    assert len(held) == 1
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.frozensets(st.integers(1, 15)), st.lists(st.sampled_from(CAMERAS), min_size=16, max_size=16))
+def test_every_segment_decodes_by_itself_and_together_there_is_no_hole(
+    silent: frozenset[int], wishes: list[str]
+) -> None:
+    site, alone = Site(silent), [own(camera) for camera in range(2)]
+    last = None
+    shown: list[NDArray[np.uint8]] = []
+    for gop, wish in enumerate(wishes):
+        site.show(gop, None if gop in silent else wish)
+        if gop not in silent:
+            last = CAMERAS.index(wish)
+        assert last is not None
+        for pulse in range(gop * GOP, (gop + 1) * GOP):
+            shown.append(shown[-1] if gop in silent else alone[last][pulse])
+    for segment in site.reel.listed:
+        check(site.decoded([segment]), shown, segment.first)
+    check(site.decoded(list(site.reel.listed)), shown, site.reel.listed[0].first)
+
+
+def check(
+    pictures: list[tuple[float, float, NDArray[np.uint8]]], shown: list[NDArray[np.uint8]], first: int
+) -> None:
+    """Compare with what is to be shown at every pulse; a picture of a tick or two is not seen."""
+    assert pictures[0][0] == pytest.approx(first)
+    for (_, until, _), (begin, _, _) in pairwise(pictures):
+        assert until == pytest.approx(begin), "no hole"
+    for begin, until, picture in pictures:
+        if until - begin > 0.01:
+            for pulse in range(round(begin), round(until)):
+                np.testing.assert_array_equal(picture, shown[pulse])
+
+
+def test_the_end_of_somebody_forgotten_can_be_fetched_for_a_while() -> None:
+    site = Site()
+    for gop in range(5):
+        site.show(gop, CAMERAS[0])
+    site.splicer.forget([], [])
+    reel = site.reel
+    assert reel.ended
+    assert [it.number for it in reel.listed] == [0, 1, 2]
+    for gop in range(5, 200):
+        site.splicer.decision(GopDecision(gop * GOP, GOP, (), {}, {}, (), NO_REASON))
+    assert site.splicer.reel(1) is None
+
+
+@pytest.mark.parametrize("absent", [1, 4, 20, 100_000])
+def test_numbers_follow_each_other_whatever_was_not_decided(absent: int) -> None:
+    site = Site()
+    for gop in [*range(7), *range(7 + absent, 9 + absent)]:
+        site.show(gop, CAMERAS[0])
+    for gop in range(9 + absent, 20 + absent):
+        site.show(gop, CAMERAS[0])
+        numbers = [it.number for it in site.reel.listed]
+        assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
+        assert all(it.until - it.first <= site.splicer.plan.frames for it in site.reel.listed)

@@ -1,0 +1,138 @@
+"""Cameras with parameter sets of their own: a cut from one to the other is right, and so is what bridges."""
+
+from __future__ import annotations
+
+import asyncio
+import io
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import av
+import numpy as np
+import pytest
+
+from fakes.cameras import FPS, GOP, HEIGHT, WIDTH, small_config
+from fakes.media.browser_playback import READ, seen_in_chromium
+from fakes.parameter_sets import GOPS, MAKES, OWN, decision, expected, put, sent
+from fakes.programs import needs_chromium, needs_ffmpeg
+from fakes.site import Hall, opened
+from server.config.site_config import Config
+from server.media.codec import agreement_for
+from server.media.h264.annexb import nal_units, parameter_sets
+from server.media.stream_format import ParameterMismatchError
+from server.service.streaming.broadcaster import Chunk
+from server.service.streaming.frame_buffer import FrameBuffer
+from server.service.streaming.media_chunk import MediaChunk
+from server.service.streaming.splicer import Splicer
+
+
+async def spliced(config: Config) -> tuple[bytes, bytes]:
+    """Give a stream that changes camera at every GOP, as MP4 and as a transport stream."""
+    agreement = agreement_for(config)
+    shelves = {camera: FrameBuffer(FPS, GOPS * GOP, agreement) for camera in MAKES}
+    put(shelves)
+    splicer, pieces, viewer = Splicer(shelves, agreement, config), list[Chunk](), None
+    for gop in range(GOPS):
+        splicer.decision(decision(gop))
+        viewer = viewer or splicer.objects[1].join()
+    splicer.close()
+    assert viewer is not None
+    pieces = [piece async for piece in viewer.pieces()]
+    head = agreement.head(config.site)
+    assert head is not None
+    ts = b"".join(piece.ts for piece in pieces if isinstance(piece, MediaChunk))
+    return head + b"".join(piece.data for piece in pieces), ts
+
+
+def config(**changes: Any) -> Config:
+    return small_config(**OWN, http={"viewer_queue_gops": 100}, **changes)
+
+
+def test_the_cameras_do_differ() -> None:
+    one, other = (parameter_sets(nal_units(sent(camera)[0].data)) for camera in MAKES)
+    assert one is not None
+    assert other is not None
+    assert one.sps != other.sps
+    assert one.pps != other.pps
+
+
+@pytest.mark.parametrize("form", ["mp4", "mpegts"])
+async def test_every_frame_is_the_chosen_cameras_and_holes_stand_still(form: str) -> None:
+    mp4, ts = await spliced(config())
+    with av.open(io.BytesIO(mp4 if form == "mp4" else ts), format=form) as container:
+        seen = [(frame.time, frame.to_ndarray(format="yuv420p")) for frame in container.decode(video=0)]
+    assert [round(time * FPS) for time, _ in seen] == list(range(GOPS * GOP))
+    for pulse, ((_, picture), right) in enumerate(zip(seen, expected(), strict=True)):
+        np.testing.assert_array_equal(picture, right, f"pulse {pulse}")
+
+
+@needs_ffmpeg
+async def test_ffmpeg_plays_it_without_a_warning(tmp_path: Path) -> None:
+    for name, data in zip(("own.mp4", "own.ts"), await spliced(config()), strict=True):
+        (tmp_path / name).write_bytes(data)
+        as_pictures = "-f rawvideo -pix_fmt yuv420p -fps_mode passthrough -"
+        command = f"ffmpeg -nostdin -v warning -i {tmp_path / name} {as_pictures}".split()
+        played = await asyncio.to_thread(subprocess.run, command, capture_output=True, check=True)
+        assert played.stderr == b"", name
+        pictures = np.frombuffer(played.stdout, np.uint8).reshape(-1, HEIGHT * 3 // 2, WIDTH)
+        np.testing.assert_array_equal(pictures, expected(), name)
+
+
+async def test_where_they_must_be_equal_the_second_camera_is_refused() -> None:
+    with pytest.raises(ParameterMismatchError, match="differ from the other cameras'"):
+        await spliced(small_config())
+
+
+LOOK = (
+    "async ([url, type, width, height]) => {"
+    + READ
+    + """
+  const canvas = new OffscreenCanvas(width, height).getContext('2d');
+  const greens = [];
+  for (let pulse = 0; pulse < buffer.buffered.end(0) * 25 - 0.5; pulse += 3) {
+    video.currentTime = (pulse + 0.5) / 25;
+    for (let is = -1; is !== pulse;) {  // a picture says when it is shown; that it was sought says less
+      await new Promise(requestAnimationFrame);
+      if (video.seeking || video.readyState < video.HAVE_CURRENT_DATA) continue;
+      const image = new VideoFrame(video);
+      is = Math.round(image.timestamp * 25 / 1e6);
+      canvas.drawImage(image, 0, 0);
+      image.close();
+    }
+    const { data } = canvas.getImageData(0, 0, width, height);
+    const blocks = [];
+    for (let y = 4; y < height; y += 8) {
+      for (let x = 4; x < width; x += 8) blocks.push(data[4 * (y * width + x) + 1]);
+    }
+    greens.push(blocks);
+  }
+  return { ranges: buffer.buffered.length, greens, error: video.error?.message ?? '' };
+}"""
+)
+
+
+@needs_chromium
+async def test_chromium_shows_the_chosen_cameras_pictures() -> None:
+    async for hall in opened(patience=60, **OWN, http={"viewer_queue_gops": 100}):
+        seen = await _played(hall)
+    assert (seen["error"], seen["ranges"]) == ("", 1)
+    rgb = [av.VideoFrame.from_ndarray(it, format="yuv420p").to_ndarray(format="rgb24") for it in expected()]
+    right = np.array([it[4::8, 4::8, 1].ravel() for it in rgb], dtype=float)[::3]
+    found = np.array(seen["greens"], dtype=float)
+    assert len(found) == GOPS * GOP / 3
+    # Colours are converted in two ways; pictures of other pulses or cameras differ by several times as much.
+    assert np.abs(found - right).mean(axis=1).max() < 20
+    assert np.abs(found[1:] - right[:-1]).mean(axis=1)[:4].min() > 40
+
+
+async def _played(hall: Hall) -> dict[str, Any]:
+    splicer, agreement = hall.service.splicer, hall.service.agreement
+    put(hall.service.shelves)
+    splicer.decision(decision(0))
+    assert agreement.codec is not None
+    assert agreement.codec.startswith("avc3.")
+    return await seen_in_chromium(
+        *(hall.port, splicer, GOPS, lambda gop: splicer.decision(decision(gop))),
+        *(LOOK, "/objects/1/best.mp4", f'video/mp4; codecs="{agreement.codec}"', WIDTH, HEIGHT),
+    )

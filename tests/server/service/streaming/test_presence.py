@@ -1,0 +1,82 @@
+"""Who was seen by no camera for long is held, and then absent, by whatever number they go."""
+
+from __future__ import annotations
+
+import pytest
+
+from fakes.cameras import CAMERAS, GOP, NO_REASON
+from server.service.streaming.presence import Presence, PresenceLog
+from server.service.view_selection.decider import GopDecision
+
+A, B = CAMERAS
+BOX = (1.0, 2.0, 3.0, 4.0)
+UNSEEN = 2 * GOP
+
+
+def decision(
+    gop: int, seen: dict[int, list[int]], merged: dict[int, int] | None = None, camera: str = A
+) -> GopDecision:
+    """Give a GOP in which people are seen at some of its places."""
+    boxes = [[(number, *BOX) for number, places in seen.items() if place in places] for place in range(GOP)]
+    return GopDecision(gop * GOP, GOP, (), {camera: boxes}, merged or {}, (), NO_REASON)
+
+
+@pytest.fixture
+def log() -> PresenceLog:
+    return PresenceLog(UNSEEN)
+
+
+def test_who_was_never_seen_is_absent(log: PresenceLog) -> None:
+    log.take(decision(0, {1: [0]}))
+    assert log.of(1) is Presence.PRESENT
+    assert log.of(2) is Presence.ABSENT
+
+
+@pytest.mark.parametrize(("place", "present"), [(0, 2), (GOP - 1, 2)])
+def test_who_leaves_is_present_for_a_while_then_held_then_absent(
+    log: PresenceLog, place: int, present: int
+) -> None:
+    log.take(decision(0, {1: [place]}))
+    found = []
+    for gop in range(1, 9):
+        log.take(decision(gop, {}))
+        found.append(log.of(1))
+    held = [Presence.HELD] * (found.index(Presence.ABSENT) - present)
+    assert found == [Presence.PRESENT] * present + held + [Presence.ABSENT] * (8 - present - len(held))
+    assert len(held) == 2
+
+
+def test_one_glimpse_by_any_camera_is_enough(log: PresenceLog) -> None:
+    log.take(decision(0, {1: [0]}))
+    log.take(decision(9, {1: [GOP - 1]}, camera=B))
+    assert log.of(1) is Presence.PRESENT
+
+
+def test_what_two_numbers_were_seen_by_is_one_persons_when_they_are_merged(log: PresenceLog) -> None:
+    log.take(decision(0, {1: [0], 2: [0]}))
+    log.take(decision(4, {2: [0]}))
+    log.take(decision(5, {}, merged={2: 1}))
+    assert log.of(1) is log.of(2) is Presence.PRESENT
+    log.take(decision(8, {2: [3]}, merged={2: 1}))
+    assert log.of(1) is Presence.PRESENT, "also by boxes that still have the other number"
+
+
+def test_pulses_that_begin_anew_make_everybody_absent(log: PresenceLog) -> None:
+    log.take(decision(100, {1: [0]}))
+    log.take(decision(0, {}))
+    assert log.of(1) is Presence.ABSENT
+
+
+def test_who_is_forgotten_is_absent(log: PresenceLog) -> None:
+    log.take(decision(0, {1: [0], 2: [0]}))
+    log.forget({2})
+    assert log.of(1) is Presence.ABSENT
+    assert log.of(2) is Presence.PRESENT
+
+
+def test_without_a_while_only_who_is_seen_in_a_gop_is_present_in_it() -> None:
+    log = PresenceLog(0)
+    log.take(decision(0, {1: [GOP - 1]}))
+    assert log.of(1) is Presence.PRESENT
+    log.take(decision(1, {}))
+    assert log.of(1) is Presence.ABSENT

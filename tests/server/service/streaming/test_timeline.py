@@ -1,0 +1,205 @@
+"""No stream has a hole in its time: where a picture is missing, a decoder shows the last one again."""
+
+from __future__ import annotations
+
+import asyncio
+import io
+from dataclasses import dataclass
+from functools import cache
+
+import av
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from fakes.cameras import CAMERAS, FPS, GOP, HEIGHT, NO_REASON, WIDTH, small_config
+from fakes.timeouts import PATIENCE
+from server.camera.encoding.encoder import AccessUnit, Encoder
+from server.config.sections import EncodeSettings, SiteSettings
+from server.media.containers.fmp4 import init_segment
+from server.media.stream_format import Agreement
+from server.service.streaming.broadcaster import Subscriber
+from server.service.streaming.frame_buffer import FrameBuffer
+from server.service.streaming.splicer import Splicer
+from server.service.view_selection.decider import GopDecision, ObjectChoice
+
+FRAMES = 6 * GOP
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A decoded picture, when it is shown, and for how many pulses."""
+
+    pulse: int
+    lasts: int
+    picture: NDArray[np.uint8]
+
+
+@cache
+def taken(seed: int, missed: frozenset[int], preset: str) -> tuple[AccessUnit, ...]:
+    """Encode a camera's pictures, but for those pulses that it misses."""
+    encoder = Encoder(
+        SiteSettings(width=WIDTH, height=HEIGHT, fps=FPS),
+        EncodeSettings.model_validate({"gop": GOP, "preset": preset}),
+    )
+    noise = np.random.default_rng(seed).integers(0, 255, (FRAMES, HEIGHT, WIDTH, 3), dtype=np.uint8)
+    return tuple(encoder.encode(pulse, noise[pulse]) for pulse in range(FRAMES) if pulse not in missed)
+
+
+def alone(units: tuple[AccessUnit, ...]) -> dict[int, NDArray[np.uint8]]:
+    """Decode all that a camera encoded."""
+    decoder = av.CodecContext.create("h264", "r")
+    frames = [
+        frame for data in [*units, None] for frame in decoder.decode(av.Packet(data.data) if data else None)
+    ]
+    return {unit.pulse: frame.to_ndarray(format="yuv420p") for unit, frame in zip(units, frames, strict=True)}
+
+
+def shown(splicer_head: bytes, pieces: list[bytes]) -> list[Shown]:
+    with av.open(io.BytesIO(splicer_head + b"".join(pieces))) as container:
+        found = []
+        for frame in container.decode(video=0):
+            pulse = round(float(frame.time or 0) * FPS)
+            lasts = round((frame.duration or 0) * FPS / 90_000)
+            found.append(Shown(pulse, lasts, frame.to_ndarray(format="yuv420p")))
+        return found
+
+
+async def received(viewer: Subscriber) -> list[bytes]:
+    viewer.close()
+    async with asyncio.timeout(PATIENCE):
+        return [data async for data in viewer]
+
+
+pulses = st.frozensets(st.integers(0, FRAMES - 1), max_size=8)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    missed=pulses,
+    lost=st.tuples(pulses, pulses),
+    wishes=st.lists(st.sampled_from([*CAMERAS, None]), min_size=6, max_size=6),
+    preset=st.sampled_from(["ultrafast", "superfast"]),
+)
+def test_every_pulse_shows_a_cameras_own_picture_of_it_or_the_picture_before(
+    missed: frozenset[int],
+    lost: tuple[frozenset[int], frozenset[int]],
+    wishes: list[str | None],
+    preset: str,
+) -> None:
+    agreement = Agreement()
+    shelves = {camera: FrameBuffer(FPS, FRAMES, agreement) for camera in CAMERAS}
+    splicer = Splicer(shelves, agreement, small_config())
+    sent = {camera: taken(seed, missed, preset) for seed, camera in enumerate(CAMERAS)}
+    own = {camera: alone(units) for camera, units in sent.items()}
+    live = {camera: splicer.cameras[camera].join() for camera in CAMERAS}
+    for camera, gone in zip(CAMERAS, lost, strict=True):
+        for unit in sent[camera]:
+            if unit.pulse not in gone:
+                splicer.frame(camera, shelves[camera].put(unit.pulse, 1, unit.data, key=unit.key))
+    best = None
+    for number, wish in enumerate(wishes):
+        whole = wish and all(shelves[wish].has(pulse) for pulse in range(number * GOP, (number + 1) * GOP))
+        choice = ObjectChoice(1, wish if whole else None, None, away=False)
+        splicer.decision(GopDecision(number * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
+        best = best or splicer.objects[1].join()
+    assert best is not None
+    if agreement.parameters is None:
+        return
+    head = init_segment(agreement.parameters, WIDTH, HEIGHT)
+    for viewer, cameras in [(best, CAMERAS), *((live[camera], (camera,)) for camera in CAMERAS)]:
+        pieces = asyncio.run(received(viewer))
+        if not pieces:
+            continue
+        pictures = shown(head, pieces)
+        assert [it.pulse for it in pictures[1:]] == [it.pulse + it.lasts for it in pictures[:-1]], "no hole"
+        before: NDArray[np.uint8] | None = None
+        for it in pictures:
+            possible = [own[camera][it.pulse] for camera in cameras if it.pulse in own[camera]]
+            possible += [] if before is None else [before]
+            assert any(np.array_equal(it.picture, other) for other in possible), it.pulse
+            before = it.picture
+        if viewer is best:
+            assert pictures[-1].pulse + pictures[-1].lasts == FRAMES
+
+
+def splicing() -> tuple[Splicer, dict[str, FrameBuffer], bytes]:
+    agreement = Agreement()
+    shelves = {camera: FrameBuffer(FPS, 40, agreement) for camera in CAMERAS}
+    splicer = Splicer(shelves, agreement, small_config())
+    for unit in taken(0, frozenset(), "ultrafast"):
+        shelves["c0"].put(unit.pulse, 1, unit.data, key=unit.key)
+    assert agreement.parameters is not None
+    return splicer, shelves, init_segment(agreement.parameters, WIDTH, HEIGHT)
+
+
+def decide(splicer: Splicer, gop: int, camera: str | None) -> None:
+    choice = ObjectChoice(1, camera, None, away=False)
+    splicer.decision(GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
+
+
+async def test_a_picture_that_the_camera_did_not_take_costs_only_itself() -> None:
+    splicer, shelves, head = splicing()
+    units = taken(1, frozenset({7, 8}), "ultrafast")
+    for unit in units:
+        shelves["c1"].put(unit.pulse, 1, unit.data, key=unit.key)
+    decide(splicer, 0, "c1")
+    viewer = splicer.objects[1].join()
+    decide(splicer, 1, None)
+    pictures = shown(head, await received(viewer))
+    assert [(it.pulse, it.lasts) for it in pictures[GOP:]] == [(5, 1), (6, 1), (7, 2), (9, 1)]
+    own = alone(units)
+    for it, pulse in zip(pictures[GOP:], [5, 6, 6, 9], strict=True):
+        np.testing.assert_array_equal(it.picture, own[pulse])
+
+
+async def test_a_camera_that_fell_silent_stands_still_until_it_comes_back() -> None:
+    splicer, _, head = splicing()
+    viewer = splicer.cameras["c0"].join()
+    units = taken(0, frozenset(), "ultrafast")
+    shelf = FrameBuffer(FPS, 10, Agreement())
+    for unit in units[: GOP + 2]:
+        splicer.frame("c0", shelf.put(unit.pulse, 1, unit.data, key=unit.key))
+    for gop in range(2, 14):
+        decide(splicer, gop, None)
+    for unit in units[GOP + 2 : GOP + 4]:
+        splicer.frame("c0", shelf.put(unit.pulse, 1, unit.data, key=unit.key))
+    splicer.close()
+    pictures = shown(head, await received(viewer))
+    assert [it.pulse for it in pictures] == list(range(13 * GOP - 2 * FPS)), "what comes late is not shown"
+    for it in pictures[GOP + 2 :]:
+        np.testing.assert_array_equal(it.picture, alone(units)[GOP + 1])
+
+
+async def test_whoever_comes_while_nothing_can_be_shown_for_long_waits_and_no_queue_grows() -> None:
+    splicer, _, _ = splicing()
+    decide(splicer, 0, "c0")
+    slow = splicer.objects[1].join()
+    for gop in range(8, 2000):
+        decide(splicer, gop, None)
+    assert len(slow._queue) < 20
+    late = splicer.objects[1].join()
+    assert not late._queue
+
+
+async def test_after_hours_without_a_picture_the_stream_goes_on_all_the_same() -> None:
+    splicer, shelves, _ = splicing()
+    decide(splicer, 0, "c0")
+    viewer = splicer.objects[1].join()
+    day = 86_400 * FPS
+    for unit in taken(0, frozenset(), "ultrafast")[:GOP]:
+        shelves["c0"].put(day + unit.pulse, 1, unit.data, key=unit.key)
+    decide(splicer, day // GOP, "c0")
+    assert len(await received(viewer)) == 2
+
+
+async def test_pulses_that_begin_anew_begin_the_stream_anew() -> None:
+    splicer, shelves, _ = splicing()
+    units = taken(0, frozenset(), "ultrafast")
+    for unit in units[:GOP]:
+        splicer.frame("c0", shelves["c0"].put(100_000 + unit.pulse, 1, unit.data, key=unit.key))
+    viewer = splicer.cameras["c0"].join()
+    for unit in units[:GOP]:
+        splicer.frame("c0", shelves["c0"].put(unit.pulse, 2, unit.data, key=unit.key))
+    assert len(await received(viewer)) == 2 * GOP

@@ -1,0 +1,276 @@
+"""Who is shown by which camera: bigger boxes win, cuts wait for GOPs, what is not there is not chosen."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fakes.cameras import CAMERAS, GOP, LARGE, SMALL, STRIDE, TrackNumbers, epoch_of, small_config, word
+from server.messaging.messages import Box
+from server.service.decision_state import Board, reason
+from server.service.view_selection.decider import Decider, GopDecision
+
+Seen = Mapping[str, Mapping[int, Box | None]]
+A, B = CAMERAS
+EVERY_FRAME: Callable[[str, int], bool] = lambda _camera, _pulse: True  # noqa: E731 — a default of the tests
+
+
+def decider(has: Callable[[str, int], bool] = EVERY_FRAME, **changes: Any) -> Decider:
+    it = Decider(small_config(**changes), dict.fromkeys(CAMERAS), has)
+    it.people._registry = TrackNumbers()  # type: ignore[assignment]
+    return it
+
+
+def decide(it: Decider, story: Sequence[Seen], *, end: int | None = None) -> list[GopDecision]:
+    """Tell a story epoch by epoch; ``end`` is the last frame when the recordings are over."""
+    decisions = []
+    for number, seen in enumerate(story):
+        decisions += it.step(
+            epoch_of(number, *(word(camera, number, boxes) for camera, boxes in seen.items()))
+        )
+    return decisions + ([] if end is None else it.finish(end))
+
+
+def shown(decisions: list[GopDecision], number: int = 1) -> list[str | None]:
+    return [choice.camera for it in decisions for choice in it.choices if choice.number == number]
+
+
+def said(decision: GopDecision) -> str:
+    return reason(decision.choices[0], decision.why.of(decision.choices[0].number))
+
+
+def test_a_gop_is_decided_when_its_look_ahead_is_known() -> None:
+    it = decider()
+    assert decide(it, [{A: {1: SMALL}, B: {}}]) == []
+    [decision] = it.step(epoch_of(1, word(A, 1, {1: SMALL}), word(B, 1, {})))
+    assert (decision.first, decision.frames) == (0, GOP)
+
+
+def test_the_camera_with_the_bigger_box_shows_the_person() -> None:
+    decisions = decide(decider(), [{A: {1: SMALL}, B: {1: LARGE}}] * 4)
+    assert shown(decisions) == [B, B, B]
+    views = decisions[-1].why.of(1).views
+    assert views[B].cost == 0.0
+    assert views[A].cost == pytest.approx(1 - (views[A].quality or 0.0) / (views[B].quality or 0.0))
+
+
+def test_a_little_better_is_not_worth_a_cut_and_much_better_is() -> None:
+    larger: Box = (20.0, 4.0, 36.5, 44.0)
+    before: Seen = {A: {1: LARGE}, B: {1: SMALL}}
+    between: Seen = {A: {1: LARGE}, B: {1: larger}}
+    after: Seen = {A: {1: SMALL}, B: {1: LARGE}}
+    decisions = decide(decider(), [before] * 2 + [between] * 3 + [after] * 3)
+    assert shown(decisions) == [A, A, A, A, B, B, B]
+    assert "a little better than c0, but not enough" in said(decisions[2])
+
+
+def test_a_person_who_is_seen_by_one_camera_alone_is_shown_by_it() -> None:
+    decisions = decide(decider(), [{A: {}, B: {1: SMALL}}] * 3)
+    assert shown(decisions) == [B, B]
+
+
+def test_views_change_only_where_gops_begin_and_boxes_are_of_the_gops_frames() -> None:
+    story = [{A: {1: LARGE}, B: {}}] * 3 + [{A: {}, B: {}}] * 3
+    decisions = decide(decider(), story, end=6 * STRIDE - 1)
+    assert [it.first for it in decisions] == [n * GOP for n in range(6)]
+    for it in decisions:
+        assert all(len(frames) == it.frames for frames in it.boxes.values())
+    assert decisions[0].boxes[A] == [[(1, *LARGE)]] * GOP
+    assert decisions[3].boxes[A] == [[]] * GOP
+
+
+def test_a_camera_of_which_a_frame_is_missing_is_not_chosen_for_that_gop() -> None:
+    it = decider(has=lambda camera, pulse: (camera, pulse) != (A, GOP + 2))
+    decisions = decide(it, [{A: {1: LARGE}, B: {}}] * 5, end=5 * STRIDE - 1)
+    assert shown(decisions) == [A, B, A, A, A]
+    assert decisions[1].why.of(1).views[A].cost is None
+
+
+def test_where_no_camera_can_be_shown_none_is_chosen_and_the_stream_goes_on_after() -> None:
+    it = decider(has=lambda _camera, pulse: pulse // GOP != 1)
+    decisions = decide(it, [{A: {1: LARGE}, B: {}}] * 5, end=5 * STRIDE - 1)
+    assert shown(decisions) == [A, None, A, A, A]
+    assert said(decisions[1]) == "No camera's picture can be shown at the moment."
+
+
+@pytest.mark.parametrize("left", range(1, GOP + 1))
+def test_the_end_decides_what_is_left_a_partial_gop_too(left: int) -> None:
+    end = 2 * GOP + left - 1
+    decisions = decide(decider(), [{A: {1: LARGE}, B: {}}] * 3, end=end)
+    assert [(it.first, it.frames) for it in decisions] == [(0, GOP), (GOP, GOP), (2 * GOP, left)]
+    assert shown(decisions) == [A] * 3
+    assert all(len(frames) == left for frames in decisions[-1].boxes.values())
+
+
+def test_the_end_of_nothing_decides_nothing() -> None:
+    assert decider().finish(100) == []
+
+
+def test_a_service_that_starts_in_the_middle_begins_with_the_next_gop() -> None:
+    it = decider(encode={"gop": 10}, view={"lookahead": 20})
+    decisions = []
+    for number in range(5, 12):
+        decisions += it.step(epoch_of(number, word(A, number, {1: SMALL})))
+    assert [decision.first for decision in decisions] == [30, 40]
+
+
+@settings(deadline=None, max_examples=15)
+@given(
+    st.lists(
+        st.fixed_dictionaries(
+            {
+                camera: st.dictionaries(st.integers(1, 3), st.sampled_from([SMALL, LARGE, None]), max_size=3)
+                for camera in CAMERAS
+            }
+        ),
+        min_size=1,
+        max_size=8,
+    ),
+    st.sets(st.tuples(st.sampled_from(CAMERAS), st.integers(0, 39)), max_size=5),
+)
+def test_the_same_epochs_give_the_same_decisions_and_none_shows_what_is_missing(
+    story: list[Seen], missing: set[tuple[str, int]]
+) -> None:
+    end = len(story) * STRIDE - 1
+    one, two = (
+        decide(decider(has=lambda camera, pulse: (camera, pulse) not in missing), story, end=end)
+        for _ in "12"
+    )
+    assert one == two
+    assert sum(it.frames for it in one) == end + 1
+    for it in one:
+        for choice in it.choices:
+            for pulse in range(it.first, it.first + it.frames):
+                assert (choice.camera, pulse) not in missing
+
+
+def test_a_cut_is_told_once_with_both_cameras() -> None:
+    it = decider(has=lambda camera, pulse: (camera, pulse // GOP) != (A, 1))
+    board = Board(25.0)
+    told = [board.put(decision) for decision in decide(it, [{A: {1: LARGE}, B: {}}] * 4, end=19)]
+    assert [[(cut.from_camera, cut.to_camera, cut.pulse) for cut in it.cuts] for it in told] == [
+        [],
+        [(A, B, GOP)],
+        [(B, A, 2 * GOP)],
+        [],
+    ]
+    assert board.cuts == 2
+    assert board.standings[1].since == 2 * GOP
+    assert board.standings[1].cameras == (A,)
+    assert told[0].choices == {1: A}
+    assert told[0].boxes[A][0] == [(1, *LARGE)]
+
+
+def test_after_a_hole_the_same_camera_is_no_cut() -> None:
+    it = decider(has=lambda _camera, pulse: pulse // GOP != 1)
+    board = Board(25.0)
+    for decision in decide(it, [{A: {1: LARGE}, B: {}}] * 4, end=19):
+        board.put(decision)
+    assert board.cuts == 0
+
+
+def test_the_reason_is_one_plain_sentence_for_every_case() -> None:
+    story: list[Seen] = [{A: {1: LARGE}, B: {}}] * 2
+    only_a = decide(decider(has=lambda camera, _pulse: camera == A), story)[0]
+    assert said(only_a) == "c0 is the only camera whose picture can be shown."
+    best = decide(decider(), story)[0]
+    assert said(best) == "c0 sees this person best over the next frames."
+    away = decide(decider(), [*story, *[{A: {}, B: {}}] * 3])[-1]
+    assert said(away) == "Nobody sees this person at the moment; c0 saw them last."
+
+
+def test_a_camera_that_dies_in_the_middle_of_a_window_is_left_at_the_gop_it_dies_in() -> None:
+    dies = 2 * GOP + 2
+    story: list[Seen] = [{A: {1: LARGE}, B: {1: SMALL}}] * 8
+    alive = {A: 10 * GOP}
+    it = decider(has=lambda camera, pulse: pulse < alive.get(camera, pulse + 1))
+    before = decide(it, story[:3])  # decides GOPs 0 and 1; the look-ahead of the second ends with GOP 2
+    alive[A] = dies
+    after = []
+    for number in range(3, 8):  # its last words are lost with it
+        after += it.step(epoch_of(number, word(B, number, story[number][B])))
+    assert shown(before) == [A, A]
+    assert shown(after) == [B, B, B, B, B], "no hole, and one cut"
+    assert after[0].why.of(1).views[A].cost is None
+
+
+def test_what_was_seen_ahead_of_a_death_is_decided_again_without_the_camera() -> None:
+    story: list[Seen] = [{A: {1: LARGE}, B: {1: SMALL}}] * 3
+    late = decider(has=lambda camera, pulse: camera == B or pulse < 2 * GOP, view={"lookahead": 4 * GOP})
+    early = decide(late, [*story, *[{B: {1: SMALL}}] * 4])
+    assert shown(early) == [A, A, B, B]
+    sum_ahead = early[0].why.of(1)
+    assert sum_ahead.stay is None
+    assert sum_ahead.views[A].cost is None, "it cannot be shown to the end of the look-ahead"
+    assert said(early[0]) == "c0 is shown for as long as it can be: some of its next frames are missing."
+
+
+def test_before_a_cut_that_is_planned_it_is_said_to_come() -> None:
+    story: list[Seen] = [{A: {1: LARGE}, B: {1: SMALL}}] * 3 + [{A: {1: SMALL}, B: {1: LARGE}}] * 7
+    decisions = decide(decider(view={"lookahead": 4 * GOP, "switch_cost_s": 0.04}), story)
+    last = shown(decisions).index(B) - 1
+    why = decisions[last].why.of(1)
+    assert why.stay is not None
+    assert why.cut is not None
+    assert why.stay > why.cut, "for the whole look-ahead the other one would be better"
+    assert (
+        said(decisions[last]) == "Another camera will see this person better than c0: it is too soon to cut."
+    )
+
+
+@pytest.mark.parametrize(("min_shot_s", "cuts"), [(0.0, 4), (0.5, 2)])
+def test_a_shot_is_as_long_as_asked_for(min_shot_s: float, cuts: int) -> None:
+    here: Seen = {A: {1: LARGE}, B: {1: SMALL}}
+    there: Seen = {A: {1: SMALL}, B: {1: LARGE}}
+    story = [here, here, there, there, here, here, there, there, here, here, here]
+    it = decider(view={"min_shot_s": min_shot_s})
+    views = shown(decide(it, story, end=11 * STRIDE - 1))
+    changes = [n for n in range(1, len(views)) if views[n] != views[n - 1]]
+    assert len(changes) == cuts
+    assert all(b - a >= it.least_shot for a, b in itertools.pairwise(changes))
+
+
+def test_a_shot_that_shows_nobody_may_be_short() -> None:
+    here, gone = {A: {1: LARGE}, B: {1: SMALL}}, {A: {}, B: {1: SMALL}}
+    it = decider(view={"min_shot_s": 2.0})
+    assert shown(decide(it, [here, here, *[gone] * 4])) == [A, A, B, B, B]
+
+
+def test_a_track_that_becomes_another_person_inside_a_window_is_each_of_them_in_their_frames() -> None:
+    it = decider()
+    changes = STRIDE + 2
+    it.people.numbers = lambda keys, first, frames: np.where(  # type: ignore[method-assign]
+        first + np.arange(frames) < changes, 1, 2
+    )[None].repeat(len(keys), axis=0)
+    decisions = decide(it, [{A: {1: LARGE}, B: {}}] * 4)
+    assert [[number for number, *_ in frame] for frame in decisions[1].boxes[A]] == [[1], [1], [2], [2], [2]]
+    assert decisions[1].why.of(1).views[A].seen == pytest.approx(2 / (2 * GOP))
+
+
+def test_how_far_away_everybody_is_makes_no_difference() -> None:
+    tiny: Box = (30.0, 30.0, 31.0, 33.0)
+    half: Box = (30.0, 30.0, 30.5, 31.5)
+    story: list[Seen] = [{A: {1: tiny}, B: {1: half}}] * 3 + [{A: {1: half}, B: {1: tiny}}] * 3
+    assert shown(decide(decider(), story)) == [A, A, A, B, B]
+    papers = decider(view={"quality": {"relative": False}})
+    assert shown(decide(papers, story)) == [A] * 5, "the paper's cost of a cut is of a picture full of them"
+
+
+@pytest.mark.parametrize(("missed_s", "expected"), [(0.0, [A, B, A, A]), (1.0, [A, A, A, A])])
+def test_who_is_missed_for_a_moment_is_not_worth_two_cuts(missed_s: float, expected: list[str]) -> None:
+    here, missed = {A: {1: LARGE}, B: {1: SMALL}}, {A: {}, B: {1: SMALL}}
+    it = decider(view={"missed_s": missed_s})
+    assert shown(decide(it, [here, missed, here, here, here])) == expected
+
+
+def test_who_is_not_found_again_is_left_in_the_end() -> None:
+    here, gone = {A: {1: LARGE}, B: {1: SMALL}}, {A: {}, B: {1: SMALL}}
+    views = shown(decide(decider(view={"missed_s": 1.0}), [here, *[gone] * 8]))
+    assert (views[0], views[-1]) == (A, B)
+    assert [a != b for a, b in itertools.pairwise(views)].count(True) == 1

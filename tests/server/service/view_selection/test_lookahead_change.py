@@ -1,0 +1,161 @@
+"""A look-ahead that is changed while the service runs: no stream has a hole, nothing is decided too soon."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fakes.cameras import (
+    CAMERAS,
+    GOP,
+    LARGE,
+    SMALL,
+    STRIDE,
+    FedService,
+    TrackNumbers,
+    epoch_of,
+    small_config,
+    word,
+)
+from fakes.site import A, B, Hall
+from server.config.sections import ViewSettings
+from server.http.access.csrf import CHANGES
+from server.service.streaming.broadcaster import Chunk
+from server.service.view_selection.decider import Decider, GopDecision
+from server.system.errors import UserError
+
+EPOCHS = 8  # as many as there are pictures of
+MINE = {CHANGES: "1"}
+Changes = Mapping[int, int]
+"""By epoch before which it is changed: the look-ahead from then on."""
+CHANGED = st.dictionaries(st.integers(0, 29), st.integers(GOP, 40), max_size=6)
+
+
+def looking(view: ViewSettings, frames: int) -> ViewSettings:
+    return view.model_copy(update={"lookahead": frames})
+
+
+@settings(deadline=None, max_examples=15)
+@given(CHANGED, st.sampled_from([5, 10]), st.sampled_from([0.0, 0.6]))
+def test_every_gop_is_decided_once_in_order_and_by_frames_that_are_known(
+    changes: Changes, gop: int, min_shot_s: float
+) -> None:
+    config = small_config(encode={"gop": gop}, view={"lookahead": 20, "min_shot_s": min_shot_s})
+    decider = Decider(config, dict.fromkeys(CAMERAS), lambda *_: True)
+    decider.people._registry = TrackNumbers()  # type: ignore[assignment]
+    decided: list[GopDecision] = []
+    for number in range(45):
+        if number in changes:
+            decider.choose_by(looking(config.view, max(gop, changes[number])))
+        one, other = (SMALL, LARGE) if number // 3 % 2 else (LARGE, SMALL)
+        epoch = epoch_of(number, word(A, number, {1: one}), word(B, number, {1: other}))
+        new = decider.step(epoch)
+        assert len(new) <= -(-STRIDE // gop) + 1, "who watches is not overrun"
+        for decision in new:
+            assert decision.why.of(1).frames == decider.view.lookahead
+            assert decision.first + decider.view.lookahead - 1 <= epoch.last
+        decided += new
+    assert [it.first for it in decided] == [gop * n for n in range(len(decided))]
+    # Some epochs after the last change the streams are as near to the cameras as they can be.
+    ahead = epoch.last + 1 - (decided[-1].first + gop)
+    assert decider.view.lookahead - gop <= ahead < decider.view.lookahead
+
+
+def test_a_look_ahead_that_was_changed_and_settled_chooses_as_if_it_had_always_been() -> None:
+    def told(*changes: tuple[int, int]) -> list[GopDecision]:
+        config = small_config(view={"lookahead": 20})
+        decider = Decider(config, dict.fromkeys(CAMERAS), lambda *_: True)
+        decider.people._registry = TrackNumbers()  # type: ignore[assignment]
+        decided = []
+        for number in range(30):
+            for epoch, frames in changes:
+                if epoch == number:
+                    decider.choose_by(looking(config.view, frames))
+            boxes = {A: {1: LARGE if number < 20 else SMALL}, B: {1: SMALL if number < 20 else LARGE}}
+            decided += decider.step(epoch_of(number, *(word(it, number, boxes[it]) for it in CAMERAS)))
+        return decided
+
+    for changes in ([(3, 35), (8, 20)], [(3, 10), (9, 20)]):
+        assert told(*changes) == told()
+
+
+@settings(deadline=None, max_examples=20)
+@given(st.dictionaries(st.integers(0, EPOCHS - 1), st.integers(GOP, 30), max_size=4))
+def test_streams_are_the_chosen_cameras_gops_without_a_hole(changes: Changes) -> None:
+    service = FedService(small_config())
+    service.decider.people._registry = TrackNumbers()  # type: ignore[assignment]
+    service.come(*CAMERAS)
+    shown: list[str | None] = []
+    service.on_decision.append(lambda it: shown.append(it.choices.get(1)))
+    got: list[bytes] = []
+
+    def take(piece: Chunk) -> bool:
+        got.append(piece.data)
+        return True
+
+    viewer = None
+    for epoch in range(EPOCHS):
+        if epoch in changes:
+            service.choose_by(looking(service.config.view, changes[epoch]))
+        one, other = (SMALL, LARGE) if epoch // 3 % 2 else (LARGE, SMALL)
+        service.feed(epoch, {A: {1: one}, B: {1: other}})
+        if viewer is None and 1 in service.splicer.objects:
+            viewer = service.splicer.objects[1].join()
+            begun = len(shown) - 1
+            got += [it.data for it in viewer._queue]
+            viewer._queue.clear()
+            viewer.at_once = take
+    if viewer is not None:
+        assert viewer.lost == 0
+        names = [it or "" for it in shown[begun:]]
+        assert got == [service.shelves[it].gop((begun + n) * GOP, GOP) for n, it in enumerate(names)]
+    service.close()
+
+
+@pytest.mark.parametrize(
+    ("frames", "error"),
+    [
+        (4, "view.lookahead: is 4 frames but must be at least 5 (encode.gop + "),
+        (10_000, "view.lookahead: is 10000 frames but can be at most "),
+        (0, "to try out: view.lookahead: Input should be greater than 0"),
+        (10.5, "to try out: view.lookahead: Input should be a valid integer"),
+    ],
+)
+async def test_a_look_ahead_that_cannot_be_is_refused_with_what_can(
+    busy: Hall, frames: float, error: str
+) -> None:
+    asked = {"lookahead": frames}
+    async with busy.session.put("/api/operator/choosing", headers=MINE, json=asked) as answer:
+        assert answer.status == 400
+        said = (await answer.json())["error"]
+    assert said.startswith(error)
+    assert "\n" not in said
+    assert busy.service.decider.view == busy.service.config.view
+
+
+async def test_the_site_says_the_look_ahead_that_is_in_force(busy: Hall) -> None:
+    most = (await busy.get_json("/api/operator/choosing"))["most_lookahead"]
+    for frames in (most, 5):
+        asked: dict[str, Any] = {"lookahead": frames}
+        async with busy.session.put("/api/operator/choosing", headers=MINE, json=asked) as answer:
+            told = await answer.json()
+        assert told["values"]["lookahead"] == frames
+        assert f"lookahead: {frames}\n" in told["lines"]
+        assert (await busy.get_json("/api/site"))["lookahead_frames"] == frames
+
+
+def test_what_is_kept_reaches_as_far_as_can_be_looked_ahead() -> None:
+    for view in ({}, {"buffer_s": 1.0}, {"buffer_s": 60.0}, {"lookahead": 200}):
+        service = FedService(small_config(view=view))
+        config, fps = service.config, service.config.site.fps
+        kept = service.shelves[A]._frames
+        late = round(config.view.late_after_s * fps) + round(config.track.backlog_s * fps)
+        assert service.most_lookahead >= config.view.lookahead
+        assert service.most_lookahead + late + STRIDE + GOP <= kept
+        with pytest.raises(UserError):
+            service.choose_by(looking(config.view, service.most_lookahead + 1))
+        service.close()

@@ -1,0 +1,130 @@
+"""What is ahead is what was said last of every frame, however it is put together."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from bestview import TrackKey
+from fakes.cameras import CAMERAS, STRIDE, TrackNumbers, epoch_of, small_config, word
+from server.messaging.messages import Box, CameraTracks
+from server.service.identity.people import People
+from server.service.ingest.epoch_aligner import Epoch
+from server.service.view_selection.lookahead_window import Outlook
+from server.service.view_selection.view_quality_buffer import Sight
+
+WINDOW, EPOCHS = 3 * STRIDE, 5
+BOX = st.tuples(*(st.integers(1, 20) for _ in "xywh")).map(
+    lambda it: (float(it[0]), float(it[1]), float(it[0] + it[2]), float(it[1] + it[3]))
+)
+WORD = st.dictionaries(
+    st.integers(1, 3), st.lists(BOX | st.none(), min_size=WINDOW, max_size=WINDOW), max_size=3
+)
+STORY = st.lists(st.dictionaries(st.sampled_from(CAMERAS), WORD, max_size=2), min_size=1, max_size=EPOCHS)
+
+
+class Drifting(People):
+    """People whose numbers change at a frame, differently in each camera and track."""
+
+    def numbers(self, keys: Sequence[TrackKey], first: int, frames: int) -> NDArray[np.int64]:
+        """Give numbers that depend on the frame."""
+        return np.array([[self.one(key, n) for n in range(first, first + frames)] for key in keys]).reshape(
+            len(keys), frames
+        )
+
+    @staticmethod
+    def one(key: TrackKey, pulse: int) -> int:
+        """Give one track's number in one frame; two tracks may share it, and -1 is nobody."""
+        return (key.local + CAMERAS.index(key.camera) + pulse // 7) % 4 or -1
+
+
+def long_word(camera: str, epoch: int, boxes: Mapping[int, Sequence[Box | None]]) -> CameraTracks:
+    """Give a window of three epochs, the first ones of a recording shorter."""
+    told = word(camera, epoch, dict.fromkeys(boxes))
+    first = max(0, told.last - WINDOW + 1)
+    tracks = [
+        type(it)(
+            id=it.id,
+            boxes=list(boxes[it.id][: told.last - first + 1]),
+            looks=it.looks,
+            confidence=1.0,
+        )
+        for it in told.tracks
+    ]
+    return word(camera, epoch, {}, first=first, tracks=tracks)
+
+
+def slowly(story: Sequence[Epoch], sight: Sight, people: Drifting) -> dict[tuple[int, str, int], float]:
+    """Give the quality of every view by pulse, camera and number, one box after the other."""
+    found: dict[tuple[int, str, int], float] = {}
+    newest: dict[tuple[int, str], CameraTracks] = {}
+    for epoch in story:
+        for camera, message in epoch.tracks.items():
+            newest |= {(pulse, camera): message for pulse in range(message.first, message.last + 1)}
+    for (pulse, camera), message in newest.items():
+        [stretch] = sight.over(camera, pulse, pulse)
+        seen = stretch.window
+        for track, key in enumerate(seen.window.keys):
+            box = message.tracks[track].boxes[pulse - message.first]
+            number = people.one(key, pulse)
+            if box is not None and number > 0 and number in people.known:
+                found.setdefault((pulse, camera, number), float(seen.quality[pulse - message.first, track]))
+    return found
+
+
+@settings(deadline=None, max_examples=60)
+@given(STORY, st.sets(st.tuples(st.sampled_from(CAMERAS), st.integers(0, 24)), max_size=4), st.booleans())
+def test_it_holds_every_view_once_and_compares_it_with_the_best(
+    story: list[dict[str, dict[int, list[Box | None]]]], missing: set[tuple[str, int]], relative: bool
+) -> None:
+    config = small_config()
+    people = Drifting(config.view.identity, CAMERAS, dict.fromkeys(CAMERAS), (64, 48), lag=0)
+    people._registry = TrackNumbers()  # type: ignore[assignment]
+    sight = Sight(config, dict.fromkeys(CAMERAS), people.fits)
+    epochs = [
+        epoch_of(number, *(long_word(camera, number, boxes) for camera, boxes in said.items()))
+        for number, said in enumerate(story)
+    ]
+    for epoch in epochs:
+        sight.put(people.update(epoch))
+    last = epochs[-1].last
+    outlook = Outlook(
+        CAMERAS,
+        sight,
+        people,
+        lambda camera, pulse: (camera, pulse) not in missing,
+        2,
+        last,
+        relative=relative,
+    )
+    views = outlook.views
+    found = {
+        (int(n) + 2, CAMERAS[c], int(outlook.numbers[k])): (quality, worth)
+        for n, c, k, quality, worth in zip(
+            views.frame,
+            views.camera,
+            views.person,
+            outlook.quality.tolist(),
+            views.worth.tolist(),
+            strict=True,
+        )
+    }
+    expected = {
+        (pulse, camera, number): quality
+        for (pulse, camera, number), quality in slowly(epochs, sight, people).items()
+        if pulse >= 2 and (camera, pulse) not in missing and quality > 0
+    }
+    assert len(found) == len(views.frame)
+    assert {it: quality for it, (quality, _) in found.items()} == expected
+    for (pulse, camera, number), (quality, worth) in found.items():
+        best = max(expected.get((pulse, it, number), 0.0) for it in CAMERAS) if relative else 1.0
+        assert worth == quality / best, camera
+    for view, (quality, _) in enumerate(found.values()):
+        weights = config.view.quality.weights
+        terms = dict(zip(config.view.quality.terms, outlook.terms(view).tolist(), strict=True))
+        assert np.prod([1 - weights[it] * (1 - term) for it, term in terms.items()]) == pytest.approx(quality)

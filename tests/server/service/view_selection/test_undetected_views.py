@@ -1,0 +1,169 @@
+"""Who is not found by a camera, but stands before it as another knows, may still be shown by it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fakes.cameras import CAMERAS, STRIDE, TrackNumbers, epoch_of, small_config, word
+from server.messaging.messages import Box
+from server.service.decision_state import reason
+from server.service.view_selection.cross_view_inference import Elsewhere
+from server.service.view_selection.decider import Decider, GopDecision
+from server.service.view_selection.undetected_views import Tested as Looked
+from server.service.view_selection.undetected_views import Unfound
+from server.service.view_selection.view_quality_buffer import Sight
+
+A, B = CAMERAS
+GROUND = {A: np.eye(3), B: np.diag([0.5, 0.5, 1.0])}
+"""Both look straight down, B from half as high: everybody is twice as large in it."""
+NOWHERE: dict[str, np.ndarray | None] = {A: np.eye(3), B: None}
+Told = Mapping[str, Mapping[int, Box | None]]
+
+
+def at(x: float, y: float, camera: str = A) -> Box:
+    """Give the box of somebody whose feet are at a place of A's picture."""
+    scale = 1.0 if camera == A else 2.0
+    return scale * (x - 2.0), scale * (y - 10.0), scale * (x + 2.0), scale * y
+
+
+def decider(ground: Mapping[str, np.ndarray | None] = GROUND, **view: Any) -> Decider:
+    it = Decider(small_config(view=view), ground, lambda _camera, _pulse: True)
+    it.people._registry = TrackNumbers()  # type: ignore[assignment]
+    return it
+
+
+def decide(it: Decider, story: Sequence[Told]) -> list[GopDecision]:
+    epochs = (
+        epoch_of(number, *(word(camera, number, boxes) for camera, boxes in said.items()))
+        for number, said in enumerate(story)
+    )
+    return [decision for epoch in epochs for decision in it.step(epoch)]
+
+
+def shown(decisions: Sequence[GopDecision], number: int = 1) -> list[str | None]:
+    return [choice.camera for it in decisions for choice in it.choices if choice.number == number]
+
+
+PLACE = 15.0, 20.0
+LOST = {3: at(26.0, 14.0)}
+"""Somebody whom B never finds where A sees them stand: it misses people, then."""
+FOUND: Told = {A: {1: at(*PLACE), **LOST}, B: {1: at(*PLACE, B)}}
+COVERED: Told = {A: FOUND[A], B: {1: None, 2: at(17.0, 20.0, B)}}
+"""Somebody else's box is there."""
+GONE: Told = {A: FOUND[A], B: {1: None}}
+
+
+def test_who_is_lost_beside_somebody_is_still_shown_where_they_are_larger() -> None:
+    story = [FOUND] * 20 + [COVERED] * 12
+    assert shown(decide(decider(unfound=0.0), story))[-1] == A, "missed for longer than a moment"
+    assert shown(decide(decider(), story)) == [B] * 31
+    assert shown(decide(decider(NOWHERE), story))[-1] == A, "nobody knows where the other camera looks"
+
+
+def test_where_no_box_is_at_all_they_are_taken_to_be_behind_something() -> None:
+    views = shown(decide(decider(), [FOUND] * 20 + [GONE] * 12))
+    assert views[:20] == [B] * 20
+    assert views[-1] == A
+
+
+def test_whom_a_camera_does_not_find_that_misses_nobody_is_hidden() -> None:
+    story = [{A: {1: at(*PLACE)}, B: said[B]} for said in [FOUND] * 100 + [COVERED] * 4]
+    views = shown(decide(decider(missed_s=0.0), story))
+    assert views[98] == B
+    assert views[-1] == A
+
+
+def test_a_camera_that_never_finds_anybody_at_a_place_shows_nobody_there() -> None:
+    learned = [COVERED] * 60
+    assert shown(decide(decider(missed_s=0.0), [FOUND, *learned]))[-1] == A
+    assert shown(decide(decider(missed_s=0.0), [FOUND] * 60 + learned[:12]))[-1] == B
+
+
+@pytest.mark.parametrize("speaks", [False, True], ids=["is silent", "sees nothing"])
+def test_nothing_is_learned_of_a_camera_that_is_not_there(speaks: bool) -> None:
+    it = decider()
+    decide(it, [FOUND] * 20)
+    trust = it._elsewhere._findable._shares.copy()
+    for number in range(20, 40):
+        away = word(B, number, {}, unsearched=[*range(number * STRIDE, (number + 1) * STRIDE)])
+        it.step(epoch_of(number, word(A, number, FOUND[A]), *([away] if speaks else [])))
+    changed = np.abs(it._elsewhere._findable._shares - trust)
+    assert changed.max() < 0.05, "but for forgetting"
+
+
+def test_who_stands_outside_the_picture_is_not_expected_in_it() -> None:
+    there = {A: {1: at(*PLACE), 2: at(60.0, 40.0)}, B: {1: at(*PLACE, B)}}
+    decisions = decide(decider(), [there] * 20)
+    assert shown(decisions, 2) == [A] * 19
+    assert decisions[-1].why.of(2).views[B].unfound == 0.0
+
+
+def test_why_says_who_does_not_find_them_and_what_that_view_is_worth() -> None:
+    decisions = decide(decider(), [FOUND] * 20 + [COVERED] * 6)
+    why = decisions[-1].why.of(1)
+    assert (why.views[A].seen, why.views[A].unfound) == (1.0, 0.0)
+    assert (why.views[B].seen, why.views[B].unfound) == (0.0, 1.0)
+    assert why.views[B].quality is None
+    alone = why.views[A].quality
+    worth = why.views[B].unfound_quality
+    assert alone is not None
+    assert worth is not None
+    assert worth == pytest.approx(2.0 * alone), "twice as large, and people are always found there"
+    assert why.views[B].cost == pytest.approx(0.0)
+    assert reason(decisions[-1].choices[0], why).startswith("c1 does not find this person, but")
+
+
+@pytest.mark.parametrize("frames", [1, 4, 10, 13, 25])
+def test_a_look_stands_for_the_frames_to_the_next_one_and_for_none_that_are_decided_later(
+    frames: int,
+) -> None:
+    it = Elsewhere(small_config(), Sight(small_config(), GROUND, {}))
+    looks = np.array([0, 10, 20])
+    cameras, feet = np.zeros(3, int), np.full((3, 2), 20.0)
+    tested = Looked(looks, cameras, feet, np.ones(3, dtype=np.bool_))
+    it.learn(replace(Unfound.nobody(), tested=tested), frames)
+    assert it._findable._counts[0].sum() == frames, "the next outlook begins with a look"
+
+
+def test_the_factor_is_what_such_views_are_worth() -> None:
+    story = [FOUND] * 20 + [COVERED] * 6
+    whole, half = (decide(decider(unfound=it), story)[-1].why.of(1).views[B] for it in (1.0, 0.5))
+    assert half.unfound_quality == pytest.approx(0.5 * (whole.unfound_quality or 0.0))
+
+
+PLACES = st.sampled_from([(10.0, 15.0), (14.0, 18.0), (26.0, 22.0), (40.0, 30.0)])
+SOMEBODY = st.tuples(PLACES, st.booleans(), st.booleans())
+STORY = st.lists(st.tuples(SOMEBODY, SOMEBODY, SOMEBODY), min_size=6, max_size=20)
+
+
+def told(moment: Sequence[tuple[tuple[float, float], bool, bool]]) -> Told:
+    return {
+        camera: {
+            number: at(*place, camera) if found[CAMERAS.index(camera)] else None
+            for number, (place, *found) in enumerate(moment, start=1)
+        }
+        for camera in CAMERAS
+    }
+
+
+@settings(deadline=None, max_examples=15)
+@given(STORY)
+def test_services_that_share_the_people_choose_as_one_service_does(
+    story: list[tuple[tuple[tuple[float, float], bool, bool], ...]],
+) -> None:
+    words = [told(moment) for moment in story]
+    alone = decide(decider(), words)
+    for index in range(2):
+        part = decide(decider(share={"of": 2, "index": index}), words)
+        for one, mine in zip(alone, part, strict=True):
+            expected = [choice for choice in one.choices if choice.number % 2 == index]
+            assert list(mine.choices) == expected
+            for choice in mine.choices:
+                assert mine.why.of(choice.number) == one.why.of(choice.number)

@@ -1,0 +1,122 @@
+"""A site is not open to other machines by accident."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from fakes.cameras import small_config
+from fakes.command_line import Run, refusal
+from fakes.paths import CONFIGS
+from fakes.tokens import line_of, write_tokens
+from server.cli.generated_config import DEMO
+from server.config.loader import load_config
+from server.config.sections import AccessSettings
+from server.supervisor.exposure_checks import check_bus, check_pulses, check_viewers, is_loopback
+from server.system.errors import UserError
+
+OUTSIDE = "0.0.0.0"  # noqa: S104 — what the tests are about
+
+
+@pytest.mark.parametrize(
+    ("host", "here"),
+    [
+        ("127.0.0.1", True),
+        ("127.3.2.1", True),
+        ("::1", True),
+        ("localhost", True),
+        (OUTSIDE, False),
+        ("::", False),
+        ("", False),
+        ("10.0.0.5", False),
+        ("server.example", False),
+    ],
+)
+def test_what_only_this_machine_reaches(host: str, here: bool) -> None:
+    assert is_loopback(host) == here
+
+
+def test_the_defaults_are_for_this_machine_alone() -> None:
+    for check in (check_viewers, check_pulses, check_bus):
+        check(small_config())
+
+
+def test_viewers_from_elsewhere_take_tokens_or_a_word(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match=r"http\.host: .* access\.tokens .* access\.open_to_all: true"):
+        check_viewers(small_config(http={"host": OUTSIDE}))
+    check_viewers(small_config(http={"host": OUTSIDE}, access={"open_to_all": True}))
+    tokens = tmp_path / "tokens.yaml"
+    settings = {"http": {"host": OUTSIDE}, "access": {"tokens": str(tokens)}}
+    with pytest.raises(UserError, match="cannot read the tokens"):
+        check_viewers(small_config(**settings))
+    write_tokens(tokens, line_of("lead"))
+    check_viewers(small_config(**settings))
+
+
+@pytest.mark.parametrize(
+    ("check", "section", "setting"),
+    [
+        (check_pulses, "sync", {"bind": OUTSIDE}),
+        (check_bus, "zenoh", {"listen": f"tcp/{OUTSIDE}:7447"}),
+        (check_bus, "zenoh", {"listen": "tcp/[::]:7447"}),
+        (check_bus, "zenoh", {"listen": "udp/10.0.0.5:7447"}),
+    ],
+)
+def test_what_has_no_password_takes_a_network_that_is_trusted(check: Any, section: str, setting: Any) -> None:
+    with pytest.raises(UserError, match=rf"{section}\.\w+: .* access\.trusted_network: true"):
+        check(small_config(**{section: setting}))
+    check(small_config(**{section: setting, "access": {"trusted_network": True}}))
+    with pytest.raises(UserError):
+        check(small_config(**{section: setting, "access": {"open_to_all": True}}))
+
+
+@pytest.mark.parametrize(
+    ("command", "changes", "setting"),
+    [
+        ("up", {"http": {"host": OUTSIDE}}, "http.host"),
+        ("up", {"sync": {"bind": OUTSIDE}}, "sync.bind"),
+        ("up", {"zenoh": {"listen": f"tcp/{OUTSIDE}:7447"}}, "zenoh.listen"),
+        ("bestview", {"http": {"host": OUTSIDE}}, "http.host"),
+        ("bestview", {"zenoh": {"listen": f"tcp/{OUTSIDE}:7447"}}, "zenoh.listen"),
+        ("sync", {"sync": {"bind": OUTSIDE}}, "sync.bind"),
+    ],
+)
+def test_every_command_that_listens_refuses_with_one_line(
+    myview: Run, tmp_path: Path, command: str, changes: dict[str, Any], setting: str
+) -> None:
+    path = tmp_path / "site.yaml"
+    path.write_text(yaml.safe_dump({**DEMO, **changes}), encoding="utf-8")
+    assert refusal(myview(command, str(path))).startswith(f"myview: {setting}: ")
+
+
+def test_a_bus_that_asks_who_comes_may_be_anywhere_if_it_is_encrypted() -> None:
+    listen = f"{OUTSIDE}:7447"
+    check_bus(small_config(zenoh={"listen": f"tls/{listen}", "users": "zenoh.users"}))
+    for zenoh in ({"listen": f"tcp/{listen}", "users": "zenoh.users"}, {"listen": f"tls/{listen}"}):
+        with pytest.raises(UserError, match=r"zenoh\.listen"):
+            check_bus(small_config(zenoh=zenoh))
+
+
+def test_pulses_that_ask_who_comes_may_be_anywhere() -> None:
+    with pytest.raises(UserError, match=r"sync\.bind: .* sync\.users"):
+        check_pulses(small_config(sync={"bind": OUTSIDE}))
+    check_pulses(small_config(sync={"bind": OUTSIDE, "users": "sync.users"}))
+
+
+def test_the_secure_example_is_open_to_nobody_without_a_token_or_a_password() -> None:
+    config = load_config(CONFIGS / "secure.yaml")
+    assert not is_loopback(config.http.host)
+    assert not config.access.open_to_all
+    assert not config.access.trusted_network
+    assert config.sync.users == CONFIGS / "secret" / "sync.users"
+    assert config.access.tokens == CONFIGS / "secret" / "tokens.yaml"
+    assert config.http.tls.key == CONFIGS / "secret" / "https.key"
+    assert config.zenoh.connect.startswith("tls/")
+    assert config.zenoh.tls.authority == CONFIGS / "secret" / "authority.pem"
+    check_pulses(config)
+    check_bus(config.model_copy(update={"access": AccessSettings()}))
+    with pytest.raises(UserError, match="cannot read the tokens"):
+        check_viewers(config)

@@ -1,0 +1,268 @@
+"""The containers' health checks tell who is well from who is not, by HTTPS and with a token, too."""
+
+from __future__ import annotations
+
+import asyncio
+import http.server
+import json
+import os
+import shutil
+import ssl
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from camsync import PulseServer
+from fakes.paths import ROOT
+from fakes.programs import needs_openssl
+from server.cli.generated_config import free_port
+from server.config.password_file import read_users
+from server.config.pulse_passwords import SHORTEST
+from server.config.tokens_file import read_tokens, token_digest
+from server.supervisor.healthcheck import main
+
+LIVE = {"camera": "c0", "state": "live", "fps": 25.0, "message": ""}
+
+
+class Service(http.server.ThreadingHTTPServer):
+    """What a best-view service answers to health checks."""
+
+    def __init__(self, secrets: Path | None = None) -> None:
+        super().__init__(("127.0.0.1", 0), _Answer)
+        self.cameras: list[dict[str, Any]] = [LIVE]
+        self.token = "" if secrets is None else (secrets / "cameras/c0/token").read_text("ascii").strip()
+        if secrets is not None:
+            context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+            context.load_cert_chain(secrets / "public" / "https.pem", secrets / "web" / "https.key")
+            self.socket = context.wrap_socket(self.socket, server_side=True)
+
+    def handle_error(self, *_: object) -> None:
+        """Say nothing of who hangs up."""
+
+
+class _Answer(http.server.BaseHTTPRequestHandler):
+    server: Service
+
+    def do_GET(self) -> None:
+        allowed = not self.server.token or self.headers["Authorization"] == f"Bearer {self.server.token}"
+        self.send_response(200 if allowed or self.path == "/healthz" else 401)
+        self.end_headers()
+        self.wfile.write(json.dumps({"cameras": self.server.cameras}).encode())
+
+    def log_message(self, *_: object) -> None:
+        """Say nothing."""
+
+
+def serving(service: Service) -> Iterator[Service]:
+    running = threading.Thread(target=partial(service.serve_forever, 0.01))
+    running.start()
+    yield service
+    service.shutdown()
+    running.join()
+    service.server_close()
+
+
+@pytest.fixture
+def plain(monkeypatch: pytest.MonkeyPatch) -> Iterator[Service]:
+    service = Service()
+    monkeypatch.setenv("MYVIEW_HEALTH_URL", f"http://127.0.0.1:{service.server_port}")
+    yield from serving(service)
+
+
+@pytest.fixture(scope="module")
+def secrets(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Make all files as an operator does."""
+    folder = tmp_path_factory.mktemp("made") / "secrets"
+    words = ["sh", str(ROOT / "configs" / "secrets.sh"), "cameras.example", "c0"]
+    subprocess.run(words, env={**os.environ, "MYVIEW_SECRETS": str(folder)}, check=True, capture_output=True)
+    return folder
+
+
+@pytest.fixture
+def secure(secrets: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Service]:
+    service = Service(secrets)
+    monkeypatch.setenv("MYVIEW_HEALTH_URL", f"https://127.0.0.1:{service.server_port}/")
+    monkeypatch.setenv("MYVIEW_HEALTH_CERTIFICATE", str(secrets / "public" / "https.pem"))
+    monkeypatch.setenv("MYVIEW_HEALTH_TOKEN", str(secrets / "cameras" / "c0" / "token"))
+    yield from serving(service)
+
+
+@pytest.mark.parametrize("users", [None, {"c0": "a password"}])
+async def test_pulses_are_well_while_somebody_greets(
+    monkeypatch: pytest.MonkeyPatch, users: dict[str, str] | None
+) -> None:
+    async with PulseServer(25.0, users=users) as server:
+        monkeypatch.setenv("MYVIEW_SYNC__PORT", str(server.port))
+        assert await _apart("sync") == 0
+        assert server.refused == 0, "whoever looks every few seconds is no stranger who is told of"
+    monkeypatch.setenv("MYVIEW_SYNC__PORT", str(free_port()))
+    assert await _apart("sync") == 1
+
+
+async def _apart(*words: str) -> int:
+    """Check as the engine does: in a process of its own."""
+    process = await asyncio.create_subprocess_exec(
+        sys.executable,
+        "-m",
+        "server.supervisor.healthcheck",
+        *words,
+        cwd=ROOT,
+        stdout=asyncio.subprocess.DEVNULL,
+    )
+    return await process.wait()
+
+
+def test_a_camera_is_well_when_its_frames_arrive(plain: Service, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["camera", "c0"]) == 0
+    assert main(["bestview"]) == 0
+    for state in (
+        {"fps": 0.0},
+        {"state": "gone", "message": "its source gives no pictures"},
+        {"camera": "c1"},
+    ):
+        plain.cameras = [{**LIVE, **state}]
+        assert main(["camera", "c0"]) == 1
+        assert capsys.readouterr().out.count("\n") == 1
+
+
+@pytest.mark.usefixtures("plain")
+def test_no_proxy_is_asked(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("http_proxy", f"http://127.0.0.1:{free_port()}")
+    monkeypatch.delenv("no_proxy", raising=False)
+    assert main(["bestview"]) == 0
+
+
+def test_what_cannot_be_asked_is_not_well(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("MYVIEW_HEALTH_URL", f"http://127.0.0.1:{free_port()}")
+    for words in (["bestview"], ["camera", "c0"], ["camera"], []):
+        assert main(words) == 1
+        assert capsys.readouterr().out.count("\n") == 1
+
+
+def test_an_answer_that_is_no_service_s_is_not_well(plain: Service) -> None:
+    plain.cameras = [{"camera": "c0"}]
+    assert main(["camera", "c0"]) == 1
+
+
+@needs_openssl
+@pytest.mark.usefixtures("secure")
+def test_by_https_the_certificate_and_the_token_count(
+    secrets: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert main(["camera", "c0"]) == 0
+    assert main(["bestview"]) == 0
+    with monkeypatch.context() as patch:
+        patch.setenv("MYVIEW_HEALTH_CERTIFICATE", str(secrets / "public" / "router.pem"))
+        assert main(["bestview"]) == 1, "another certificate is another service: no token is for it"
+    (tmp_path / "token").write_text("wrong", encoding="ascii")
+    monkeypatch.setenv("MYVIEW_HEALTH_TOKEN", str(tmp_path / "token"))
+    assert main(["camera", "c0"]) == 1
+
+
+@needs_openssl
+def test_what_is_made_for_a_secure_site_fits_together(secrets: Path) -> None:
+    assert (secrets.stat().st_mode & 0o777) == 0o700, "nobody else of the host looks in"
+    operator, health = read_tokens(secrets / "web" / "tokens.yaml")
+    assert (operator.role, operator.camera) == ("operate", None)
+    assert (health.role, health.camera) == ("watch", "c0")
+    token = (secrets / "cameras" / "c0" / "token").read_text("ascii").strip()
+    assert health.sha256 == token_digest(token)
+    c0 = secrets / "cameras" / "c0"
+    assert users(secrets / "bus") == users(c0 / "bus")
+    assert users(secrets / "pulses") == users(secrets / "web" / "pulses") | users(c0 / "pulses")
+    assert set(users(secrets / "pulses")) == {"bestview", "c0"}
+    assert min(map(len, users(secrets / "pulses").values())) >= SHORTEST
+    assert users(c0 / "bus") != users(c0 / "pulses"), "who has one of them has not the other"
+
+
+def users(path: Path) -> dict[str, str]:
+    return read_users(path, "users")
+
+
+def made(folder: Path, name: str, camera: str = "c0", **environment: str) -> subprocess.CompletedProcess[str]:
+    script = ["/bin/sh", str(ROOT / "configs" / "secrets.sh"), name, camera]
+    surroundings = {**os.environ, "MYVIEW_SECRETS": str(folder), **environment}
+    return subprocess.run(script, env=surroundings, capture_output=True, text=True, check=False)
+
+
+def test_without_openssl_nothing_is_made_and_that_is_said(tmp_path: Path) -> None:
+    done = made(tmp_path / "secrets", "cameras.example", PATH=str(tmp_path))
+    assert (done.returncode, done.stderr) == (1, "secrets.sh: needs openssl, which is not there\n")
+    assert not (tmp_path / "secrets").exists()
+
+
+@needs_openssl
+@pytest.mark.parametrize("camera", ["c 0", "../x", "bestview", "bestview-1", "a: b", ""])
+def test_a_camera_that_cannot_be_called_that_is_refused_before_anything_is_made(
+    tmp_path: Path, camera: str
+) -> None:
+    done = made(tmp_path / "secrets", "cameras.example", camera)
+    assert done.returncode == 2
+    assert "cannot be a camera's name" in done.stderr
+    assert not (tmp_path / "secrets").exists()
+
+
+@needs_openssl
+def test_a_name_that_no_certificate_takes_is_said_and_a_shorter_one_is_taken_then(tmp_path: Path) -> None:
+    done = made(tmp_path, f"{'a' * 63}.example")
+    assert done.returncode == 1
+    assert "too long" in done.stderr
+    assert made(tmp_path, "cameras.example").returncode == 0
+    assert not [it.name for it in tmp_path.iterdir() if it.name in {"log", "names", "request"}]
+
+
+@needs_openssl
+@pytest.mark.parametrize(
+    ("name", "also"),
+    [
+        ("cameras.example", "DNS:cameras.example"),
+        ("10.0.0.5", "IP Address:10.0.0.5"),
+        ("2001:db8::5", "IP Address:2001:DB8:0:0:0:0:0:5"),
+    ],
+)
+def test_a_certificate_is_for_the_name_or_the_address(tmp_path: Path, name: str, also: str) -> None:
+    assert made(tmp_path, name).returncode == 0
+    words = [
+        "openssl",
+        "x509",
+        "-in",
+        str(tmp_path / "public" / "https.pem"),
+        "-noout",
+        "-ext",
+        "subjectAltName",
+    ]
+    said = subprocess.run(words, capture_output=True, text=True, check=True).stdout
+    assert said.splitlines()[1:] == [f"    {also}"]
+
+
+@needs_openssl
+def test_a_camera_is_added_to_a_secure_site_that_stays_as_it_is(secrets: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "secrets"
+    shutil.copytree(secrets, folder)
+    before = {it: it.read_bytes() for it in folder.rglob("*") if it.is_file()}
+    words = ["sh", str(ROOT / "configs" / "secrets.sh"), "cameras.example", "c0", "yard"]
+    subprocess.run(words, env={**os.environ, "MYVIEW_SECRETS": str(folder)}, check=True, capture_output=True)
+    assert all(it.read_bytes().startswith(content) for it, content in before.items())
+    new = {str(it.relative_to(folder)) for it in folder.rglob("*") if it.is_file()}
+    new -= {str(it.relative_to(folder)) for it in before}
+    assert new == {f"cameras/yard/{it}" for it in ("bus", "pulses", "token")}
+
+
+@needs_openssl
+def test_a_site_of_before_the_pulses_had_passwords_gets_them(secrets: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "secrets"
+    shutil.copytree(secrets, folder)
+    for name in ("pulses", "web/pulses", "cameras/c0/pulses"):
+        (folder / name).unlink()
+    before = {it: it.read_bytes() for it in folder.rglob("*") if it.is_file()}
+    assert made(folder, "cameras.example").returncode == 0
+    assert all(it.read_bytes() == content for it, content in before.items())
+    assert set(users(folder / "pulses")) == {"bestview", "c0"}

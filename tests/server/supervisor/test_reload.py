@@ -1,0 +1,257 @@
+"""A configuration that is read again: what becomes of each change, and what runs while the file is wrong."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import pty
+import signal
+import sys
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any
+
+import aiohttp
+import pytest
+import yaml
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fakes.cameras import CAMERAS, FedService, small_config
+from fakes.timeouts import PATIENCE
+from server.cli.generated_config import free_port
+from server.config.config_diff import changed_keys
+from server.config.loader import build_config
+from server.config.running_config import (
+    ACTIVE_CONFIG_VARIABLE,
+    ActiveConfig,
+    ConfigFileState,
+    serialize_config,
+)
+from server.config.sections import HttpSettings
+from server.config.site_config import Config
+from server.http.app import make_app, serving
+from server.supervisor.reload import plan_reload
+from server.system.errors import UserError
+
+LIVE, CAMERA, ALL_CAMERAS, BEST_VIEW, SITE = "live", "camera c1", "all cameras", "best view", "site"
+
+CHANGES: dict[str, tuple[str, Any]] = {
+    "view.switch_cost_s": (LIVE, 2.0),
+    "view.quality.central": (LIVE, 0.5),
+    "view.lookahead": (LIVE, 20),
+    "view.buffer_s": (BEST_VIEW, 20.0),
+    "view.identity.join": (BEST_VIEW, 1.0),
+    "http.port": (BEST_VIEW, 8123),
+    "record.keep_s": (BEST_VIEW, 5.0),
+    "cameras.c1.source": (CAMERA, "rtsp://elsewhere/1"),
+    "cameras.c1.offset": (CAMERA, 3),
+    "cameras.c1.options": (CAMERA, {"rtsp_transport": "tcp"}),
+    "cameras.c1.ground": (SITE, [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]),
+    "detect.boxes.least_height": (ALL_CAMERAS, 0.3),
+    "track.costs.occlusion": (ALL_CAMERAS, 0.9),
+    "track.window.birth_max_cost": (ALL_CAMERAS, 0.6),
+    "track.backlog_s": (SITE, 3.0),
+    "site.fps": (SITE, 12.5),
+    "encode.crf": (SITE, 30),
+    "zenoh.lease_s": (SITE, 2.0),
+    "sync.port": (SITE, 7412),
+}
+"""Settings, what a change of each takes, and another value."""
+
+
+def changed(keys: set[str]) -> Config:
+    content: dict[str, Any] = {}
+    cameras: dict[str, dict[str, Any]] = {it: {"id": it, "source": "scene:room"} for it in CAMERAS}
+    small = {"view": {"identity": {"confirm": 1, "regroup": 1}}, "track": {"window": WINDOW}}
+    for key in keys:
+        first, *way, name = key.split(".")
+        inner = cameras[way.pop(0)] if first == "cameras" else content.setdefault(first, {})
+        for step in way:
+            inner = inner.setdefault(step, dict(small.get(first, {}).get(step, {})))
+        inner[name] = CHANGES[key][1]
+    return small_config([*cameras.values()], **content)
+
+
+WINDOW = {"window": 5, "stride": 5, "birth_window": 5}
+
+
+@settings(max_examples=20)
+@given(st.sets(st.sampled_from(sorted(CHANGES))))
+def test_everything_is_in_force_or_waits_and_is_named(keys: set[str]) -> None:
+    running, wanted = small_config(), changed(keys)
+    reload = plan_reload(running, wanted)
+    takes = {key: CHANGES[key][0] for key in keys}
+    assert set(reload.live) == {key for key in keys if takes[key] == LIVE}
+    assert set(reload.best_view) == {key for key in keys if takes[key] == BEST_VIEW}
+    assert set(reload.site) == {key for key in keys if takes[key] == SITE}
+    if ALL_CAMERAS in takes.values():
+        assert reload.cameras == CAMERAS
+    else:
+        assert reload.cameras == (("c1",) if CAMERA in takes.values() else ())
+    assert set(changed_keys(reload.now, wanted)) == {*reload.best_view, *reload.site}
+    again = plan_reload(reload.now, wanted)
+    assert (again.now, again.live, again.cameras) == (reload.now, (), ())
+    assert all(
+        name in reload.line for name in {*reload.live, *reload.cameras, *reload.best_view, *reload.site}
+    )
+    assert (
+        build_config(yaml.safe_load(serialize_config(reload.now, Path())), where="", folder=Path("/"))
+        == reload.now
+    )
+
+
+def test_a_lookahead_that_tracks_do_not_allow_yet_waits_with_what_allows_it() -> None:
+    track = {"window": {"window": 15, "stride": 5, "birth_window": 5}}
+    running = small_config(track=track, view={"lookahead": 15})
+    reload = plan_reload(running, small_config(view={"lookahead": 5, "switch_cost_s": 1.0}))
+    assert reload.live == ("view.switch_cost_s",)
+    assert reload.best_view == ("view.lookahead",)
+    assert reload.site == ("track.window.window",)
+    assert reload.now.view.lookahead == running.view.lookahead
+    assert reload.now.track.window == running.track.window
+
+
+def test_other_cameras_wait_and_those_that_run_stay_as_they_are() -> None:
+    running = small_config()
+    wanted = small_config([{"id": "c0", "source": "scene:room", "offset": 5}, "c1", "c2"])
+    reload = plan_reload(running, wanted)
+    assert (reload.site, reload.now.cameras) == (("cameras",), running.cameras)
+
+
+def test_cameras_begin_anew_where_sharpness_begins_to_count() -> None:
+    reload = plan_reload(small_config(), small_config(view={"quality": {"sharp": 0.5}}))
+    assert (reload.live, reload.cameras) == (("view.quality.sharp",), CAMERAS)
+
+
+def write(path: Path, **changes: Any) -> None:
+    path.write_text(yaml.safe_dump({"cameras": [{"id": "c0", "source": "c0.mp4"}], **changes}))
+
+
+def test_what_runs_is_known_to_differ_from_a_file_that_is_wrong_changed_or_mended(tmp_path: Path) -> None:
+    path = tmp_path / "site.yaml"
+    write(path)
+    running = ActiveConfig(path)
+    assert not running.on_disk().differs
+    write(path, view={"lookahead": "many"})
+    found = running.on_disk()
+    assert "view.lookahead" in found.error
+    assert found.differs
+    with pytest.raises(UserError, match=r"view\.lookahead"):
+        running.wanted()
+    write(path, view={"lookahead": 40}, site={"fps": 12.5})
+    assert running.on_disk().waiting == ("site.fps", "view.lookahead")
+    running.now = plan_reload(running.now, running.wanted()).now
+    assert running.on_disk().waiting == ("site.fps",)
+    write(path, view={"lookahead": 40})
+    assert not running.on_disk().differs
+
+
+def test_a_ground_file_that_has_changed_is_no_longer_what_runs(tmp_path: Path) -> None:
+    path, ground = tmp_path / "site.yaml", tmp_path / "ground.json"
+    write(path, ground="ground.json")
+    ground.write_text('{"homography": {"c0": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}}')
+    running = ActiveConfig(path)
+    assert not running.on_disk().differs
+    ground.write_text('{"homography": {"c0": [[2, 0, 0], [0, 1, 0], [0, 0, 1]], "c1": [[1]]}}')
+    assert "ground.json" in running.on_disk().error
+    ground.write_text('{"homography": {"c0": [[2, 0, 0], [0, 1, 0], [0, 0, 1]]}}')
+    assert running.on_disk().waiting == ("cameras.c0.ground",)
+
+
+def test_what_a_supervisor_keeps_is_what_its_processes_run_by(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, kept = tmp_path / "site.yaml", tmp_path / "elsewhere" / "kept.yaml"
+    write(path, record={"folder": "recorded"}, access={"tokens": "tokens.yaml"})
+    before = ActiveConfig(path).now
+    kept.parent.mkdir()
+    kept.write_text(serialize_config(before, path.parent))
+    write(path, site={"fps": "banana"})
+    monkeypatch.setenv(ACTIVE_CONFIG_VARIABLE, str(kept))
+    running = ActiveConfig(path)
+    assert running.now == before
+    assert "site.fps" in running.on_disk().error
+
+
+def test_a_service_goes_by_it_and_what_was_tried_out_stays_where_nothing_else_is_said() -> None:
+    service = FedService(small_config())
+    service.choose_by(service.config.view.model_copy(update={"switch_cost_s": 3.0}))
+    service.go_by(small_config([{"id": "c0", "source": "scene:room", "offset": 4}, "c1"]))
+    assert service.config.camera("c0").offset == 4
+    assert service.decider.view.switch_cost_s == 3.0
+    service.go_by(small_config(view={"switch_cost_s": 2.0}))
+    assert service.decider.view.switch_cost_s == service.config.view.switch_cost_s == 2.0
+    before = service.config
+    with pytest.raises(UserError, match="can be at most"):
+        service.go_by(small_config(view={"lookahead": 10_000}))
+    assert service.config is before
+    service.close()
+
+
+@pytest.mark.parametrize(
+    "found",
+    [ConfigFileState("", ()), ConfigFileState("site.yaml: is wrong", ()), ConfigFileState("", ("site.fps",))],
+)
+async def test_the_operator_and_prometheus_are_told(found: ConfigFileState) -> None:
+    service = FedService(small_config())
+    async with (
+        asyncio.timeout(PATIENCE),
+        serving(make_app(service, lambda: found), HttpSettings(port=0)) as port,
+        aiohttp.ClientSession(f"http://127.0.0.1:{port}") as session,
+    ):
+        told = await (await session.get("/api/operator/config")).json()
+        metrics = await (await session.get("/metrics")).text()
+    service.close()
+    assert (told["error"], told["waiting"]) == (found.error, list(found.waiting))
+    assert f"myview_config_differs {float(found.differs)}" in metrics
+
+
+async def until_said(terminal: int, text: bytes) -> None:
+    heard = b""
+    while text not in heard:
+        heard += await asyncio.to_thread(os.read, terminal, 4096)
+
+
+@asynccontextmanager
+async def sync_at_a_terminal(path: Path) -> AsyncIterator[tuple[asyncio.subprocess.Process, int]]:
+    """Run pulses whose log goes to a terminal; give the terminal's other end, too, once they are sent."""
+    port = free_port()
+    write(path, sync={"port": port})
+    ours, theirs = pty.openpty()
+    process = await asyncio.create_subprocess_exec(
+        *(sys.executable, "-m", "server.cli.main", "sync", str(path)), stderr=theirs, start_new_session=True
+    )
+    os.close(theirs)
+    try:
+        await until_said(ours, b"pulses at")
+        yield process, ours
+    finally:
+        if process.returncode is None:
+            process.kill()  # nor does anybody read its terminal then
+            await process.wait()
+
+
+async def test_a_process_says_what_waits_and_what_is_wrong_and_ends_with_its_terminal(tmp_path: Path) -> None:
+    path = tmp_path / "site.yaml"
+    async with asyncio.timeout(PATIENCE), sync_at_a_terminal(path) as (process, terminal):
+        content = yaml.safe_load(path.read_text())
+        for fps, said in ((12.5, b"restart of all processes: site.fps"), (-1, b"as it was stays in force")):
+            path.write_text(yaml.safe_dump({**content, "site": {"fps": fps}}))
+            process.send_signal(signal.SIGHUP)
+            await until_said(terminal, said)
+        assert process.returncode is None
+        os.close(terminal)
+        process.send_signal(signal.SIGHUP)
+        assert await process.wait() == 0
+
+
+def test_a_tracker_by_which_frames_are_final_later_waits_for_a_restart() -> None:
+    running = small_config(view={"lookahead": 200})
+    for track in ({"tracker": "temporal"}, {"tracker": "temporal", "temporal": {"stages": 2}}):
+        reload = plan_reload(running, small_config(view={"lookahead": 200}, track=track))
+        assert reload.now.track == running.track
+        assert "track.tracker" in reload.site
+    quicker = plan_reload(running, small_config(view={"lookahead": 200}, track={"tracker": "kalman"}))
+    assert quicker.now.track.tracker == "kalman"

@@ -1,0 +1,52 @@
+"""What of a configuration has to wait for what, and a wrong file that is mended."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+import yaml
+
+from fakes.cameras import small_config
+from server.config.running_config import ACTIVE_CONFIG_VARIABLE, ActiveConfig
+from server.supervisor.reload import plan_reload
+
+
+def test_whose_h264_passes_waits_for_a_codec_that_can() -> None:
+    passing = [{"id": "c0", "source": "scene:room", "h264": "pass"}, "c1"]
+    running = small_config(encode={"codec": "vp8"})
+    reload = plan_reload(running, small_config(passing))
+    assert (reload.cameras, reload.now) == ((), running)
+    assert reload.site == ("encode.codec", "cameras.c0.h264")
+    reload = plan_reload(small_config(), small_config(passing))
+    assert (reload.cameras, reload.site) == (("c0",), ())
+
+
+def test_a_wrong_ground_file_is_wrong_until_it_is_mended(
+    tmp_path: Path,
+) -> None:
+    path, ground = tmp_path / "site.yaml", tmp_path / "ground.json"
+    path.write_text(yaml.safe_dump({"cameras": [{"id": "c0", "source": "x"}], "ground": "ground.json"}))
+    right = '{"homography": {"c0": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}}'
+    ground.write_text(right)
+    running = ActiveConfig(path)
+    ground.write_text('{"homography": {"c0": [[1]]}}')
+    assert all("ground.json" in running.on_disk().error for _ in range(3))
+    ground.write_text(right)
+    assert not running.on_disk().differs
+
+
+def test_what_somebody_else_put_where_the_supervisor_kept_it_is_not_gone_by(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, theirs, link = (tmp_path / name for name in ("site.yaml", "theirs.yaml", "link.yaml"))
+    path.write_text("cameras: [{id: c0, source: x}]\n")
+    theirs.write_text("cameras: [{id: c9, source: x}]\n")
+    link.symlink_to(theirs)
+    monkeypatch.setenv(ACTIVE_CONFIG_VARIABLE, str(link))
+    assert ActiveConfig(path).now.camera_ids == ("c0",)
+    monkeypatch.setenv(ACTIVE_CONFIG_VARIABLE, str(theirs))
+    assert ActiveConfig(path).now.camera_ids == ("c9",), "the supervisor's own"
+    monkeypatch.setattr(os, "geteuid", lambda: os.getuid() + 1)
+    assert ActiveConfig(path).now.camera_ids == ("c0",)

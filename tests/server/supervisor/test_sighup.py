@@ -1,0 +1,79 @@
+"""SIGHUP while a process starts: what is written into its configuration by then is read all the same."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+from collections.abc import Callable, Coroutine, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from fakes.command_line import Run
+from fakes.timeouts import PATIENCE
+from server.cli import site_commands
+from server.cli.generated_config import free_port
+from server.supervisor.sighup import record_early_sighups, sighups
+
+
+@pytest.fixture(autouse=True)
+def _nothing_ends_by_it() -> Iterator[None]:
+    before = signal.signal(signal.SIGHUP, lambda *_: None)
+    yield
+    signal.signal(signal.SIGHUP, before)
+
+
+def hang_up() -> None:
+    os.kill(os.getpid(), signal.SIGHUP)
+
+
+async def turn() -> None:
+    """Wait for SIGHUP."""
+    waiting = sighups()
+    async with asyncio.timeout(PATIENCE):
+        await anext(waiting)
+    await waiting.aclose()
+
+
+@pytest.mark.parametrize("command", [("sync",), ("camera", "c0"), ("bestview",), ("up",)])
+def test_what_comes_between_reading_and_running_is_not_lost(
+    myview: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: tuple[str, ...]
+) -> None:
+    bus = f"tcp/127.0.0.1:{free_port()}"
+    content = {
+        "cameras": [{"id": "c0", "source": "scene:room"}],
+        "sync": {"port": free_port()},
+        "zenoh": {"connect": bus, "listen": bus},
+        "http": {"port": 0},
+    }
+    path = tmp_path / "site.yaml"
+    path.write_text(yaml.safe_dump(content), encoding="utf-8")
+    told: list[str] = []
+
+    def run(_: Callable[[], Coroutine[Any, Any, None]], **__: float) -> None:
+        hang_up()
+        asyncio.run(turn())
+        told.append("to read it again")
+
+    monkeypatch.setattr(site_commands, "run_process", run)
+    ended = myview(command[0], path, *command[1:])
+    assert (ended.code, ended.err) == (0, "")
+    assert told == ["to read it again"]
+
+
+async def test_those_that_came_early_are_one_and_those_that_come_later_one_each() -> None:
+    record_early_sighups()
+    hang_up()
+    hang_up()
+    waiting = sighups()
+    async with asyncio.timeout(PATIENCE):
+        await anext(waiting)
+        again = asyncio.ensure_future(anext(waiting))
+        await asyncio.sleep(0)
+        assert not again.done(), "the early ones were one"
+        hang_up()
+        await again
+    await waiting.aclose()

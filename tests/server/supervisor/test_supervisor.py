@@ -1,0 +1,236 @@
+"""The supervisor: what dies is restarted, what is done stays done, what was refused ends everything."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+from collections.abc import AsyncIterator, Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from fakes.cameras import CAMERAS, small_config
+from fakes.timeouts import PATIENCE
+from server.supervisor import supervisor
+from server.supervisor.shutdown import EXIT_FINISHED
+from server.supervisor.startup_signal import STARTED_FD_VARIABLE
+from server.supervisor.supervisor import Supervisor
+from server.system.errors import UserError
+
+NOBODY = 2**22 + 1  # more than a process's number can be (proc(5), pid_max)
+
+
+class Process:
+    """A process by hand; ``told`` is what it closes once it has loaded."""
+
+    pid = NOBODY
+
+    def __init__(self, arguments: tuple[str, ...], told: int) -> None:
+        self.arguments = arguments
+        self._told: int | None = told
+        self.returncode: int | None = None
+        self._over = asyncio.Event()
+
+    def loaded(self) -> None:
+        if self._told is not None:
+            os.close(self._told)
+        self._told = None
+
+    def end(self, code: int) -> None:
+        self.loaded()
+        self.returncode = code
+        self._over.set()
+
+    async def wait(self) -> int:
+        await self._over.wait()
+        assert self.returncode is not None
+        return self.returncode
+
+    def terminate(self) -> None:
+        self.end(-15)
+
+    kill = terminate
+
+
+class Machine:
+    """A machine on which a supervisor starts processes by hand; they load at once, or when told to."""
+
+    def __init__(self) -> None:
+        self.loads_at_once = True
+        self.started: asyncio.Queue[Process] = asyncio.Queue()
+        self.task: asyncio.Task[None] | None = None
+
+    async def start(self, *words: str, env: dict[str, str], pass_fds: tuple[int], **_: Any) -> Process:
+        assert env[STARTED_FD_VARIABLE] == str(pass_fds[0])
+        process = Process(words[3:], os.dup(pass_fds[0]))
+        if self.loads_at_once:
+            process.loaded()
+        self.started.put_nowait(process)
+        return process
+
+    async def processes(self, count: int) -> dict[str, Process]:
+        """Give the next processes by what they are."""
+        found = [await self.started.get() for _ in range(count)]
+        return {
+            process.arguments[-1 if process.arguments[0] == "camera" else 0]: process for process in found
+        }
+
+    async def nothing_more(self) -> None:
+        """Make sure that nothing else is started as things stand."""
+        for _ in range(20):  # turns of the loop: nothing here waits for anything else
+            await asyncio.sleep(0)
+        assert self.started.empty()
+
+    def run(
+        self,
+        out: Path | None = None,
+        before_start: Callable[[], None] = lambda: None,
+        cameras: tuple[str, ...] = CAMERAS,
+    ) -> asyncio.Task[None]:
+        supervisor = Supervisor(Path("site.yaml"), small_config(cameras=cameras), {}, out, before_start)
+        self.task = asyncio.create_task(supervisor.run())
+        return self.task
+
+
+@pytest.fixture
+async def machine(monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Machine]:
+    it = Machine()
+    monkeypatch.setattr(asyncio, "create_subprocess_exec", it.start)
+    monkeypatch.setattr(supervisor, "_RETRY_FIRST_S", 0.0)
+    async with asyncio.timeout(PATIENCE):
+        yield it
+        if it.task is not None:
+            it.task.cancel()
+            await asyncio.gather(it.task, return_exceptions=True)
+
+
+async def test_everything_is_started_and_ended_together(machine: Machine) -> None:
+    task = machine.run()
+    processes = await machine.processes(4)
+    assert set(processes) == {"bestview", "sync", "c0", "c1"}
+    task.cancel()
+    await asyncio.gather(task, return_exceptions=True)
+    assert all(process.returncode == -15 for process in processes.values())
+
+
+async def test_the_best_view_and_the_pulses_load_before_any_camera(machine: Machine) -> None:
+    machine.loads_at_once = False
+    machine.run()
+    first = await machine.processes(2)
+    assert list(first) == ["bestview", "sync"]
+    for process in first.values():
+        await machine.nothing_more()
+        process.loaded()
+    await machine.processes(1)
+
+
+async def test_no_more_cameras_load_at_a_time_than_there_are_processors(
+    machine: Machine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(supervisor, "processors", lambda: 2.5)
+    machine.run(cameras=("c0", "c1", "c2", "c3", "c4"))
+    await machine.processes(2)
+    machine.loads_at_once = False
+    processes = await machine.processes(2)
+    assert list(processes) == ["c0", "c1"]
+    await machine.nothing_more()
+    processes["c0"].loaded()
+    processes |= await machine.processes(1)
+    await machine.nothing_more()
+    processes["c1"].end(-9)  # it will not load any more, and asks for another turn behind those that wait
+    processes |= await machine.processes(1)
+    await machine.nothing_more()
+    assert list(processes) == ["c0", "c1", "c2", "c3"]
+    processes["c3"].loaded()
+    assert list(await machine.processes(1)) == ["c4"]
+    processes["c2"].loaded()
+    assert list(await machine.processes(1)) == ["c1"]
+
+
+async def test_a_best_view_that_died_waits_for_no_camera_that_loads(machine: Machine) -> None:
+    machine.run()
+    processes = await machine.processes(2)
+    machine.loads_at_once = False
+    await machine.processes(1)
+    processes["bestview"].end(-9)
+    found = await machine.processes(1)
+    while "bestview" not in found:  # the other camera, where there are more processors
+        found |= await machine.processes(1)
+
+
+async def test_what_never_says_that_it_has_loaded_keeps_nobody_for_ever(
+    machine: Machine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(supervisor, "_STARTS_WITHIN_S", 0.01)
+    machine.loads_at_once = False
+    machine.run()
+    assert len(await machine.processes(4)) == 4
+
+
+@pytest.mark.parametrize("code", [-9, 1, 0])
+async def test_what_dies_or_is_told_to_end_is_started_again_alone(
+    machine: Machine, code: int, caplog: pytest.LogCaptureFixture
+) -> None:
+    machine.run()
+    processes = await machine.processes(4)
+    for _ in range(3):
+        processes["c0"].end(code)
+        processes |= await machine.processes(1)
+        assert processes["c0"].returncode is None
+    assert machine.started.empty()
+    assert len(caplog.messages) == 1, "told of once for one cause"
+
+
+async def test_what_is_needed_to_start_is_seen_to_before_every_start(machine: Machine) -> None:
+    seen: list[int] = []
+    machine.run(before_start=lambda: seen.append(len(seen)))
+    processes = await machine.processes(4)
+    assert len(seen) == 4
+    processes["c0"].end(-9)
+    await machine.processes(1)
+    assert len(seen) == 5
+
+
+async def test_a_camera_whose_recording_is_over_stays_so_and_the_best_views_end_ends_everything(
+    machine: Machine,
+) -> None:
+    task = machine.run()
+    processes = await machine.processes(4)
+    processes["c0"].end(EXIT_FINISHED)
+    processes["bestview"].end(EXIT_FINISHED)
+    await task
+    assert machine.started.empty()
+    assert processes["c1"].returncode == processes["sync"].returncode == -15
+
+
+async def test_what_refuses_its_input_at_the_start_ends_everything(machine: Machine) -> None:
+    task = machine.run()
+    processes = await machine.processes(4)
+    processes["c1"].end(2)
+    with pytest.raises(UserError, match="c1 could not start"):
+        await task
+    assert all(process.returncode is not None for process in processes.values())
+
+
+async def test_what_once_ran_is_tried_again_even_when_it_refuses(machine: Machine) -> None:
+    machine.run()
+    processes = await machine.processes(4)
+    for code in (-9, 2, 2):
+        processes["c0"].end(code)
+        processes |= await machine.processes(1)
+
+
+async def test_a_restarted_best_view_writes_beside_what_it_wrote_before(machine: Machine) -> None:
+    machine.run(Path("out"))
+    processes = await machine.processes(4)
+    written = [processes["bestview"].arguments]
+    for _ in range(2):
+        processes["bestview"].end(-9)
+        processes |= await machine.processes(1)
+        written.append(processes["bestview"].arguments)
+    assert [arguments[-2:] for arguments in written] == [
+        ("--out", "out"),
+        ("--out", "out/restart-1"),
+        ("--out", "out/restart-2"),
+    ]

@@ -1,0 +1,114 @@
+"""A network camera that does not answer when its process starts is waited for."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import AsyncIterator, Awaitable, Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+import yaml
+from aiohttp import web
+
+from fakes.media.videos import write_video
+from fakes.system.ports import free
+from fakes.timeouts import PATIENCE
+from server.config.running_config import ActiveConfig
+from server.supervisor.camera_process import camera_process
+from server.system.errors import UnavailableError
+
+
+class Lines(logging.Handler):
+    """What is said in the log, for who waits for it."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.lines: list[str] = []
+        self._more = asyncio.Event()
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Take a line."""
+        self.lines.append(record.getMessage())
+        self._more.set()
+
+    async def until(self, said: Callable[[str], bool]) -> None:
+        """Wait until a line says so."""
+        async with asyncio.timeout(PATIENCE):
+            while not any(said(line) for line in self.lines):
+                self._more.clear()
+                await self._more.wait()
+
+
+@dataclass
+class Site:
+    """One camera's process, whose network camera does not answer yet."""
+
+    process: asyncio.Task[None]
+    told: Lines
+    answer: Callable[[], Awaitable[None]]
+    """Let the camera answer."""
+
+
+@pytest.fixture
+async def begin(tmp_path: Path) -> AsyncIterator[Callable[..., Site]]:
+    """Begin one by the site's width and how the camera's own H.264 is used."""
+    write_video(tmp_path / "c0.mp4", 25)
+    told, log = Lines(), logging.getLogger("server")
+    log.addHandler(told)
+    log.setLevel(logging.INFO)
+    app = web.Application()
+    app.router.add_static("/", tmp_path)
+    runner = web.AppRunner(app)
+    begun: list[asyncio.Task[None]] = []
+
+    def begin(width: int = 64, h264: str = "encode") -> Site:
+        port, bus = free(), f"tcp/127.0.0.1:{free()}"
+        path = tmp_path / "site.yaml"
+        content = {
+            "site": {"name": "hall", "width": width, "height": 48},
+            "sync": {"port": free(), "start_timeout_s": 0.1},
+            "zenoh": {"connect": bus, "listen": bus},
+            "cameras": [{"id": "c0", "source": f"http://127.0.0.1:{port}/c0.mp4", "h264": h264}],
+        }
+        path.write_text(yaml.safe_dump(content))
+        begun.append(asyncio.create_task(camera_process(ActiveConfig(path), "c0")))
+
+        async def answer() -> None:
+            await runner.setup()
+            await web.TCPSite(runner, "127.0.0.1", port).start()
+
+        return Site(begun[-1], told, answer)
+
+    yield begin
+    for process in begun:
+        process.cancel()
+    await asyncio.gather(*begun, return_exceptions=True)
+    await runner.cleanup()
+    log.removeHandler(told)
+    log.setLevel(logging.NOTSET)
+
+
+@pytest.mark.timeout(2 * PATIENCE + 10)
+async def test_it_is_said_once_that_a_camera_does_not_answer_and_when_it_does_it_runs(
+    begin: Callable[..., Site],
+) -> None:
+    site = begin()
+    await site.told.until(lambda line: "Connection refused; it is tried again" in line)
+    await site.answer()
+    await site.told.until(lambda line: line.startswith("camera c0: it answers, after"))
+    await site.told.until(lambda line: "no best-view service" in line)  # it runs
+    assert sum("Connection refused" in line for line in site.told.lines) == 1
+
+
+@pytest.mark.timeout(2 * PATIENCE + 10)
+async def test_what_is_wrong_with_a_camera_that_was_waited_for_ends_no_others(
+    begin: Callable[..., Site],
+) -> None:
+    """A mistake at the start ends the site, but the others have begun long ago."""
+    site = begin(128, "pass")
+    await site.told.until(lambda line: "Connection refused; it is tried again" in line)
+    await site.answer()
+    with pytest.raises(UnavailableError, match=r"^camera c0: h264: pass: its pictures are 64x48"):
+        await asyncio.wait_for(site.process, PATIENCE)

@@ -1,0 +1,95 @@
+"""Addresses as they may be shown: protocol and host, and nothing that could be a password."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from fakes.passwords import HOST, PASSWORDS, PLACES, tells
+from server.config.source_address import SourceKind, source_kind
+from server.system.address_redaction import redact_address, redact_addresses, redact_endpoint
+
+
+@pytest.mark.parametrize(
+    ("address", "expected"),
+    [
+        ("rtsp://10.0.0.1", "rtsp://10.0.0.1"),
+        ("rtsp://10.0.0.1:554/", "rtsp://10.0.0.1:554/"),
+        ("rtsp://me:secret@10.0.0.1/live", "rtsp://10.0.0.1/..."),
+        ("rtsp://me:secret@[fe80::1]:554", "rtsp://[fe80::1]:554/..."),
+        ("rtsp://me:sec@ret@10.0.0.1:554/live", "rtsp://10.0.0.1:554/..."),
+        ("rtsp://me:sec ret@10.0.0.1:554/live", "rtsp://10.0.0.1:554/..."),
+        ("rtsp://me:sec/ret@10.0.0.1/live", "rtsp://..."),
+        ("rtsp://me:sec#ret@10.0.0.1/live", "rtsp://..."),
+        ("rtsp://me:sec?ret@10.0.0.1/live", "rtsp://..."),
+        ("rtsp://me:s@cr/et@10.0.0.1/live", "rtsp://..."),
+        ("rtsp://10.0.0.1/user=me_password=12_34_channel=1", "rtsp://10.0.0.1/..."),
+        ("http://camera-1.example/video?p=12", "http://camera-1.example/..."),
+        ("async:rtsp://me:secret@10.0.0.1/", "async:..."),
+        ("rtsp:me:secret@10.0.0.1/", "rtsp:..."),
+        ("me:secret@10.0.0.1/", "(not shown)"),
+        ("recordings/key=1.mp4", "recordings/key=1.mp4"),
+        ("/recordings/2026-11-22 10:30@hall.mp4", "/recordings/2026-11-22 10:30@hall.mp4"),
+        ("/etc/myview/smb:/me:secret@nas/kept", "/etc/myview/..."),
+        ("hall:1.mp4", "hall:1.mp4"),
+        ("/dev/v4l/by-path/pci-0000:00:14.0-usb", "/dev/v4l/by-path/pci-0000:00:14.0-usb"),
+        ("scene:room?camera=0&seed=1", "scene:room?camera=0&seed=1"),
+    ],
+)
+def test_of_an_address_protocol_and_host_are_shown_and_a_path_is_as_it_is(
+    address: str, expected: str
+) -> None:
+    assert redact_address(address) == expected
+    assert redact_address(expected) == expected, "what was shown may be shown again"
+
+
+@given(st.sampled_from(PLACES), PASSWORDS)
+@example(PLACES[0], "ps/w")
+@example(PLACES[0], "pa@q/xz")
+def test_nothing_of_a_password_is_shown_wherever_it_stands(place: str, password: str) -> None:
+    told = redact_address(place.format(password))
+    assert not tells(told, password, without=place), told
+    assert redact_address(told) == told
+
+
+@given(PASSWORDS.filter(lambda it: not set(it) & set("/?#")))
+def test_the_host_is_shown_where_it_is_surely_that(password: str) -> None:
+    assert redact_address(f"rtsp://user:{password}@{HOST}:554/live") == f"rtsp://{HOST}:554/..."
+
+
+@given(st.text())
+def test_any_text_can_be_shown(text: str) -> None:
+    assert isinstance(redact_address(text) + redact_endpoint(text), str)
+
+
+@pytest.mark.parametrize(
+    "source", ["rtsp:me:secret@10.0.0.1/", "concat:a|b", "srt://10.0.0.1:9", "/dev/video7"]
+)
+def test_what_ffmpeg_would_open_by_a_protocol_is_no_file(source: str) -> None:
+    assert source_kind(source) is SourceKind.STREAM
+
+
+@pytest.mark.parametrize(
+    ("endpoint", "expected"),
+    [
+        ("tcp/127.0.0.1:7447", "tcp/127.0.0.1:7447"),
+        ("tls/[::1]:7447", "tls/[::1]:7447"),
+        ("tls/bus.example:7447#connect_private_key_base64=c2VjcmV0", "tls/bus.example:7447 ..."),
+        ("tls/bus#key=c2VjcmV0:7447", "(not shown)"),
+        ("tls/me:secret@bus:7447", "(not shown)"),
+    ],
+)
+def test_of_an_endpoint_of_the_bus_its_settings_are_not_shown(endpoint: str, expected: str) -> None:
+    assert redact_endpoint(endpoint) == expected
+
+
+@given(st.sampled_from([it for it in PLACES if not it.startswith(("rtsp//", "user:"))]), PASSWORDS)
+def test_others_words_end_where_an_address_begins(place: str, password: str) -> None:
+    text = f"Traceback\n  File a.py, line 3\nOSError: [Errno 5] Failed: '{place.format(password)}'\nmore\n"
+    told = redact_addresses(text)
+    assert not tells(told, password, without=f"{place}{text.partition('Failed')[0]}Failed: '...\nmore\n"), (
+        told
+    )
+    assert told.startswith("Traceback\n  File a.py, line 3\nOSError: [Errno 5] Failed: ")
+    assert told.endswith("\nmore\n")

@@ -1,0 +1,105 @@
+"""How many files may be open: as many as the system lets be, with some kept for what is no viewer."""
+
+from __future__ import annotations
+
+import json
+import resource
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from fakes.cameras import small_config
+from fakes.command_line import Run
+from fakes.system.few_descriptors import FEW, MYVIEW, awaited, connected, running, written
+from fakes.system.ports import free
+from fakes.timeouts import PATIENCE
+from server.cli.doctor.findings import Level
+from server.cli.doctor.machine import descriptor_findings
+from server.system.descriptors import (
+    FOR_OPERATORS,
+    connection_limit,
+    descriptor_limit,
+    raise_descriptor_limit,
+)
+
+
+@pytest.fixture
+def low() -> Iterator[int]:
+    """Lower this process's soft limit; give the hard one."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (512, hard))
+    yield hard
+    resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+
+
+def test_the_soft_limit_is_raised_to_the_hard_one(low: int) -> None:
+    assert descriptor_limit() == 512
+    raise_descriptor_limit()
+    assert descriptor_limit() == min(low, 1 << 20) > 512
+
+
+def test_every_command_raises_it_and_what_it_starts_has_it_too(low: int, myview: Run) -> None:
+    assert myview("--version").code == 0
+    child = [sys.executable, "-c", "import resource; print(resource.getrlimit(resource.RLIMIT_NOFILE)[0])"]
+    shown = subprocess.run(child, check=True, capture_output=True, text=True)
+    assert int(shown.stdout) == descriptor_limit() == min(low, 1 << 20)
+
+
+@pytest.mark.parametrize("descriptors", [256, 512, 1024, 4096, 1 << 20])
+@pytest.mark.parametrize("record", [{}, {"folder": "kept"}])
+def test_what_viewers_cannot_take_is_left_for_everything_else(
+    descriptors: int, record: dict[str, Any]
+) -> None:
+    config = small_config(record=record, http={"viewers_max": 300, "connections_max": 2000})
+    taken = connection_limit(config, descriptors)
+    files = min(config.http.viewers_max, taken) if record else 0  # of the past: one for each who watches
+    assert 0 < taken <= 2000
+    assert taken == 2000 or taken + files + FOR_OPERATORS + 128 <= descriptors
+    assert (taken == 2000) == (descriptors >= 4096)
+
+
+def test_without_a_number_there_are_connections_enough_for_all_viewers() -> None:
+    assert small_config().http.connections == 4000
+    assert small_config(http={"viewers_max": 2}).http.connections == 1000
+    assert small_config(http={"viewers_max": 9000}).http.connections == 36000
+    assert small_config(http={"viewers_max": 9000, "connections_max": 7}).http.connections == 7
+
+
+def test_the_doctor_says_what_fits() -> None:
+    (found,) = descriptor_findings(small_config(), 1 << 20)
+    assert found.level is Level.OK
+    assert "4000 connections and 1000 viewers" in found.text
+    (found,) = descriptor_findings(small_config(), 4096)
+    assert found.level is Level.WARNING
+    assert "1000 viewers among them; http.connections_max says 4000" in found.text
+    (found,) = descriptor_findings(small_config(), 1024)
+    assert found.level is Level.WARNING
+    assert "http.viewers_max says 1000" in found.text
+    assert "LimitNOFILE" in found.do
+
+
+def test_the_doctor_tells_of_it(myview: Run, tmp_path: Path) -> None:
+    path = written(tmp_path, free())
+    said = json.loads(myview("doctor", path, "--json", "--seconds", 1).out)
+    (found,) = [it for it in said["findings"] if it["check"] == "open files"]
+    assert str(descriptor_limit()) in found["text"]
+
+
+def test_a_process_that_can_accept_nobody_says_so_once_and_takes_them_when_it_can(tmp_path: Path) -> None:
+    port, log = free(), tmp_path / "log"
+    with running(f"{MYVIEW} sync {written(tmp_path, port)}", log), ExitStack() as silent:
+        for _ in range(FEW + 16):  # and no more than wait in the system
+            silent.enter_context(connected(port))
+        awaited(log, b"Too many open files")
+        silent.close()
+        with connected(port) as late:
+            late.settimeout(PATIENCE)
+            assert late.recv(12) == b"MYVIEW-SYNC ", "it accepts again"
+    told = log.read_bytes()
+    assert told.count(b"cannot be accepted: Too many open files") == 1
+    assert b"Traceback" not in told

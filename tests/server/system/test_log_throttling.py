@@ -1,0 +1,213 @@
+"""What fails for every frame, message or attempt is one event of the log, and not a line for each."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import av
+import msgspec
+import pytest
+
+from camsync import Spell
+from fakes.cameras import GOP, small_config
+from fakes.media.videos import write_video
+from fakes.rendering import CANVAS, fragments
+from fakes.site import Hall
+from server.camera.audio import LiveSound, RecordedSound, recorded_source
+from server.camera.peers.detection_exchange import Exchange
+from server.camera.process import CameraProcess
+from server.camera.sources import recording
+from server.camera.sources.frame_reader import pictures
+from server.camera.sources.recording import Recording
+from server.config.sections import SoundSettings
+from server.media.rendering_messages import Draw
+from server.messaging.inbox import Message
+from server.messaging.messages import CameraStatus, FrameDetections, ZenohKeys
+from server.service.rendering import rendered_stream as stream_source
+from server.service.rendering.decided_boxes import NO_OVERLAY
+from server.service.rendering.worker import stream_renderer
+from server.service.rendering.worker_process import WorkerDiedError
+from server.service.streaming.broadcaster import Broadcaster
+from server.supervisor.site import _keep
+
+KEYS = ZenohKeys("hall")
+
+
+def found(camera: str, pulse: int) -> bytes:
+    """Give what a camera says of a frame."""
+    return msgspec.json.encode(FrameDetections(camera=camera, boot=1, size=(192, 108), pulse=pulse, boxes=[]))
+
+
+async def test_words_that_come_too_late_again_and_again_are_told_of_seldom_and_when_that_is_over(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    caplog.set_level("INFO")
+    clock = [0.0]
+    exchange = Exchange(small_config(), "c0", None, 10)
+    exchange._late["c1"] = Spell(lambda: clock[0])
+    for pulse in range(3):
+        exchange._tell_late("c1", pulse)
+        exchange._tell_in_time("c1")
+    clock[0] = 60.0
+    exchange._tell_late("c1", 1500)
+    clock[0] = 120.0
+    exchange._tell_in_time("c1")
+    assert caplog.messages == [
+        "camera c0: what c1 found in frame 0 came too late",
+        "camera c0: what c1 found in frame 1500 came too late, and 2 times before",
+        "camera c0: what c1 finds comes in time again",
+    ]
+
+
+async def test_a_camera_that_nobody_understands_is_told_of_once_and_not_by_frame(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    caplog.set_level("INFO")
+    clock = [0.0]
+    exchange = Exchange(small_config(), "c0", None, 10)
+    for camera in ("c1", "c2"):
+        exchange._bad[camera] = Spell(lambda: clock[0])
+
+    def hear(camera: str, payload: bytes) -> None:
+        exchange._read(Message(KEYS.camera(camera, "found"), payload, b""))
+
+    for frame in range(250):
+        clock[0] = frame / 25
+        hear("c1", b'{"camera": "c1"}')
+        hear("c2", found("c2", frame))
+    clock[0] += 60.0
+    hear("c1", found("c1", 1750))
+    none, well = caplog.messages
+    assert none.startswith("camera c0: a message on myview/hall/camera/c1/found is none: Object missing")
+    assert well == "camera c0: what c1 says is understood again; 250 messages were not"
+    assert exchange.bad_messages == 250
+
+
+async def test_what_a_camera_does_not_understand_is_in_its_status(monkeypatch: pytest.MonkeyPatch) -> None:
+    config = small_config()
+    cameras = [it.model_copy(update={"source": "scene:room?camera=0&objects=1"}) for it in config.cameras]
+    camera = CameraProcess(config.model_copy(update={"cameras": cameras}), "c0")
+    said: list[bytes] = []
+    monkeypatch.setattr(camera, "_publish", lambda _, payload: said.append(payload))
+    camera._exchange._read(Message(KEYS.camera("c1", "found"), b"{", b""))
+    for _ in range(2):
+        camera._pointed.put(Message(KEYS.camera("c0", "pointing"), b"{", b""))
+    camera._send_status()
+    camera._pipeline.close()
+    [status] = [msgspec.json.decode(it, type=CameraStatus) for it in said]
+    assert status.bad_messages == 3
+
+
+def test_a_camera_without_sound_is_told_of_once_however_often_it_is_opened(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    caplog.set_level("INFO")
+    sound = LiveSound(SoundSettings(source="c0"), 25.0)
+    for _ in range(10):
+        sound.opened(None)
+    assert caplog.messages == ["there is no sound in what the camera sends; the site is silent"]
+
+
+def test_a_damaged_recording_that_repeats_is_told_of_once(caplog: pytest.LogCaptureFixture) -> None:
+    def demux(_: Any) -> Any:
+        raise av.error.InvalidDataError(1, "damaged")
+
+    container = SimpleNamespace(name="hall.mp4", demux=demux)
+    opened: Any = SimpleNamespace(container=container, stream=SimpleNamespace(time_base=None), fps=25.0)
+    assert not list(pictures(opened))
+    for _ in range(5):
+        assert not list(pictures(opened, again=True))
+    assert caplog.messages == ["hall.mp4: cannot be read any further: damaged"]
+
+
+def test_damaged_sound_that_repeats_is_told_of_once(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def demux(_: Any) -> Any:
+        raise av.error.InvalidDataError(1, "damaged")
+
+    container = SimpleNamespace(demux=demux, close=lambda: None)
+    monkeypatch.setattr(recorded_source, "_open", lambda _: (container, None))
+    sound = RecordedSound.__new__(RecordedSound)
+    sound._path, sound._told = "hall.mp4", False
+    for _ in range(5):
+        assert not list(sound._once())
+    assert caplog.messages == ["hall.mp4: its sound cannot be read any further: damaged"]
+
+
+def test_a_recording_that_repeats_is_read_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[bool] = []
+
+    def noted(opened: Any, *, again: bool = False) -> Any:
+        asked.append(again)
+        return pictures(opened, again=again)
+
+    monkeypatch.setattr(recording, "pictures", noted)
+    repeated = Recording(str(write_video(tmp_path / "hall.avi", 3, codec="mjpeg")), 0, "loop")
+    for pulse in range(9):
+        repeated.take(pulse)
+    repeated.close()
+    assert asked == [False, True, True]
+
+
+def test_frames_that_cannot_be_decoded_are_told_of_once_for_a_stream(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    class Damaged:
+        def decode(self, _: Any) -> Any:
+            raise av.error.InvalidDataError(1, "damaged")
+
+    monkeypatch.setattr(stream_renderer, "_decoder", lambda _: Damaged())
+    drawing = stream_renderer.StreamRenderer(CANVAS)
+    for gop in range(3):
+        drawing.draw(Draw(fragments=fragments(gop * GOP, GOP)))
+    assert len(caplog.messages) == 1
+    assert caplog.messages[0].startswith("frame 0 cannot be decoded: ")
+
+
+async def test_drawing_processes_that_die_again_and_again_are_counted_and_told_of_once(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(stream_source, "_RETRY_FIRST_S", 0.0)
+    monkeypatch.setattr(stream_source, "_RETRY_MAX_S", 0.0)
+    drawing = stream_source.RenderedStream(
+        "object 1", Broadcaster(), lambda _: NO_OVERLAY, CANVAS, live=True, queue_gops=4
+    )
+
+    async def dies() -> None:
+        await asyncio.sleep(0)
+        if drawing.restarts < 10:
+            raise WorkerDiedError("died")
+
+    monkeypatch.setattr(drawing, "_run_process", dies)
+    await drawing.run()
+    assert drawing.restarts == 10
+    assert caplog.messages == ["drawing object 1: the process died; starting another"]
+
+
+async def test_a_mistake_in_an_answer_is_told_of_once_however_often_it_is_asked_for(
+    hall: Hall, caplog: pytest.LogCaptureFixture
+) -> None:
+    hall.service.lacking = None  # type: ignore[assignment]
+    with caplog.at_level(logging.WARNING):
+        for _ in range(5):
+            async with hall.session.get("/metrics") as answer:
+                assert answer.status == 500
+    assert caplog.messages == ["answering GET /metrics failed"]
+    assert caplog.records[0].exc_info
+
+
+def test_a_folder_that_cannot_be_written_is_told_of_once_however_often_something_is_started(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    (tmp_path / "file").write_text("")
+    spell = Spell()
+    running: Any = SimpleNamespace(path=tmp_path / "site.yaml", now=small_config())
+    for _ in range(5):
+        _keep(running, tmp_path / "file" / "folder" / "site.yaml", spell)
+    assert len(caplog.messages) == 1
+    assert "cannot write what is in force" in caplog.messages[0]

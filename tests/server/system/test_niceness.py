@@ -1,0 +1,79 @@
+"""Who yields to whom: real processes, and what the system says of them."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+import yaml
+
+from fakes.timeouts import PATIENCE
+from server.cli.generated_config import free_port
+from server.system.child_process import start_child
+from server.system.niceness import lower_priority
+
+NOBODY = 2**22 + 1  # more than a process's number can be (proc(5), pid_max)
+BEFORE = os.getpriority(os.PRIO_PROCESS, 0)
+
+pytestmark = pytest.mark.skipif(BEFORE > 10, reason="there is not much that is nicer than these tests")
+
+
+def niceness(pid: int) -> int:
+    return os.getpriority(os.PRIO_PROCESS, pid)
+
+
+def nicer_by(*steps: int) -> int:
+    """Give how nice a process becomes that is told so many times to be nicer."""
+    calls = "; ".join(f"lower_own_priority({by})" for by in steps)
+    script = f"import os; from server.system.niceness import lower_own_priority; {calls}; print(os.nice(0))"
+    return int(subprocess.run([sys.executable, "-c", script], capture_output=True, check=True).stdout)
+
+
+@pytest.mark.parametrize(("steps", "by"), [((4,), 4), ((4, 4), 4), ((4, 2), 4), ((0,), 0)])
+def test_a_process_is_nicer_than_who_has_started_it_however_often_it_is_told(
+    steps: tuple[int, ...], by: int
+) -> None:
+    assert nicer_by(*steps) == BEFORE + by
+
+
+def test_nobody_is_nicer_than_the_system_knows() -> None:
+    assert nicer_by(19) == 19
+
+
+def test_who_is_gone_already_is_no_trouble() -> None:
+    lower_priority(NOBODY, 5)
+
+
+async def test_what_the_service_starts_yields_to_it_and_goes_before_the_cameras() -> None:
+    process = await start_child("server.service.rendering.worker")
+    try:
+        assert BEFORE < niceness(process.pid) < BEFORE + 10
+    finally:
+        process.kill()
+        await process.wait()
+
+
+def test_a_camera_that_is_started_by_itself_is_nicer_too(tmp_path: Path) -> None:
+    bus = f"tcp/127.0.0.1:{free_port()}"
+    content = {
+        "site": {"niceness": 3},
+        "cameras": [{"id": "c0", "source": "scene:room"}],
+        "sync": {"port": free_port()},
+        "zenoh": {"connect": bus, "listen": bus},
+    }
+    path = tmp_path / "site.yaml"
+    path.write_text(yaml.safe_dump(content), encoding="utf-8")
+    camera = subprocess.Popen([sys.executable, "-m", "server.cli.main", "camera", str(path), "c0"])
+    try:
+        until = time.monotonic() + PATIENCE
+        while niceness(camera.pid) != BEFORE + 3:
+            assert time.monotonic() < until
+            assert camera.poll() is None
+            time.sleep(0.05)
+    finally:
+        camera.kill()
+        camera.wait()

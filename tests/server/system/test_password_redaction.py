@@ -1,0 +1,223 @@
+"""No line that MyView writes has a camera's password in it, however the password stands in the address."""
+
+from __future__ import annotations
+
+import json
+import logging
+import sys
+import traceback
+from pathlib import Path
+from typing import Any
+
+import av
+import pytest
+import yaml
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fakes.command_line import Run
+from fakes.passwords import PASSWORDS, PLACES, tells
+from fakes.system.ports import free
+from server.camera.audio import open_sound
+from server.camera.passthrough.opening import open_own
+from server.camera.sources import open_source
+from server.config import yaml_file
+from server.config.loader import build_config
+from server.config.sections import CameraSettings, SiteSettings
+from server.config.site_config import Config
+from server.config.yaml_file import read_yaml
+from server.http.operator.settings import settings_of
+from server.system.errors import UserError
+from server.system.log_format import JsonLines, TextLines
+
+HARMLESS = "0000"
+NAIVE = ("QXZ/JKV7", "QXZ JKV7", "QXZ@JKV7", "QXZ#JKV7", "QXZ?JKV7", "QXZJKV7")
+"""Read without care, an address with one of these ends in the midst of it. The users below are hosts of this
+machine: FFmpeg reads so, and would look for others."""
+SOURCES = (
+    "rtsp://127.0.0.1:{}@127.0.0.1:1/x",
+    "rtsp://127.0.0.1:1/x/{}",
+    "http://127.0.0.1:1/x?p={}",
+    "http://127.0.0.1:1/x?credentials={}",
+    "http://127.0.0.1:1/x?sig={}",
+    "async:rtsp://127.0.0.1:{}@127.0.0.1:1/x",
+    "concat:rtsp://127.0.0.1:{}@127.0.0.1:1/x",
+    "nonsense://127.0.0.1:{}@127.0.0.1:1/x",
+    "rtsp:127.0.0.1:{}@127.0.0.1:1/x",
+    "rtsp//127.0.0.1:{}@127.0.0.1:1/x",
+)
+"""Where nobody answers, or FFmpeg has no such protocol, or it is no address."""
+
+
+def built(**changes: Any) -> Config:
+    content = {"cameras": [{"id": "door", "source": "door.mp4"}], **changes}
+    return build_config(content, where="site.yaml", folder=Path("/etc/myview"))
+
+
+def written(config: Config) -> str:
+    """Give all that an operator is shown of a configuration."""
+    return "\n".join(f"{it.key}: {it.value} {it.default}" for it in settings_of(config))
+
+
+def door(source: str, **changes: Any) -> dict[str, Any]:
+    return {"id": "door", "source": source, **changes}
+
+
+@settings(max_examples=30)  # each writes out all settings
+@given(st.sampled_from(PLACES), PASSWORDS)
+def test_an_operator_is_shown_no_password_of_a_source(place: str, password: str) -> None:
+    def told(secret: str) -> str:
+        source = place.format(secret)
+        return written(built(cameras=[door(source)], sound={"source": source}))
+
+    assert not tells(told(password), password, without=told(HARMLESS))
+
+
+@settings(max_examples=20)
+@given(PASSWORDS.filter(lambda it: not set(it) & set(" /#?")))
+def test_an_operator_is_shown_no_secret_of_other_settings(password: str) -> None:
+    def told(secret: str) -> str:
+        options = {"headers": f"Authorization: Basic {secret}", "rtsp_transport": secret}
+        file = f"{secret}.password"  # who misunderstands the setting writes the password itself
+        cameras = [door("rtsp://viewer:{password}@192.0.2.11/", options=options, password=file)]
+        servers = [f"http://viewer:{secret}@192.0.2.11/"]
+        zenoh = {"connect": f"tls/bus:7447#key={secret}"}
+        record = {"folder": f"smb://me:{secret}@nas/kept"}
+        return written(
+            built(cameras=cameras, zenoh=zenoh, record=record, view={"share": {"servers": servers}})
+        )
+
+    assert not tells(told(password), password, without=told(HARMLESS))
+
+
+def misplaced(address: str, secret: str) -> list[dict[str, Any]]:
+    """Give configurations in which an address or a secret is where it does not belong."""
+    camera = door("door.mp4")
+    return [
+        {"cameras": [{**camera, address: None}]},
+        {"cameras": [{**camera, "id": address}]},
+        {"cameras": [{**camera, "at_end": address}]},
+        {"cameras": [{**camera, "kind": address}]},
+        {"cameras": [{**camera, "ground": address}]},
+        {"cameras": [{**camera, "options": {"headers": f"Cookie: {secret}\r\n"}}]},
+        {"cameras": [{**camera, "options": {"headers": [secret]}}]},
+        {"cameras": [{**camera, "source": f"{address}\n"}]},
+        {"cameras": [{**camera, "source": f"{address}\ud800"}]},
+        {"cameras": [{**camera, "source": [address]}]},
+        {"cameras": address},
+        {"cameras": [address]},
+        {address: None, "cameras": [camera]},
+        {"cameras": [camera], "zenoh": {"connect": address}},
+        {"cameras": [camera], "zenoh": {"listen": f"tls/bus#key={secret}"}},
+        {"cameras": [camera], "view": {"share": {"servers": [f"{address} "]}}},
+    ]
+
+
+@settings(max_examples=30)
+@given(st.sampled_from(PLACES), PASSWORDS)
+def test_no_complaint_about_a_configuration_repeats_a_password(place: str, password: str) -> None:
+    address = place.format(password)
+    secrets = zip(misplaced(address, password), misplaced(place.format(HARMLESS), HARMLESS), strict=True)
+    for content, harmless in secrets:
+        told = []
+        for it in (content, harmless):
+            with pytest.raises(UserError) as refused:
+                build_config(it, where="site.yaml", folder=Path())
+            told.append("".join(traceback.format_exception(refused.value.__cause__ or refused.value)))
+            told[-1] += str(refused.value)
+        assert not tells(told[0], password, without=told[1]), told[0]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "source: [rtsp://me:QXZJKV7@h/\n",
+        "source: rtsp://me:QXZJKV7@h: x\n",
+        "source: *QXZJKV7\n",
+        "source: !QXZJKV7 x\n",
+        "source: !QXZJ!KV7 x\n",
+        "source: @QXZJKV7\n",
+        'source: "QXZJKV7\\q"\n',
+        "&QXZJKV7 a: b\n&QXZJKV7 c: d\n",
+        "source: !!int QXZJKV7\n",
+        "rtsp://me:QXZJKV7@h/ : 1\nrtsp://me:QXZJKV7@h/ : 2\n",
+    ],
+)
+@pytest.mark.parametrize("loader", ["with libyaml", "without libyaml"])
+def test_what_is_no_yaml_is_not_repeated(
+    text: str, loader: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if loader == "without libyaml":
+
+        class Plain(yaml.SafeLoader):
+            pass
+
+        monkeypatch.setattr(yaml_file, "_Loader", Plain)
+        monkeypatch.setattr(yaml_file, "SafeLoader", yaml.SafeLoader)
+    path = tmp_path / "site.yaml"
+    path.write_text(text)
+    with pytest.raises(UserError, match=r"site\.yaml: ") as refused:
+        read_yaml(path, "the configuration")
+    said = "".join(traceback.format_exception(refused.value))
+    assert not tells(said, "QXZJKV7", without="")
+
+
+@pytest.mark.parametrize("source", SOURCES)
+@pytest.mark.parametrize("password", NAIVE)
+def test_why_a_camera_cannot_be_opened_is_said_without_its_password(source: str, password: str) -> None:
+    address = source.format(password)
+    config = built(cameras=[door(address, h264="auto")], sound={"source": address})
+    for attempt in (
+        lambda: open_source(CameraSettings(id="door", source=address), SiteSettings()),
+        lambda: open_own(config, config.camera("door"), None),
+        lambda: open_sound(config, "door"),
+    ):
+        with pytest.raises(UserError) as refused:
+            attempt()
+        said = "".join(traceback.format_exception(refused.value))
+        assert not tells(said, password, without=""), said
+
+
+def test_the_doctor_shows_no_password(myview: Run, tmp_path: Path) -> None:
+    cameras = [
+        {"id": f"c{number}", "source": source.format(NAIVE[number % len(NAIVE)])}
+        for number, source in enumerate(SOURCES)
+    ]
+    cameras[0]["options"] = {"headers": "Authorization: Basic QXZJKV7"}
+    content = {
+        "cameras": cameras,
+        "sound": {"source": "http://127.0.0.1:QXZ/JKV7@127.0.0.1:1/a.aac"},
+        **{section: {"port": free()} for section in ("sync", "http")},
+        "zenoh": dict.fromkeys(("connect", "listen"), f"tcp/127.0.0.1:{free()}"),
+    }
+    path = tmp_path / "site.yaml"
+    path.write_text(yaml.safe_dump(content))
+    for how in ([], ["--json"]):
+        ended = myview("doctor", path, "--seconds", 1, *how)
+        assert ended.code == 1
+        for password in NAIVE:
+            assert not tells(ended.out + ended.err, password, without="")
+    said = {it["check"]: it["text"] for it in json.loads(ended.out)["findings"]}
+    assert said["camera c1"].startswith("rtsp://127.0.0.1:1/...: cannot open this video: ")
+    assert said["camera c9"] == "(not shown): no such file or folder"
+
+
+@pytest.mark.parametrize("command", ["render", "track", "calibrate"])
+def test_an_address_instead_of_a_recording_is_not_repeated(command: str, myview: Run, tmp_path: Path) -> None:
+    for password in NAIVE:
+        ended = myview(command, f"rtsp://127.0.0.1:{password}@127.0.0.1:1/x", "--out", tmp_path / "out")
+        assert ended.code == 2
+        assert not tells(ended.out + ended.err, password, without="")
+
+
+@pytest.mark.parametrize("lines", [TextLines(), JsonLines("door")])
+@pytest.mark.parametrize("password", NAIVE)
+def test_a_traceback_in_the_log_ends_where_an_address_begins(lines: logging.Formatter, password: str) -> None:
+    try:
+        av.open(f"rtsp://127.0.0.1:{password}@127.0.0.1:1/x", timeout=(5.0, 5.0))
+    except (av.error.FFmpegError, OSError):
+        record = logging.LogRecord("server", logging.ERROR, __file__, 1, "it failed", (), sys.exc_info())
+        said = lines.format(record)
+    assert "it failed" in said
+    assert "Traceback" in said
+    assert not tells(said, password, without="")

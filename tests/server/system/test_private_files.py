@@ -1,0 +1,130 @@
+"""What is written about people is for the user that writes it alone, whatever the umask."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import stat
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from fakes.cameras import CAMERAS, GOP, HEIGHT, SMALL, WIDTH, FedService, small_config
+from fakes.decisions import choice, decision
+from fakes.recordings import AMPLE, A, filled, head, piece, written
+from fakes.system.unprivileged import nobodys_folder
+from server.cli.doctor.disk import disk_findings
+from server.cli.doctor.findings import Level
+from server.media.letterbox import Letterbox
+from server.service.decision_files.decision_writer import DecisionWriter
+from server.service.decision_files.live_decision_writer import LiveDecisionWriter
+from server.service.recording.recording_folder import RecordingFolder
+from server.service.recording.recording_session import InitSegments
+from server.system.private_files import make_private_folder
+
+FITS = dict.fromkeys(CAMERAS, Letterbox((WIDTH, HEIGHT), (WIDTH, HEIGHT)))
+
+
+@contextlib.contextmanager
+def umask(mask: int) -> Iterator[None]:
+    before = os.umask(mask)
+    try:
+        yield
+    finally:
+        os.umask(before)
+
+
+@contextlib.contextmanager
+def folder_of(who: str, tmp_path: Path) -> Iterator[Path]:
+    """Give a folder that is open to all, of the user that the tests run as or of another than root."""
+    with contextlib.nullcontext(tmp_path) if who == "whoever" else nobodys_folder() as folder:
+        folder.chmod(0o755)
+        yield folder
+
+
+def modes(folder: Path) -> dict[bool, set[int]]:
+    """Give the modes of all folders (True) and files (False) below one."""
+    found: dict[bool, set[int]] = {True: set(), False: set()}
+    for it in folder.rglob("*"):
+        found[it.is_dir()].add(stat.S_IMODE(it.stat().st_mode))
+    return found
+
+
+@pytest.mark.parametrize("who", ["whoever", "nobody"])
+@pytest.mark.parametrize("mask", [0o000, 0o022, 0o077])
+def test_recordings_are_closed_to_others(tmp_path: Path, who: str, mask: int) -> None:
+    with folder_of(who, tmp_path) as around, umask(mask):
+        store = written(
+            RecordingFolder(around / "site" / "kept", AMPLE), [piece(gop, {1: A}) for gop in range(7)]
+        )
+        assert modes(around) == {True: {0o700}, False: {0o600}}
+        assert store.run is not None
+        store.run.number_since(5.0)
+        store.close()
+        assert modes(around) == {True: {0o700}, False: {0o600}}
+
+
+@pytest.mark.parametrize("who", ["whoever", "nobody"])
+@pytest.mark.parametrize("mask", [0o000, 0o022])
+def test_what_a_live_service_writes_down_of_people_is_closed_to_others(
+    tmp_path: Path, who: str, mask: int
+) -> None:
+    with folder_of(who, tmp_path) as around, umask(mask):
+        recorder = LiveDecisionWriter(around / "out" / "today", CAMERAS, FITS)
+        recorder.write(decision(0, choice(1, A), c0=[[(1, *SMALL)]] * GOP))
+        recorder.close()
+        assert modes(around) == {True: {0o700}, False: {0o600}}
+
+
+def test_what_somebody_renders_is_theirs_to_share(tmp_path: Path) -> None:
+    with umask(0o022):
+        DecisionWriter(tmp_path / "out", CAMERAS, FITS).close()
+    assert modes(tmp_path) == {True: {0o755}, False: {0o644}}
+
+
+def test_a_folder_that_was_there_is_left_as_it_is_and_told_of(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    folder = tmp_path / "kept"
+    folder.mkdir()
+    folder.chmod(0o755)
+    config = small_config(record={"folder": str(folder)})
+    service = FedService(config)
+    service.past.open()
+    service.close()
+    assert stat.S_IMODE(folder.stat().st_mode) == 0o755
+    (told,) = [it for it in caplog.messages if it.startswith("record.folder")]
+    assert "has mode 755" in told
+    assert "chmod 700" in told
+    (found, *_) = disk_findings(config, {})
+    said = f"{folder} can be written, but has mode 755: others on this machine may see"
+    assert (found.level, found.text) == (Level.WARNING, f"{said} when it was recorded, not what")
+    folder.chmod(0o700)
+    (found, *_) = disk_findings(config, {})
+    assert (found.level, found.text) == (Level.OK, f"{folder} can be written")
+
+
+def test_runs_that_an_earlier_version_left_open_are_closed_and_nobody_elses(tmp_path: Path) -> None:
+    written(RecordingFolder(tmp_path, AMPLE), [piece(0, {1: A})]).close()
+    (run,) = (it for it in tmp_path.iterdir() if it.is_dir())
+    run.chmod(0o755)
+    other = tmp_path / "holiday"
+    other.mkdir()
+    other.chmod(0o755)
+    again = RecordingFolder(tmp_path, AMPLE)
+    again.open()
+    again.write(piece(1, {1: A}), head(), InitSegments(filled()[1]))
+    again.close()
+    assert stat.S_IMODE(run.stat().st_mode) == 0o700
+    assert stat.S_IMODE(other.stat().st_mode) == 0o755
+
+
+def test_a_private_folder_is_made_with_those_above_it_or_is_there(tmp_path: Path) -> None:
+    make_private_folder(tmp_path / "a" / "b" / "c")
+    make_private_folder(tmp_path / "a" / "b" / "c")
+    (tmp_path / "a" / "file").write_text("")
+    with pytest.raises(FileExistsError):
+        make_private_folder(tmp_path / "a" / "file")
+    with pytest.raises(NotADirectoryError):
+        make_private_folder(tmp_path / "a" / "file" / "d")

@@ -1,0 +1,204 @@
+"""The survey's trackers: each follows what is easy, no number is used twice, the same comes of the same."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fakes.tracking.strolls import Stroll, final_boxes, seen_at
+from tracking import CostSettings, Detections, WindowResult, WindowSettings, create_solver
+from tracking.baselines import (
+    TEMPORAL,
+    StepwiseSettings,
+    Tracker,
+    needs_pictures,
+    tracker_named,
+    tracker_names,
+)
+from tracking.baselines.color_histograms import BINS, ColourField
+from tracking.boxes import Floats, iou
+from tracking.detectors.base import Image
+
+WINDOW = WindowSettings(window=6, stride=3, birth_window=6)
+BY_DETECTIONS = [it for it in tracker_names() if it != TEMPORAL]
+"""Temporal consistency goes by blobs alone, and learns the room first: it has tests of its own."""
+SIZE = (120, 200)
+_TALL, _WIDE = 40, 18
+_COLOURS = ((40, 40, 220), (220, 60, 30))
+
+
+def _tracker(name: str) -> Tracker:
+    return tracker_named(name, WINDOW, CostSettings(), lambda: create_solver("columns"))
+
+
+def _where(person: int, frame: int) -> Floats:
+    """Two people who pass each other on two levels."""
+    left = 15.0 + 2.0 * frame if person == 0 else 160.0 - 2.0 * frame
+    top = 8.0 + 60.0 * person
+    return np.array([left, top, left + _WIDE, top + _TALL])
+
+
+def _picture(frame: int, people: int) -> Image:
+    rng = np.random.default_rng(5)
+    image = rng.integers(90, 130, (*SIZE, 3)).astype(np.uint8)
+    texture = np.random.default_rng(6).integers(-25, 25, (_TALL, _WIDE, 1))
+    for person in range(people):
+        left, top, right, bottom = _where(person, frame).astype(int)
+        image[top:bottom, left:right] = np.clip(np.array(_COLOURS[person]) + texture, 0, 255)
+    return image
+
+
+def _seen(frame: int, people: int) -> Detections:
+    boxes = np.array([_where(person, frame) for person in range(people)]).reshape(-1, 4)
+    return Detections(boxes, np.full(people, 0.9), np.tile([0.5, 0.5], (people, 1)))
+
+
+def _follow(tracker: Tracker, frames: int, people: int, blind: range = range(0)) -> list[WindowResult]:
+    """Follow people in pictures; in some frames the detector finds nobody."""
+    told = [
+        tracker.push(frame, _seen(frame, 0 if frame in blind else people), _picture(frame, people))
+        for frame in range(frames)
+    ]
+    return [it for it in (*told, tracker.flush()) if it is not None]
+
+
+@pytest.mark.parametrize("name", BY_DETECTIONS)
+def test_two_people_who_pass_each_other_apart_keep_their_numbers(name: str) -> None:
+    results = _follow(_tracker(name), 45, 2)
+    boxes = final_boxes(results)
+    assert {number for row in boxes.values() for number in row} == {1, 2}
+    mine = {person: set() for person in range(2)}
+    for frame, row in boxes.items():
+        for number, box in row.items():
+            near = [float(iou(box, _where(person, frame))) for person in range(2)]
+            assert max(near) > 0.5, f"frame {frame}"
+            mine[int(np.argmax(near))].add(number)
+    assert [len(numbers) for numbers in mine.values()] == [1, 1]
+    assert sum(len(row) for row in boxes.values()) > 2 * 45 - 12
+
+
+@pytest.mark.parametrize("name", [it for it in BY_DETECTIONS if it != "lp" and needs_pictures(it)])
+def test_who_looks_at_the_picture_follows_where_nothing_was_detected(name: str) -> None:
+    blind = range(20, 24)
+    boxes = final_boxes(_follow(_tracker(name), 45, 1, blind))
+    for frame in blind:
+        assert [round(float(iou(box, _where(0, frame))), 1) >= 0.5 for box in boxes[frame].values()] == [True]
+    assert set(boxes[44]) == {1}
+
+
+def test_the_filter_goes_on_as_it_went_and_says_nothing_meanwhile() -> None:
+    blind = range(20, 26)
+    boxes = final_boxes(_follow(_tracker("kalman"), 45, 1, blind))
+    assert not any(boxes.get(frame) for frame in blind)
+    assert set(boxes[30]) == {1}, "found again where it was expected"
+
+
+@pytest.mark.parametrize("name", [it for it in BY_DETECTIONS if needs_pictures(it)])
+def test_a_frame_without_a_picture_begins_nobody_and_ends_nobody(name: str) -> None:
+    tracker = _tracker(name)
+    told = []
+    for frame in range(45):
+        picture = None if frame < 6 or frame in {20, 21} else _picture(frame, 1)
+        told.append(tracker.push(frame, _seen(frame, 1), picture))
+    boxes = final_boxes([it for it in (*told, tracker.flush()) if it is not None])
+    assert not any(boxes.get(frame) for frame in range(6))
+    assert set(boxes[44]) == {1}
+
+
+@pytest.mark.parametrize("name", [it for it in BY_DETECTIONS if it != "lp"])
+def test_the_same_pictures_give_the_same_tracks(name: str) -> None:
+    def shown(results: list[WindowResult]) -> list[bytes]:
+        return [track.boxes.tobytes() for result in results for track in result.tracks]
+
+    assert shown(_follow(_tracker(name), 20, 2)) == shown(_follow(_tracker(name), 20, 2))
+
+
+def test_a_name_that_no_tracker_has_is_told_with_those_that_there_are() -> None:
+    with pytest.raises(ValueError, match=r"'sort'.*kalman.*lp|'sort'.*lp.*kalman"):
+        tracker_named("sort", WINDOW, CostSettings(), lambda: create_solver("columns"))
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"match": 1.5}, {"birth_score": -0.1}, {"confirm": 0}, {"patience": 0}, {"unseen": -1}]
+)
+def test_settings_that_make_no_sense_are_refused(wrong: dict[str, float]) -> None:
+    with pytest.raises(ValueError, match=r"must be|between 0 and 1"):
+        StepwiseSettings(**wrong)  # type: ignore[arg-type]
+
+
+@st.composite
+def streams(draw: st.DrawFn) -> list[tuple[int, Detections]]:
+    """People who come, go and are missed, in frames some of which are left out."""
+    rng = np.random.default_rng(draw(st.integers(0, 1000)))
+    people = [
+        Stroll(float(rng.integers(0, 300)), 20.0, float(rng.integers(-4, 5)), look) for look in range(3)
+    ]
+    frame, found = draw(st.integers(0, 10)), []
+    for _ in range(draw(st.integers(1, 40))):
+        there = [person for person in people if rng.random() < 0.8]
+        found.append((frame, seen_at(there, frame, jitter=1.5, seed=1)))
+        frame += 1 if rng.random() < 0.9 else int(rng.integers(2, 40))
+    return found
+
+
+@given(streams())
+@settings(deadline=None, max_examples=40)
+def test_every_frame_is_told_once_and_no_number_is_used_twice(stream: list[tuple[int, Detections]]) -> None:
+    tracker = _tracker("kalman")
+    results = [tracker.push(frame, seen) for frame, seen in stream]
+    told = [it for it in (*results, tracker.flush()) if it is not None]
+    assert told[0].first == stream[0][0]
+    assert told[-1].final_to == stream[-1][0]
+    for earlier, later in pairwise(told):
+        assert later.first == earlier.last + 1
+    ends: dict[int, int] = {}
+    begins: dict[int, int] = {}
+    for result in told:
+        for track in result.tracks:
+            assert track.boxes.shape == (result.last - result.first + 1, 4)
+            assert not np.isnan(track.boxes).all()
+            shown = result.first + np.flatnonzero(~np.isnan(track.boxes[:, 0]))
+            assert shown[0] > ends.get(track.id, -1)
+            assert shown[0] - ends.get(track.id, shown[0]) <= StepwiseSettings().patience
+            begins.setdefault(track.id, int(shown[0]))
+            ends[track.id] = int(shown[-1])
+    assert sorted(begins) == list(range(1, len(begins) + 1))
+
+
+@pytest.mark.parametrize("name", BY_DETECTIONS)
+def test_no_result_spans_a_long_gap_and_nobody_is_known_after_it(name: str) -> None:
+    tracker, later = _tracker(name), WINDOW.forget_after + 12
+    before = _follow(tracker, 8, 1)
+    told = [tracker.push(frame, _seen(9, 1), _picture(9, 1)) for frame in range(later, later + 9)]
+    after = [it for it in (*told, tracker.flush()) if it is not None]
+    assert after[0].first == later
+    assert after[-1].final_to == later + 8
+    numbers = [{it.id for result in results for it in result.tracks} for results in (before, after)]
+    assert all(len(it) == 1 for it in numbers)
+    assert numbers[0] != numbers[1]
+
+
+def test_a_frame_that_does_not_come_after_the_last_one_is_refused() -> None:
+    tracker = _tracker("kalman")
+    tracker.push(5, _seen(0, 1))
+    with pytest.raises(ValueError, match="frame 5 came after frame 5"):
+        tracker.push(5, _seen(0, 1))
+
+
+@given(st.integers(0, 500), st.lists(st.tuples(*[st.integers(-20, 60)] * 4), min_size=1, max_size=5))
+@settings(deadline=None, max_examples=60)
+def test_colours_of_boxes_are_those_that_are_counted(
+    seed: int, corners: list[tuple[int, int, int, int]]
+) -> None:
+    image = np.random.default_rng(seed).integers(0, 256, (30, 40, 3)).astype(np.uint8)
+    boxes = np.array([[min(a, c), min(b, d), max(a, c), max(b, d)] for a, b, c, d in corners], dtype=float)
+    codes = (image // 64).astype(int) @ np.array([16, 4, 1])
+    for box, found in zip(boxes, ColourField(image).histograms(boxes), strict=True):
+        left, top, right, bottom = np.clip(box, 0, [40, 30, 40, 30]).astype(int)
+        inside = codes[top:bottom, left:right].ravel()
+        expected = np.bincount(inside, minlength=BINS) / max(inside.size, 1)
+        assert np.allclose(found, expected)

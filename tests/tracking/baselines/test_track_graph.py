@@ -1,0 +1,141 @@
+"""The track graph: who leaves a group, and two who cross while one of them is not detected."""
+
+from __future__ import annotations
+
+from itertools import permutations
+from math import exp, hypot
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fakes.tracking.strolls import BINS, Stroll, final_boxes, look, seen_at
+from tracking import CostSettings, Detections, WindowSettings, create_solver
+from tracking.appearance import appearance_distance
+from tracking.baselines import Tracker, tracker_named
+from tracking.baselines.track_groups import GraphSettings
+from tracking.baselines.track_links import End, who_left
+from tracking.boxes import iou
+
+CLOSE = 25
+
+
+def _tracker(name: str) -> Tracker:
+    window = WindowSettings(window=6, stride=3, birth_window=6)
+    return tracker_named(name, window, CostSettings(), lambda: create_solver("columns"))
+
+
+def _end(rng: np.random.Generator, frame: int) -> End:
+    look = rng.dirichlet(np.ones(BINS))
+    return End(frame, rng.uniform(0, 100, 2), rng.uniform(-3, 3, 2), float(rng.uniform(40, 90)), look)
+
+
+def _unlike(before: End, after: End) -> float:
+    looks = float(appearance_distance(before.look[None], after.look[None])[0, 0])
+    frames = after.frame - before.frame
+    if frames > CLOSE:
+        return looks
+    x, y = after.place - before.place - frames * before.step
+    return 0.7 * looks + 0.3 * min(hypot(x, y) / before.height, 1.0)
+
+
+@given(st.integers(0, 5000), st.integers(2, 5))
+@settings(deadline=None, max_examples=80)
+def test_who_left_is_the_most_probable_of_all_states(seed: int, count: int) -> None:
+    rng = np.random.default_rng(seed)
+    group = [_end(rng, int(rng.integers(0, 40))) for _ in range(count)]
+    out, rest = _end(rng, 50), _end(rng, 50)
+    probabilities = {}
+    for leaving, *staying in permutations(range(count)):
+        probability = exp(-_unlike(group[leaving], out))
+        if len(staying) == 1:
+            probability *= exp(-_unlike(group[staying[0]], rest))
+        probabilities[leaving] = probability
+    best = max(probabilities, key=lambda it: probabilities[it])
+    assert who_left(group, out, rest, CLOSE, unlike=1.0) == best
+
+
+def test_who_is_like_nobody_of_a_group_was_never_in_it() -> None:
+    place, still = np.zeros(2), np.zeros(2)
+    group = [End(0, place, still, 80.0, look(kind)) for kind in (0, 1)]
+    stranger = End(90, place, still, 80.0, look(5))
+    assert who_left(group, stranger, group[0], CLOSE, unlike=0.5) is None
+
+
+def _crossing() -> tuple[list[Detections], list[Stroll]]:
+    """One walks by another, who is not detected while they are nearly one behind the other."""
+    standing = Stroll(200.0, 50.0, 0.0, 2, seen=range(1000))
+    hidden = {it for it in range(200) if abs(50.0 + 3.0 * it - 200.0) < 30.0}
+    walking = Stroll(50.0, 45.0, 3.0, 6)
+    frames = [
+        seen_at([standing] if frame in hidden else [standing, walking], frame, jitter=0.5, seed=3)
+        for frame in range(100)
+    ]
+    return frames, [standing, walking]
+
+
+def _numbers(tracker: Tracker, frames: list[Detections], people: list[Stroll]) -> list[list[int]]:
+    """Give the numbers that each had, in the order in which they had them."""
+    told = [tracker.push(number, seen) for number, seen in enumerate(frames)]
+    results = [it for it in (*told, tracker.flush()) if it is not None]
+    had: list[list[int]] = [[] for _ in people]
+    for frame, boxes in sorted(final_boxes(results).items()):
+        for number, box in boxes.items():
+            near = [float(iou(box, np.array(person.box(frame)))) for person in people]
+            mine = had[int(np.argmax(near))]
+            if max(near) > 0.6 and (not mine or mine[-1] != number):
+                mine.append(number)
+    return had
+
+
+def test_who_comes_out_of_a_group_has_the_number_they_went_in_with() -> None:
+    frames, people = _crossing()
+    assert [len(numbers) for numbers in _numbers(_tracker("track-graph"), frames, people)] == [1, 1]
+
+
+def test_who_is_followed_on_by_mistake_gets_their_number_back_when_the_group_splits() -> None:
+    people = [Stroll(200.0, 50.0, 0.0, 2), Stroll(100.0, 50.0, 1.0, 6)]
+    # Who alone is detected: the box goes from the one who stands to the one who walks, the filter with it.
+    stands, walks = range(82, 112), range(112, 140)
+    frames = []
+    for frame in range(180):
+        there = [people[0]] if frame in stands else [people[1]] if frame in walks else people
+        frames.append(seen_at(there, frame, jitter=0.5, seed=4))
+    graph, plain = (_numbers(_tracker(name), frames, people) for name in ("track-graph", "kalman"))
+    assert graph[0][-1] == graph[0][0]
+    assert graph[1][-1] == graph[1][0]
+    assert graph[0][0] != graph[1][0]
+    assert [plain[0][0] == plain[0][-1], plain[1][0] == plain[1][-1]] != [True, True]
+
+
+def test_a_frame_shows_a_number_at_most_once_and_the_same_comes_of_the_same() -> None:
+    rng = np.random.default_rng(8)
+    people = [Stroll(float(rng.integers(0, 300)), 40.0, float(rng.integers(-4, 5)), it) for it in range(5)]
+    frames = []
+    for frame in range(200):
+        there = [
+            person
+            for place, person in enumerate(people)
+            if not any(abs(person.box(frame)[0] - other.box(frame)[0]) < 14 for other in people[:place])
+        ]
+        frames.append(seen_at(there, frame % 90, jitter=1.0, seed=frame))
+    told = []
+    for _ in range(2):
+        tracker = _tracker("track-graph")
+        results = [tracker.push(n, seen) for n, seen in enumerate(frames)]
+        told.append([it for it in (*results, tracker.flush()) if it is not None])
+    for result in told[0]:
+        numbers = [track.id for track in result.tracks]
+        assert len(numbers) == len(set(numbers))
+    assert [[it.boxes.tobytes() for it in result.tracks] for result in told[0]] == [
+        [it.boxes.tobytes() for it in result.tracks] for result in told[1]
+    ]
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"covered": 0.0}, {"beside": -1.0}, {"wait": 0}, {"remember": 0}, {"gone": 0}]
+)
+def test_settings_that_make_no_sense_are_refused(wrong: dict[str, float]) -> None:
+    with pytest.raises(ValueError, match=r"covered|must be"):
+        GraphSettings(**wrong)  # type: ignore[arg-type]

@@ -1,0 +1,296 @@
+"""The standard detector on drawn pictures: who is there is found, and what is not there is not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fakes.tracking.drawn_people import HEIGHT, WIDTH, Figure, picture, watched
+from tracking.boxes import iou
+from tracking.detectors import BackgroundDetector, BackgroundSettings, LooksSettings
+from tracking.detectors.background.height_model import (
+    Floor,
+    HeightLineLearner,
+    HeightLineSettings,
+    fit_line,
+    prior_of,
+)
+from tracking.detectors.background.isolated_people import Alone
+from tracking.detectors.background.sample_novelty import SeenAnew
+from tracking.types import Detections
+
+SURE = 0.4
+WALKER = Figure(10, 200, speed=2.0, begin=40)
+
+
+def best_overlap(seen: Detections, figure: Figure, frame: int) -> float:
+    """Give the best overlap with the figure among what the detector is sure of."""
+    sure = seen.boxes[seen.scores >= SURE]
+    return float(iou(sure, figure.box(frame)).max(initial=0.0))
+
+
+def test_a_walker_is_found_in_a_tight_box() -> None:
+    seen = watched(BackgroundDetector(), [WALKER], range(120))
+    overlaps = [best_overlap(seen[frame], WALKER, frame) for frame in range(45, 120)]
+    assert np.mean(np.array(overlaps) >= 0.5) >= 0.95
+    # One alone may be tall, so that their height is in doubt, and a rectangle is no person.
+    assert np.mean(overlaps) >= 0.65
+
+
+def test_nobody_is_found_where_nobody_is() -> None:
+    seen = watched(BackgroundDetector(), [], range(60))
+    assert all((frame.scores < SURE).all() for frame in seen)
+
+
+def test_two_people_side_by_side_are_two() -> None:
+    pair = [Figure(60, 200, speed=1.5, begin=40), Figure(95, 215, speed=1.5, begin=40)]
+    seen = watched(BackgroundDetector(), [*pair, Figure(300, 180, speed=-2.0, begin=40)], range(130))
+    for figure in pair:
+        found = [best_overlap(seen[frame], figure, frame) >= 0.5 for frame in range(90, 130)]
+        assert np.mean(found) >= 0.8
+
+
+def test_the_camera_s_gain_does_not_turn_the_scene_into_people() -> None:
+    detector = BackgroundDetector()
+    watched(detector, [], range(50))
+    brighter = watched(detector, [], range(50, 70), gain=1.15)
+    assert all((frame.scores < SURE).all() for frame in brighter)
+
+
+def test_somebody_who_stands_still_is_not_absorbed() -> None:
+    arrived = [Figure(10, 200, speed=2.0, begin=40, end=100), Figure(210, 200, begin=100)]
+    seen = watched(BackgroundDetector(), arrived, range(200))
+    assert np.mean([best_overlap(seen[frame], arrived[1], frame) >= 0.5 for frame in range(110, 200)]) > 0.95
+
+
+def test_who_is_in_a_recording_s_first_frame_is_found_there_and_leaves_no_ghost() -> None:
+    walker = Figure(10, 200, speed=2.0, begin=0)
+    detector = BackgroundDetector()
+    assert detector.blind
+    detector.prepare([picture([walker], frame) for frame in range(0, 160, 20)], every=20)
+    seen = watched(detector, [walker], range(100))
+    assert not detector.blind
+    assert np.mean([best_overlap(seen[frame], walker, frame) >= 0.5 for frame in range(100)]) >= 0.95
+    left = [(seen[frame].scores >= SURE) & (seen[frame].boxes[:, 2] < 40.0) for frame in range(60, 100)]
+    assert not any(ghosts.any() for ghosts in left)
+
+
+def test_what_a_recording_shows_ahead_is_learned_and_forgotten_when_the_light_changes() -> None:
+    detector = BackgroundDetector()
+    detector.prepare([picture([], frame) for frame in range(3)], every=1)
+    upside_down = [np.ascontiguousarray(picture([], frame)[::-1]) for frame in range(120)]
+    seen = [detector.detect(image) for image in upside_down]
+    assert (seen[-1].scores < SURE).all()
+
+
+def test_the_ghost_of_somebody_who_was_there_from_the_start_vanishes() -> None:
+    leaves = Figure(150, 200, end=60)
+    detector = BackgroundDetector()
+    watched(detector, [leaves], range(60))
+    after = watched(detector, [], range(60, 130))
+    assert best_overlap(after[0], leaves, 0) >= 0.5, "there is no ghost to begin with"
+    assert all((frame.scores < SURE).all() for frame in after[-20:])
+
+
+def test_what_is_ignored_is_not_found() -> None:
+    right = ((WIDTH / 2, 0.0), (WIDTH, 0.0), (WIDTH, HEIGHT), (WIDTH / 2, HEIGHT))
+    hidden = Figure(260, 200, speed=-0.5, begin=40)
+    seen = watched(BackgroundDetector(BackgroundSettings(ignore=(right,))), [hidden], range(100))
+    assert all((frame.scores < SURE).all() for frame in seen)
+
+
+@pytest.mark.parametrize(("colour", "length"), [(True, 96), (False, 64)])
+def test_looks_tell_people_apart_by_colour(colour: bool, length: int) -> None:
+    red, blue = Figure(40, 200, 1.0, 40), Figure(250, 200, -1.0, 40, colour=(190, 110, 35))
+    detector = BackgroundDetector(BackgroundSettings(looks=LooksSettings(colour=colour)))
+    seen = watched(detector, [red, blue], range(80))[-1]
+    assert detector.bins == length == seen.histograms.shape[1]
+    np.testing.assert_allclose(seen.histograms.sum(axis=1), 1.0)
+    looks = [seen.histograms[np.argmax(iou(seen.boxes, figure.box(79)))] for figure in (red, blue)]
+    likeness = np.sqrt(looks[0] * looks[1]).sum()
+    assert (likeness < 0.85) == colour
+
+
+def test_the_same_frames_give_the_same_detections_to_the_byte() -> None:
+    first, second = (watched(BackgroundDetector(), [WALKER], range(80)) for _ in range(2))
+    for one, other in zip(first, second, strict=True):
+        for part in ("boxes", "scores", "histograms"):
+            assert getattr(one, part).tobytes() == getattr(other, part).tobytes()
+
+
+def test_another_size_or_type_is_refused() -> None:
+    detector = BackgroundDetector()
+    detector.detect(picture([], 0))
+    with pytest.raises(ValueError, match="size changed"):
+        detector.detect(picture([], 1)[:-2])
+    with pytest.raises(ValueError, match="uint8"):
+        detector.detect(picture([], 1)[..., 0])
+
+
+def test_a_third_of_wild_samples_does_not_move_the_height_line() -> None:
+    rng = np.random.default_rng(1)
+    foot = rng.uniform(100, 280, 300)
+    height = (0.6 * foot - 20.0) * rng.normal(1.0, 0.05, 300)
+    height[::3] *= 1.6
+    line = fit_line(np.stack([foot, height], axis=1), HeightLineSettings())
+    assert line is not None
+    np.testing.assert_allclose(line.at(np.array([120.0, 200.0, 280.0])), [52.0, 100.0, 148.0], rtol=0.06)
+
+
+def test_the_height_line_is_in_doubt_where_nobody_was_seen() -> None:
+    foot = np.linspace(150, 170, 20)
+    line = fit_line(np.stack([foot, 0.6 * foot - 20.0], axis=1), HeightLineSettings())
+    assert line is not None
+    near, far = line.doubt(np.array([160.0, 280.0]))
+    assert far > 2.0 * near
+
+
+def test_people_all_of_one_height_everywhere_are_no_floor() -> None:
+    foot = np.linspace(60, 280, 400)
+    steep = np.stack([foot, 200.0 - 0.5 * foot], axis=1)
+    assert fit_line(steep, HeightLineSettings()) is None
+
+
+@settings(deadline=None, max_examples=40)
+@given(st.floats(0.35, 1.0), st.floats(-80.0, 60.0), st.integers(0, 1000))
+def test_by_metres_pieces_and_pairs_of_people_do_not_lead_the_line_astray(
+    slope: float, row: float, seed: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    foot = rng.uniform(190, 220, 60)
+    height = slope * (foot - row) * rng.normal(1.0, 0.04, 60)
+    height[:24] *= rng.uniform(0.2, 0.6, 24)
+    height[24:32] *= rng.uniform(1.2, 1.5, 8)
+    prior = prior_of(HeightLineSettings(), Floor(row, slope), HEIGHT)
+    line = fit_line(np.stack([foot, height], axis=1), HeightLineSettings(), prior)
+    assert line is not None
+    rows = np.array([130.0, 200.0, 270.0])
+    np.testing.assert_allclose(line.at(rows), slope * (rows - row), rtol=0.08)
+
+
+def test_by_metres_there_is_a_line_before_anybody_was_seen_and_where_nothing_agrees() -> None:
+    floor = Floor(20.0, 0.65)
+    before = HeightLineLearner(HeightLineSettings(), floor, HEIGHT).line
+    assert before is not None
+    assert before.at(np.array([20.0, 120.0])).tolist() == [0.0, 65.0]
+    assert HeightLineLearner(HeightLineSettings()).line is None
+    rng = np.random.default_rng(3)
+    wild = np.stack([rng.uniform(100, 280, 200), rng.uniform(20, 250, 200)], axis=1)
+    assert fit_line(wild, HeightLineSettings(), prior_of(HeightLineSettings(), floor, HEIGHT)) == before
+    assert fit_line(wild, HeightLineSettings()) is None
+
+
+def test_children_are_learned_to_be_smaller_than_people_of_the_usual_height() -> None:
+    rng = np.random.default_rng(5)
+    foot = rng.uniform(100, 280, 300)
+    height = 0.8 * 0.6 * (foot - 30.0) * rng.normal(1.0, 0.05, 300)
+    prior = prior_of(HeightLineSettings(), Floor(30.0, 0.6), HEIGHT)
+    samples = np.stack([foot, height], axis=1)
+    line = fit_line(samples, HeightLineSettings(), prior, people=8)
+    assert line is not None
+    np.testing.assert_allclose(line.at(np.array([120.0, 200.0])), [43.2, 81.6], rtol=0.08)
+    one = fit_line(samples, HeightLineSettings(), prior, people=1)
+    assert one is not None
+    assert line.at(np.array([200.0])) < one.at(np.array([200.0])) < 102.0, "one child is no school"
+
+
+def test_the_fewer_people_were_seen_the_more_the_height_line_is_in_doubt() -> None:
+    foot = np.linspace(100, 280, 900)
+    samples = np.stack([foot, 0.65 * foot - 20.0], axis=1)
+    lines = [fit_line(samples, HeightLineSettings(), people=people) for people in (1, 2, 8)]
+    doubts = [float(line.doubt(np.array([200.0]))[0]) for line in lines if line is not None]
+    assert len(doubts) == 3
+    assert doubts[0] > 1.3 * doubts[1] > 1.6 * doubts[2]
+    assert doubts[0] >= 0.03 * 110.0, "however often somebody is seen, they may be tall"
+
+
+def test_who_stands_still_counts_once_and_who_walks_at_every_tenth_of_their_height() -> None:
+    anew, counted = SeenAnew(), {"stands": 0, "walks": 0}
+    for frame in range(400):
+        stands = Alone(60.0 + frame % 3, 130.0, 50.0)
+        walks = Alone(80.0 + 2.0 * frame, 200.0, 100.0)
+        flickers = [] if 100 <= frame < 140 else [stands]
+        for person in anew.of([*flickers, walks]):
+            counted["walks" if person is walks else "stands"] += 1
+    assert counted["stands"] == 1
+    assert 60 <= counted["walks"] <= 80
+
+
+def test_a_place_is_forgotten_when_nobody_is_there() -> None:
+    anew, person = SeenAnew(), Alone(60.0, 130.0, 50.0)
+    assert anew.of([person]) == [person]
+    assert anew.of([], frames=200) == []
+    assert anew.of([person]) == [person]
+
+
+def test_who_stands_long_with_hidden_feet_does_not_lead_the_line_astray() -> None:
+    visible = np.full((HEIGHT, WIDTH), 255, dtype=np.uint8)
+    learner = HeightLineLearner(HeightLineSettings())
+    for frame in range(600):
+        foreground = np.zeros_like(visible)
+        foreground[85:125, 280:296] = 255  # three quarters of somebody
+        if frame < 200:
+            foot = 140 + frame // 2
+            tall = round(0.6 * foot - 25)
+            left = 20 + frame
+            foreground[foot - tall : foot, left : left + round(0.36 * tall)] = 255
+        learner.watch(foreground, visible)
+    assert learner.line is not None
+    rows = np.array([125.0, 180.0, 235.0])
+    np.testing.assert_allclose(learner.line.at(rows), 0.6 * rows - 25.0, rtol=0.08)
+
+
+def test_of_ground_without_metres_the_horizon_holds_the_line() -> None:
+    rng = np.random.default_rng(8)
+    foot = rng.uniform(120, 150, 60)
+    height = 0.8 * (foot - 20.0) * rng.normal(1.0, 0.04, 60)
+    height[:20] *= 0.7
+    prior = prior_of(HeightLineSettings(), Floor(20.0, None), HEIGHT)
+    assert prior.line is None
+    samples = np.stack([foot, height], axis=1)
+    held, free = (fit_line(samples, HeightLineSettings(), it, people=4) for it in (prior, None))
+    assert held is not None
+    assert free is not None
+    near = np.array([260.0])
+    np.testing.assert_allclose(held.at(near), [192.0], rtol=0.08)
+    assert held.doubt(near) < 0.5 * free.doubt(near)
+
+
+def test_more_pieces_than_people_do_not_lead_the_line_astray() -> None:
+    rng = np.random.default_rng(6)
+    foot = rng.uniform(110, 260, 200)
+    height = (0.6 * foot - 20.0) * rng.normal(1.0, 0.04, 200)
+    height[:120] *= rng.choice([0.3, 0.4], 120)
+    line = fit_line(np.stack([foot, height], axis=1), HeightLineSettings())
+    assert line is not None
+    np.testing.assert_allclose(line.at(np.array([120.0, 200.0, 260.0])), [52.0, 100.0, 136.0], rtol=0.08)
+
+
+def test_how_tall_people_are_is_sure_by_metres_or_by_many_people() -> None:
+    alone = HeightLineLearner(HeightLineSettings())
+    assert not alone.sure
+    assert HeightLineLearner(HeightLineSettings(), Floor(57.0, 0.7), HEIGHT).sure
+    visible = np.full((HEIGHT, WIDTH), 255, dtype=np.uint8)
+    surely = []
+    for step in range(120):
+        foreground = np.zeros_like(visible)
+        foot = 120 + step
+        tall = int(0.7 * foot - 40)
+        left = 20 + 2 * step
+        foreground[foot - tall : foot, left : left + int(0.36 * tall)] = 255
+        alone.watch(foreground, visible)
+        surely.append(alone.sure)
+    assert not surely[5]
+    assert surely[-1]
+
+
+def test_what_was_measured_of_the_floor_says_how_tall_people_are_in_every_size_of_picture() -> None:
+    lines = []
+    for factor in (1, 2):
+        detector = BackgroundDetector(floor=Floor(57.0 * factor, 0.7))
+        assert detector.height_line is None
+        detector.detect(np.zeros((factor * HEIGHT, factor * WIDTH, 3), dtype=np.uint8))
+        lines.append(detector.height_line)
+    assert lines[0] == lines[1] == prior_of(HeightLineSettings(), Floor(57.0, 0.7), HEIGHT).line

@@ -1,0 +1,105 @@
+"""Networks of the user's: every layout of YOLO's is read, and what does not fit is said in one line."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from fakes.tracking.tiny_networks import save, yolov5, yolov8
+from tracking.detectors import OnnxDetector, OnnxSettings
+from tracking.detectors.neural.yolo_output import decoded
+
+# The picture is twice as large as the input and has its proportions: no bars.
+WHITE = np.full((128, 192, 3), 255, dtype=np.uint8)
+# In pixels of the input: middle, width and height; and the same box in the picture.
+MIDDLE, BOX = (30.0, 32.0, 12.0, 40.0), [48.0, 24.0, 72.0, 104.0]
+NEAR = (31.0, 32.0, 12.0, 40.0)
+AWAY = (70.0, 32.0, 12.0, 40.0)
+
+
+def detector(path: Path, **settings: object) -> OnnxDetector:
+    return OnnxDetector(OnnxSettings(model=path, **settings))  # type: ignore[arg-type]
+
+
+V5 = yolov5([(*MIDDLE, 0.9, 0.8, 0.1), (*NEAR, 0.8, 0.8, 0.1), (*AWAY, 0.9, 0.05, 0.9)])
+V8 = yolov8([(*MIDDLE, 0.72, 0.1), (*NEAR, 0.64, 0.1), (*AWAY, 0.05, 0.9)])
+END = yolov5([(24, 12, 36, 52, 0.72, 0), (64, 12, 76, 52, 0.9, 1)], boxes=5)
+
+
+@pytest.mark.parametrize("table", [V5, V8, END], ids=["yolov5", "yolov8", "end2end"])
+def test_a_person_is_found_once_and_other_classes_are_not(
+    tmp_path: Path, table: npt.NDArray[np.float32]
+) -> None:
+    seen = detector(save(tmp_path / "tiny.onnx", table)).detect(WHITE)
+    np.testing.assert_allclose(seen.boxes, [BOX], atol=1e-4)
+    np.testing.assert_allclose(seen.scores, [0.72], rtol=1e-5)
+    assert seen.histograms.shape == (1, 96)
+
+
+def test_the_classes_asked_for_are_found(tmp_path: Path) -> None:
+    one = detector(save(tmp_path / "tiny.onnx", V8), classes=(0, 1))
+    np.testing.assert_allclose(one.detect(WHITE).scores, [0.9, 0.72], rtol=1e-5)
+    with pytest.raises(ValueError, match="no class 7"):
+        detector(tmp_path / "tiny.onnx", classes=(7,))
+
+
+def test_weak_boxes_are_left_out(tmp_path: Path) -> None:
+    assert len(detector(save(tmp_path / "tiny.onnx", V8), least_score=0.8).detect(WHITE)) == 0
+
+
+def test_boxes_are_moved_back_from_between_the_bars(tmp_path: Path) -> None:
+    path = save(tmp_path / "tiny.onnx", V8, size=(96, 96))
+    wide = np.full((64, 192, 3), 255, dtype=np.uint8)  # half its size in the input, 32 rows of bar above
+    seen = detector(path, least_score=0.1).detect(wide)
+    # The bars are 114 of 255 bright, and so sure is this network.
+    np.testing.assert_allclose(seen.scores, [0.72 * 114 / 255], rtol=1e-3)
+    np.testing.assert_allclose(seen.boxes, [[48, 0, 72, 40]], atol=1e-4)
+
+
+def test_a_file_that_leaves_its_size_open_gets_the_one_set(tmp_path: Path) -> None:
+    path = save(tmp_path / "tiny.onnx", V8, size=("height", "width"))
+    square = np.full((200, 200, 3), 255, dtype=np.uint8)
+    seen = detector(path, size=100).detect(square)
+    np.testing.assert_allclose(seen.boxes, [BOX], atol=1e-4)
+
+
+def test_half_precision_is_understood(tmp_path: Path) -> None:
+    seen = detector(save(tmp_path / "tiny.onnx", V8, kind="FLOAT16")).detect(WHITE)
+    np.testing.assert_allclose(seen.boxes, [BOX], atol=0.1)
+
+
+def test_a_file_that_does_not_fit_is_refused_in_one_line(tmp_path: Path) -> None:
+    noise = tmp_path / "noise.onnx"
+    noise.write_bytes(b"no network")
+    refused = {
+        noise: "not a usable ONNX file",
+        save(tmp_path / "flat.onnx", V8[0]): r"output has the shape \(6, 20\)",
+        save(tmp_path / "thin.onnx", yolov5([(1.0, 2.0, 3.0, 4.0)])): r"shape \(1, 20, 4\)",
+    }
+    for path, said in refused.items():
+        with pytest.raises(ValueError, match=said) as caught:
+            detector(path)
+        assert path.name in str(caught.value)
+        assert "\n" not in str(caught.value)
+    with pytest.raises(OSError, match=r"none\.onnx"):
+        detector(tmp_path / "none.onnx")
+
+
+def test_without_onnxruntime_the_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = save(tmp_path / "tiny.onnx", V8)
+    monkeypatch.setitem(sys.modules, "onnxruntime", None)
+    with pytest.raises(ImportError, match=r"pip install 'myview\[onnx\]'"):
+        detector(path)
+
+
+def test_a_layout_that_is_named_goes_before_the_shape() -> None:
+    one_class = yolov5([(*MIDDLE, 0.9, 0.8)], boxes=300)
+    found = decoded(one_class, "yolov5", (0,))
+    np.testing.assert_allclose(found.boxes[0], [24, 12, 36, 52])
+    np.testing.assert_allclose(found.scores[0], 0.72)
+    by_shape = decoded(one_class, "auto", (0,))
+    np.testing.assert_allclose(by_shape.boxes[0], MIDDLE, err_msg="by its shape it is end to end")

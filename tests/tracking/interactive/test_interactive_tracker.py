@@ -1,0 +1,276 @@
+"""The tracker that is helped: nothing changes unasked, and the past is mended when told."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fakes.tracking.strolls import TEST_COSTS, WIDTH, Stroll, final_boxes, follow, seen_at
+from tracking import Detections, OnlineTracker, WindowResult, WindowSettings, create_solver
+from tracking.baselines import tracker_named
+from tracking.boxes import iou
+from tracking.interactive import AssistedTracker, AssistSettings, Pointing
+from tracking.interactive.late_correction import carried
+
+ALIKE = [Stroll(0, 50, 4.0, 1), Stroll(300, 50, -4.0, 1)]
+"""Two who look alike and cross in frame 37; nothing tells who is who after it but how they went."""
+
+
+def _helped(memory: int = 250) -> AssistedTracker:
+    assist = AssistSettings(enabled=True, memory=memory)
+    return AssistedTracker(WindowSettings(), TEST_COSTS, create_solver("columns"), assist)
+
+
+def _plain() -> OnlineTracker:
+    return OnlineTracker(WindowSettings(), TEST_COSTS, create_solver("columns"))
+
+
+def _crossing(people: Sequence[Stroll] = ALIKE, frames: int = 80) -> list[Detections]:
+    """One piece of foreground while they are behind each other."""
+    stream = [seen_at(people, n, 0.5, 1) for n in range(frames)]
+    for n in range(33, 42):
+        found = stream[n]
+        stream[n] = Detections(found.boxes[:1], found.scores[:1], found.histograms[:1])
+    return stream
+
+
+def _at(person: Stroll, frame: int, number: int) -> Pointing:
+    left, top, right, bottom = person.box(frame)
+    return Pointing(frame, number, (left + right) / 2, (top + bottom) / 2, WIDTH / 2)
+
+
+def _boxes(result: WindowResult, number: int) -> np.ndarray:
+    return next(track.boxes for track in result.tracks if track.id == number)
+
+
+def _whom(box: np.ndarray, frame: int) -> int:
+    return int(np.argmax([iou(box, np.array(person.box(frame))) for person in ALIKE]))
+
+
+def _shown(results: Sequence[WindowResult]) -> list[object]:
+    return [
+        (
+            it.first,
+            it.last,
+            it.final_to,
+            [(t.id, t.boxes.tobytes(), t.interpolated.tobytes()) for t in it.tracks],
+        )
+        for it in results
+    ]
+
+
+def test_without_a_pointing_its_tracks_are_those_of_the_plain_tracker() -> None:
+    stream = _crossing()
+    helped = follow(stream, _helped())
+    assert _shown(helped) == _shown(follow(stream, _plain()))
+    assert all(it.revised_from is None for it in helped)
+    assert not any(it.troubles for it in follow(stream, _plain()))
+
+
+def test_two_alike_who_are_about_to_cross_are_foreseen_and_two_others_are_not() -> None:
+    def foreseen(people: Sequence[Stroll]) -> list[tuple[int, int]]:
+        results = follow(_crossing(people), _helped())
+        return [
+            (it.last, trouble.frame) for it in results for trouble in it.troubles if trouble.reason == "alike"
+        ]
+
+    warned = foreseen(ALIKE)
+    assert warned
+    first, expected = warned[0]
+    assert first < 33
+    assert expected == pytest.approx(37, abs=5)
+    assert not foreseen([ALIKE[0], Stroll(300, 50, -4.0, 4)])
+
+
+def test_who_vanishes_with_nobody_near_is_foreseen_to_be_lost() -> None:
+    gone = Stroll(200, 50, 1.0, 2, seen=range(40))
+    results = follow([seen_at([ALIKE[0], gone], n, 0.5) for n in range(60)], _helped())
+    fading = [trouble for it in results for trouble in it.troubles if trouble.reason == "fading"]
+    assert fading
+    assert {trouble.objects for trouble in fading} == {(2,)}
+    assert all(40 <= trouble.frame < 60 for trouble in fading)
+
+
+@pytest.mark.parametrize(
+    "frames", [range(42, 60), range(60, 61), range(75, 76)], ids=["following", "late", "last"]
+)
+def test_a_pointing_mends_the_past_back_to_where_the_two_met(frames: range) -> None:
+    """They are told to have turned back, which the tracker holds for less likely."""
+    tracked = _helped()
+    for n, seen in enumerate(_crossing()):
+        tracked.push(n, seen)
+    mended = tracked.point([_at(ALIKE[1], n, 1) for n in frames])
+    assert mended is not None
+    assert mended.last == 79
+    assert mended.first <= 33
+    assert mended.revised_from is not None
+    assert 33 <= mended.revised_from <= 45
+    for number, before, after in ((1, 0, 1), (2, 1, 0)):
+        boxes = _boxes(mended, number)
+        for frame in range(mended.first, 80):
+            box = boxes[frame - mended.first]
+            if not np.isnan(box[0]) and not 33 <= frame < 45:
+                assert _whom(box, frame) == (before if frame < 33 else after), (number, frame)
+    assert {track.id for track in mended.tracks} == {1, 2}
+
+
+def test_what_comes_after_a_mended_past_goes_on_from_it() -> None:
+    tracked, stream = _helped(), _crossing(frames=100)
+    for n, seen in enumerate(stream[:60]):
+        tracked.push(n, seen)
+    tracked.point([_at(ALIKE[1], n, 1) for n in range(42, 58)])
+    later = [it for n, seen in enumerate(stream[60:], 60) if (it := tracked.push(n, seen)) is not None]
+    for frame, tracks in final_boxes(later).items():
+        assert {number: _whom(box, frame) for number, box in tracks.items()} == {1: 1, 2: 0}
+
+
+def test_a_pointing_that_the_tracks_follow_already_changes_nothing() -> None:
+    tracked = _helped()
+    for n, seen in enumerate(_crossing()):
+        tracked.push(n, seen)
+    assert tracked.point([_at(ALIKE[0], n, 1) for n in range(45, 79)]) is None
+
+
+def test_who_was_lost_and_got_another_number_gets_the_old_one_back_when_pointed_at() -> None:
+    """Hidden for two seconds, and elsewhere than they went: the tracker holds them for somebody new."""
+    away = [Stroll(0, 50, 2.0, 1, seen=range(30)), Stroll(-100, 50, 5.0, 1, seen=range(80, 140))]
+    tracked = _helped()
+    for n in range(140):
+        tracked.push(n, seen_at(away, n, 0.5))
+    mended = tracked.point([_at(away[1], 120, 1)])
+    assert mended is not None
+    assert {track.id for track in mended.tracks if not np.isnan(track.boxes[-1, 0])} == {1}
+    assert mended.revised_from == pytest.approx(80, abs=2)
+
+
+def test_a_pointing_before_the_memory_is_not_taken() -> None:
+    tracked = _helped(memory=30)
+    for n, seen in enumerate(_crossing()):
+        tracked.push(n, seen)
+    assert not tracked.remembers(40)
+    assert tracked.remembers(49)
+    assert tracked.point([_at(ALIKE[1], 40, 1)]) is None
+
+
+def test_a_small_doubt_that_is_forgotten_keeps_no_later_pointing_from_mending() -> None:
+    tracked, stream = _helped(memory=60), _crossing(frames=91)
+    for n, seen in enumerate(stream):
+        tracked.push(n, seen)
+        if n == 20:
+            beside = _at(ALIKE[0], 15, 1)
+            assert tracked.point([replace(beside, x=beside.x + 0.3**0.5 * WIDTH)]) is None
+            assert tracked._doubtful == [15]
+    mended = tracked.point([_at(ALIKE[1], n, 1) for n in range(60, 70)])
+    assert mended is not None
+    assert mended.revised_from is not None
+
+
+def test_the_memory_is_bounded() -> None:
+    tracked = _helped(memory=40)
+    for n in range(300):
+        tracked.push(n, seen_at(ALIKE, n % 60, 0.5))
+        tracked.point([_at(ALIKE[0], n % 60, 1)])
+    memory = tracked._memory
+    assert len(memory.seen) <= 40 + WindowSettings().window + 1
+    assert len(memory.where) <= len(memory.seen)
+    assert len(memory.steps) <= 40 // WindowSettings().stride + 2
+    assert len(tracked._pointings) <= 41
+
+
+def test_after_a_long_gap_nothing_before_it_is_remembered() -> None:
+    tracked, stream = _helped(), _crossing()
+    for n, seen in enumerate(stream[:60]):
+        tracked.push(n, seen)
+    tracked.push(5000, stream[0])
+    assert not tracked.remembers(50)
+    assert tracked.remembers(5000)
+    assert tracked.point([_at(ALIKE[1], 50, 1)]) is None
+
+
+def test_the_same_pointings_give_the_same_answer() -> None:
+    def mended() -> list[object]:
+        tracked = _helped()
+        results = [tracked.push(n, seen) for n, seen in enumerate(_crossing())]
+        results += [tracked.point([_at(ALIKE[1], n, 1) for n in range(42, 60)]), tracked.flush()]
+        return _shown([it for it in results if it is not None])
+
+    assert mended() == mended()
+
+
+def test_after_the_end_of_a_recording_it_is_still_mended() -> None:
+    tracked = _helped()
+    for n, seen in enumerate(_crossing()):
+        tracked.push(n, seen)
+    tracked.flush()
+    mended = tracked.point([_at(ALIKE[1], n, 1) for n in range(42, 60)])
+    assert mended is not None
+    assert mended.final_to == 79
+
+
+@pytest.mark.parametrize(
+    ("assist", "kind"),
+    [
+        (None, OnlineTracker),
+        (AssistSettings(), OnlineTracker),
+        (AssistSettings(enabled=True), AssistedTracker),
+    ],
+)
+def test_only_who_asks_for_help_gets_a_tracker_that_takes_it(
+    assist: AssistSettings | None, kind: Callable[..., object]
+) -> None:
+    found = tracker_named("lp", WindowSettings(), TEST_COSTS, lambda: create_solver("columns"), assist=assist)
+    assert type(found) is kind
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"memory": 0},
+        {"memory": 10**6},
+        {"horizon": 0},
+        {"horizon": 10**12},
+        {"weight": -1.0},
+        {"hidden": 1.5},
+    ],
+)
+def test_settings_that_make_no_sense_are_refused(wrong: dict[str, float]) -> None:
+    with pytest.raises(ValueError, match=r"must|at least|share"):
+        AssistSettings(**wrong)  # type: ignore[arg-type]
+
+
+def test_who_is_pointed_at_has_a_box_of_their_own_where_the_detector_finds_one_for_two() -> None:
+    tracked, stream = _helped(), _crossing()
+    merged = (33, 34, 35, 40, 41)
+    for n in range(33, 42):
+        both = np.array([person.box(n) for person in ALIKE])
+        box = np.concatenate([both[:, :2].min(axis=0), both[:, 2:].max(axis=0)])
+        stream[n] = Detections(box[None], stream[n].scores, stream[n].histograms)
+    shown = final_boxes(follow(stream, _plain()))
+    assert not any(_own(shown[n].get(2), n) for n in merged), "one box is nobody's own"
+    for n, seen in enumerate(stream):
+        tracked.push(n, seen)
+    mended = tracked.point([_at(ALIKE[1], n, 2) for n in range(30, 46)])
+    assert mended is not None
+    boxes = _boxes(mended, 2)
+    assert all(_own(boxes[n - mended.first], n) for n in merged)
+    assert {track.id for track in mended.tracks} == {1, 2}
+    later = [tracked.push(n, seen_at(ALIKE, n, 0.5)) for n in range(80, 100)]
+    assert {track.id for it in later if it for track in it.tracks} == {1, 2}, "nobody begins with such a box"
+
+
+def _own(box: np.ndarray | None, frame: int) -> bool:
+    return box is not None and bool(iou(box, np.array(ALIKE[1].box(frame))) > 0.7)
+
+
+def test_who_is_pointed_at_while_hidden_by_somebody_who_was_there_before_is_behind_them() -> None:
+    """That says nothing of the frames before; at a box of the other one's in the open it does."""
+    tracked = _helped()
+    for n, seen in enumerate(_crossing()):
+        tracked.push(n, seen)
+    behind, open_ = _at(ALIKE[1], 38, 2), _at(ALIKE[0], 60, 2)
+    assert 2 not in tracked._memory.where[38]
+    assert carried(behind, tracked._memory, TEST_COSTS, since=0) == []
+    assert {it.object for it in carried(open_, tracked._memory, TEST_COSTS, since=0)} == {1, 2}

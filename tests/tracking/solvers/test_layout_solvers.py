@@ -1,0 +1,90 @@
+"""The layout term: L1 in `arcs`, `columns` and `exact`, the square of L2 in `l2`."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+
+from fakes.tracking.random_networks import SETTINGS, Case, cases, network_of
+from tracking.model.network import Network, Template, build_network
+from tracking.model.settings import PAPER_COSTS
+from tracking.solvers import create_solver
+from tracking.solvers.objective import conflict_count, layout_cost, total_cost
+from tracking.types import Detections
+
+SQUARE = 2
+PERSON = np.array([0.0, 0.0, 20.0, 50.0])
+
+
+def best_square_by_trying(network: Network) -> float:
+    best = np.inf
+    for flat in product(range(network.places + 1), repeat=network.objects * network.frames):
+        nodes = np.array(flat).reshape(network.objects, network.frames)
+        cost = total_cost(network, nodes, SQUARE)
+        if cost < best and conflict_count(network, nodes) == 0:
+            best = cost
+    return best
+
+
+ILL = replace(SETTINGS, gate=40.0, layout=1e-4, conflict_distance=120.0)
+REGULAR_IS_WORSE = Case(3, 2, 2, shared=True, settings=ILL, seed=1537)
+"""A window whose quadratic program HiGHS ends in an error, unless nothing is added to make it regular."""
+
+
+@settings(deadline=None, max_examples=40)
+@given(case=cases(objects=3, frames=2, places=2, layouts=(1e-5, 1e-4)))
+@example(case=REGULAR_IS_WORSE)
+def test_squares_are_bounded_below_the_optimum_and_whole_relaxations_attain_it(case: Case) -> None:
+    network = network_of(case)
+    report = create_solver("l2").solve(network).report
+    optimum = best_square_by_trying(network)
+    assert report.bound <= optimum + 1e-6
+    assert report.objective >= optimum - 1e-9
+    assert report.conflicts == 0
+    if report.integral:
+        assert report.objective == pytest.approx(optimum, rel=1e-6)
+
+
+@settings(deadline=None, max_examples=20)
+@given(case=cases(objects=4, frames=4, places=4))
+def test_without_layout_squares_change_nothing(case: Case) -> None:
+    network = network_of(case)
+    columns, squares = create_solver("columns").solve(network), create_solver("l2").solve(network)
+    np.testing.assert_array_equal(columns.states, squares.states)
+
+
+def side_by_side(layout: float) -> Network:
+    """Two people walk right in step; in the last frame the second may also stay, which looks better."""
+    dark, grey = np.array([1.0, 0.0]), np.array([0.97, 0.03])
+
+    def at(*lefts: float, looks: tuple[np.ndarray, ...]) -> Detections:
+        boxes = np.array([PERSON + np.array([left, 0.0, left, 0.0]) for left in lefts])
+        return Detections(boxes, np.ones(len(boxes)), np.array(looks))
+
+    frames = [
+        at(0.0, 100.0, looks=(dark, dark)),
+        at(30.0, 130.0, looks=(dark, dark)),
+        at(60.0, 160.0, 130.0, looks=(dark, grey, dark)),
+    ]
+    first = frames[0].boxes
+    templates = [Template(n, dark, first[n]) for n in range(2)]
+    return build_network(templates, frames, replace(replace(PAPER_COSTS, displacement=1e-4), layout=layout))
+
+
+@pytest.mark.parametrize("name", ["arcs", "columns", "exact", "extended-dp"])
+def test_the_layout_term_keeps_people_in_step(name: str) -> None:
+    apart = create_solver(name).solve(side_by_side(layout=0.0))
+    together = create_solver(name).solve(side_by_side(layout=0.01))
+    assert apart.states[1].tolist() == [1, 1, 2]
+    assert together.states[1].tolist() == [1, 1, 1]
+
+
+def test_a_step_of_one_object_costs_its_pixels_on_every_side() -> None:
+    network = side_by_side(layout=0.01)
+    nodes = np.array([[0, 0, 0], [1, 1, 2]])
+    assert layout_cost(network, nodes) == 2 * 30.0
+    assert layout_cost(network, nodes, SQUARE) == 2 * 30.0**2

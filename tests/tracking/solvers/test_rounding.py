@@ -1,0 +1,80 @@
+"""From shares of paths to whole ones."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from hypothesis import given, settings
+
+from fakes.tracking.random_networks import Case, cases, network_of
+from tracking.model.network import Network, Template, build_network
+from tracking.model.settings import PAPER_COSTS
+from tracking.solvers.dynamic_programming import greedy_paths
+from tracking.solvers.objective import conflict_count, total_cost
+from tracking.solvers.rounding import LocalSearch, is_integral, round_relaxation
+from tracking.types import Detections
+
+many = settings(deadline=None, max_examples=60)
+
+
+def two_at_one_place(*, gate: float | None = None, frames: int = 1) -> Network:
+    seen = Detections(np.array([[0.0, 0, 20, 50], [200.0, 0, 220, 50]]), np.ones(2), np.ones((2, 1)))
+    templates = [Template(n, np.ones(1), None) for n in range(2)]
+    return build_network(templates, [seen] * frames, replace(PAPER_COSTS, gate=gate))
+
+
+def test_the_largest_share_gets_the_place_and_the_other_its_next() -> None:
+    usage = np.array([[[0.6, 0.3, 0.1]], [[0.5, 0.2, 0.3]]])
+    assert round_relaxation(two_at_one_place(), usage).tolist() == [[0], [2]]
+    usage = np.array([[[0.6, 0.3, 0.1]], [[0.5, 0.4, 0.1]]])
+    assert round_relaxation(two_at_one_place(), usage).tolist() == [[0], [1]]
+
+
+def test_of_equal_shares_the_first_object_gets_the_place() -> None:
+    usage = np.array([[[0.5, 0.0, 0.5]], [[0.5, 0.0, 0.5]]])
+    assert round_relaxation(two_at_one_place(), usage).tolist() == [[0], [2]]
+
+
+def test_who_keeps_nothing_is_occluded() -> None:
+    usage = np.array([[[0.7, 0.0, 0.3]], [[0.6, 0.4, 0.0]]])
+    usage[1, 0, 1] = 0.0
+    assert round_relaxation(two_at_one_place(), usage).tolist() == [[0], [2]]
+
+
+def test_whole_shares_stay_as_they_are() -> None:
+    usage = np.array([[[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]]])
+    assert is_integral(usage)
+    assert round_relaxation(two_at_one_place(), usage).tolist() == [[0], [1]]
+
+
+def test_a_jump_that_gating_forbids_is_repaired() -> None:
+    network = two_at_one_place(gate=50.0, frames=2)
+    jump = np.array([[0, 1], [2, 2]])
+    assert np.isinf(total_cost(network, jump))
+    better = LocalSearch(network).improve(jump)
+    assert np.isfinite(total_cost(network, better))
+    assert conflict_count(network, better) == 0
+
+
+@many
+@given(case=cases(objects=4, frames=4, places=4, layouts=(0.0, 0.002)))
+def test_any_shares_round_to_nodes_without_conflict_and_improving_never_costs(case: Case) -> None:
+    network = network_of(case)
+    rng = np.random.default_rng(case.seed)
+    usage = rng.dirichlet(np.full(network.places + 1, 0.5), (network.objects, network.frames))
+    usage[:, :, :-1] *= network.present[network.sets]
+    nodes = round_relaxation(network, usage)
+    assert conflict_count(network, nodes) == 0
+    better = LocalSearch(network).improve(nodes)
+    assert conflict_count(network, better) == 0
+    assert total_cost(network, better) <= total_cost(network, nodes)
+
+
+@many
+@given(case=cases(objects=4, frames=4, places=4))
+def test_greedy_paths_keep_all_conflicts(case: Case) -> None:
+    network = network_of(case)
+    found = greedy_paths(network)
+    assert conflict_count(network, found.nodes) == 0
+    assert found.bound <= total_cost(network, found.nodes) + 1e-9

@@ -1,0 +1,143 @@
+"""What every solver promises, on random windows against trying everything."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from fakes.tracking.random_networks import SETTINGS, Case, best_by_trying, cases, network_of
+from tracking.model.network import Template, build_network
+from tracking.model.settings import PAPER_COSTS
+from tracking.solvers import OCCLUDED, Solution, create_solver
+from tracking.solvers.objective import conflict_count, nodes_from_states, total_cost
+from tracking.types import Detections
+
+CLOSE = 1e-9
+RELAXING = ("arcs", "columns")
+WITHOUT_CONFLICTS = (*RELAXING, "greedy-dp")
+bounded = settings(deadline=None, max_examples=60)
+
+
+def solved(case: Case, name: str) -> Solution:
+    return create_solver(name).solve(network_of(case))
+
+
+def test_an_unknown_solver_is_refused_with_the_names_there_are() -> None:
+    with pytest.raises(ValueError, match=r"'simplex'.*arcs, columns"):
+        create_solver("simplex")
+
+
+@pytest.mark.parametrize("name", WITHOUT_CONFLICTS)
+@bounded
+@given(case=cases(layouts=(0.0, 0.002)))
+def test_states_exist_and_keep_all_conflicts(name: str, case: Case) -> None:
+    network = network_of(case)
+    solution = create_solver(name).solve(network)
+    nodes = nodes_from_states(network, solution.states)
+    assert solution.states.shape == (network.objects, network.frames)
+    assert solution.states.dtype == np.int64
+    assert solution.states.min(initial=OCCLUDED) >= OCCLUDED
+    assert solution.report.objective == pytest.approx(total_cost(network, nodes), rel=CLOSE)
+    assert np.isfinite(solution.report.objective)
+    assert conflict_count(network, nodes) == solution.report.conflicts == 0
+
+
+@pytest.mark.parametrize("name", [*WITHOUT_CONFLICTS, "separate-dp"])
+@settings(deadline=None, max_examples=30)
+@given(case=cases(objects=2, frames=3, places=2, layouts=(0.0, 0.002)))
+def test_the_bound_is_below_the_optimum_and_whole_relaxations_are_optimal(name: str, case: Case) -> None:
+    network = network_of(case)
+    optimum = best_by_trying(network)
+    report = create_solver(name).solve(network).report
+    assert report.bound <= optimum + CLOSE
+    if report.conflicts == 0:
+        assert report.objective >= optimum - CLOSE
+    if report.integral:
+        assert report.objective == pytest.approx(optimum, rel=CLOSE)
+        assert report.gap < CLOSE
+
+
+@pytest.mark.parametrize("name", ["arcs", "extended-dp", "greedy-dp"])
+@settings(deadline=None, max_examples=40)
+@given(case=cases(objects=3, frames=2, places=2), share=st.sampled_from([0.2, 0.5, 0.8]))
+def test_where_objects_must_be_somewhere_they_are_there_or_the_answer_says_it_is_in_conflict(
+    name: str, case: Case, share: float
+) -> None:
+    network = network_of(case)
+    barred = np.random.default_rng(case.seed).uniform(size=network.node.shape) < share
+    network = replace(network, node=np.where(barred, np.inf, network.node))
+    optimum = best_by_trying(network)
+    assume(np.isfinite(optimum))
+    found = create_solver(name).solve(network)
+    assert found.report.conflicts == conflict_count(network, nodes_from_states(network, found.states))
+    if not found.report.conflicts:
+        assert found.report.objective >= optimum - CLOSE
+    if name != "greedy-dp":
+        assert not found.report.conflicts
+        assert np.isfinite(found.report.objective)
+    if name == "extended-dp" or found.report.integral:
+        assert found.report.objective == pytest.approx(optimum, rel=CLOSE)
+
+
+def test_greedy_ends_where_there_is_a_way_for_nobody() -> None:
+    network = network_of(Case(3, 3, 2, shared=True, settings=SETTINGS, seed=1))
+    found = create_solver("greedy-dp").solve(replace(network, node=np.full_like(network.node, np.inf)))
+    assert np.isinf(found.report.objective)
+
+
+@settings(deadline=None, max_examples=25)
+@given(case=cases(objects=3, frames=2, places=2))
+def test_three_objects_get_the_optimum_where_the_relaxation_is_whole(case: Case) -> None:
+    network = network_of(case)
+    optimum = best_by_trying(network)
+    for name in RELAXING:
+        report = create_solver(name).solve(network).report
+        assert report.bound <= optimum + CLOSE
+        assert not report.integral or report.objective == pytest.approx(optimum, rel=CLOSE)
+
+
+@settings(deadline=None, max_examples=150)
+@given(case=cases(objects=6, frames=6, places=6, layouts=(0.0, 0.0, 0.002)))
+def test_columns_finds_the_optimum_of_all_arcs(case: Case) -> None:
+    columns, arcs = solved(case, "columns").report, solved(case, "arcs").report
+    assert columns.bound == pytest.approx(arcs.bound, rel=CLOSE, abs=CLOSE)
+    if columns.integral and arcs.integral:
+        assert columns.objective == pytest.approx(arcs.objective, rel=CLOSE, abs=CLOSE)
+
+
+@pytest.mark.parametrize("name", [*WITHOUT_CONFLICTS, "separate-dp"])
+@settings(deadline=None, max_examples=10)
+@given(case=cases(objects=4, frames=4, places=4))
+def test_the_same_window_gives_the_same_states(name: str, case: Case) -> None:
+    first, second = solved(case, name), solved(case, name)
+    np.testing.assert_array_equal(first.states, second.states)
+    assert first.report == second.report
+
+
+@settings(deadline=None, max_examples=15)
+@given(case=cases(objects=20, frames=5, places=12), crowd=st.integers(13, 20))
+def test_columns_finds_the_optimum_of_crowds(case: Case, crowd: int) -> None:
+    crowded = replace(case, objects=crowd, places=12, shared=True)
+    columns, arcs = solved(crowded, "columns").report, solved(crowded, "arcs").report
+    assert columns.bound == pytest.approx(arcs.bound, rel=CLOSE, abs=CLOSE)
+
+
+def test_columns_finds_the_optimum_of_many_small_groups() -> None:
+    """Ten pairs far from each other; in the middle frame one box of each pair is missing."""
+    lefts = np.array([left for pair in range(10) for left in (500.0 * pair, 500.0 * pair + 60.0)])
+    boxes = np.column_stack([lefts, np.zeros(20), lefts + 20.0, np.full(20, 50.0)])
+
+    def seen(frame: int) -> Detections:
+        there = boxes[::2] if frame == 2 else boxes
+        return Detections(there, np.ones(len(there)), np.ones((len(there), 1)))
+
+    templates = [Template(n, np.ones(1), boxes[n]) for n in range(20)]
+    network = build_network(templates, [seen(m) for m in range(5)], replace(PAPER_COSTS, displacement=0.003))
+    columns, arcs = (create_solver(name).solve(network).report for name in RELAXING)
+    assert columns.rounds > 0
+    assert columns.bound == pytest.approx(arcs.bound, rel=CLOSE)
+    assert columns.integral

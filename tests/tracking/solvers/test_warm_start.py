@@ -1,0 +1,121 @@
+"""What one window tells the next: right or wrong, the optimum stays the same."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fakes.tracking.random_networks import Case, cases, network_of
+from tracking.model.network import CostSettings, Network, Template, build_network
+from tracking.model.settings import PAPER_COSTS
+from tracking.solvers import UNKNOWN_STATE, ConflictPrice, WarmStart, create_solver
+from tracking.solvers.objective import conflict_count, nodes_from_states
+from tracking.types import Detections
+
+CLOSE = 1e-9
+PERSON = np.array([0.0, 0.0, 20.0, 50.0])
+bounded = settings(deadline=None, max_examples=60)
+
+
+def same_optimum(network: Network, hint: WarmStart) -> None:
+    columns = create_solver("columns")
+    cold, warm = columns.solve(network), columns.solve(network, hint)
+    assert warm.report.bound == pytest.approx(cold.report.bound, rel=CLOSE, abs=CLOSE)
+    assert conflict_count(network, nodes_from_states(network, warm.states)) == 0
+    assert warm.report.objective >= warm.report.bound
+    if warm.report.integral and cold.report.integral:
+        assert warm.report.objective == pytest.approx(cold.report.objective, rel=CLOSE, abs=CLOSE)
+
+
+@bounded
+@given(case=cases(objects=6, frames=6, places=6, layouts=(0.0, 0.0, 0.002)))
+def test_an_answer_as_its_own_hint_changes_nothing(case: Case) -> None:
+    network = network_of(case)
+    same_optimum(network, create_solver("columns").solve(network).warm_start)
+
+
+@bounded
+@given(case=cases(objects=6, frames=6, places=6), other=cases(objects=6, frames=6, places=6))
+def test_the_hint_of_another_window_changes_nothing(case: Case, other: Case) -> None:
+    same_optimum(network_of(case), create_solver("columns").solve(network_of(other)).warm_start)
+
+
+@bounded
+@given(case=cases(objects=5, frames=5, places=6, stars=False), seed=st.integers(0, 2**32 - 1))
+def test_a_made_up_hint_changes_nothing(case: Case, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    network = network_of(replace(case, shared=True))
+    rows = [
+        ConflictPrice(
+            frame=int(rng.integers(0, case.frames + 2)),
+            places=tuple(sorted(set(rng.integers(0, case.places + 3, 3).tolist()))),
+            price=float(rng.exponential()),
+        )
+        for _ in range(5)
+    ]
+    states = rng.integers(
+        UNKNOWN_STATE, case.places + 3, (case.objects, int(rng.integers(0, case.frames + 3)))
+    )
+    same_optimum(network, WarmStart(tuple(rows), states))
+
+
+@bounded
+@given(case=cases(objects=6, frames=5, places=6))
+def test_the_same_hint_gives_the_same_answer(case: Case) -> None:
+    columns, network = create_solver("columns"), network_of(case)
+    hint = columns.solve(network).warm_start
+    first, second = columns.solve(network, hint), columns.solve(network, hint)
+    np.testing.assert_array_equal(first.states, second.states)
+    assert first.report == second.report
+
+
+@pytest.mark.parametrize("name", ["arcs", "exact", "extended-dp", "greedy-dp", "separate-dp", "l2"])
+def test_other_solvers_need_no_hint(name: str) -> None:
+    network, solver = rivals(0), create_solver(name)
+    first, second = (
+        solver.solve(network),
+        solver.solve(network, create_solver("columns").solve(network).warm_start),
+    )
+    np.testing.assert_array_equal(first.states, second.states)
+
+
+def test_a_later_window_knows_its_frames_and_objects_by_their_new_numbers() -> None:
+    rows = (ConflictPrice(0, (1, 2), 0.5), ConflictPrice(2, (0, 1), 0.25))
+    hint = WarmStart(rows, np.array([[0, 1, 2], [3, 4, -1]])).shift(2, [1, None, 0])
+    assert hint.rows == (ConflictPrice(0, (0, 1), 0.25),)
+    assert hint.states.tolist() == [[-1], [UNKNOWN_STATE], [2]]
+
+
+def rivals(first: int, frames: int = 6) -> Network:
+    """Two people who look alike stand apart; in frame 3 only one of them is seen, and both want the box."""
+    boxes = np.array([PERSON, PERSON + np.array([60.0, 0.0, 60.0, 0.0])])
+
+    def seen(frame: int) -> Detections:
+        count = 1 if frame == 3 else 2
+        return Detections(boxes[:count], np.ones(count), np.ones((count, 1)))
+
+    templates = [Template(n, np.ones(1), boxes[n]) for n in range(2)]
+    return build_network(templates, [seen(first + m) for m in range(frames)], costs())
+
+
+def costs() -> CostSettings:
+    return replace(PAPER_COSTS, displacement=0.003, conflict_distance=60.0)
+
+
+def test_where_the_old_prices_hold_no_program_is_solved() -> None:
+    columns = create_solver("columns")
+    before = columns.solve(rivals(0))
+    assert before.report.rounds > 0, "the two have to want the same boxes for this test"
+    after = columns.solve(rivals(1), before.warm_start.shift(1, [0, 1]))
+    assert after.report.rounds == 0
+    assert after.report.objective == pytest.approx(columns.solve(rivals(1)).report.objective, rel=CLOSE)
+
+
+def test_a_report_says_the_time_and_is_equal_whatever_it_was() -> None:
+    first, second = (create_solver("columns").solve(rivals(0)).report for _ in range(2))
+    assert first.seconds > 0.0
+    assert replace(first, seconds=1.0) == replace(second, seconds=2.0)
